@@ -1,0 +1,59 @@
+# Every target works on a fresh machine: it needs Python 3.11 or newer with pip, and nothing else.
+# PYTHON chooses the interpreter of a new environment:  make test PYTHON=python3.12
+
+PYTHON ?= python3
+BIN := .venv/bin
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test doctest lint types docs bench clean distclean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: .venv/.base ## simulate a block under a shipped record; writes out/demo.png
+	@$(BIN)/python examples/demo.py
+
+test: .venv/.all ## run the full test suite
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable
+
+doctest: .venv/.all ## run the examples in the docstrings
+	$(BIN)/python -m pytest --doctest-modules src/rocking
+
+lint: .venv/.all ## ruff (rules and format) and the import contracts
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+
+types: .venv/.all ## mypy --strict
+	$(BIN)/mypy --strict
+
+docs: .venv/.all ## build the documentation into docs/_build/html; a warning is an error
+	$(BIN)/sphinx-build -W --keep-going -n -b html docs docs/_build/html
+
+bench: .venv/.all ## run the benchmarks
+	$(BIN)/python -m pytest benchmarks
+
+clean: ## remove what the other targets made, but not the environment
+	rm -rf out build dist docs/_build docs/api/generated .pytest_cache .hypothesis .mypy_cache .ruff_cache \
+	    .benchmarks .import_linter_cache
+	find src tests benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} +
+
+distclean: clean ## remove the environment, too
+	rm -rf .venv
+
+# A stamp per set of packages: installing again is needed only when the versions or the project's table change.
+.venv/.base: EXTRAS :=
+.venv/.all: EXTRAS := [formats,test,lint,docs]
+.venv/.base .venv/.all: pyproject.toml constraints.txt | .venv/bin/python
+	@echo "Installing rocking$(EXTRAS) into .venv (a few minutes the first time) ..."
+	@$(BIN)/python -m pip install --disable-pip-version-check -qq -c constraints.txt -e ".$(EXTRAS)"
+	@touch $@
+
+.venv/bin/python:
+	@command -v $(PYTHON) >/dev/null || { echo "error: '$(PYTHON)' was not found; install Python 3.11 or newer," \
+	    "or name it: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "error: rocking needs Python 3.11 or" \
+	    "newer, but '$(PYTHON)' is $$($(PYTHON) --version 2>&1); name a newer one: make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "error: '$(PYTHON)' lacks the venv module; install" \
+	    "it (on Debian and Ubuntu: apt install python3-venv) and try again" >&2; exit 1; }
+	@$(PYTHON) -m venv .venv

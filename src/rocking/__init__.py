@@ -1,0 +1,78 @@
+"""Rocking, chattering, rest and overturning of free-standing rigid blocks under ground motion."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from rocking import chattering
+    from rocking.block import Block
+    from rocking.errors import (
+        InvalidBlock,
+        InvalidMotion,
+        InvalidOption,
+        OutputError,
+        RockingError,
+        UnreadableRecord,
+    )
+    from rocking.motion import Motion, pulses, records
+    from rocking.motion.formats import read
+    from rocking.response import Response
+    from rocking.simulation import simulate
+    from rocking.treatment import AsymptoticTime, Certified, IntervalThreshold, VelocityThreshold
+
+__all__ = [
+    "AsymptoticTime",
+    "Block",
+    "Certified",
+    "IntervalThreshold",
+    "InvalidBlock",
+    "InvalidMotion",
+    "InvalidOption",
+    "Motion",
+    "OutputError",
+    "Response",
+    "RockingError",
+    "UnreadableRecord",
+    "VelocityThreshold",
+    "chattering",
+    "pulses",
+    "read",
+    "records",
+    "simulate",
+]
+
+# Public names are imported when they are first used, so that `import rocking` and the command line start at once.
+_HOMES = {
+    "AsymptoticTime": "rocking.treatment",
+    "Block": "rocking.block",
+    "Certified": "rocking.treatment",
+    "IntervalThreshold": "rocking.treatment",
+    "InvalidBlock": "rocking.errors",
+    "InvalidMotion": "rocking.errors",
+    "InvalidOption": "rocking.errors",
+    "Motion": "rocking.motion.motion",
+    "OutputError": "rocking.errors",
+    "Response": "rocking.response",
+    "RockingError": "rocking.errors",
+    "UnreadableRecord": "rocking.errors",
+    "VelocityThreshold": "rocking.treatment",
+    "chattering": "rocking.chattering",
+    "pulses": "rocking.motion.pulses",
+    "read": "rocking.motion.formats",
+    "records": "rocking.motion.records",
+    "simulate": "rocking.simulation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'rocking' has no attribute {name!r}")
+    home = import_module(_HOMES[name])
+    is_module = home.__name__.rpartition(".")[2] == name
+    return home if is_module else getattr(home, name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

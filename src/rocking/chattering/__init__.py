@@ -1,0 +1,1 @@
+"""The dimensionless theory of chattering under a sine: asymptotic, semi-analytical, series, exact."""

@@ -1,0 +1,45 @@
+"""Command line: thin commands over the public names, one module each, imported when they are called."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from cyclopts import App, CycloptsError
+
+import rocking
+from rocking.errors import RockingError
+
+app = App(
+    name="rocking",
+    help="Rocking, chattering, rest and overturning of free-standing rigid blocks under ground motion.",
+    version=rocking.__version__,
+    result_action="return_value",
+)
+for _command, _help in {
+    "simulate": "Simulate one block under one record and say what happens to it.",
+    "records": "List the shipped records, or show what a record file holds.",
+}.items():
+    app.command(f"rocking.cli.{_command}:{_command}", name=_command, help=_help)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit: 0 when done, 2 with one line on stderr for bad input, 130 when interrupted."""
+    try:
+        app(arguments, exit_on_error=False, print_error=False)
+        sys.stdout.flush()
+    except (RockingError, CycloptsError) as error:
+        sys.exit(_refuse(error))
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except BrokenPipeError:
+        # The reader of our output has gone; so must Python's own last flush.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _refuse(error: Exception) -> int:
+    hint = "; see rocking --help" if isinstance(error, CycloptsError) else ""
+    sentence = " ".join(str(error).split()).rstrip(".")
+    print(f"rocking: {sentence}{hint}", file=sys.stderr)
+    return 2

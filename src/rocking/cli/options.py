@@ -1,0 +1,121 @@
+"""What several commands share: reading a motion, a block and a treatment from their options, and writing results."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rocking.block import Block
+from rocking.errors import InvalidBlock, InvalidOption, OutputError
+from rocking.motion import formats, records
+from rocking.motion.motion import Motion
+from rocking.treatment import Certified, IntervalThreshold, Treatment, VelocityThreshold, treatment
+
+
+def motion_from(
+    name: str,
+    *,
+    channel: str | None = None,
+    dt: float | None = None,
+    units: str | None = None,
+    scale: float = 1.0,
+) -> Motion:
+    """Motion of a record file, or of a shipped record of that name, times a factor."""
+    if not Path(name).exists() and name in records.names():
+        motion = records.load(name)
+    else:
+        motion = formats.read(name, channel=channel, dt=dt, units=units)
+    return motion if scale == 1.0 else motion.scaled(scale)
+
+
+def block_from(
+    half_width: float | None,
+    half_height: float | None,
+    p: str | None,
+    alpha: str | None,
+    restitution: str | None,
+) -> Block:
+    """Block from its sizes or from its parameters; each parameter is "NUMBER" or "NUMBER,NUMBER"."""
+    sizes, parameters = (half_width, half_height), (p, alpha)
+    e = None if restitution is None else numbers(restitution, "--restitution")
+    if half_width is not None and half_height is not None and parameters == (None, None):
+        return Block(half_width, half_height, restitution=e)
+    if p is not None and alpha is not None and sizes == (None, None):
+        return Block.from_parameters(numbers(p, "--p"), numbers(alpha, "--alpha"), e)
+    raise InvalidBlock("a block needs either --half-width and --half-height (m), or --p (rad/s) and --alpha (rad)")
+
+
+def numbers(text: str, option: str) -> float | list[float]:
+    """One number, or a list from numbers with commas between."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InvalidOption(
+            f"{option} takes a number, or two with a comma between (side +, side -), not {text!r}"
+        ) from None
+    return values[0] if len(values) == 1 else values
+
+
+def treatment_from(text: str) -> Treatment:
+    """Treatment from its name, or from "certified=TOLERANCE", "velocity=THRESHOLD", "interval=SECONDS"."""
+    name, given, value = text.partition("=")
+    if not given:
+        return treatment(name)
+    with_parameter: dict[str, Callable[[float], Treatment]] = {
+        "certified": Certified,
+        "velocity": VelocityThreshold,
+        "interval": IntervalThreshold,
+    }
+    if name not in with_parameter:
+        raise InvalidOption(f"--chattering {name} takes no parameter; those that do are {', '.join(with_parameter)}")
+    parameter = numbers(value, f"--chattering {name}")
+    if not isinstance(parameter, float):
+        raise InvalidOption(f"--chattering {name} takes one number, not {value!r}")
+    return with_parameter[name](parameter)
+
+
+def output_folder(folder: Path) -> Path:
+    """Folder for results, made if need be.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made or written to.
+    """
+    probe = folder / ".rocking-can-write"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
+    return folder
+
+
+def print_json(result: Mapping[str, Any]) -> None:
+    """Print a result for machines: plain JSON, NaN and infinity as null."""
+    print(json.dumps(plain(result), indent=2, allow_nan=False))
+
+
+def rows(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
+    """Rows of a structured array as mappings."""
+    names = table.dtype.names or ()
+    return [dict(zip(names, row.tolist(), strict=True)) for row in table]
+
+
+def plain(value: Any) -> Any:
+    """Value that JSON knows: no arrays, no NaN."""
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,6 @@
+"""Physical constants shared by every layer."""
+
+from typing import Final
+
+#: Standard acceleration of gravity, m/s^2; readers and blocks use the same value.
+STANDARD_GRAVITY: Final = 9.80665

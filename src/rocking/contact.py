@@ -1,0 +1,46 @@
+"""What the ground must supply: friction and normal force at the pivot, from the rotation alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rocking.kernels.state import Floats
+
+
+def contact_forces(
+    rotation: Floats,
+    velocity: Floats,
+    acceleration: Floats,
+    ground_over_g: Floats,
+    slenderness: Floats,
+    radius_over_g: Floats,
+) -> tuple[Floats, Floats]:
+    """Horizontal and vertical force on the block over its weight, all arrays of one shape.
+
+    Parameters
+    ----------
+    rotation, velocity, acceleration : ndarray
+        theta (rad) and its rates.
+    ground_over_g : ndarray
+        Ground acceleration in units of g.
+    slenderness, radius_over_g : ndarray
+        alpha (rad) and R/g (s^2) of the side that the block leans to.
+
+    Notes
+    -----
+    On side i = +-1, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
+    pivot; forces are m (a + x'') and m (g + y''). Rotations of exactly 0 with no motion give (a/g, 1).
+    """
+    side = np.where(rotation != 0.0, np.sign(rotation), np.sign(velocity))
+    psi = slenderness - np.abs(rotation)
+    towards_pivot = side * acceleration
+    horizontal = side * radius_over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * velocity**2)
+    vertical = radius_over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * velocity**2)
+    return ground_over_g + horizontal, 1.0 + vertical
+
+
+def friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
+    """Friction coefficient that sticking needs: |H|/N, and infinite where the block would leave the ground."""
+    demand = np.full(np.shape(horizontal), np.inf)
+    np.divide(np.abs(horizontal), vertical, out=demand, where=vertical > 0.0)
+    return demand

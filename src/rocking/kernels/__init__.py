@@ -1,0 +1,1 @@
+"""Compiled leaves: numbers in, numbers and a status out; they never raise."""

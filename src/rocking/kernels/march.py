@@ -1,0 +1,290 @@
+"""The whole response of one block to one motion: rest, uplift, arc, impact, and so on to the end."""
+
+import numpy as np
+
+from rocking.kernels.arc import vary_linear, vary_nonlinear
+from rocking.kernels.chatter import motion_at, motion_slope, prove_rest, restoring, time_to_rest
+from rocking.kernels.compiled import kernel, leaf, routine
+from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift
+from rocking.kernels.state import (
+    AT_REST,
+    DU,
+    DV,
+    END,
+    EVENTS,
+    IMPACTS,
+    NODES,
+    OFFSET,
+    PEAK,
+    PEAK_CHANGE,
+    PEAK_TIME,
+    PIECE,
+    RESTITUTION,
+    RUN,
+    RUN_START,
+    SEQUENCES,
+    SIDE,
+    SMOOTH,
+    STALLED,
+    STIFFNESS,
+    STILL,
+    STRUCK,
+    UPLIFTED,
+    U,
+    V,
+)
+from rocking.kernels.status import (
+    BALANCED,
+    CERTIFIED,
+    DONE,
+    FELL,
+    FULL,
+    IMPACT,
+    INTERVAL,
+    OVERTURN,
+    REST,
+    STEP,
+    TIME,
+    TOPPLED,
+    UPLIFT,
+    VELOCITY,
+)
+
+_ULP = 2.0**-52
+
+# Further outcomes of an arc, besides STEP, IMPACT and OVERTURN.
+_STOPPED = 3
+_STUCK = 4
+
+
+@kernel
+def march(shaking, sides, rules, tables, scratch, at, x):
+    """Follow one block through one motion, from the state (at, x) on; returns how it ended (`status`).
+
+    FULL means that a table has no room left: call again with larger tables and the same state.
+    """
+    while has_room(tables, at):
+        if at[SIDE] == AT_REST and not wait_for_uplift(shaking, sides, rules, tables, scratch, at, x):
+            return DONE
+        outcome = follow_arc(shaking, sides, rules, tables, scratch, at, x)
+        if outcome == IMPACT:
+            strike(shaking, sides, tables, at, x)
+            resting, lower, upper, to_rest = judge(shaking, sides, rules, scratch, at, x)
+            if resting and not come_to_rest(shaking, rules, tables, lower, upper, to_rest, at, x):
+                return DONE
+        elif outcome == OVERTURN:
+            return FELL
+        elif outcome == _STOPPED:
+            return DONE
+        elif outcome == _STUCK:
+            return BALANCED
+    return FULL
+
+
+@leaf
+def has_room(tables, at):
+    """Whether every table has room for what one turn of the march can write."""
+    return (
+        at[NODES] + 3 <= tables.nodes.shape[0]
+        and at[IMPACTS] < tables.impacts.shape[0]
+        and at[EVENTS] + 2 <= tables.events.shape[0]
+        and at[SEQUENCES] < tables.sequences.shape[0]
+    )
+
+
+@leaf
+def now(shaking, at, x):
+    """Time of the state."""
+    return shaking.breakpoints[at[PIECE]] + x[OFFSET]
+
+
+@leaf
+def sign_of(side):
+    """Sign of the rotation on a side: +1, -1, and 0 at rest."""
+    return 0.0 if side == AT_REST else 1.0 - 2.0 * side
+
+
+@routine
+def wait_for_uplift(shaking, sides, rules, tables, scratch, at, x):
+    """Stay at rest until the motion passes a threshold; False when it never does."""
+    write_node(tables, now(shaking, at, x), at, x)
+    piece, offset, side, jump = next_uplift(shaking, at[PIECE], x[OFFSET], sides, rules.stop, scratch.A, scratch.d)
+    if side == AT_REST or shaking.breakpoints[piece] + offset >= rules.stop:
+        x[END] = max(now(shaking, at, x), shaking.breakpoints[-1]) if rules.endless else rules.stop
+        return False
+    at[PIECE], x[OFFSET], at[SIDE] = piece, offset, side
+    at[SMOOTH] = not jump
+    x[U] = x[V] = x[DU] = x[DV] = 0.0
+    x[UPLIFTED] = x[STRUCK] = now(shaking, at, x)
+    shift = 0.0
+    if not jump:
+        shift = -motion_at(shaking, piece, offset) / motion_slope(shaking, piece, offset)
+    write_event(tables, x[UPLIFTED], UPLIFT, shift, at)
+    return True
+
+
+@routine
+def follow_arc(shaking, sides, rules, tables, scratch, at, x):
+    """One Taylor step along the arc, or as much of it as its first event leaves."""
+    start = now(shaking, at, x)
+    write_node(tables, start, at, x)
+    left, last = time_left(shaking, at[PIECE], x[OFFSET], rules.stop)
+    if left <= 0.0:
+        x[END] = rules.stop
+        return _STOPPED
+    side = at[SIDE]
+    order, h, degree = expand(shaking, sides, rules, scratch, side, at[PIECE], x[OFFSET], x[U], x[V], left)
+    if at[SMOOTH]:  # the acceleration at an uplift is zero, whatever rounding says
+        scratch.c[2] = 0.0
+        at[SMOOTH] = 0
+    if at[PIECE] == shaking.coefficients.shape[0] and x[V] == 0.0 and scratch.c[2] == 0.0 and rules.endless:
+        return _STUCK
+    outcome, t, u, v, _, top, height = advance(x[U], x[V], order, h, scratch.c, scratch.d)
+    if height > x[PEAK]:
+        x[PEAK], x[PEAK_TIME] = height, start + top
+        x[PEAK_CHANGE], _ = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, top)
+    x[DU], x[DV] = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, t)
+    at[STILL] = x[OFFSET] + t == x[OFFSET]
+    x[OFFSET] += t
+    x[U], x[V] = u, v
+    if outcome == OVERTURN:
+        x[END] = x[PEAK_TIME] = now(shaking, at, x)
+        x[PEAK], x[PEAK_CHANGE] = QUARTER_TURN, 0.0
+        write_node(tables, x[END], at, x)
+        write_event(tables, x[END], TOPPLED, -x[DU] / v, at)
+    elif outcome == STEP and t >= left:
+        if last:
+            x[END] = rules.stop
+            write_node(tables, rules.stop, at, x)
+            return _STOPPED
+        at[PIECE] += 1
+        x[OFFSET] = 0.0
+    return outcome
+
+
+@routine
+def strike(shaking, sides, tables, at, x):
+    """Impact: the angular speed drops, the side changes, and the variation jumps with them (saltation)."""
+    time = now(shaking, at, x)
+    settle(shaking, at, x)
+    acceleration = motion_at(shaking, at[PIECE], x[OFFSET])
+    left, entered = at[SIDE], 1 - at[SIDE]
+    speed = max(0.0, -x[V])
+    e = sides[left, RESTITUTION]
+    shift = x[DU] / speed
+    faster = -(x[DV] - restoring(sides, left, acceleration * shaking.inverse_g) * shift)
+    at[SIDE], x[U], x[V] = entered, 0.0, e * speed
+    x[DU] = -x[V] * shift
+    x[DV] = e * faster + restoring(sides, entered, acceleration * shaking.inverse_g) * shift
+    row = tables.impacts[at[IMPACTS]]
+    row[0], row[1], row[2], row[3], row[4] = time, sign_of(entered), speed, x[V], shift
+    at[IMPACTS] += 1
+
+
+@routine
+def judge(shaking, sides, rules, scratch, at, x):
+    """Whether the block comes to rest from this impact on: proven, imposed, or because time no longer advances.
+
+    Returns (resting, lower and upper bound on the time that it takes, estimate of it); NaN bounds: not proven.
+    """
+    time, v, side = now(shaking, at, x), x[V], at[SIDE]
+    interval = time - x[STRUCK]
+    x[STRUCK] = time
+    if v == 0.0 or at[STILL]:
+        at[STALLED] += at[STILL]
+        at[RUN] = 0
+        return True, np.nan, np.nan, 0.0
+    if rules.treatment != CERTIFIED:
+        return imposed(rules, side, v, interval, time - x[UPLIFTED]), np.nan, np.nan, 0.0
+    lower, upper = prove_rest(shaking, sides, rules.nonlinear, scratch.A, v, side, at[PIECE], x[OFFSET])
+    if not upper >= 0.0:
+        at[RUN] = 0
+        return False, lower, upper, 0.0
+    if at[RUN] == 0:
+        x[RUN_START] = time
+    at[RUN] += 1
+    # Room for the rounding of the arcs resolved since the first proof, and of the times themselves.
+    slack = 4.0 * _ULP * time + 8.0 * _ULP * (at[RUN] + 4) * (time + upper - x[RUN_START])
+    lower, upper = max(0.0, lower - slack), upper + slack
+    if upper - lower > max(rules.tolerance, 4.0 * slack):
+        return False, lower, upper, 0.0
+    estimate = time_to_rest(shaking, sides, v, side, at[PIECE], x[OFFSET])
+    return True, lower, upper, min(max(estimate, lower), upper)
+
+
+@leaf
+def imposed(rules, side, v, interval, since_uplift):
+    """Whether a treatment other than the certificate brings the block to rest at this impact."""
+    if rules.treatment == VELOCITY:
+        return v <= rules.limit[side]
+    if rules.treatment == INTERVAL:
+        return interval <= rules.limit[side]
+    return rules.treatment == TIME and since_uplift >= rules.limit[side]
+
+
+@routine
+def come_to_rest(shaking, rules, tables, lower, upper, to_rest, at, x):
+    """Close a sequence of impacts; False when the march stops before the block is at rest."""
+    time = now(shaking, at, x)
+    if at[RUN] == 0:
+        at[RUN], x[RUN_START] = 1, time
+    row = tables.sequences[at[SEQUENCES]]
+    row[0], row[1], row[2], row[3], row[4] = x[RUN_START], time + to_rest, time + lower, time + upper, at[RUN]
+    at[SEQUENCES] += 1
+    at[RUN] = 0
+    if time + to_rest >= rules.stop:
+        x[END] = rules.stop
+        return False
+    at[SIDE], x[U], x[V] = AT_REST, 0.0, 0.0
+    write_event(tables, time + to_rest, REST, tables.impacts[at[IMPACTS] - 1, 4], at)
+    x[OFFSET] += to_rest
+    settle(shaking, at, x)
+    return True
+
+
+@leaf
+def vary(sides, rules, scratch, du, dv, side, order, degree, t):
+    """Variation carried over a part of the step, linear or nonlinear."""
+    stiffness = sides[side, STIFFNESS]
+    if rules.nonlinear:
+        return vary_nonlinear(du, dv, stiffness, degree, order, t, scratch)
+    return vary_linear(du, dv, stiffness, degree, order, t, scratch)
+
+
+@leaf
+def time_left(shaking, piece, offset, stop):
+    """Time to the end of the piece, or to ``stop`` where that comes first, and whether it does."""
+    until_stop = stop - shaking.breakpoints[piece] - offset
+    if piece == shaking.coefficients.shape[0]:
+        return until_stop, True
+    left = shaking.breakpoints[piece + 1] - shaking.breakpoints[piece] - offset
+    return min(left, until_stop), until_stop <= left
+
+
+@leaf
+def settle(shaking, at, x):
+    """Bring the offset inside its own piece."""
+    while at[PIECE] < shaking.coefficients.shape[0]:
+        length = shaking.breakpoints[at[PIECE] + 1] - shaking.breakpoints[at[PIECE]]
+        if x[OFFSET] < length:
+            return
+        x[OFFSET] -= length
+        at[PIECE] += 1
+
+
+@leaf
+def write_node(tables, time, at, x):
+    """Write down the state."""
+    row = tables.nodes[at[NODES]]
+    row[0], row[1], row[2], row[3], row[4], row[5] = (
+        time, at[PIECE], x[OFFSET], sign_of(at[SIDE]), x[U], x[V],
+    )  # fmt: skip
+    at[NODES] += 1
+
+
+@leaf
+def write_event(tables, time, kind, shift, at):
+    """Write down an uplift, a rest or an overturning."""
+    row = tables.events[at[EVENTS]]
+    row[0], row[1], row[2], row[3] = time, kind, sign_of(at[SIDE]), shift
+    at[EVENTS] += 1

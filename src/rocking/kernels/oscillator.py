@@ -1,0 +1,118 @@
+"""Largest displacement of a linear oscillator under a piecewise polynomial base acceleration."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.kernels.compiled import kernel, leaf, routine
+
+#: Length of the work array beyond the columns of the motion: 0.25**16 / 16! = 1e-23.
+TERMS = 18
+_RADIANS_PER_STEP = 0.25
+
+
+@kernel
+def peak_displacements(
+    breakpoints: NDArray[np.float64],
+    coefficients: NDArray[np.float64],
+    frequencies: NDArray[np.float64],
+    damping: float,
+    work: NDArray[np.float64],
+    peaks: NDArray[np.float64],
+) -> None:
+    """Put the largest ``|u|`` (m) of ``u'' + 2 z w u' + w^2 u = -a(t)`` from rest into `peaks`, for each w (rad/s).
+
+    On each step of at most a quarter radian u is the Taylor series of the exact solution. The response is followed
+    past the end of the motion to its first extremum there. Assumes positive frequencies and ``0 <= z < 1``; `work`
+    has twice the motion's columns plus TERMS numbers.
+    """
+    columns = coefficients.shape[1]
+    for i in range(len(frequencies)):
+        peaks[i] = _peak(breakpoints, coefficients, frequencies[i], damping, work[:columns], work[columns:])
+
+
+@routine
+def _peak(
+    breakpoints: NDArray[np.float64],
+    coefficients: NDArray[np.float64],
+    frequency: float,
+    damping: float,
+    force: NDArray[np.float64],
+    series: NDArray[np.float64],
+) -> float:
+    series[:] = 0.0
+    peak = 0.0
+    for k in range(len(coefficients)):
+        width = breakpoints[k + 1] - breakpoints[k]
+        steps = max(1, math.ceil(frequency * width / _RADIANS_PER_STEP))
+        for j in range(len(force)):
+            force[j] = coefficients[k, j]
+        for _ in range(steps):
+            peak = max(peak, _advance(series, force, width / steps, frequency, damping))
+            _move(force, width / steps)
+    force[:] = 0.0
+    half_period = math.pi / math.sqrt(1.0 - damping * damping)
+    for _ in range(math.ceil(half_period / _RADIANS_PER_STEP)):
+        peak = max(peak, _advance(series, force, _RADIANS_PER_STEP / frequency, frequency, damping))
+    return peak
+
+
+@routine
+def _advance(
+    series: NDArray[np.float64], force: NDArray[np.float64], h: float, frequency: float, damping: float
+) -> float:
+    """Expand the solution about the start of a step, move ``series[:2]`` to its end and return its peak."""
+    for k in range(len(series) - 2):
+        drive = force[k] if k < len(force) else 0.0
+        rate = 2.0 * damping * frequency * (k + 1) * series[k + 1] + frequency * frequency * series[k]
+        series[k + 2] = -(drive + rate) / ((k + 1) * (k + 2))
+    start_velocity = series[1]
+    end_velocity = _slope(series, h)
+    end = _value(series, h)
+    peak = abs(end)
+    if start_velocity * end_velocity < 0.0:
+        peak = max(peak, abs(_value(series, _extremum(series, h))))
+    series[0], series[1] = end, end_velocity
+    return peak
+
+
+@routine
+def _extremum(series: NDArray[np.float64], h: float) -> float:
+    """Root of the velocity between 0 and h, where it has opposite signs, by bisection.
+
+    The displacement is stationary there, so half the digits of the time give all the digits of the peak.
+    """
+    low, high = 0.0, h
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        if (_slope(series, middle) > 0.0) == (series[1] > 0.0):
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@leaf
+def _value(series: NDArray[np.float64], x: float) -> float:
+    result = 0.0
+    for k in range(len(series) - 1, -1, -1):
+        result = result * x + series[k]
+    return result
+
+
+@leaf
+def _slope(series: NDArray[np.float64], x: float) -> float:
+    result = 0.0
+    for k in range(len(series) - 1, 0, -1):
+        result = result * x + k * series[k]
+    return result
+
+
+@routine
+def _move(force: NDArray[np.float64], shift: float) -> None:
+    """Re-expand a polynomial about `shift`, in place (repeated synthetic division)."""
+    last = len(force) - 1
+    for i in range(last):
+        for j in range(last - 1, i - 1, -1):
+            force[j] += shift * force[j + 1]

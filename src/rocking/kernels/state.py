@@ -1,0 +1,104 @@
+"""What a march carries along: the problem, its state, its tables and its scratch space, as plain arrays."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Highest power in an arc's series; enough for steps of 1/p to full double precision.
+ORDER = 22
+
+
+class Shaking(NamedTuple):
+    """The ground motion: its pieces (s, m/s^2), 1/g, and its approximation error in units of g."""
+
+    breakpoints: Floats
+    coefficients: Floats
+    inverse_g: float
+    error: float
+
+
+class Rules(NamedTuple):
+    """How to compute: model, end of chattering (see `status`), width of a good bracket (s), when to stop (s)."""
+
+    nonlinear: bool
+    treatment: int
+    limit: Floats
+    tolerance: float
+    stop: float
+    endless: bool
+
+
+class Tables(NamedTuple):
+    """What a march writes down, one row each.
+
+    nodes (n, 6) : time, piece, offset, side (+1, -1; 0 at rest), u, u'
+    impacts (n, 5) : time, side entered, speed before, speed after, shift of the time per unit of scaling
+    events (n, 4) : time, kind, side, shift
+    sequences (n, 5) : start, end, lower, upper, impacts
+    """
+
+    nodes: Floats
+    impacts: Floats
+    events: Floats
+    sequences: Floats
+
+
+class Trail(NamedTuple):
+    """What it takes to follow a response again: the problem and the nodes of its steps."""
+
+    shaking: Shaking
+    sides: Floats
+    rules: Rules
+    nodes: Floats
+
+
+class Scratch(NamedTuple):
+    """Room for the series of one step: rotation, motion, sine, cosine, and a spare one."""
+
+    c: Floats
+    A: Floats
+    S: Floats
+    C: Floats
+    d: Floats
+
+
+# Columns of a block's side (rows: side +, side -).
+STIFFNESS, SLENDERNESS, THRESHOLD, GAIN, RESTITUTION = range(5)
+
+# Integers of the state. RUN counts the impacts since chattering was proven, SMOOTH marks an uplift that is not a
+# jump, STILL an impact at which time did not advance, STALLED counts the rests that only that brought about.
+PIECE, SIDE, NODES, IMPACTS, EVENTS, SEQUENCES, RUN, SMOOTH, STILL, STALLED = range(10)
+
+# Floats of the state: position in the motion, rotation, its rate, their variations, times of the last uplift, impact
+# and proof, the highest rotation so far, the end.
+OFFSET, U, V, DU, DV, UPLIFTED, STRUCK, RUN_START, PEAK, PEAK_TIME, PEAK_CHANGE, END = range(12)
+
+#: Side index of a block at rest.
+AT_REST = -1
+
+
+def new_state() -> tuple[Integers, Floats]:
+    """State of a block at rest at time zero."""
+    at, x = np.zeros(STALLED + 1, dtype=np.int64), np.zeros(END + 1)
+    at[SIDE] = AT_REST
+    return at, x
+
+
+def new_scratch(columns: int) -> Scratch:
+    """Scratch space for motions with that many coefficients in a piece."""
+    size = max(ORDER + 1, columns)
+    return Scratch(*(np.zeros(size) for _ in Scratch._fields))
+
+
+def new_tables(nodes: int) -> Tables:
+    """Empty tables for a first try."""
+    return Tables(np.empty((nodes, 6)), np.empty((256, 5)), np.empty((16, 4)), np.empty((8, 5)))
+
+
+def grown(tables: Tables) -> Tables:
+    """Tables with twice the room and the same rows."""
+    return Tables(*(np.concatenate([table, np.empty_like(table)]) for table in tables))

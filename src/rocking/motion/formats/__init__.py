@@ -1,0 +1,180 @@
+"""Readers of strong-motion records: PEER AT2, CSMIP V1 and V2, COSMOS, SMC, K-NET, ESM, text, ObsPy's formats.
+
+The format is told from the content, never from the file's name. Numbers become m/s^2 (g = 9.80665 m/s^2); nothing
+else is done to them: no filter, no baseline, no offset removed.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Protocol
+
+from rocking.errors import UnreadableRecord
+from rocking.motion.formats import at2, cosmos, csmip_v1, csmip_v2, esm, knet, smc, table, through_obspy
+from rocking.motion.formats.channel import Channel
+from rocking.motion.formats.identification import Identification
+from rocking.motion.formats.request import Request
+from rocking.motion.formats.source import Source, open_source
+from rocking.motion.motion import Motion
+
+__all__ = ["Channel", "Identification", "channels", "identify", "read"]
+
+
+class _Reader(Protocol):
+    """What the module of a format offers."""
+
+    def recognise(self, source: Source) -> Identification | None: ...
+    def read(self, source: Source, request: Request) -> list[Channel]: ...
+
+
+#: In the order in which they are asked; the last two take what no title claims.
+_READERS: tuple[_Reader, ...] = (at2, cosmos, csmip_v1, csmip_v2, smc, esm, knet, table, through_obspy)
+
+_LISTED = 30
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    channel: int | str | None = None,
+    dt: float | None = None,
+    units: str | None = None,
+) -> Motion:
+    r"""Read one channel of a record file as a motion.
+
+    Parameters
+    ----------
+    path : str or path
+        A file in PEER AT2, CSMIP V1 or V2, COSMOS, USGS SMC, K-NET/KiK-net or ESM format, a text table of one
+        column (accelerations) or two (times, accelerations), or any file that ObsPy reads if the `formats` extra
+        is installed. The format is told from the content.
+    channel : int or str, optional
+        Number or name of the channel; needed only where the file holds several.
+    dt : float, optional
+        Sampling step, s; needed only for one column of accelerations. Elsewhere it must agree with the file.
+    units : {"g", "m/s2", "cm/s2", "gal", "mm/s2"}, optional
+        Units of the numbers; needed only where the file does not say: text tables and ObsPy's formats.
+
+    Returns
+    -------
+    Motion
+        In m/s^2, linear between the samples, its time counted from the first sample. Nothing is removed: an
+        instrument's constant offset, as K-NET's files have, is still in it.
+
+    Raises
+    ------
+    UnreadableRecord
+        If the file is missing or unreadable, its format unknown, its content at odds with its header, a number
+        spoilt, the channel unknown or not chosen. The message names file, line and mend.
+    InvalidMotion
+        If `dt` is not a positive number, or the samples do not make a motion.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> file = Path(tempfile.mkdtemp()) / "pulse.txt"
+    >>> _ = file.write_text("time (s), a (g)\n0.00, 0.0\n0.01, 0.5\n0.02, 0.0\n")
+    >>> motion = read(file, units="g")
+    >>> motion.duration, motion.pga
+    (0.02, 4.903325)
+    """
+    source, reader, request = _prepare(path, dt, units)
+    return _choose(source, reader.read(source, request), channel).motion()
+
+
+def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: str | None = None) -> tuple[Channel, ...]:
+    """Return all acceleration channels of a record file.
+
+    Parameters
+    ----------
+    path, dt, units
+        As for `read`.
+
+    Returns
+    -------
+    tuple of Channel
+        In the file's order.
+
+    Raises
+    ------
+    UnreadableRecord, InvalidMotion
+        As for `read`.
+    """
+    source, reader, request = _prepare(path, dt, units)
+    return tuple(reader.read(source, request))
+
+
+def identify(path: str | os.PathLike[str]) -> Identification:
+    r"""Return what format a file is taken for, and why.
+
+    Raises
+    ------
+    UnreadableRecord
+        If the file is missing or unreadable, or its format is unknown.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> file = Path(tempfile.mkdtemp()) / "samples.dat"
+    >>> _ = file.write_text("# cm/s2 at 100 Hz\n0.1\n0.3\n-0.2\n")
+    >>> identify(file)
+    Identification(format='text table', reason='from line 2 on each line holds one number')
+    """
+    return _recognise(open_source(path))[1]
+
+
+def _prepare(path: str | os.PathLike[str], dt: float | None, units: str | None) -> tuple[Source, _Reader, Request]:
+    request = Request.checked(dt, units)
+    source = open_source(path)
+    return source, _recognise(source)[0], request
+
+
+def _recognise(source: Source) -> tuple[_Reader, Identification]:
+    for reader in _READERS:
+        identification = reader.recognise(source)
+        if identification is not None:
+            return reader, identification
+    raise _unknown(source)
+
+
+def _unknown(source: Source) -> UnreadableRecord:
+    wide = table.columns(source)
+    if wide is not None:
+        return source.error(
+            f"each line holds {wide} numbers, but a text table has one (acceleration) or two (time, acceleration); "
+            "keep only these"
+        )
+    line = source.first_line()
+    if line is not None and "RESPONSE AND FOURIER" in line.text.upper():
+        return source.error("this is a V3 file of spectra; give the V1 or V2 file of the acceleration", line.start)
+    position = source.binary_at()
+    what = "this is text" if position is None else f"this is a binary file (byte {source.data[position]} at {position})"
+    if through_obspy.installed():
+        return source.error(f"{what} in no format known here, nor to ObsPy; give a strong-motion record")
+    return source.error(
+        f"{what} in no format known here; if it is MiniSEED, SAC or another format that ObsPy reads, "
+        "install rocking[formats]"
+    )
+
+
+def _choose(source: Source, found: list[Channel], wanted: int | str | None) -> Channel:
+    listed = ", ".join(channel.label for channel in found[:_LISTED]) + (", ..." if len(found) > _LISTED else "")
+    if wanted is None and len(found) > 1:
+        raise source.error(f"the file holds {len(found)} channels; give channel= as one of {listed}")
+    matching = found if wanted is None else _matching(found, wanted)
+    if not matching:
+        raise source.error(f"there is no channel {wanted!r}; give one of {listed}")
+    if len(matching) > 1:
+        raise source.error(f"{len(matching)} channels are called {wanted!r}; give another name or number of {listed}")
+    return matching[0]
+
+
+def _matching(found: list[Channel], wanted: int | str) -> list[Channel]:
+    """Return the channels of that number; or else of that name, or whose name begins with that word."""
+    text = " ".join(str(wanted).casefold().split())
+    by_number = [channel for channel in found if str(channel.number) == text]
+    by_name = [channel for channel in found if " ".join(channel.name.casefold().split()) == text]
+    by_word = [channel for channel in found if channel.name.casefold().split()[:1] == [text]]
+    return by_number or by_name or by_word

@@ -1,0 +1,107 @@
+"""PEER AT2: header lines, NPTS and DT in the last of them, then the accelerations in g, five to a line.
+
+The last header line comes in several shapes: ``NPTS=  5372, DT= .0100 SEC,`` (NGA) or ``4096    0.0100    NPTS, DT``
+(the older database), in any spacing and case. VT2 and DT2 files look alike but hold velocities, displacements.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from rocking.motion.formats.channel import Channel, to_acceleration
+from rocking.motion.formats.identification import Identification
+from rocking.motion.formats.request import Request
+from rocking.motion.formats.source import Line, Source
+from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.values import NUMBER, Layout, parse, read_values
+
+NAME = "PEER AT2"
+
+_HEADER_LINES = 12
+_LAYOUT = Layout(per_line=5, width=15)
+_KEYS_FIRST = re.compile(rf"NPTS\s*[=:]?\s*(\d{{1,12}})\b.*?\bDT\s*[=:]?\s*({NUMBER})", re.IGNORECASE)
+_VALUES_FIRST = re.compile(rf"^\s*(\d{{1,12}})[\s,]+({NUMBER})[\s,]+NPTS\s*,\s*DT\b", re.IGNORECASE)
+_UNITS = re.compile(r"UNITS\s+OF\s+([A-Z0-9/^*]+)", re.IGNORECASE)
+_OTHER_QUANTITY = re.compile(r"\b(VELOCITY|DISPLACEMENT)\s+TIME\b", re.IGNORECASE)
+_EXTENSIONS = {"velocity": "VT2", "displacement": "DT2"}
+
+
+class _Header(NamedTuple):
+    titles: list[Line]
+    sizes: Line
+    points: int
+    dt: float
+
+
+def recognise(source: Source) -> Identification | None:
+    """Return the format if one of the first lines gives NPTS and DT."""
+    header = _header(source)
+    if header is None:
+        return None
+    return Identification(NAME, f"line {source.line_number(header.sizes.start)} gives NPTS and DT")
+
+
+def read(source: Source, request: Request) -> list[Channel]:
+    """Return the one channel of the file.
+
+    Raises
+    ------
+    UnreadableRecord
+        If the file holds velocities or displacements, or more or fewer values than its NPTS.
+    """
+    header = _header(source)
+    assert header is not None
+    _refuse_other_quantities(source, header)
+    at = header.sizes.start
+    spelling = next((found[1] for line in header.titles if (found := _UNITS.search(line.text))), "")
+    unit = request.units(source, find_unit(spelling), at)
+    dt = request.step(source, header.dt, at)
+    values = read_values(source, header.sizes.next, len(source.data), count=header.points, layout=_LAYOUT)
+    if len(values) != header.points:
+        raise source.error(
+            f"NPTS is {header.points} but {len(values)} values follow; get the whole file again or correct NPTS", at
+        )
+    title = header.titles[1].text.strip() if len(header.titles) > 1 else ""
+    event, station, name = _places(title)
+    channel = Channel(
+        name=name,
+        number=1,
+        acceleration=to_acceleration(source, at, values, unit),
+        dt=dt,
+        azimuth=float(name) % 360.0 if re.fullmatch(r"\d{1,3}", name, re.ASCII) else None,
+        units=spelling or unit.name,
+        station=station,
+        event=event,
+        metadata={"format": NAME, "file": source.file},
+    )
+    return [channel]
+
+
+def _header(source: Source) -> _Header | None:
+    lines = source.lines(0, _HEADER_LINES)
+    for index, line in enumerate(lines):
+        found = _VALUES_FIRST.search(line.text) or _KEYS_FIRST.search(line.text)
+        dt = parse(found[2].encode("latin-1")) if found else None
+        if found and dt is not None:
+            return _Header(lines[:index], line, int(found[1]), dt)
+    return None
+
+
+def _refuse_other_quantities(source: Source, header: _Header) -> None:
+    for line in header.titles:
+        found = _OTHER_QUANTITY.search(line.text)
+        if found:
+            quantity = found[1].lower()
+            raise source.error(
+                f"this is a PEER {_EXTENSIONS[quantity]} file of {quantity}; give the AT2 file of the acceleration",
+                line.start,
+            )
+
+
+def _places(title: str) -> tuple[str, str, str]:
+    """Split "event, date, station, component" (or "event, station, component")."""
+    parts = [part.strip() for part in title.split(",")]
+    if len(parts) < 3:
+        return title, "", "acceleration"
+    return ", ".join(parts[:-2]), parts[-2], parts[-1] or "acceleration"

@@ -1,0 +1,177 @@
+"""COSMOS strong-motion format 1.20: headers that state their length and columns, comments, then one block of data.
+
+A file may hold several channels, and velocities and displacements beside accelerations; only accelerations are
+read. Real header 62 is the step in milliseconds, 34 that of the raw data in seconds.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import NamedTuple
+
+from rocking.motion.formats import csmip
+from rocking.motion.formats.channel import Channel, to_acceleration
+from rocking.motion.formats.identification import Identification
+from rocking.motion.formats.request import Request
+from rocking.motion.formats.source import Line, Source
+from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.values import Floats, expect, read_values
+
+NAME = "COSMOS"
+
+_TITLE = re.compile(r"\(format\s+v\s*[\d.]{1,8}\s+with\s+(\d{1,3})\s+text", re.IGNORECASE | re.ASCII)
+_NUMBERS = re.compile(
+    r"^\s*(\d{1,6})\s+(integer|real)-header\s+values\s+follow\s+on\s+(\d{1,4})\s+lines", re.IGNORECASE | re.ASCII
+)
+_COMMENTS = re.compile(r"^\s*(\d{1,4})\s+comment", re.IGNORECASE | re.ASCII)
+_DATA_LINE = re.compile(r"^\s*(\d{1,12})\s+(\S.*?)\s*pts\b", re.IGNORECASE | re.ASCII)
+_DURATION = re.compile(r"approx\s+(\d{1,9})\s+secs", re.IGNORECASE | re.ASCII)
+_UNITS = re.compile(r"units\s*=\s*([A-Za-z0-9/^]+)", re.IGNORECASE)
+_UNKNOWN = re.compile(r"unspecified:.*,\s*(-\d{1,9}(?:\.\d{0,9})?)\s*$", re.IGNORECASE | re.ASCII)
+_CHANNEL = re.compile(r"^\s*sta\s+cha\w*\s*:?\s*(\w+|\?)\s*:\s*([^(]*)", re.IGNORECASE)
+_CHANNEL_NUMBER = re.compile(r"\d{1,6}", re.ASCII)
+_STATION = re.compile(r"^\s*statn\s+no\S*\s+(\S+)\s*(?:code:\s*\S+)?\s*(.*)$", re.IGNORECASE)
+
+_STEP_MS, _RAW_STEP_S = 62, 34
+
+
+class _Header(NamedTuple):
+    text: list[Line]
+    reals: Floats
+    data: Line
+    points: int
+    quantity: str
+
+
+def recognise(source: Source) -> Identification | None:
+    """Return the format if the first line states its version and number of text lines."""
+    line = source.first_line()
+    found = _TITLE.search(line.text) if line is not None else None
+    if line is None or found is None:
+        return None
+    return Identification(NAME, f"line {source.line_number(line.start)} says {found[0] + ' lines)'!r}")
+
+
+def read(source: Source, request: Request) -> list[Channel]:
+    """Return the accelerations in the file.
+
+    Raises
+    ------
+    UnreadableRecord
+        If there is none, or a header and its data do not agree.
+    """
+    found: list[Channel] = []
+    others: list[str] = []
+    title = source.first_line()
+    while title is not None:
+        header = _header(source, title)
+        end = csmip.data_end(source, header.data.next, _TITLE)
+        if header.quantity.startswith("accel"):
+            found.append(_channel(source, request, header, end, len(found) + 1))
+        else:
+            others.append(header.quantity)
+        title = source.first_line(csmip.after_trailer(source, end))
+    if not found:
+        raise source.error(f"this file holds {others[0]!r}; give the file of the processed acceleration")
+    return found
+
+
+def _header(source: Source, title: Line) -> _Header:
+    stated = _TITLE.search(title.text)
+    if stated is None:
+        raise source.error("a channel's title with '(Format v01.20 ...' should stand here; mend the file", title.start)
+    text = source.lines(title.start, max(int(stated[1]), 1))
+    _, after = _numbers(source, text[-1].next, "integer")
+    reals, after = _numbers(source, after, "real")
+    data = source.line(_after_comments(source, after))
+    found = _DATA_LINE.match(data.text)
+    if found is None:
+        raise source.error("the line with the number of points should stand here; get the file again", data.start)
+    return _Header(text, reals, data, int(found[1]), found[2].lower())
+
+
+def _numbers(source: Source, start: int, kind: str) -> tuple[Floats, int]:
+    line = source.line(start)
+    stated = _NUMBERS.match(line.text)
+    if stated is None or stated[2].lower() != kind:
+        raise source.error(f"a line '... {kind}-header values follow' should stand here; get the file again", start)
+    end = _after(source, line, int(stated[3]))
+    count = int(stated[1])
+    values = read_values(source, line.next, end, count=count, layout=csmip.layout_in(line.text))
+    return expect(source, start, count, values), end
+
+
+def _after_comments(source: Source, start: int) -> int:
+    line = source.line(start)
+    stated = _COMMENTS.match(line.text)
+    return _after(source, line, int(stated[1])) if stated else start
+
+
+def _after(source: Source, line: Line, count: int) -> int:
+    """Return the offset after the `count` lines that follow `line`."""
+    return [line, *source.lines(line.next, count)][-1].next
+
+
+def _channel(source: Source, request: Request, header: _Header, end: int, ordinal: int) -> Channel:
+    line = header.data
+    spelling = _UNITS.search(line.text)
+    unit = request.units(source, find_unit(spelling[1]) if spelling else None, line.start)
+    dt = request.step(source, _step(source, header), line.start)
+    layout = csmip.layout_in(line.text)
+    values = read_values(source, line.next, end, count=header.points, layout=layout)
+    _refuse_unknown(source, header, expect(source, line.start, header.points, values))
+    number, name, place = _name(header.text, ordinal)
+    station = next((found[2] or found[1] for each in header.text if (found := _STATION.match(each.text))), "")
+    facts = {"format": NAME, "file": source.file, "stage": header.text[0].text.split("(")[0].strip()}
+    return Channel(
+        name=name,
+        number=number,
+        acceleration=to_acceleration(source, line.start, values, unit),
+        dt=dt,
+        azimuth=csmip.azimuth(name),
+        units=spelling[1] if spelling else unit.name,
+        station=" ".join(station.split()),
+        event=header.text[1].text.strip() if len(header.text) > 1 else "",
+        metadata=facts | ({"location": place} if place else {}),
+    )
+
+
+def _step(source: Source, header: _Header) -> float:
+    """Return the step (s) of the two in the header that fits the stated duration."""
+    steps = [each for each in (_real(header, _STEP_MS) / 1000.0, _real(header, _RAW_STEP_S)) if each > 0.0]
+    if not steps:
+        raise source.error("real headers 34 and 62 give no sampling step; get the file again", header.data.start)
+    stated = _DURATION.search(header.data.text)
+    if stated is None or int(stated[1]) == 0:
+        return steps[0]
+    # The duration is printed in whole seconds, by some without the last interval.
+    duration = int(stated[1])
+    fitting = [each for each in steps if abs(header.points * each - duration) <= 1.0 + each]
+    if not fitting:
+        raise source.error(
+            f"{header.points} points at {steps[0]:g} s do not last {duration} s; correct the header", header.data.start
+        )
+    return fitting[0]
+
+
+def _real(header: _Header, number: int) -> float:
+    value = float(header.reals[number - 1]) if len(header.reals) >= number else 0.0
+    return value if math.isfinite(value) else 0.0
+
+
+def _refuse_unknown(source: Source, header: _Header, values: Floats) -> None:
+    flag = next((found[1] for line in header.text if (found := _UNKNOWN.search(line.text))), None)
+    if flag is not None and (values == float(flag)).any():
+        raise source.error(
+            f"some values are {flag}, which here means 'unknown'; get a record without gaps", header.data.start
+        )
+
+
+def _name(text: list[Line], ordinal: int) -> tuple[int, str, str]:
+    found = next((found for line in text if (found := _CHANNEL.match(line.text))), None)
+    if found is None:
+        return ordinal, f"channel {ordinal}", ""
+    number = int(found[1]) if _CHANNEL_NUMBER.fullmatch(found[1]) else ordinal
+    name = " ".join(found[2].split("  ")[0].split())
+    return number, name or f"channel {number}", csmip.location(found.string)

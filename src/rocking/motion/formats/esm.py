@@ -1,0 +1,93 @@
+"""ESM and ITACA ASCII (DYNA headers): lines "KEY: value", then one value to a line."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from rocking.motion.formats.channel import Channel, to_acceleration
+from rocking.motion.formats.identification import Identification
+from rocking.motion.formats.request import Request
+from rocking.motion.formats.source import Source
+from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.values import parse, read_values
+
+NAME = "ESM"
+
+_HEADER_LINES = 200
+_KEY = re.compile(r"^([A-Z][A-Z0-9_/^]*)\s*:\s*(.*)$")
+_SIGNS = ("DATA_TYPE", "SAMPLING_INTERVAL_S", "NDATA")
+_AZIMUTHS = {"N": 0.0, "E": 90.0}
+
+
+class _Entry(NamedTuple):
+    value: str
+    at: int
+
+
+def recognise(source: Source) -> Identification | None:
+    """Return the format if the first lines are keys and values, step and type of data among them."""
+    entries, _ = _entries(source)
+    if not all(key in entries for key in _SIGNS):
+        return None
+    line = source.line_number(entries["DATA_TYPE"].at)
+    return Identification(NAME, f"the first lines read 'KEY: value', line {line} is DATA_TYPE")
+
+
+def read(source: Source, request: Request) -> list[Channel]:
+    """Return the one channel of the file.
+
+    Raises
+    ------
+    UnreadableRecord
+        If the file holds anything but acceleration, or more or fewer values than its NDATA.
+    """
+    entries, start = _entries(source)
+    kind = entries["DATA_TYPE"]
+    if kind.value.upper() != "ACCELERATION":
+        raise source.error(f"this ESM file holds {kind.value.lower()!r}; give the file of the acceleration", kind.at)
+    spelling = entries.get("UNITS", _Entry("", start))
+    unit = request.units(source, find_unit(spelling.value), spelling.at)
+    dt = request.step(source, _number(source, entries, "SAMPLING_INTERVAL_S"), entries["SAMPLING_INTERVAL_S"].at)
+    values = read_values(source, start, len(source.data))
+    count = _number(source, entries, "NDATA")
+    if len(values) != count:
+        raise source.error(
+            f"NDATA is {count:g} but {len(values)} values follow; get the whole file again", entries["NDATA"].at
+        )
+    text = {key: entry.value for key, entry in entries.items() if entry.value}
+    name = text.get("STREAM", "acceleration")
+    processing = {"processing": text["PROCESSING"]} if "PROCESSING" in text else {}
+    channel = Channel(
+        name=name,
+        number=1,
+        acceleration=to_acceleration(source, start, values, unit),
+        dt=dt,
+        azimuth=_AZIMUTHS.get(name[-1]),
+        units=spelling.value or unit.name,
+        station=".".join(text[key] for key in ("NETWORK", "STATION_CODE") if key in text),
+        event=text.get("EVENT_ID", text.get("EVENT_NAME", "")),
+        metadata={"format": NAME, "file": source.file, **processing},
+    )
+    return [channel]
+
+
+def _entries(source: Source) -> tuple[dict[str, _Entry], int]:
+    """Return the header's values by their key, and where the data start."""
+    entries: dict[str, _Entry] = {}
+    start = 0
+    for line in source.lines(0, _HEADER_LINES):
+        found = _KEY.match(line.text)
+        if found is None:
+            break
+        entries[found[1]] = _Entry(found[2].strip(), line.start)
+        start = line.next
+    return entries, start
+
+
+def _number(source: Source, entries: dict[str, _Entry], key: str) -> float:
+    entry = entries[key]
+    number = parse(entry.value.encode("latin-1"))
+    if number is None:
+        raise source.error(f"{key} is {entry.value!r}, which is not a number; correct it", entry.at)
+    return number

@@ -1,0 +1,145 @@
+"""K-NET and KiK-net ASCII: 17 header lines, then counts that the scale factor turns into gal.
+
+The counts hold the instrument's constant offset (some gal). It is kept, and the metadata say so: remove it with a
+baseline correction of the motion. "Record Time" is 15 s later than the first sample.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from rocking.motion.formats.channel import Channel, to_acceleration
+from rocking.motion.formats.identification import Identification
+from rocking.motion.formats.request import Request
+from rocking.motion.formats.source import Line, Source
+from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.values import Floats, Layout, parse, read_values
+
+NAME = "K-NET/KiK-net"
+
+_KEYS = (
+    "Origin Time",
+    "Lat.",
+    "Lon",
+    "Depth",
+    "Mag.",
+    "Station Code",
+    "Station Lat",
+    "Station Lon",
+    "Station Height",
+    "Record Time",
+    "Sampling Freq",
+    "Duration Time",
+    "Dir.",
+    "Scale Factor",
+    "Max",
+    "Last Correction",
+    "Memo",
+)
+_KEY_COLUMNS = 18
+_COUNTS = Layout(per_line=8, width=9)
+_RATE = re.compile(r"([\d.]{1,20})\s*Hz", re.IGNORECASE | re.ASCII)
+_SCALE = re.compile(r"([\d.]{1,20})\s*\(\s*gal\s*\)\s*/\s*([\d.]{1,20})", re.IGNORECASE | re.ASCII)
+_SECONDS = re.compile(r"([\d.]{1,20})", re.ASCII)
+
+#: KiK-net numbers its six sensors: three in the borehole, three at the surface.
+_SENSORS = {"1": "N-S borehole", "2": "E-W borehole", "3": "U-D borehole", "4": "N-S", "5": "E-W", "6": "U-D"}
+_AZIMUTHS = {"N-S": 0.0, "E-W": 90.0}
+
+
+class _Entry(NamedTuple):
+    value: str
+    at: int
+
+
+def recognise(source: Source) -> Identification | None:
+    """Return the format if the file begins with 'Origin Time' and has a 'Scale Factor'."""
+    lines = source.lines(0, 2 * len(_KEYS))
+    scale = next((line for line in lines if line.text.startswith("Scale Factor")), None)
+    if scale is None or not lines[0].text.startswith("Origin Time"):
+        return None
+    return Identification(NAME, f"line 1 begins 'Origin Time', line {source.line_number(scale.start)} 'Scale Factor'")
+
+
+def read(source: Source, request: Request) -> list[Channel]:
+    """Return the one channel of the file, its offset kept.
+
+    Raises
+    ------
+    UnreadableRecord
+        If a header line is missing, or the number of counts is not rate times duration.
+    """
+    entries, start = _entries(source)
+    (rate,) = _positive(source, entries, "Sampling Freq", _RATE)
+    gal, counts = _positive(source, entries, "Scale Factor", _SCALE)
+    scale_at = entries["Scale Factor"].at
+    unit = request.units(source, find_unit("gal"), scale_at)
+    dt = request.step(source, 1.0 / rate, entries["Sampling Freq"].at)
+    values = read_values(source, start, len(source.data), layout=_COUNTS)
+    _check_duration(source, entries, rate, len(values))
+    with np.errstate(over="ignore"):
+        scaled = values * gal / counts
+    acceleration = to_acceleration(source, scale_at, scaled, unit)
+    direction = entries["Dir."].value
+    name = _SENSORS.get(direction, direction) or "acceleration"
+    channel = Channel(
+        name=name,
+        number=1,
+        acceleration=acceleration,
+        dt=dt,
+        azimuth=_AZIMUTHS.get(name.split(" ")[0]),
+        units="gal",
+        station=entries["Station Code"].value,
+        event=f"{entries['Origin Time'].value}, magnitude {entries['Mag.'].value}",
+        metadata={
+            "format": NAME,
+            "file": source.file,
+            "record time": entries["Record Time"].value,
+            "offset": f"kept, the mean is {_mean(acceleration):.4g} m/s^2",
+        },
+    )
+    return [channel]
+
+
+def _entries(source: Source) -> tuple[dict[str, _Entry], int]:
+    """Return the header's values by their key, and where the data start."""
+    lines = source.lines(0, len(_KEYS))
+    for line, key in zip(lines, _KEYS, strict=False):
+        if not line.text.startswith(key):
+            raise source.error(f"the header line {key!r} should stand here; get the record again", line.start)
+    if len(lines) < len(_KEYS):
+        raise source.error("the file ends within its header; get the whole file again", lines[-1].start)
+    return dict(zip(_KEYS, map(_entry, lines), strict=True)), lines[-1].next
+
+
+def _entry(line: Line) -> _Entry:
+    return _Entry(line.text[_KEY_COLUMNS:].strip(), line.start)
+
+
+def _positive(source: Source, entries: dict[str, _Entry], key: str, pattern: re.Pattern[str]) -> list[float]:
+    """Return the numbers that `pattern` finds in the entry `key`; each must be positive."""
+    entry = entries[key]
+    found = pattern.match(entry.value)
+    numbers = [parse(group.encode("latin-1")) for group in found.groups()] if found else []
+    positive = [number for number in numbers if number is not None and number > 0.0]
+    if not positive or len(positive) < len(numbers):
+        raise source.error(f"{entry.value!r} is no {key.lower()}; get the record again", entry.at)
+    return positive
+
+
+def _check_duration(source: Source, entries: dict[str, _Entry], rate: float, count: int) -> None:
+    (seconds,) = _positive(source, entries, "Duration Time", _SECONDS)
+    stated = seconds * rate
+    if not abs(count - stated) < rate:
+        raise source.error(
+            f"{seconds:g} s at {rate:g} Hz make {stated:g} samples but {count} follow; get the whole file again",
+            entries["Duration Time"].at,
+        )
+
+
+def _mean(acceleration: Floats) -> float:
+    with np.errstate(over="ignore"):
+        return float(acceleration.mean())

@@ -1,0 +1,73 @@
+"""What the caller says about a file, reconciled with what the file says."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rocking.errors import InvalidMotion
+from rocking.motion.formats.source import Source
+from rocking.motion.formats.units import CHOICES, Unit, choose_unit
+
+_SAME_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class Request:
+    """The arguments `dt` (s) and `units` of a read; None where the file should know."""
+
+    dt: float | None = None
+    unit: Unit | None = None
+
+    @classmethod
+    def checked(cls, dt: float | None, units: str | None) -> Request:
+        """Return the request.
+
+        Raises
+        ------
+        InvalidMotion
+            If `dt` is not a positive number.
+        UnreadableRecord
+            If the units are not known.
+        """
+        return cls(None if dt is None else _positive(dt), None if units is None else choose_unit(units))
+
+    def step(self, source: Source, stated: float, at: int | None) -> float:
+        """Return the step (s) that the file states at the offset `at`.
+
+        Raises
+        ------
+        UnreadableRecord
+            If it is not positive, or `dt` says otherwise.
+        """
+        # No file holds more samples than bytes, so this also bounds the record's length.
+        if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
+            raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
+        if self.dt is not None and not math.isclose(self.dt, stated, rel_tol=_SAME_STEP):
+            raise source.error(f"the sampling step is {stated:g} s, not dt = {self.dt:g} s; leave dt out", at)
+        return stated
+
+    def units(self, source: Source, stated: Unit | None, at: int | None) -> Unit:
+        """Return the unit that the file states at the offset `at`, or else the one asked for.
+
+        Raises
+        ------
+        UnreadableRecord
+            If there is neither, or the two differ.
+        """
+        unit = stated or self.unit
+        if unit is None:
+            raise source.error(f"the file does not say its units; give units= as one of {', '.join(CHOICES)}", at)
+        if self.unit is not None and unit != self.unit:
+            raise source.error(f"the units are {unit.name}, not units = {self.unit.name!r}; leave units out", at)
+        return unit
+
+
+def _positive(dt: float) -> float:
+    try:
+        step = float(dt)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidMotion(f"the sampling step dt must be a positive number of seconds, not {dt!r}") from error
+    if not (math.isfinite(step) and step > 0.0):
+        raise InvalidMotion(f"the sampling step dt must be a positive number of seconds, not {dt!r}")
+    return step

@@ -1,0 +1,159 @@
+"""A record file in memory: its text with line ends made uniform, its lines, and errors that name one of them."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+from rocking.errors import UnreadableRecord
+
+#: Largest file that is read, bytes; the longest strong-motion records are a hundred times smaller.
+SIZE_LIMIT = 512 * 2**20
+
+#: Header lines are decoded up to this length, so that a file without line ends costs no more than any other.
+LINE_LIMIT = 512
+
+_UTF8_MARK = b"\xef\xbb\xbf"
+_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_CONTROL = bytes(c for c in range(32) if c not in b"\t\n")
+_ENDS_OF_TEXT = b"\x00\x1a"
+_VISIBLE = re.compile(rb"\S")
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line: its text (cut at LINE_LIMIT), its offset in the file and that of the next line."""
+
+    text: str
+    start: int
+    next: int
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file's content.
+
+    Attributes
+    ----------
+    path : str
+        The file's name as the user gave it.
+    raw : bytes
+        The bytes as they are on disk, for binary formats.
+    data : bytes
+        The text: byte-order marks, form feeds and end-of-text bytes removed, lines ended by newlines.
+    """
+
+    path: str
+    raw: bytes
+    data: bytes
+
+    @property
+    def file(self) -> str:
+        """The file's name without its folder."""
+        return Path(self.path).name
+
+    @property
+    def stem(self) -> str:
+        """The file's name without folder and extension."""
+        return Path(self.path).stem
+
+    def line(self, start: int) -> Line:
+        """Return the line that starts at the offset `start`."""
+        end = self.data.find(b"\n", start)
+        end = len(self.data) if end < 0 else end
+        text = self.data[start : min(end, start + LINE_LIMIT)].decode("latin-1")
+        return Line(text.rstrip(), start, min(end + 1, len(self.data)))
+
+    def lines(self, start: int, count: int) -> list[Line]:
+        """Return up to `count` lines from the offset `start` on."""
+        found: list[Line] = []
+        while len(found) < count and start < len(self.data):
+            found.append(self.line(start))
+            start = found[-1].next
+        return found
+
+    def first_line(self, start: int = 0) -> Line | None:
+        """Return the first line from `start` on that is not blank, or None."""
+        found = _VISIBLE.search(self.data, start)
+        return None if found is None else self.line(self.data.rfind(b"\n", 0, found.start()) + 1)
+
+    def line_number(self, at: int) -> int:
+        """Return the number (from 1) of the line that holds the offset `at`."""
+        return self.data.count(b"\n", 0, at) + 1
+
+    def binary_at(self) -> int | None:
+        """Return the offset of the first byte that no text file holds, or None if this is text."""
+        cleaned = self.data.translate(None, _CONTROL)
+        if len(cleaned) == len(self.data):
+            return None
+        return min(position for position in map(self.data.find, _each(_CONTROL)) if position >= 0)
+
+    def error(self, message: str, at: int | None = None) -> UnreadableRecord:
+        """Return the error that says `message` about this file, at the line that holds the offset `at`."""
+        if at is None:
+            return UnreadableRecord(f"{self.path}: {message}")
+        return UnreadableRecord(f"{self.path}, line {self.line_number(at)}: {message}")
+
+
+def open_source(path: str | os.PathLike[str]) -> Source:
+    """Read a file whole.
+
+    Raises
+    ------
+    UnreadableRecord
+        If it is missing, not a regular file, not readable, empty or larger than SIZE_LIMIT.
+    """
+    name = _name(path)
+    try:
+        raw = _content(name)
+    except FileNotFoundError as error:
+        raise UnreadableRecord(f"{name}: there is no such file; check the name and the folder") from error
+    except PermissionError as error:
+        raise UnreadableRecord(f"{name}: this file may not be read; ask for permission to read it") from error
+    except (OSError, ValueError) as error:
+        raise UnreadableRecord(f"{name}: this file could not be read ({error}); check the name and the disk") from error
+    data = _text(raw)
+    if not data.strip():
+        raise UnreadableRecord(f"{name}: this file is empty; get the record again")
+    return Source(name, raw, data)
+
+
+def _name(path: str | os.PathLike[str]) -> str:
+    try:
+        return os.fsdecode(path)
+    except TypeError as error:
+        raise UnreadableRecord(f"the path of a record must be a file name, not {path!r}") from error
+
+
+def _content(name: str) -> bytes:
+    status = os.stat(name)  # noqa: PTH116 - Path() would turn an empty name into the current folder
+    if stat.S_ISDIR(status.st_mode):
+        raise UnreadableRecord(f"{name}: this is a folder; name one record file in it")
+    if not stat.S_ISREG(status.st_mode):
+        raise UnreadableRecord(f"{name}: this is not a regular file; copy the record into one")
+    with open(name, "rb") as file:  # noqa: PTH123
+        raw = file.read(SIZE_LIMIT + 1)
+    if len(raw) > SIZE_LIMIT:
+        limit = SIZE_LIMIT // 2**20
+        raise UnreadableRecord(f"{name}: this file is larger than {limit} MiB; cut the record into smaller files")
+    return raw
+
+
+def _text(raw: bytes) -> bytes:
+    data = raw
+    if data.startswith(_UTF16_MARKS):
+        data = data.decode("utf-16", "replace").encode("latin-1", "replace")
+    data = data.removeprefix(_UTF8_MARK)
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if b"\f" in data:
+        # At the start of a line a form feed is the printer's page break and takes no column.
+        data = data.removeprefix(b"\f").replace(b"\n\f", b"\n").replace(b"\f", b" ")
+    return data.rstrip(_ENDS_OF_TEXT)
+
+
+def _each(values: bytes) -> list[bytes]:
+    return [bytes([value]) for value in values]

@@ -1,0 +1,159 @@
+"""Plain text and CSV: one column of accelerations with dt=, or times and accelerations; units= in any case.
+
+Heading lines and comments (#, %, !, //) are passed over. The delimiter is a semicolon (a comma is then the decimal
+sign), a comma, or blanks. Exponents may be Fortran's (1.0D-3).
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from rocking.errors import UnreadableRecord
+from rocking.motion.formats.channel import Channel, to_acceleration
+from rocking.motion.formats.identification import Identification
+from rocking.motion.formats.request import Request
+from rocking.motion.formats.source import Line, Source
+from rocking.motion.formats.timing import even_step, first_fault
+from rocking.motion.formats.values import Floats, convert, not_a_number, parse
+
+NAME = "text table"
+
+_HEADING_LINES = 64
+_LINES_AT_ONCE = 50_000
+_COMMENT = re.compile(rb"[ \t]*(#|%|!|//)")
+
+#: Titles of other formats' tables, which ObsPy reads.
+_OTHER_TITLES = ("TIMESERIES ",)
+
+
+class _Shape(NamedTuple):
+    """How the rows are written, and where the first one starts."""
+
+    translation: bytes
+    delimiter: str
+    columns: int
+    start: int
+
+
+class _Row(NamedTuple):
+    tokens: list[bytes]
+    at: int
+
+
+def recognise(source: Source) -> Identification | None:
+    """Return the format if, after comments and headings, rows of one or two numbers begin."""
+    shape = _shape(source)
+    if shape is None or shape.columns > 2:
+        return None
+    what = "one number" if shape.columns == 1 else f"two numbers, between them {shape.delimiter}"
+    return Identification(NAME, f"from line {source.line_number(shape.start)} on each line holds {what}")
+
+
+def columns(source: Source) -> int | None:
+    """Return how many numbers the first row of what looks like a table holds, or None."""
+    shape = _shape(source)
+    return None if shape is None else shape.columns
+
+
+def read(source: Source, request: Request) -> list[Channel]:
+    """Return the one channel of the file.
+
+    Raises
+    ------
+    UnreadableRecord
+        If units are not given, or dt is not given for a single column, or a row is not like the first one, or
+        times do not increase.
+    """
+    shape = _shape(source)
+    assert shape is not None
+    if shape.columns == 1 and request.dt is None:
+        raise source.error("the file does not say its sampling step; give dt= in seconds", shape.start)
+    unit = request.units(source, None, shape.start)
+    values = _values(source, shape)
+    dt, times = request.dt, None
+    if shape.columns == 2:
+        dt, times = _timing(source, request, shape, values[0::2])
+        values = values[1::2]
+    acceleration = to_acceleration(source, shape.start, values, unit)
+    facts = {"format": NAME, "file": source.file}
+    return [Channel("acceleration", 1, acceleration, dt, times, units=unit.name, station=source.stem, metadata=facts)]
+
+
+def _shape(source: Source) -> _Shape | None:
+    for line in source.lines(0, _HEADING_LINES):
+        text = line.text.encode("latin-1")
+        if line.text.startswith(_OTHER_TITLES):
+            return None
+        translation, delimiter = _delimiter(line)
+        tokens = text.translate(translation).split()
+        if tokens and not _COMMENT.match(text) and all(parse(token) is not None for token in tokens):
+            return _Shape(translation, delimiter, len(tokens), line.start)
+    return None
+
+
+def _delimiter(line: Line) -> tuple[bytes, str]:
+    """Return what turns a row into blank-separated numbers that Python reads, and the delimiter's name."""
+    if ";" in line.text:
+        return bytes.maketrans(b"Dd,;", b"EE. "), "a semicolon"
+    if "," in line.text:
+        return bytes.maketrans(b"Dd,", b"EE "), "a comma"
+    return bytes.maketrans(b"Dd", b"EE"), "a blank"
+
+
+def _values(source: Source, shape: _Shape) -> Floats:
+    """Return all numbers, row by row."""
+    parts = []
+    for rows in _groups(_rows(source, shape)):
+        values = convert([token for row in rows for token in row.tokens])
+        if values is None or any(len(row.tokens) != shape.columns for row in rows):
+            raise _first_bad(source, rows, shape)
+        parts.append(values)
+    return np.concatenate(parts)
+
+
+def _rows(source: Source, shape: _Shape) -> Iterator[_Row]:
+    data, start = source.data, shape.start
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end
+        line = data[start:end]
+        tokens = line.translate(shape.translation).split()
+        if tokens and not _COMMENT.match(line):
+            yield _Row(tokens, start)
+        start = end + 1
+
+
+def _groups(rows: Iterator[_Row]) -> Iterator[list[_Row]]:
+    while group := list(itertools.islice(rows, _LINES_AT_ONCE)):
+        yield group
+
+
+def _first_bad(source: Source, rows: list[_Row], shape: _Shape) -> UnreadableRecord:
+    for row in rows:
+        for token in row.tokens:
+            number = parse(token)
+            if number is None or not np.isfinite(number):
+                return not_a_number(source, token, row.at)
+        if len(row.tokens) != shape.columns:
+            return source.error(
+                f"here are {len(row.tokens)} numbers, in the first row {shape.columns}; make all rows alike", row.at
+            )
+    raise AssertionError("among rows that do not convert one is bad")
+
+
+def _timing(source: Source, request: Request, shape: _Shape, times: Floats) -> tuple[float | None, Floats | None]:
+    fault = first_fault(times)
+    if fault is not None:
+        at = next(row.at for index, row in enumerate(_rows(source, shape)) if index == fault)
+        raise source.error("the time does not increase from the row before; mend the first column", at)
+    dt = even_step(times) if len(times) > 1 else None
+    if dt is not None:
+        return request.step(source, dt, shape.start), None
+    if request.dt is not None:
+        raise source.error(f"the times are not evenly {request.dt:g} s apart; leave dt out", shape.start)
+    return None, times

@@ -1,0 +1,120 @@
+"""Algebra of piecewise polynomials, vectorised over the pieces.
+
+Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, x counted from the piece's start.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def value(coefficients: Floats, x: Floats) -> Floats:
+    """Value of each polynomial (last axis of `coefficients`: powers) at `x`, by Horner's rule."""
+    result = coefficients[..., -1] + 0.0 * x
+    for j in range(coefficients.shape[-1] - 2, -1, -1):
+        result = result * x + coefficients[..., j]
+    return result
+
+
+def at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floats:
+    """Value at `time`, clipped to the span of the breakpoints; at a jump, the value after it."""
+    inside = np.clip(time, breakpoints[0], breakpoints[-1])
+    piece = np.minimum(np.searchsorted(breakpoints, inside, side="right"), len(coefficients)) - 1
+    return value(coefficients[piece], inside - breakpoints[piece])
+
+
+def linear(times: Floats, samples: Floats) -> Floats:
+    """Coefficients of the pieces that join the samples by straight lines."""
+    with np.errstate(over="ignore"):
+        return np.column_stack([samples[:-1], np.diff(samples) / np.diff(times)])
+
+
+def derivative(coefficients: Floats) -> Floats:
+    """Coefficients of the derivative of each piece."""
+    return coefficients[:, 1:] * np.arange(1.0, coefficients.shape[1])
+
+
+def antiderivative(widths: Floats, coefficients: Floats) -> Floats:
+    """Coefficients of the continuous antiderivative that starts at zero."""
+    powers = np.arange(1.0, coefficients.shape[1] + 1)
+    integral = np.hstack([np.zeros((len(coefficients), 1)), coefficients / powers])
+    integral[1:, 0] = np.cumsum(value(integral, widths))[:-1]
+    return integral
+
+
+def moved(coefficients: Floats, shift: Floats) -> Floats:
+    """Coefficients about ``x = shift`` of each piece (repeated synthetic division)."""
+    result = coefficients.copy()
+    last = result.shape[1] - 1
+    for i in range(last):
+        for j in range(last - 1, i - 1, -1):
+            result[:, j] += shift * result[:, j + 1]
+    return result
+
+
+def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: int) -> Floats:
+    """Coefficients on the pieces of `finer`, which has all the breakpoints and may end later (zero there)."""
+    piece = np.minimum(np.searchsorted(breakpoints, finer[:-1], side="right"), len(coefficients)) - 1
+    result = np.zeros((len(finer) - 1, columns))
+    result[:, : coefficients.shape[1]] = moved(coefficients[piece], finer[:-1] - breakpoints[piece])
+    result[finer[:-1] >= breakpoints[-1]] = 0.0
+    return result
+
+
+def root_candidates(widths: Floats, coefficients: Floats) -> Floats:
+    """Points of each piece among which are all its roots; shape (pieces, degree), sorted along each row.
+
+    A row is filled up with points that are not roots (ends of the piece, vertices, real parts): callers look
+    for extrema or split integrals there, where one point more does no harm.
+    """
+    degree = coefficients.shape[1] - 1
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        if degree == 1:
+            roots = -coefficients[:, :1] / coefficients[:, 1:]
+        elif degree == 2:
+            roots = _quadratic_roots(coefficients)
+        else:
+            roots = _numerical_roots(widths, coefficients)
+    roots = np.where(np.isfinite(roots), roots, 0.0)
+    return np.sort(np.clip(roots, 0.0, widths[:, np.newaxis]), axis=1)
+
+
+def _quadratic_roots(coefficients: Floats) -> Floats:
+    c, b, a = coefficients.T
+    q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
+    return np.column_stack([q / a, c / q])
+
+
+def _numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
+    degree = coefficients.shape[1] - 1
+    roots = np.zeros((len(coefficients), max(degree, 0)))
+    if degree < 1:
+        return roots
+    scaled = coefficients * widths[:, np.newaxis] ** np.arange(degree + 1.0)
+    for row, piece in zip(roots, scaled, strict=True):
+        found = _polynomial_roots(piece)
+        row[: len(found)] = found
+    return roots * widths[:, np.newaxis]
+
+
+def _polynomial_roots(piece: Floats) -> Floats:
+    # A leading coefficient far below rounding would put roots at infinity and spoil the others.
+    significant = np.flatnonzero(np.abs(piece) > 1e-18 * np.max(np.abs(piece)))
+    if len(significant) == 0:
+        return np.zeros(0)
+    found: Floats = np.polynomial.polynomial.polyroots(piece[: significant[-1] + 1]).real
+    return found
+
+
+def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
+    """Largest absolute value over all pieces, at their ends or at their interior extrema."""
+    best = max(float(np.max(np.abs(coefficients[:, 0]))), float(np.max(np.abs(value(coefficients, widths)))))
+    if coefficients.shape[1] <= 2:
+        return best
+    may_exceed = value(np.abs(coefficients), widths) > best
+    if not np.any(may_exceed):
+        return best
+    pieces, spans = coefficients[may_exceed], widths[may_exceed]
+    extrema = root_candidates(spans, derivative(pieces))
+    return max(best, float(np.max(np.abs(value(pieces[:, np.newaxis, :], extrema)))))

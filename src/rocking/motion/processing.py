@@ -1,0 +1,120 @@
+"""Processing of a ground motion: trim, baseline, band-pass, resample; each returns a new motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from rocking.errors import InvalidMotion
+from rocking.motion import piecewise
+from rocking.motion.checks import finite, positive
+from rocking.motion.piecewise import Floats
+
+if TYPE_CHECKING:
+    from rocking.motion.motion import Motion
+
+_MOST_SAMPLES: Final = 50_000_000
+
+
+def trim(motion: Motion, start: float, end: float) -> Motion:
+    """Keep the part from `start` to `end` (s); even samples are cut at the nearest sample."""
+    first, last = finite(start, "start of the part to keep"), finite(end, "end of the part to keep")
+    if not 0.0 <= first < last <= motion.duration * (1.0 + 1e-12):
+        raise InvalidMotion(
+            f"trim needs 0 <= start < end <= {motion.duration:.6g} s, the motion's duration, "
+            f"not {first:.6g} and {last:.6g}"
+        )
+    if motion.step is not None:
+        return _trimmed_samples(motion, motion.step, round(first / motion.step), round(last / motion.step))
+    breakpoints = motion.breakpoints
+    inside = breakpoints[(breakpoints > first) & (breakpoints < last)]
+    kept = np.concatenate([[first], inside, [min(last, motion.duration)]])
+    coefficients = piecewise.refined(breakpoints, motion.coefficients, kept, motion.coefficients.shape[1])
+    changed = replace(motion, breakpoints=kept - first, coefficients=coefficients)
+    return _noted(changed, f"trimmed to {first:.6g}-{last:.6g} s")
+
+
+def _trimmed_samples(motion: Motion, step: float, first: int, last: int) -> Motion:
+    if last <= first:
+        raise InvalidMotion(f"trim must keep at least two samples, {step:.6g} s apart")
+    samples = motion.samples[1][first : last + 1]
+    return _noted(_with_samples(motion, samples, step), f"trimmed to {first * step:.6g}-{last * step:.6g} s")
+
+
+def baseline(motion: Motion, degree: int) -> Motion:
+    """Subtract the polynomial of the given degree that fits the samples best (least squares)."""
+    step = _step(motion, "baseline")
+    times, samples = motion.samples
+    if not isinstance(degree, int) or not 0 <= degree <= 10 or degree >= len(samples):
+        raise InvalidMotion(f"the degree of a baseline must be a whole number from 0 to 10, not {degree}")
+    fitted = np.polynomial.Legendre.fit(times, samples, degree)(times)
+    return _noted(_with_samples(motion, samples - fitted, step), f"baseline of degree {degree} removed")
+
+
+def band_pass(motion: Motion, low: float | None, high: float | None, *, order: int) -> Motion:
+    """Filter with a Butterworth band-pass, forwards and backwards, zeros added at both ends meanwhile.
+
+    The zeros last ``1.5 order / low`` on each side (Converse and Brady 1992); without `low`, ``1.5 order /
+    high``.
+    """
+    from scipy import signal  # half a second: loaded only where it is used
+
+    step = _step(motion, "band_pass")
+    corners = _corners(motion, low, high)
+    if not isinstance(order, int) or not 1 <= order <= 12:
+        raise InvalidMotion(f"the order of a filter must be a whole number from 1 to 12, not {order}")
+    kind: Final = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
+    at = corners if kind == "bandpass" else corners[0]
+    sections = signal.butter(order, at, btype=kind, output="sos", fs=1.0 / step)
+    pad = math.ceil(1.5 * order / corners[0] / step)
+    padded = np.pad(motion.samples[1], pad)
+    filtered: Floats = signal.sosfiltfilt(sections, padded, padtype=None)[pad:-pad]
+    span = f"{'0' if low is None else f'{low:.6g}'}-{'inf' if high is None else f'{high:.6g}'} Hz"
+    return _noted(_with_samples(motion, filtered, step), f"band-passed {span}, order {order} forwards and backwards")
+
+
+def _corners(motion: Motion, low: float | None, high: float | None) -> list[float]:
+    corners = [positive(corner, "corner frequency", "Hz") for corner in (low, high) if corner is not None]
+    nyquist = 0.5 / _step(motion, "band_pass")
+    if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
+        raise InvalidMotion(
+            f"band_pass needs (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; "
+            "one of them may be None"
+        )
+    if corners[0] * motion.duration < 0.1:
+        raise InvalidMotion(
+            f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {motion.duration:.6g} s"
+        )
+    return corners
+
+
+def resample(motion: Motion, step: float) -> Motion:
+    """Take the motion's values at the multiples of `step` (s) up to its end, joined by straight lines."""
+    new = positive(step, "new sampling step", "seconds")
+    count = math.floor(motion.duration / new * (1.0 + 1e-12)) + 1
+    if not 2 <= count <= _MOST_SAMPLES:
+        raise InvalidMotion(
+            f"a step of {new:.6g} s gives {count} samples of a motion of {motion.duration:.6g} s: "
+            f"it needs from 2 to {_MOST_SAMPLES}"
+        )
+    times = np.minimum(new * np.arange(count), motion.duration)
+    return _noted(_with_samples(motion, motion.acceleration(times), new), f"resampled to a step of {new:.6g} s")
+
+
+def _step(motion: Motion, what: str) -> float:
+    if motion.step is None:
+        raise InvalidMotion(f"{what} needs even samples: call processed(resample=...) on {motion.name} first")
+    return motion.step
+
+
+def _with_samples(motion: Motion, samples: Floats, step: float) -> Motion:
+    times = np.arange(len(samples), dtype=np.float64) * step
+    # The samples are the motion from here on: whatever they approximate, the lines between them are exact.
+    return replace(motion, breakpoints=times, coefficients=piecewise.linear(times, samples), error=0.0, step=step)
+
+
+def _noted(motion: Motion, what: str) -> Motion:
+    return replace(motion, description=motion.description.changed("processed"), history=(*motion.history, what))

@@ -1,0 +1,532 @@
+"""Analytic ground motions: sines, lobes, Ricker and Mavroeidis-Papageorgiou pulses, rectangles and triangles.
+
+Each is a `Motion` whose pieces approximate the formula to 1e-15 of the largest acceleration (`Motion.error`);
+rectangles and triangles are exact. Pulses start at time 0, are zero after their end, and are added with
+``+``.
+
+All others are sums of sines or derivatives of a Gaussian, whose Taylor series are known: each piece is the
+series about its middle, moved to its start. The pieces are so short that the first term left out is below
+1e-16 of the peak.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.errors import InvalidMotion
+from rocking.motion import piecewise
+from rocking.motion.checks import finite, positive
+from rocking.motion.motion import Description, Motion
+from rocking.motion.piecewise import Floats
+
+# Relative to the peak; covers the terms left out and the rounding of the coefficients.
+_ERROR: Final = 1e-15
+_MOST_CYCLES: Final = 100_000
+
+# A sine: half a piece is pi/8 = 0.39 rad, and 0.39**14 / 14! = 2.4e-17.
+_PIECES_PER_CYCLE: Final = 8
+_SINE_DEGREE: Final = 13
+
+# A Ricker pulse, in standard deviations of its Gaussian: by Cramer's inequality (|He_n(x)| exp(-x^2/4) is at
+# most 1.09 sqrt(n!)) the first term left out is below 6 e-17 of the peak.
+_RICKER_PIECE: Final = 0.4
+_RICKER_DEGREE: Final = 15
+# Where the pulses fall below 1e-16 of their peak.
+_SYMMETRIC_REACH: Final = 9.1
+_ANTISYMMETRIC_REACH: Final = 9.3
+
+
+class _Angle(NamedTuple):
+    """Angles by their sines and cosines."""
+
+    sine: Floats
+    cosine: Floats
+
+
+def sine(amplitude: float, frequency: float, *, cycles: float, phase: float = 0.0) -> Motion:
+    """Return ``amplitude * sin(2 pi frequency t + phase)`` over a number of cycles.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    frequency : float
+        Hz.
+    cycles : float
+        Duration times frequency; need not be whole.
+    phase : float
+        rad.
+
+    Raises
+    ------
+    InvalidMotion
+        If `frequency` or `cycles` is not positive, there are more than 100,000 cycles, or a number is not
+        finite.
+
+    Examples
+    --------
+    >>> motion = sine(3.0, 2.0, cycles=5)
+    >>> motion.duration, round(motion.pga, 12), round(motion.acceleration(0.0625), 9)
+    (2.5, 3.0, 2.121320344)
+    """
+    return _sine("sine", amplitude, frequency, cycles, phase)
+
+
+def half_sine(amplitude: float, frequency: float) -> Motion:
+    """Return one lobe, ``amplitude * sin(2 pi frequency t)`` for half a cycle.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    frequency : float
+        Hz, of the whole sine: the pulse lasts ``1 / (2 frequency)``.
+
+    Raises
+    ------
+    InvalidMotion
+        As `sine`.
+
+    Examples
+    --------
+    >>> round(half_sine(2.0, 0.5).pgv * math.pi, 12)
+    4.0
+    """
+    return _sine("half sine", amplitude, frequency, 0.5, 0.0)
+
+
+def one_sine(amplitude: float, frequency: float) -> Motion:
+    """Return a one-sine acceleration pulse (Zhang and Makris 2001): one cycle of a sine.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    frequency : float
+        Hz.
+
+    Raises
+    ------
+    InvalidMotion
+        As `sine`.
+
+    Examples
+    --------
+    >>> abs(one_sine(2.0, 0.5).velocity(2.0)) < 1e-15
+    True
+    """
+    return _sine("one-sine", amplitude, frequency, 1.0, 0.0)
+
+
+def one_cosine(amplitude: float, frequency: float) -> Motion:
+    """Return a one-cosine acceleration pulse (Zhang and Makris 2001): one cycle of a cosine, jumps included.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    frequency : float
+        Hz.
+
+    Raises
+    ------
+    InvalidMotion
+        As `sine`.
+
+    Examples
+    --------
+    >>> round(one_cosine(2.0, 0.5).acceleration(0.0), 12)
+    2.0
+    """
+    return _sine("one-cosine", amplitude, frequency, 1.0, 0.5 * math.pi)
+
+
+def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int | None = None) -> Motion:
+    """Return half cycles of a sine, each with its own amplitude.
+
+    Lobe k (k = 0, 1, ...) is ``amplitude[k] * sin(2 pi frequency t)`` for ``k <= 2 frequency t <= k + 1``, so
+    equal amplitudes make a sine.
+
+    Parameters
+    ----------
+    amplitude : float or sequence of float
+        m/s^2; one for all lobes (then give `lobes`), or one for each.
+    frequency : float
+        Hz, of the sine: a lobe lasts ``1 / (2 frequency)``.
+    lobes : int, optional
+        Number of lobes, if `amplitude` is one number.
+
+    Raises
+    ------
+    InvalidMotion
+        If there is no lobe, `lobes` contradicts the amplitudes, or a number is not usable.
+
+    Examples
+    --------
+    >>> motion = n_lobe([1.0, 3.0, 2.0], 0.5)
+    >>> motion.acceleration([0.5, 1.5, 2.5]).round(12)
+    array([ 1., -3.,  2.])
+    """
+    amplitudes = _lobe_amplitudes(amplitude, lobes)
+    frequency = _checked_frequency(frequency)
+    per_lobe = _PIECES_PER_CYCLE // 2
+    breakpoints = np.arange(len(amplitudes) * per_lobe + 1.0) / (_PIECES_PER_CYCLE * frequency)
+    unit = _sine_pieces(breakpoints, frequency, 0.0)
+    one = np.ndim(amplitude) == 0
+    numbers = {"amplitude" if one else f"amplitude_{k}": a for k, a in enumerate(amplitudes)}
+    return Motion(
+        breakpoints,
+        unit * np.repeat(amplitudes, per_lobe)[:, np.newaxis],
+        name=f"{len(amplitudes)} lobes",
+        description=Description(
+            "n-lobe",
+            numbers | {"frequency": frequency, "lobes": len(amplitudes)},
+            "amplitude sin(2 pi frequency t), an amplitude for each half cycle",
+        ),
+        error=_ERROR * max(map(abs, amplitudes)),
+    )
+
+
+def ricker(
+    amplitude: float,
+    frequency: float,
+    *,
+    kind: Literal["symmetric", "antisymmetric"] = "symmetric",
+    duration: float | None = None,
+) -> Motion:
+    """Return a symmetric or antisymmetric Ricker pulse (Vassiliou and Makris 2011).
+
+    With t counted from the middle of the motion and f the frequency, the symmetric pulse is
+    ``amplitude (1 - x^2) exp(-x^2 / 2)``, ``x = sqrt(2) pi f t``, and the antisymmetric one
+    ``(amplitude / beta) (x^2 - 3) x exp(-x^2 / 2)``, ``x = 2 pi f t / sqrt(3)``, where beta = 1.3801... makes
+    its peak (before the middle) equal to `amplitude`.
+
+    Parameters
+    ----------
+    amplitude : float
+        Peak acceleration, m/s^2.
+    frequency : float
+        Dominant frequency 1/T_p, Hz.
+    kind : {"symmetric", "antisymmetric"}
+        Second or third derivative of a Gaussian.
+    duration : float, optional
+        Length of the motion, s, if the pulse is to be cut on both sides before it falls below 1e-16 of its
+        peak.
+
+    Raises
+    ------
+    InvalidMotion
+        If a number is not finite, `frequency` or `duration` is not positive, `duration` is longer than the
+        pulse, or `kind` is neither.
+
+    References
+    ----------
+    Vassiliou, M. F. and Makris, N. (2011). Estimating time scales and length scales in pulselike earthquake
+    acceleration records with wavelet analysis. Bulletin of the Seismological Society of America 101(2),
+    596-618.
+
+    Examples
+    --------
+    >>> pulse = ricker(2.0, 1.0, kind="antisymmetric")
+    >>> round(pulse.pga, 12), abs(pulse.velocity(pulse.duration)) < 1e-15
+    (2.0, True)
+    """
+    amplitude, frequency = finite(amplitude, "amplitude"), _checked_frequency(frequency)
+    if kind not in ("symmetric", "antisymmetric"):
+        raise InvalidMotion(f'the kind of a Ricker pulse must be "symmetric" or "antisymmetric", not {kind!r}')
+    symmetric = kind == "symmetric"
+    rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
+    longest = 2.0 * (_SYMMETRIC_REACH if symmetric else _ANTISYMMETRIC_REACH) / rate
+    length = longest if duration is None else positive(duration, "duration", "seconds")
+    if length > longest:
+        raise InvalidMotion(f"a Ricker pulse of {frequency:.6g} Hz lasts only {longest:.6g} s: give no longer duration")
+    breakpoints = np.linspace(0.0, length, _whole_pieces(rate * length / _RICKER_PIECE))
+    series = -_gaussian_derivative(2 if symmetric else 3, _middles(breakpoints) - 0.5 * length, rate)
+    peak = 1.0 if symmetric else _antisymmetric_peak()
+    formula = (
+        "amplitude (1 - x^2) exp(-x^2/2), x = sqrt(2) pi frequency (t - duration/2)"
+        if symmetric
+        else "(amplitude/1.3801) (x^2 - 3) x exp(-x^2/2), x = 2 pi frequency (t - duration/2)/sqrt(3)"
+    )
+    parameters = {"amplitude": amplitude, "frequency": frequency, "duration": length}
+    return Motion(
+        breakpoints,
+        _about_starts(breakpoints, series * (amplitude / peak)),
+        name=f"{kind} Ricker",
+        description=Description(f"{kind} Ricker", parameters, formula),
+        error=_ERROR * abs(amplitude),
+    )
+
+
+def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float, gamma: float) -> Motion:
+    """Return the near-fault pulse of Mavroeidis and Papageorgiou (2003).
+
+    Its ground velocity is ``v(t) = (amplitude / 2) [1 + cos(2 pi f s / gamma)] cos(2 pi f s + phase)``, with
+    f the frequency and ``s = t - gamma / (2 f)`` counted from the middle; the motion is its derivative::
+
+        -(amplitude pi f / gamma) [ sin(2 pi f s / gamma) cos(2 pi f s + phase)
+                                    + gamma sin(2 pi f s + phase) (1 + cos(2 pi f s / gamma)) ].
+
+    Note that `amplitude` is a velocity; use ``.scaled(pga=...)`` for a given acceleration. The
+    motion starts from rest, so its velocity equals v(t), which is zero at both ends.
+
+    Parameters
+    ----------
+    amplitude : float
+        Amplitude A of the velocity pulse, m/s.
+    frequency : float
+        Prevailing frequency f_p, Hz.
+    phase : float
+        Phase nu, rad: 0 gives a symmetric and pi/2 an antisymmetric velocity pulse.
+    gamma : float
+        Oscillatory character, at least 1: the motion lasts ``gamma / frequency``.
+
+    Raises
+    ------
+    InvalidMotion
+        If a number is not finite, `frequency` is not positive, or `gamma` is not from 1 to 100,000.
+
+    References
+    ----------
+    Mavroeidis, G. P. and Papageorgiou, A. S. (2003). A mathematical representation of near-fault ground
+    motions. Bulletin of the Seismological Society of America 93(3), 1099-1131, Eqs 3 and 4.
+
+    Examples
+    --------
+    >>> pulse = mavroeidis_papageorgiou(0.8, 0.5, phase=0.0, gamma=2.0)
+    >>> pulse.duration, round(pulse.pgv, 12)
+    (4.0, 0.8)
+    """
+    amplitude, phase = finite(amplitude, "amplitude"), finite(phase, "phase")
+    frequency, gamma = _checked_frequency(frequency), positive(gamma, "gamma", "cycles")
+    if not 1.0 <= gamma <= _MOST_CYCLES:
+        raise InvalidMotion(f"gamma of a Mavroeidis-Papageorgiou pulse must be from 1 to {_MOST_CYCLES}, not {gamma}")
+    breakpoints = np.linspace(0.0, gamma / frequency, _whole_pieces(_PIECES_PER_CYCLE * (gamma + 1.0)))
+    turns, rest = _exact_product(frequency, _middles(breakpoints))
+    carrier = _sine_and_cosine(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)
+    quotient, quotient_rest = _exact_quotient(turns, rest, gamma)
+    envelope = _sine_and_cosine(quotient, quotient_rest - 0.5, 0.0)
+    # The product of cosines is a sum of three; they have a half, a quarter and a quarter of the amplitude.
+    rate, shift = 2.0 * math.pi * frequency, 1.0 / gamma
+    series = (
+        0.5 * _sine_series(carrier, rate)
+        + 0.25 * (1.0 + shift) * _sine_series(_sum_of_angles(carrier, envelope, 1.0), rate * (1.0 + shift))
+        + 0.25 * (1.0 - shift) * _sine_series(_sum_of_angles(carrier, envelope, -1.0), rate * (1.0 - shift))
+    )
+    peak = rate * amplitude
+    return Motion(
+        breakpoints,
+        _about_starts(breakpoints, -peak * series),
+        name="Mavroeidis-Papageorgiou",
+        description=Description(
+            "Mavroeidis-Papageorgiou",
+            {"amplitude": amplitude, "frequency": frequency, "phase": phase, "gamma": gamma},
+            "derivative of amplitude/2 [1 + cos(2 pi frequency s/gamma)] cos(2 pi frequency s + phase), "
+            "s = t - gamma/(2 frequency); amplitude is a velocity, m/s",
+        ),
+        error=_ERROR * abs(peak),
+    )
+
+
+def rectangular(amplitude: float, duration: float) -> Motion:
+    """Return a constant acceleration; exact.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    duration : float
+        s.
+
+    Raises
+    ------
+    InvalidMotion
+        If `amplitude` is not finite or `duration` is not positive.
+
+    Examples
+    --------
+    >>> rectangular(2.0, 0.5).pgv
+    1.0
+    """
+    amplitude, duration = finite(amplitude, "amplitude"), positive(duration, "duration", "seconds")
+    return Motion(
+        np.array([0.0, duration]),
+        np.array([[amplitude]]),
+        name="rectangular",
+        description=Description("rectangular", {"amplitude": amplitude, "duration": duration}, "constant"),
+    )
+
+
+def triangular(amplitude: float, duration: float) -> Motion:
+    """Return an acceleration that rises linearly to its amplitude and falls to zero in equal times; exact.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    duration : float
+        s.
+
+    Raises
+    ------
+    InvalidMotion
+        If `amplitude` is not finite or `duration` is not positive.
+
+    Examples
+    --------
+    >>> triangular(2.0, 0.5).pgv
+    0.5
+    """
+    amplitude, duration = finite(amplitude, "amplitude"), positive(duration, "duration", "seconds")
+    return Motion.from_points(
+        [0.0, 0.5 * duration, duration],
+        [0.0, amplitude, 0.0],
+        name="triangular",
+        description=Description(
+            "triangular",
+            {"amplitude": amplitude, "duration": duration},
+            "linear from 0 to amplitude at duration/2 and back to 0",
+        ),
+    )
+
+
+def _sine(family: str, amplitude: float, frequency: float, cycles: float, phase: float) -> Motion:
+    amplitude, phase = finite(amplitude, "amplitude"), finite(phase, "phase")
+    frequency, cycles = _checked_frequency(frequency), positive(cycles, "number of cycles", "cycles")
+    if cycles > _MOST_CYCLES:
+        raise InvalidMotion(f"a sine may have at most {_MOST_CYCLES} cycles, not {cycles:g}")
+    breakpoints = np.linspace(0.0, cycles / frequency, _whole_pieces(_PIECES_PER_CYCLE * cycles))
+    return Motion(
+        breakpoints,
+        amplitude * _sine_pieces(breakpoints, frequency, phase),
+        name=family,
+        description=Description(
+            family,
+            {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase},
+            "amplitude sin(2 pi frequency t + phase) over the given cycles",
+        ),
+        error=_ERROR * abs(amplitude),
+    )
+
+
+def _checked_frequency(frequency: float) -> float:
+    checked = positive(frequency, "frequency", "Hz")
+    if not 1e-12 <= checked <= 1e12:
+        raise InvalidMotion(f"the frequency of a pulse must be from 1e-12 to 1e12 Hz, not {frequency!r}")
+    return checked
+
+
+def _whole_pieces(pieces: float) -> int:
+    """Return the number of breakpoints of at least so many equal pieces."""
+    return math.ceil(pieces - 1e-9) + 1
+
+
+def _lobe_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> list[float]:
+    if np.ndim(amplitude) > 1:
+        raise InvalidMotion("the amplitudes of the lobes must be one number or a flat sequence of numbers")
+    given = [finite(a, "amplitude of a lobe") for a in np.atleast_1d(np.asarray(amplitude, dtype=object))]
+    if np.ndim(amplitude) == 0 and lobes is not None:
+        if not isinstance(lobes, int) or not 1 <= lobes <= 2 * _MOST_CYCLES:
+            raise InvalidMotion(
+                f"the number of lobes must be a whole number from 1 to {2 * _MOST_CYCLES}, not {lobes!r}"
+            )
+        return given * lobes
+    if np.ndim(amplitude) == 0 or not given or lobes not in (None, len(given)):
+        raise InvalidMotion(
+            "give one amplitude and the number of lobes, or a sequence with one amplitude for each lobe"
+        )
+    return given
+
+
+def _middles(breakpoints: Floats) -> Floats:
+    return breakpoints[:-1] + 0.5 * np.diff(breakpoints)
+
+
+def _about_starts(breakpoints: Floats, about_middles: Floats) -> Floats:
+    return piecewise.moved(about_middles, breakpoints[:-1] - _middles(breakpoints))
+
+
+def _sine_pieces(breakpoints: Floats, frequency: float, phase: float) -> Floats:
+    turns, rest = _exact_product(frequency, _middles(breakpoints))
+    angle = _sine_and_cosine(turns, rest, phase)
+    return _about_starts(breakpoints, _sine_series(angle, 2.0 * math.pi * frequency))
+
+
+def _sine_series(angle: _Angle, rate: float) -> Floats:
+    """Taylor coefficients of ``sin(angle + rate t)`` about ``t = 0``; shape (angles, degree + 1)."""
+    powers = np.arange(_SINE_DEGREE + 1)
+    derivatives = np.column_stack([angle.sine, angle.cosine, -angle.sine, -angle.cosine])[:, powers % 4]
+    return derivatives * _scaled_powers(rate, powers)
+
+
+def _sine_and_cosine(turns: Floats, rest: Floats, phase: float) -> _Angle:
+    """Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle.
+
+    Whole quarter turns are taken off exactly, and the phase is added by the addition theorem.
+    """
+    within = (turns - np.rint(turns)) + rest
+    quarter = np.rint(4.0 * within)
+    angle = 2.0 * np.pi * (within - 0.25 * quarter)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    quadrant = quarter.astype(int) % 4
+    turned = _Angle(
+        np.choose(quadrant, [sine, cosine, -sine, -cosine]),
+        np.choose(quadrant, [cosine, -sine, -cosine, sine]),
+    )
+    return _sum_of_angles(turned, _Angle(np.sin(phase), np.cos(phase)), 1.0)
+
+
+def _sum_of_angles(one: _Angle, other: _Angle, sign: float) -> _Angle:
+    return _Angle(
+        one.sine * other.cosine + sign * one.cosine * other.sine,
+        one.cosine * other.cosine - sign * one.sine * other.sine,
+    )
+
+
+def _gaussian_derivative(order: int, times: Floats, rate: float) -> Floats:
+    """Taylor coefficients in t of the derivative in x of ``exp(-x^2 / 2)``, ``x = rate t``, about each time.
+
+    The n-th derivative of the Gaussian is ``(-1)^n He_n(x) exp(-x^2 / 2)``, He_n Hermite's polynomials.
+    """
+    x = rate * times
+    hermite = [np.ones_like(x), x]
+    for n in range(1, order + _RICKER_DEGREE):
+        hermite.append(x * hermite[n] - n * hermite[n - 1])
+    powers = np.arange(_RICKER_DEGREE + 1)
+    derivatives = np.column_stack(hermite[order:]) * np.exp(-0.5 * x * x)[:, np.newaxis]
+    return (-1.0) ** (order + powers) * derivatives * _scaled_powers(rate, powers)
+
+
+def _scaled_powers(rate: float, powers: NDArray[np.int_]) -> Floats:
+    """Return ``rate**n / n!``."""
+    return rate ** powers.astype(np.float64) / np.array([math.factorial(n) for n in powers], dtype=np.float64)
+
+
+def _antisymmetric_peak() -> float:
+    """Largest value of ``(x^2 - 3) x exp(-x^2 / 2)``, which is stationary where ``x^4 - 6 x^2 + 3 = 0``."""
+    squared = 3.0 - math.sqrt(6.0)
+    return (3.0 - squared) * math.sqrt(squared) * math.exp(-0.5 * squared)
+
+
+def _exact_product(a: float, b: Floats) -> tuple[Floats, Floats]:
+    """Product and its rounding error (Dekker 1971)."""
+    product = a * b
+    a_high, a_low = _halves(np.asarray(a))
+    b_high, b_low = _halves(b)
+    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+def _exact_quotient(a: Floats, rest: Floats, divisor: float) -> tuple[Floats, Floats]:
+    """Quotient of ``a + rest``, and what it lacks."""
+    quotient = a / divisor
+    product, error = _exact_product(divisor, quotient)
+    return quotient, ((a - product) - error + rest) / divisor
+
+
+def _halves(a: Floats) -> tuple[Floats, Floats]:
+    scaled = 134217729.0 * a
+    high = scaled - (scaled - a)
+    return high, a - high

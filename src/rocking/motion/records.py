@@ -1,0 +1,140 @@
+"""Strong-motion records that ship with the package, and are read without a network.
+
+Every channel of three stations: China Lake and Tower 2 in the 2019 Ridgecrest earthquake (M 7.1), and the
+free field of the Meloland overpass in El Centro in the 1979 Imperial Valley earthquake, whose 270 degree
+channel has a near-fault pulse. The values are exactly those published.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from dataclasses import dataclass
+from importlib import resources
+from importlib.resources.abc import Traversable
+from typing import Any
+
+import numpy as np
+
+from rocking.errors import UnreadableRecord
+from rocking.motion.formats.units import choose_unit
+from rocking.motion.motion import Description, Motion
+
+
+@dataclass(frozen=True)
+class Record:
+    """What is known of a shipped record.
+
+    Attributes
+    ----------
+    name : str
+        Name that `load` takes.
+    event, station : str
+        Earthquake and place.
+    direction : str
+        Degrees clockwise from north that positive acceleration points to, or "up".
+    state : str
+        Whether it was corrected, and how.
+    step : float
+        Sampling step, s.
+    samples : int
+        Number of samples.
+    units : str
+        Unit of the published numbers; `load` converts to m/s^2.
+    denominator : int
+        Published numbers are whole multiples of one over this.
+    source, terms : str
+        Who recorded and processed it, and terms of use.
+    """
+
+    name: str
+    archive: str
+    event: str
+    station: str
+    direction: str
+    state: str
+    step: float
+    samples: int
+    units: str
+    denominator: int
+    source: str
+    terms: str
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of the shipped records.
+
+    Examples
+    --------
+    >>> names()[:3]
+    ('ridgecrest-clc-090', 'ridgecrest-clc-360', 'ridgecrest-clc-up')
+    """
+    return tuple(_catalogue())
+
+
+def info(name: str) -> Record:
+    """Return what is known of a shipped record: event, station, direction, step, source and terms.
+
+    Raises
+    ------
+    UnreadableRecord
+        If no record has that name.
+
+    Examples
+    --------
+    >>> record = info("ridgecrest-clc-090")
+    >>> record.step, record.samples, record.units, record.terms
+    (0.01, 31932, 'g', 'CC0 1.0')
+    """
+    catalogue = _catalogue()
+    if name not in catalogue:
+        close = difflib.get_close_matches(str(name), catalogue, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(catalogue)}"
+        raise UnreadableRecord(f"no shipped record is named {name!r}: {hint}")
+    return Record(name=name, **catalogue[name])
+
+
+def load(name: str) -> Motion:
+    """Return a shipped record as a motion, linear between samples, values as published and in m/s^2.
+
+    The Ridgecrest records are uncorrected: a small constant offset of the instrument is still in them, which
+    does not matter to a rocking block but makes velocity and displacement drift. To remove it::
+
+        rocking.records.load("ridgecrest-clc-090").processed(baseline=0, band_pass=(0.05, None))
+
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+
+    Raises
+    ------
+    UnreadableRecord
+        If no record has that name.
+
+    Examples
+    --------
+    >>> motion = load("ridgecrest-clc-090")
+    >>> print(f"{motion.duration:.2f} s, {motion.pga / 9.80665:.3f} g")
+    319.31 s, 0.344 g
+    """
+    record = info(name)
+    with (_folder() / record.archive).open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        differences = archive[record.direction].astype(np.int64)
+    published = np.cumsum(np.cumsum(differences)) / record.denominator
+    facts = (record.event, record.station, f"direction {record.direction}", record.state, record.source)
+    return Motion.from_samples(
+        choose_unit(record.units).to_si(published),
+        record.step,
+        name=name,
+        description=Description("record", text=f"{'; '.join(facts)}; terms: {record.terms}"),
+    )
+
+
+def _catalogue() -> dict[str, dict[str, Any]]:
+    catalogue: dict[str, dict[str, Any]] = json.loads((_folder() / "catalogue.json").read_text("utf-8"))
+    return catalogue
+
+
+def _folder() -> Traversable:
+    return resources.files("rocking.motion") / "data"

@@ -1,0 +1,91 @@
+"""The documentation keeps its word: examples run, names exist, pages load nothing from the network."""
+
+import doctest
+import re
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import rocking
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+EXAMPLE = re.compile(r"^```pycon\n(.*?)^```", re.DOTALL | re.MULTILINE)
+PAGES_WITH_EXAMPLES = [page for page in PAGES if EXAMPLE.search(page.read_text("utf-8"))]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+
+
+def normalised(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+@pytest.mark.parametrize("page", PAGES_WITH_EXAMPLES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_the_examples_of_a_page_run_and_print_what_it_says(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = page.read_text("utf-8")
+    examples, end = "", 0
+    for match in EXAMPLE.finditer(text):
+        # Lines of text become blank lines, so that a failure is reported with its line on the page.
+        examples += "\n" * text.count("\n", end, match.start(1)) + match[1]
+        end = match.end(1)
+    test = doctest.DocTestParser().get_doctest(examples, {}, page.name, str(page), 0)
+    assert test.examples
+    report = []
+    results = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(test, out=report.append)
+    assert results.failed == 0, "".join(report)
+
+
+def test_every_public_name_is_in_the_reference():
+    reference = (ROOT / "docs" / "api" / "index.md").read_text("utf-8")
+    names = set(re.findall(r"^ {0,4}(?:rocking\.)?([\w.]+)$", reference, re.MULTILINE))
+    assert set(rocking.__all__) - {"__version__"} <= names
+
+
+def test_every_command_that_the_pages_name_exists():
+    makefile = (ROOT / "Makefile").read_text("utf-8")
+    targets = set(re.findall(r"^([a-z]+):", makefile, re.MULTILINE))
+    for page in [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "ARCHITECTURE.md", ROOT / ".ci" / "run"]:
+        named = set(re.findall(r"(?:`|\$ )make ([a-z]+)", page.read_text("utf-8")))
+        assert named <= targets, page
+
+
+def test_every_dependency_is_pinned_by_its_version_alone():
+    lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
+    pins = [line for line in lines if not line.startswith("#")]
+    assert all(re.fullmatch(r"[\w.-]+==[\w.]+", pin) for pin in pins)
+    wanted = list(PROJECT["dependencies"])
+    for extra in PROJECT["optional-dependencies"].values():
+        wanted += extra
+    names = {normalised(re.match(r"[\w.-]+", requirement)[0]) for requirement in wanted}
+    assert names <= {normalised(pin.partition("==")[0]) for pin in pins}
+
+
+def test_all_places_state_the_same_version():
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"version: {rocking.__version__}\n" in citation
+    assert PROJECT["version"] == rocking.__version__
+
+
+@pytest.mark.filterwarnings("default")
+def test_pages_load_nothing_from_the_network(tmp_path):
+    build = pytest.importorskip("sphinx.cmd.build")
+    source = tmp_path / "docs"
+    source.mkdir()
+    shutil.copy(ROOT / "docs" / "conf.py", source)
+    (source / "_static").mkdir()
+    (source / "index.md").write_text("# A page\n\nwith $x^2$ and\n\n$$\ny = x\n$$ (label)\n", "utf-8")
+    assert build.main(["-q", "-W", "-b", "html", str(source), str(tmp_path / "html")]) == 0
+    page = (tmp_path / "html" / "index.html").read_text("utf-8")
+    loaded = re.findall(r"<(?:script|img|iframe)[^>]*\ssrc=\"([^\"]*)\"|<link[^>]*\shref=\"([^\"]*)\"", page)
+    addresses = ["".join(pair) for pair in loaded]
+    assert any("mathjax" in address for address in addresses)
+    for address in addresses:
+        assert "//" not in address
+        # Where a page asks for a file, the build must have put it there.
+        assert address.startswith("#") or (tmp_path / "html" / re.split("[?#]", address)[0]).is_file(), (
+            address
+        )
+    for style in (tmp_path / "html" / "_static").rglob("*.css"):
+        assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", style.read_text("utf-8"))

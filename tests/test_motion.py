@@ -1,0 +1,345 @@
+"""Laws of the piecewise polynomial ground motion."""
+
+import pickle
+import subprocess
+import sys
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.polynomial import Polynomial
+from numpy.testing import assert_allclose, assert_array_equal
+
+from rocking.errors import InvalidMotion
+from rocking.motion import pulses
+from rocking.motion.motion import Description, Motion
+
+values = st.floats(-10.0, 10.0).map(lambda x: round(x, 3))
+
+
+@st.composite
+def motions(draw, most_columns=4):
+    """Motions of a few pieces and a low degree, with jumps."""
+    pieces, columns = draw(st.integers(1, 5)), draw(st.integers(1, most_columns))
+    widths = draw(st.lists(st.floats(0.05, 2.0), min_size=pieces, max_size=pieces))
+    row = st.lists(values, min_size=columns, max_size=columns)
+    coefficients = draw(st.lists(row, min_size=pieces, max_size=pieces))
+    return Motion(np.concatenate([[0.0], np.cumsum(widths)]), coefficients)
+
+
+def dense_times(motion, per_piece=400):
+    """Times all over the motion, the breakpoints among them."""
+    fractions = np.linspace(0.0, 1.0, per_piece + 1)
+    starts, widths = motion.breakpoints[:-1], np.diff(motion.breakpoints)
+    return np.unique(np.append((starts[:, None] + widths[:, None] * fractions).ravel(), motion.duration))
+
+
+def exact_integrals(motion, t):
+    """Velocity and displacement at time t in rational arithmetic."""
+    velocity = displacement = Fraction(0)
+    breakpoints = [Fraction(b) for b in motion.breakpoints.tolist()]
+    for start, end, row in zip(breakpoints, breakpoints[1:], motion.coefficients.tolist(), strict=False):
+        x = min(end, Fraction(t)) - start
+        if x <= 0:
+            break
+        rise = sum(Fraction(c) * x ** (j + 1) / (j + 1) for j, c in enumerate(row))
+        fall = sum(Fraction(c) * x ** (j + 2) / ((j + 1) * (j + 2)) for j, c in enumerate(row))
+        velocity, displacement = velocity + rise, displacement + velocity * x + fall
+    return float(velocity), float(displacement + velocity * max(Fraction(t) - breakpoints[-1], Fraction(0)))
+
+
+@settings(deadline=None)
+@given(st.lists(values, min_size=2, max_size=30), st.floats(0.001, 0.5))
+def test_samples_are_joined_by_straight_lines(samples, dt):
+    motion = Motion.from_samples(samples, dt)
+    times = np.linspace(0.0, motion.duration, 101)
+    expected = np.interp(times, dt * np.arange(len(samples)), samples)
+    assert_allclose(motion.acceleration(times), expected, rtol=0, atol=1e-13 * (1 + np.abs(samples).max()))
+    assert motion.step == dt
+    assert motion.error == 0.0
+
+
+@settings(deadline=None)
+@given(motions(), st.floats(0.0, 1.5))
+def test_velocity_and_displacement_are_the_exact_integrals(motion, fraction):
+    t = fraction * motion.duration
+    velocity, displacement = exact_integrals(motion, t)
+    scale = np.abs(motion.coefficients).max() * (1.0 + motion.duration) ** 5
+    assert abs(motion.velocity(t) - velocity) <= 1e-15 * scale
+    assert abs(motion.displacement(t) - displacement) <= 1e-15 * scale
+
+
+@settings(deadline=None)
+@given(motions(most_columns=7))
+def test_peaks_are_the_extrema_of_the_pieces_not_of_samples(motion):
+    velocity = displacement = 0.0
+    sampled, missed = np.zeros(3), np.zeros(3)
+    for width, row in zip(np.diff(motion.breakpoints), motion.coefficients, strict=True):
+        acceleration = Polynomial(row)
+        rise = acceleration.integ(k=velocity)
+        way = rise.integ(k=displacement)
+        x = np.linspace(0.0, width, 401)
+        for i, curve in enumerate((acceleration, rise, way)):
+            sampled[i] = max(sampled[i], np.abs(curve(x)).max())
+            # Between two samples a curve stands out by its curvature times the squared gap over eight, at most.
+            missed[i] = max(missed[i], Polynomial(np.abs(curve.coef)).deriv(2)(width) * (width / 400) ** 2 / 8)
+        velocity, displacement = rise(width), way(width)
+    peaks = np.array([motion.pga, motion.pgv, motion.pgd])
+    rounding = 1e-14 * sampled + 1e-14 * np.abs(motion.coefficients).max()
+    assert (peaks >= sampled - rounding).all()
+    assert (peaks <= sampled + missed + rounding).all()
+
+
+def test_peak_between_breakpoints_is_found_exactly():
+    motion = Motion([0.0, 3.0], [[0.0, 4.0, -2.0]])  # peak 2 at t = 1, but -6 at the end
+    assert motion.pga == 6.0
+    assert Motion([0.0, 2.0], [[0.0, 4.0, -2.0]]).pga == 2.0
+    triangle = Motion.from_samples([1.0, -1.0], 2.0)  # velocity t - t^2/2
+    assert triangle.pgv == 0.5
+    assert triangle.pgd == pytest.approx(2.0 / 3.0, rel=1e-15)
+
+
+def test_a_motion_is_zero_outside_and_takes_the_later_value_at_a_jump():
+    motion = Motion([0.0, 1.0, 2.0], [[1.0], [5.0]])
+    assert_array_equal(motion.acceleration([-1e-9, 0.0, 1.0, 2.0, 2.0 + 1e-9]), [0.0, 1.0, 5.0, 5.0, 0.0])
+    assert_array_equal(motion.velocity([-1.0, 0.0, 2.0, 9.0]), [0.0, 0.0, 6.0, 6.0])
+    assert motion.displacement(3.0) == 0.5 + 1.0 + 2.5 + 6.0
+    assert np.isnan(motion.acceleration(np.nan))
+
+
+def test_evaluation_keeps_the_shape_of_the_times():
+    motion = Motion.from_samples([0.0, 1.0], 1.0)
+    for function in (motion.acceleration, motion.velocity, motion.displacement):
+        assert isinstance(function(0.5), float)
+        assert function([0.1, 0.2]).shape == (2,)
+        assert function(np.zeros((2, 3, 1))).shape == (2, 3, 1)
+        assert function(np.zeros(0)).shape == (0,)
+
+
+def test_samples_come_back():
+    samples = np.array([0.1, -0.7, 0.3, 0.2])
+    times, back = Motion.from_samples(samples, 0.01).samples
+    assert_array_equal(times, 0.01 * np.arange(4))
+    assert_array_equal(back[:-1], samples[:-1])
+    assert_allclose(back[-1], samples[-1], rtol=1e-14)
+
+
+def test_points_may_be_uneven_and_time_counts_from_the_first():
+    motion = Motion.from_points([2.0, 2.5, 4.0], [1.0, 3.0, 0.0])
+    assert_array_equal(motion.breakpoints, [0.0, 0.5, 2.0])
+    assert motion.step is None
+    assert_array_equal(motion.acceleration([0.0, 0.25, 0.5, 1.25]), [1.0, 2.0, 3.0, 1.5])
+
+
+def test_arrays_are_own_and_read_only():
+    coefficients = np.ones((2, 1))
+    motion = Motion(np.arange(3.0), coefficients)
+    coefficients[0, 0] = 7.0
+    assert motion.pga == 1.0
+    for array in (motion.breakpoints, motion.coefficients):
+        assert array.dtype == np.float64
+        assert array.flags.c_contiguous
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+    with pytest.raises(TypeError):
+        motion.description.parameters["amplitude"] = 1.0
+
+
+def test_a_motion_travels_between_processes():
+    motion = pulses.sine(1.0, 2.0, cycles=1).scaled(2.0)
+    copy = pickle.loads(pickle.dumps(motion))
+    assert_array_equal(copy.coefficients, motion.coefficients)
+    assert not copy.coefficients.flags.writeable
+    assert (copy.name, copy.history, copy.error, copy.step) == ("sine", motion.history, motion.error, None)
+    assert copy.description == motion.description
+    assert copy != motion  # identity: two motions are never compared by value
+
+
+@settings(deadline=None)
+@given(motions(), st.floats(-5.0, 5.0))
+def test_scaling_is_linear(motion, factor):
+    times = dense_times(motion, 20)
+    assert_allclose(
+        motion.scaled(factor).acceleration(times), factor * motion.acceleration(times), rtol=1e-12, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("target", ["pga", "pgv"])
+def test_scaling_to_a_target_reaches_it(target):
+    motion = Motion.from_samples([0.0, 1.0, -3.0, 2.0], 0.3).scaled(**{target: 1.7})
+    assert getattr(motion, target) == pytest.approx(1.7, rel=1e-15)
+    assert f"to a {target} of 1.7" in motion.history[-1]
+
+
+def test_scaling_to_a_spectral_acceleration_reaches_it():
+    motion = Motion.from_samples([0.0, 1.0, -3.0, 2.0], 0.3).scaled(sa=2.0, period=0.7, damping=0.02)
+    assert motion.spectral_acceleration(0.7, 0.02) == pytest.approx(2.0, rel=1e-14)
+    assert motion.history == (f"scaled by {motion.coefficients[1, 0]:.6g} to a sa of 2 at 0.7 s, damping 0.02",)
+
+
+def test_scaling_and_polarity_keep_the_description_true():
+    motion = -pulses.sine(2.0, 1.5, cycles=2, phase=0.1).scaled(pga=3.0)
+    assert motion.description.family == "sine"
+    assert motion.description.parameters == {"amplitude": -3.0, "frequency": 1.5, "cycles": 2.0, "phase": 0.1}
+    assert motion.error == pytest.approx(3e-15)
+    assert len(motion.history) == 2
+    assert motion.history[1] == "polarity reversed"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {},
+        {"factor": 1.0, "pga": 1.0},
+        {"factor": np.nan},
+        {"factor": "two"},
+        {"pga": 0.0},
+        {"pga": -1.0},
+        {"pgv": np.inf},
+        {"sa": 1.0},
+        {"period": 1.0, "pga": 1.0},
+        {"sa": 1.0, "period": 0.0},
+    ],
+)
+def test_unusable_targets_are_refused(arguments):
+    with pytest.raises(InvalidMotion):
+        Motion.from_samples([0.0, 1.0], 1.0).scaled(**arguments)
+
+
+def test_a_zero_motion_cannot_be_scaled_to_a_target():
+    with pytest.raises(InvalidMotion, match="zero throughout"):
+        Motion.from_samples([0.0, 0.0], 1.0).scaled(pga=1.0)
+
+
+@settings(deadline=None)
+@given(motions(), motions())
+def test_a_sum_adds_accelerations(one, other):
+    total = one + other
+    times = np.sort(np.random.default_rng(0).uniform(0.0, total.duration, 50))
+    scale = sum(np.abs(m.coefficients).max() * max(1.0, m.duration) ** 3 for m in (one, other))
+    expected = one.acceleration(times) + other.acceleration(times)
+    assert_allclose(total.acceleration(times), expected, rtol=0, atol=1e-14 * scale)
+    assert total.duration == max(one.duration, other.duration)
+
+
+def test_a_sum_of_records_on_one_grid_stays_sampled_and_others_do_not():
+    record = Motion.from_samples([1.0, 2.0, 3.0], 0.5, name="a")
+    assert (record + record).step == 0.5
+    assert (record + Motion.from_samples([1.0, 1.0], 0.5)).step is None
+    total = record + pulses.half_sine(1.0, 1.0)
+    assert total.name == "a + half sine"
+    assert total.description.family == "sum"
+    assert "amplitude 1, frequency 1" in total.description.text
+    assert total.error == 1e-15
+
+
+@settings(deadline=None)
+@given(motions(), st.floats(0.01, 5.0))
+def test_a_delay_shifts_the_motion_in_time(motion, delay):
+    later = motion.delayed(delay)
+    times = 0.5 * (motion.breakpoints[1:] + motion.breakpoints[:-1])
+    scale = np.abs(motion.coefficients).max() * max(1.0, motion.duration) ** 3
+    assert_allclose(later.acceleration(times + delay), motion.acceleration(times), rtol=0, atol=1e-13 * scale)
+    assert later.acceleration(0.5 * delay) == 0.0
+    assert_allclose([later.pga, later.pgv, later.pgd], [motion.pga, motion.pgv, motion.pgd], rtol=1e-10, atol=1e-10)
+
+
+def test_a_delay_and_processing_show_in_the_family():
+    motion = pulses.sine(1.0, 1.0, cycles=1).delayed(0.5).delayed(0.5)
+    assert motion.description.family == "delayed sine"
+    assert motion.history == ("delayed by 0.5 s", "delayed by 0.5 s")
+
+
+@pytest.mark.parametrize("delay", [0.0, -1.0, np.nan, "soon"])
+def test_unusable_delays_are_refused(delay):
+    with pytest.raises(InvalidMotion):
+        Motion.from_samples([0.0, 1.0], 1.0).delayed(delay)
+
+
+@pytest.mark.parametrize(
+    ("samples", "dt"),
+    [
+        ([1.0], 0.1),
+        ([], 0.1),
+        ([0.0, np.nan], 0.1),
+        ([0.0, np.inf], 0.1),
+        ([[0.0, 1.0]], 0.1),
+        (["a", "b"], 0.1),
+        ([1.0, 1j], 0.1),
+        ([0.0, 1.0], 0.0),
+        ([0.0, 1.0], -0.1),
+        ([0.0, 1.0], np.nan),
+        ([0.0, 1.0], None),
+        ([1e308, -1e308], 0.1),
+    ],
+)
+def test_unusable_samples_are_refused(samples, dt):
+    with pytest.raises(InvalidMotion):
+        Motion.from_samples(samples, dt)
+
+
+def test_uneven_steps_are_pointed_to_from_points():
+    with pytest.raises(InvalidMotion, match="from_points"):
+        Motion.from_samples([0.0, 1.0, 0.0], [0.1, 0.2])
+
+
+def test_a_bad_sample_is_named():
+    with pytest.raises(InvalidMotion, match="sample 2 of the motion is nan"):
+        Motion.from_samples([0.0, 1.0, np.nan], 0.1)
+
+
+@pytest.mark.parametrize(
+    ("times", "samples"),
+    [
+        ([0.0, 1.0, 1.0], [0.0] * 3),
+        ([0.0, 2.0, 1.0], [0.0] * 3),
+        ([0.0, 1.0], [0.0] * 3),
+        ([0.0, np.nan], [0.0] * 2),
+    ],
+)
+def test_unusable_points_are_refused(times, samples):
+    with pytest.raises(InvalidMotion):
+        Motion.from_points(times, samples)
+
+
+@pytest.mark.parametrize(
+    ("breakpoints", "coefficients", "error"),
+    [
+        ([0.0], np.zeros((0, 1)), 0.0),
+        ([0.0, 1.0], np.zeros((1, 0)), 0.0),
+        ([0.0, 1.0], np.zeros((2, 1)), 0.0),
+        ([0.5, 1.0], np.zeros((1, 1)), 0.0),
+        ([0.0, 0.0], np.zeros((1, 1)), 0.0),
+        ([0.0, 2.0, 1.0], np.zeros((2, 1)), 0.0),
+        ([0.0, np.inf], np.zeros((1, 1)), 0.0),
+        ([0.0, 1.0], [[np.nan]], 0.0),
+        ([0.0, 1.0], [1.0], 0.0),
+        ([0.0, 1.0], [[1.0]], -1.0),
+        ([0.0, 1.0], [[1.0]], np.nan),
+    ],
+)
+def test_arrays_that_are_no_motion_are_refused(breakpoints, coefficients, error):
+    with pytest.raises(InvalidMotion):
+        Motion(breakpoints, coefficients, error=error)
+
+
+def test_descriptions_compare_by_value():
+    assert Description("sine", {"amplitude": 1.0}) == Description("sine", {"amplitude": 1.0})
+    assert Description("sine", {"amplitude": 1.0}).scaled(-2.0).parameters == {"amplitude": -2.0}
+
+
+def test_adding_something_else_is_a_type_error():
+    with pytest.raises(TypeError):
+        Motion.from_samples([0.0, 1.0], 1.0) + 1.0
+
+
+def test_motions_import_without_slow_libraries():
+    code = (
+        "import sys; import rocking.motion.motion, rocking.motion.pulses, rocking.motion.records as r;"
+        "r.load('el-centro-meloland-270').scaled(pga=1.0).pgv;"
+        "print(sorted({'scipy', 'numba', 'xarray', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
