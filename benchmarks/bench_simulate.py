@@ -23,7 +23,7 @@ from oracles.problem import Problem  # noqa: E402
 from oracles.scipy_events import integrate_as_practised  # noqa: E402
 
 EL_CENTRO = ROOT.parent / "shared" / "records" / "test_only" / "RSN6_IMPVALL.I_I-ELC180-hor1.AT2"
-SHIPPED = "meloland-270"
+SHIPPED = "el-centro-meloland-270"
 SAME_PEAK = 1e-6
 BLOCKS = {
     "linear": {"p": 1.2, "alpha": 0.22, "restitution": 0.88},

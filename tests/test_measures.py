@@ -136,7 +136,7 @@ def test_the_undamped_shock_spectrum_of_a_half_sine_is_known(ratio):
     elif x == 2.0:
         expected = math.pi / 2
     else:
-        orders = range(1, 1 + int((1 / x + 0.5)))
+        orders = range(1, 1 + int(1 / x + 0.5))
         times = [2 * k * math.pi * duration / (math.pi * (1 + 2 / x)) for k in orders]
         expected = max(
             abs(

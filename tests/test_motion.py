@@ -273,6 +273,10 @@ def test_unusable_delays_are_refused(delay):
         ([0.0, 1.0], np.nan),
         ([0.0, 1.0], None),
         ([1e308, -1e308], 0.1),
+        ([1e60, 0.0], 0.1),
+        ([0.0, 1.0], 1e308),
+        ([0.0, 1.0, 2.0], 1e308),
+        ([0.0, 1.0], 5e-324),
     ],
 )
 def test_unusable_samples_are_refused(samples, dt):

@@ -7,7 +7,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from rocking import chattering
-    from rocking.block import Block
+    from rocking.block import Block, Blocks
     from rocking.errors import (
         InvalidBlock,
         InvalidMotion,
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AsymptoticTime",
     "Block",
+    "Blocks",
     "Certified",
     "IntervalThreshold",
     "InvalidBlock",
@@ -47,6 +48,7 @@ __all__ = [
 _HOMES = {
     "AsymptoticTime": "rocking.treatment",
     "Block": "rocking.block",
+    "Blocks": "rocking.block",
     "Certified": "rocking.treatment",
     "IntervalThreshold": "rocking.treatment",
     "InvalidBlock": "rocking.errors",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -80,6 +81,7 @@ def response_figure(
         of the opposite sign is needed, so the first is drawn below zero and the second above.
     chattering : ChatteringSequence or None
         The sequence to zoom into: the interval to the next impact against the time to rest, both logarithmic.
+        There is no zoom where the time of rest is not bracketed (NaN) or the sequence has a single impact.
     title : str
         Title of the figure.
 
@@ -104,11 +106,11 @@ def response_figure(
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
+    zoom = chattering if chattering and _can_be_zoomed(chattering) else None
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.6, 4.6), layout="constrained")
-        grid = figure.add_gridspec(2, 2 if chattering else 1, height_ratios=(1.2, 1.0), width_ratios=None)
-        if chattering:
-            grid.set_width_ratios((2.7, 1.0))
+        widths = (2.7, 1.0) if zoom else (1.0,)
+        grid = figure.add_gridspec(2, len(widths), height_ratios=(1.2, 1.0), width_ratios=widths)
         rotation_axes = figure.add_subplot(grid[0, 0])
         motion_axes = figure.add_subplot(grid[1, 0], sharex=rotation_axes)
         figure.suptitle(title)
@@ -118,11 +120,15 @@ def response_figure(
         _mark_events(rotation_axes, impact_times, uplift_times, overturn_time)
         _draw_motion(motion_axes, motion_time, motion_acceleration_g, thresholds_g)
         _limit_time(rotation_axes, time, motion_time)
-        if chattering:
-            _mark_sequence(rotation_axes, chattering)
-            _draw_sequence(figure.add_subplot(grid[:, 1]), chattering)
+        if zoom:
+            _mark_sequence(rotation_axes, zoom)
+            _draw_sequence(figure.add_subplot(grid[:, 1]), zoom)
         _add_legend(figure, rotation_axes, motion_axes)
     return figure
+
+
+def _can_be_zoomed(sequence: ChatteringSequence) -> bool:
+    return sequence.impact_times.size > 1 and math.isfinite(sequence.rest_upper - sequence.rest_lower)
 
 
 def _shade_rest(axes: Axes, rest_intervals: FloatArray) -> None:
@@ -180,7 +186,7 @@ def _draw_motion(axes: Axes, time: FloatArray, acceleration: FloatArray, thresho
     plus, minus = thresholds
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, acceleration, color=GROUND, linewidth=0.6, label="ground acceleration")
-    above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.4, "interpolate": True}
+    above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
     axes.fill_between(time, acceleration, minus, where=acceleration > minus, label="beyond a threshold", **above)
     axes.fill_between(time, acceleration, -plus, where=acceleration < -plus, **above)
     axes.axhline(minus, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")

@@ -38,9 +38,10 @@ AMBIGUITY = 1e-6
 
 _ULP = 2.0**-52
 
-#: Interior points per step, and points per refinement, when the extremes of the contact forces are searched.
+#: Interior points per step, rounds, and points per further round, when the contact forces' extremes are searched.
 _INTERIOR = 4
-_REFINED = 65
+_REFINEMENTS = 3
+_REFINED = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -391,13 +392,15 @@ class Response:
     def _extreme(self, measure: Any) -> float:
         """Largest value of a measure of the two forces over the response, refined within its step."""
         times, rows = self._samples()
-        values = measure(*self._forces_in(times, rows))
-        best = int(np.argmax(values))
-        step = np.flatnonzero(rows == rows[best])
-        place = int(np.searchsorted(step, best))
-        low, high = times[step[max(place - 1, 0)]], times[step[min(place + 1, len(step) - 1)]]
-        fine = np.linspace(low, high, _REFINED)
-        return float(max(values[best], np.max(measure(*self._forces_in(fine, np.full(_REFINED, rows[best]))))))
+        best = -math.inf
+        for _ in range(_REFINEMENTS):
+            values = measure(*self._forces_in(times, rows))
+            place = int(np.argmax(values))
+            best = max(best, float(values[place]))
+            row = rows[place]
+            low, high = (times[k] if rows[k] == row else times[place] for k in (place - 1, (place + 1) % len(rows)))
+            times, rows = np.linspace(low, high, _REFINED), np.full(_REFINED, row)
+        return best
 
     def _samples(self) -> tuple[Floats, NDArray[np.int64]]:
         """Times within every step, both ends included, and at every corner of the motion; with their steps."""

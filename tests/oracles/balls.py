@@ -102,9 +102,7 @@ def sine(problem: Problem, amplitude: float, frequency: float, phase: float = 0.
         return Sine(arb(amplitude) / arb(problem.gravity), 2 * arb.pi() * arb(frequency), arb(phase))
 
 
-def rest_enclosure(
-    problem: Problem, time: float, side: int, speed: float, *, ground: Ground | None = None
-) -> arb:
+def rest_enclosure(problem: Problem, time: float, side: int, speed: float, *, ground: Ground | None = None) -> arb:
     """Ball that holds the instant of rest, from the side entered at an impact and the speed there."""
     with ctx.workprec(PRECISION):
         ground = ground or Pieces(problem)

@@ -49,8 +49,7 @@ def events_of(response: rocking.Response) -> list[tuple[float, str, int]]:
 
 def impacts_of(response: rocking.Response) -> list[tuple[float, int, float, float]]:
     return [
-        (float(i["time"]), int(i["side"]), float(i["speed_before"]), float(i["speed_after"]))
-        for i in response.impacts
+        (float(i["time"]), int(i["side"]), float(i["speed_before"]), float(i["speed_after"])) for i in response.impacts
     ]
 
 
@@ -86,9 +85,7 @@ def pulses(draw: st.DrawFn, threshold: float) -> rocking.Motion:
     frequency = draw(between(0.4, 4.0))
     family = draw(st.sampled_from(["sine", "half_sine", "one_cosine", "ricker", "triangular", "rectangular"]))
     if family == "sine":
-        return rocking.pulses.sine(
-            amplitude, frequency, cycles=draw(between(0.5, 3.0)), phase=draw(between(0.0, 6.0))
-        )
+        return rocking.pulses.sine(amplitude, frequency, cycles=draw(between(0.5, 3.0)), phase=draw(between(0.0, 6.0)))
     if family in ("triangular", "rectangular"):
         return getattr(rocking.pulses, family)(amplitude, 1.0 / frequency)
     return getattr(rocking.pulses, family)(amplitude, frequency)

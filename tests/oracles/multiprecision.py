@@ -34,9 +34,7 @@ class Course:
     peak: Number = 0
 
 
-def follow(
-    problem: Problem, *, rotation: float = 0.0, velocity: float = 0.0, most_impacts: int = 4000
-) -> Course:
+def follow(problem: Problem, *, rotation: float = 0.0, velocity: float = 0.0, most_impacts: int = 4000) -> Course:
     """Whole response from time zero until the block rests for good or overturns."""
     course = Course()
     side = int(np.sign(rotation) or np.sign(velocity))
@@ -122,9 +120,9 @@ def _arc(
     """End of an arc, the speed there, and whether the block overturned."""
     while True:
         series, span = _series(problem, time, side, u, v)
-        _note_peak(course, series, span)
         impact = _first_root(series if u != 0 else series[1:], span)
         overturn = _first_root([mp.pi / 2 - series[0], *(-c for c in series[1:])], span)
+        _note_peak(course, series, span if impact is None else impact)
         if overturn is not None and (impact is None or overturn < impact):
             course.peak = mp.pi / 2
             return time + overturn, _slope(series, overturn), True
@@ -184,9 +182,7 @@ def _enough(series: list[Number], span: Number) -> bool:
     return len(series) > 6 and _size(series, span, -1) < NEGLIGIBLE * _scale(series, span)
 
 
-def _grow_linear(
-    p: Number, alpha: Number, push: list[Number], u: Number, v: Number, span: Number
-) -> list[Number]:
+def _grow_linear(p: Number, alpha: Number, push: list[Number], u: Number, v: Number, span: Number) -> list[Number]:
     series = [u, v]
     for n in range(HIGHEST_ORDER):
         force = series[n] - (push[n] if n < len(push) else 0) - (alpha if n == 0 else 0)
@@ -196,9 +192,7 @@ def _grow_linear(
     return series
 
 
-def _grow_nonlinear(
-    p: Number, alpha: Number, push: list[Number], u: Number, v: Number, span: Number
-) -> list[Number]:
+def _grow_nonlinear(p: Number, alpha: Number, push: list[Number], u: Number, v: Number, span: Number) -> list[Number]:
     """u'' = -p^2 (S + push C) with S = sin(alpha - u), C = cos(alpha - u), S' = -C u', C' = S u'."""
     series, S, C = [u, v], [mp.sin(alpha - u)], [mp.cos(alpha - u)]
     for n in range(HIGHEST_ORDER):

@@ -66,9 +66,7 @@ class Problem:
             time = end
         return np.inf, 0
 
-    def _passing(
-        self, time: float, start: float, end: float, coefficients: NDArray[np.float64], side: int
-    ) -> float:
+    def _passing(self, time: float, start: float, end: float, coefficients: NDArray[np.float64], side: int) -> float:
         excess = np.polynomial.Polynomial(-side * coefficients) - self.threshold(side)
         if excess(time - start) > 0.0:
             return time
@@ -81,9 +79,7 @@ class Problem:
         return np.inf
 
 
-def linear_record(
-    acceleration: NDArray[np.float64], dt: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def linear_record(acceleration: NDArray[np.float64], dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Breakpoints and coefficients of samples joined by straight lines."""
     breakpoints = dt * np.arange(len(acceleration))
     slopes = np.diff(acceleration) / np.diff(breakpoints)

@@ -7,6 +7,9 @@ eps^(3/2)/omega: with z = omega T_{n;1}, y = omega sigma_{n;1} and v = -omega Ph
 import math
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rocking.kernels.compiled import kernel, leaf
 
 _ROOT2: Final = math.sqrt(2.0)
@@ -22,17 +25,10 @@ def eq65_time(a: float, omega: float, eta: float) -> float:
     """Asymptotic chattering time (Eq. 65), until its terms vanish; NaN for a < 1, infinite for eta = 1."""
     if not a >= 1.0:
         return math.nan
-    first, third = eq65_sums(eta)
-    return eq65_from_sums(a, omega, first, third)
-
-
-@leaf
-def eq65_from_sums(a: float, omega: float, first: float, third: float) -> float:
-    """Eq. 65 from its two sums, omega sum T_{n;1} and omega sum T_{n;3}."""
     if a == 1.0:
         return 0.0
-    excess = a - 1.0
-    return math.sqrt(excess) * (first + excess * third) / omega
+    first, third = eq65_sums(eta)
+    return math.sqrt(a - 1.0) * (first + (a - 1.0) * third) / omega
 
 
 @kernel
@@ -44,11 +40,30 @@ def eq65_sums(eta: float) -> tuple[float, float]:
     third = 0.0
     v = 0.0
     z = math.inf
-    while z > _VANISHED * (1.0 - eta * eta) * y:
+    while not vanishes(z, y, eta):
         z, odd, v = eq65_pair(y, v, eta)
         y += z
         third += odd
     return y, third
+
+
+@kernel
+def eq65_terms(eta: float, terms: NDArray[np.float64]) -> int:
+    """Fill rows with omega T_{n;1} and omega T_{n+1;3} until they vanish; number of rows, all when they do not."""
+    y = 0.0
+    v = 0.0
+    for pair in range(terms.shape[0]):
+        terms[pair, 0], terms[pair, 1], v = eq65_pair(y, v, eta)
+        y += terms[pair, 0]
+        if vanishes(terms[pair, 0], y, eta):
+            return pair + 1
+    return terms.shape[0]
+
+
+@leaf
+def vanishes(z: float, y: float, eta: float) -> bool:
+    """Whether all terms after z, nearly a geometric series, are nothing beside their sum y."""
+    return z <= _VANISHED * (1.0 - eta * eta) * y
 
 
 @leaf
@@ -104,3 +119,12 @@ def eq76(omega: float, eta: float) -> float:
 def eq77(eta: float) -> float:
     """Fitted critical amplitude without the frequency (Eq. 77)."""
     return -0.3941 * eta**3 + 0.5763 * eta**2 - 0.45 * eta + 1.271
+
+
+@kernel
+def fitted_amplitudes(
+    omega: NDArray[np.float64], eta: NDArray[np.float64], with_frequency: bool, amplitudes: NDArray[np.float64]
+) -> None:
+    """Eq. 76 (with the frequency) or Eq. 77 for each omega and eta."""
+    for i in range(amplitudes.size):
+        amplitudes[i] = eq76(omega[i], eta[i]) if with_frequency else eq77(eta[i])

@@ -11,10 +11,11 @@ distances the compiler can prove that stores do not disturb loads; with one arra
 import math
 from typing import Final
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.kernels.compiled import kernel, leaf, routine
+from rocking.kernels.compiled import leaf, routine
 from rocking.kernels.sine import (
     CLOSED,
     LARGEST_CORRECTION,
@@ -69,8 +70,11 @@ _NEVER_UP: Final = 3.0
 #: Pairs after which the lanes that still run are left to the scalar path.
 _MAXIMUM_PAIRS: Final = 400
 
+#: As ``compiled.kernel``, and free of the interpreter's lock, so that threads can share an array's sequences.
+_unlocked = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
 
-@kernel
+
+@_unlocked
 def rest_times(
     a: NDArray[np.float64],
     omega: NDArray[np.float64],

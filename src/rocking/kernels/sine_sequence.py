@@ -83,16 +83,17 @@ def semianalytical_phase(excess: float, delta: float, eta: float, resolved: int)
         return 0.0
     if not excess > 0.0:
         return math.nan
-    older, w, P, D = first_arc(excess, delta)
-    x = older
-    newer = 0.0
+    newer, w, P, D = first_arc(excess, delta)
+    older = 0.0
+    x = newer
     s = 1.0
     for _ in range(resolved + 1):
         if not x < math.pi:
             return math.nan
         s = -s
-        older = newer if s > 0.0 or newer > 0.0 else older
+        older = newer
         newer, w, P, D = next_arc(x, eta * w, P, D, s, delta)
         x += newer
-    rest = x - older - newer + (older + newer) / (1.0 - eta * eta)
+    pair = eta * eta
+    rest = x + (older + newer) * (pair / (1.0 - pair))
     return rest if rest < math.pi else math.nan

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, overload
+from typing import Any, Final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,10 @@ from rocking.motion import measures, piecewise, processing
 from rocking.motion.checks import finite, positive
 from rocking.motion.piecewise import Floats
 
+# Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take.
+_STRONGEST: Final = 1e50
+_LONGEST: Final = 1e15
+
 
 @dataclass(frozen=True)
 class Description:
@@ -24,9 +28,8 @@ class Description:
     Attributes
     ----------
     family : str
-        Kind of motion: "record", "samples", "sine", "ricker", ... After a delay or processing the family says
-        so ("delayed sine", "processed record"), since the formula of `text` then no longer starts at time
-        zero.
+        Kind of motion: "record", "samples", "sine", "symmetric Ricker", ... After a delay or processing it says so
+        ("delayed sine", "processed record"), since the formula of `text` then no longer starts at time zero.
     parameters : mapping of str to float
         Numbers of the formula in SI units and radians, for instance amplitude, frequency, phase and cycles of
         a sine. Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it
@@ -68,8 +71,7 @@ class Motion:
     breakpoints : array_like, shape (n + 1,)
         Ends of the pieces, s; strictly increasing, the first is 0.
     coefficients : array_like, shape (n, degree + 1)
-        m/s^2, m/s^3, ...: on piece k the acceleration is ``sum_j coefficients[k, j] * (t -
-        breakpoints[k])**j``.
+        m/s^2, m/s^3, ...: the acceleration on piece k is ``sum_j coefficients[k, j] * (t - breakpoints[k])**j``.
     name : str
         Short name for tables and figures.
     description : Description
@@ -85,7 +87,8 @@ class Motion:
     Raises
     ------
     InvalidMotion
-        If the arrays do not describe a piecewise polynomial.
+        If the arrays do not describe a piecewise polynomial, or a number is beyond all sense (accelerations of
+        1e50 m/s^2, times of 1e15 s).
 
     Examples
     --------
@@ -114,6 +117,12 @@ class Motion:
             )
         if breakpoints[0] != 0.0 or not np.all(np.diff(breakpoints) > 0.0):
             raise InvalidMotion("the breakpoints of a motion must start at 0 and increase strictly")
+        with np.errstate(over="ignore"):
+            bounds = piecewise.value(np.abs(coefficients), np.diff(breakpoints))
+        if breakpoints[-1] > _LONGEST or not np.all(bounds <= _STRONGEST):
+            raise InvalidMotion(f"a motion must stay below {_STRONGEST:g} m/s^2 and {_LONGEST:g} s: check its units")
+        if self.step is not None:
+            positive(self.step, "sampling step", "seconds")
         if not (math.isfinite(self.error) and self.error >= 0.0):
             raise InvalidMotion(
                 f"the approximation error of a motion must be finite and not negative, not {self.error}"
@@ -170,7 +179,7 @@ class Motion:
         """
         samples = _samples(acceleration)
         step = _step(dt)
-        times = np.arange(len(samples), dtype=np.float64) * step
+        times = piecewise.even_times(len(samples), step)
         return cls(
             times,
             piecewise.linear(times, samples),
@@ -218,7 +227,8 @@ class Motion:
             raise InvalidMotion(f"there are {len(instants)} times but {len(samples)} accelerations: give one for each")
         if not np.all(np.isfinite(instants)) or not np.all(np.diff(instants) > 0.0):
             raise InvalidMotion("the times of a motion must be finite and increase strictly")
-        breakpoints = instants - instants[0]
+        with np.errstate(over="ignore"):
+            breakpoints = instants - instants[0]
         return cls(
             breakpoints,
             piecewise.linear(breakpoints, samples),
@@ -452,7 +462,7 @@ class Motion:
         Raises
         ------
         InvalidMotion
-            If nothing is asked for, an argument is out of range, or `baseline` or `band_pass` is asked of a
+            If nothing is asked for, an argument is not usable, or `baseline` or `band_pass` is asked of a
             motion without even samples (resample it first, in a call of its own).
 
         Examples
@@ -466,11 +476,13 @@ class Motion:
         """
         steps: list[Callable[[Motion], Motion]] = []
         if trim is not None:
-            steps.append(lambda motion: processing.trim(motion, *trim))
+            start, end = processing.pair(trim, "trim=(start, end)")
+            steps.append(lambda motion: processing.trim(motion, start, end))
         if baseline is not None:
             steps.append(lambda motion: processing.baseline(motion, baseline))
         if band_pass is not None:
-            steps.append(lambda motion: processing.band_pass(motion, *band_pass, order=order))
+            low, high = processing.pair(band_pass, "band_pass=(low, high)")
+            steps.append(lambda motion: processing.band_pass(motion, low, high, order=order))
         if resample is not None:
             steps.append(lambda motion: processing.resample(motion, resample))
         if not steps:

@@ -3,6 +3,8 @@
 Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, x counted from the piece's start.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,9 +26,15 @@ def at(breakpoints: Floats, coefficients: Floats, time: Floats) -> Floats:
     return value(coefficients[piece], inside - breakpoints[piece])
 
 
-def linear(times: Floats, samples: Floats) -> Floats:
-    """Coefficients of the pieces that join the samples by straight lines."""
+def even_times(count: int, step: float) -> Floats:
+    """Return the times of even samples (infinite where they overflow)."""
     with np.errstate(over="ignore"):
+        return np.arange(count, dtype=np.float64) * step
+
+
+def linear(times: Floats, samples: Floats) -> Floats:
+    """Coefficients of the pieces that join the samples by straight lines (not finite where they overflow)."""
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         return np.column_stack([samples[:-1], np.diff(samples) / np.diff(times)])
 
 
@@ -65,10 +73,12 @@ def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: i
 def root_candidates(widths: Floats, coefficients: Floats) -> Floats:
     """Points of each piece among which are all its roots; shape (pieces, degree), sorted along each row.
 
-    A row is filled up with points that are not roots (ends of the piece, vertices, real parts): callers look
-    for extrema or split integrals there, where one point more does no harm.
+    A row is filled up with points that are not roots (ends of the piece, vertices, real parts): callers look for
+    extrema or split integrals there, where one point more does no harm.
     """
     degree = coefficients.shape[1] - 1
+    if degree == 0:
+        return np.zeros((len(coefficients), 0))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         if degree == 1:
             roots = -coefficients[:, :1] / coefficients[:, 1:]
@@ -87,14 +97,14 @@ def _quadratic_roots(coefficients: Floats) -> Floats:
 
 
 def _numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
-    degree = coefficients.shape[1] - 1
-    roots = np.zeros((len(coefficients), max(degree, 0)))
-    if degree < 1:
-        return roots
-    scaled = coefficients * widths[:, np.newaxis] ** np.arange(degree + 1.0)
-    for row, piece in zip(roots, scaled, strict=True):
-        found = _polynomial_roots(piece)
-        row[: len(found)] = found
+    roots = np.zeros((len(coefficients), coefficients.shape[1] - 1))
+    scaled = coefficients * _powers(widths, coefficients.shape[1])
+    control = _control_points(widths, coefficients)
+    rounding = 1e-14 * np.sum(np.abs(scaled), axis=1)
+    may_vanish = (np.min(control, axis=1) <= rounding) & (np.max(control, axis=1) >= -rounding)
+    for k in np.flatnonzero(may_vanish):
+        found = _polynomial_roots(scaled[k])
+        roots[k, : len(found)] = found
     return roots * widths[:, np.newaxis]
 
 
@@ -107,12 +117,26 @@ def _polynomial_roots(piece: Floats) -> Floats:
     return found
 
 
+def _control_points(widths: Floats, coefficients: Floats) -> Floats:
+    """Bernstein coefficients of each piece: they enclose its values."""
+    columns = coefficients.shape[1]
+    shares = [[math.comb(i, j) / math.comb(columns - 1, j) for i in range(columns)] for j in range(columns)]
+    control: Floats = (coefficients * _powers(widths, columns)) @ np.array(shares)
+    return control
+
+
+def _powers(widths: Floats, columns: int) -> Floats:
+    powers: Floats = widths[:, np.newaxis] ** np.arange(float(columns))
+    return powers
+
+
 def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
     """Largest absolute value over all pieces, at their ends or at their interior extrema."""
     best = max(float(np.max(np.abs(coefficients[:, 0]))), float(np.max(np.abs(value(coefficients, widths)))))
     if coefficients.shape[1] <= 2:
         return best
-    may_exceed = value(np.abs(coefficients), widths) > best
+    enclosed = np.max(np.abs(_control_points(widths, coefficients)), axis=1)
+    may_exceed = enclosed > best * (1.0 + 1e-15)
     if not np.any(may_exceed):
         return best
     pieces, spans = coefficients[may_exceed], widths[may_exceed]

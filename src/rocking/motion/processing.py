@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,18 @@ from rocking.motion.piecewise import Floats
 if TYPE_CHECKING:
     from rocking.motion.motion import Motion
 
+T = TypeVar("T")
+
 _MOST_SAMPLES: Final = 50_000_000
+
+
+def pair(values: tuple[T, T], what: str) -> tuple[T, T]:
+    """Return the two values, or raise InvalidMotion if they are not two."""
+    try:
+        first, second = values
+    except (TypeError, ValueError) as error:
+        raise InvalidMotion(f"{what} takes two numbers, not {values!r}") from error
+    return first, second
 
 
 def trim(motion: Motion, start: float, end: float) -> Motion:
@@ -57,8 +68,8 @@ def baseline(motion: Motion, degree: int) -> Motion:
 def band_pass(motion: Motion, low: float | None, high: float | None, *, order: int) -> Motion:
     """Filter with a Butterworth band-pass, forwards and backwards, zeros added at both ends meanwhile.
 
-    The zeros last ``1.5 order / low`` on each side (Converse and Brady 1992); without `low`, ``1.5 order /
-    high``.
+    The zeros last ``1.5 order / low`` on each side (Converse and Brady 1992); without `low`, ``1.5 order / high``.
+    They are cut off again, and with them what the filter spread there, so the displacement may keep a slow drift.
     """
     from scipy import signal  # half a second: loaded only where it is used
 
@@ -111,7 +122,7 @@ def _step(motion: Motion, what: str) -> float:
 
 
 def _with_samples(motion: Motion, samples: Floats, step: float) -> Motion:
-    times = np.arange(len(samples), dtype=np.float64) * step
+    times = piecewise.even_times(len(samples), step)
     # The samples are the motion from here on: whatever they approximate, the lines between them are exact.
     return replace(motion, breakpoints=times, coefficients=piecewise.linear(times, samples), error=0.0, step=step)
 

@@ -97,8 +97,9 @@ def info(name: str) -> Record:
 def load(name: str) -> Motion:
     """Return a shipped record as a motion, linear between samples, values as published and in m/s^2.
 
-    The Ridgecrest records are uncorrected: a small constant offset of the instrument is still in them, which
-    does not matter to a rocking block but makes velocity and displacement drift. To remove it::
+    The Ridgecrest records are uncorrected: their mean is zero, but the instruments' baseline moves by some mm/s^2
+    during the shaking, which does not matter to a rocking block but makes the displacement drift by metres. To
+    remove it::
 
         rocking.records.load("ridgecrest-clc-090").processed(baseline=0, band_pass=(0.05, None))
 

@@ -140,15 +140,15 @@ def _recognise(source: Source) -> tuple[_Reader, Identification]:
 
 
 def _unknown(source: Source) -> UnreadableRecord:
+    line = source.first_line()
+    if line is not None and "RESPONSE AND FOURIER" in line.text.upper():
+        return source.error("this is a V3 file of spectra; give the V1 or V2 file of the acceleration", line.start)
     wide = table.columns(source)
     if wide is not None:
         return source.error(
             f"each line holds {wide} numbers, but a text table has one (acceleration) or two (time, acceleration); "
             "keep only these"
         )
-    line = source.first_line()
-    if line is not None and "RESPONSE AND FOURIER" in line.text.upper():
-        return source.error("this is a V3 file of spectra; give the V1 or V2 file of the acceleration", line.start)
     position = source.binary_at()
     what = "this is text" if position is None else f"this is a binary file (byte {source.data[position]} at {position})"
     if through_obspy.installed():

@@ -39,7 +39,9 @@ def recognise(source: Source) -> Identification | None:
     header = _header(source)
     if header is None:
         return None
-    return Identification(NAME, f"line {source.line_number(header.sizes.start)} gives NPTS and DT")
+    other = _other_quantity(header)
+    name = f"PEER {_EXTENSIONS[other[0]]}" if other else NAME
+    return Identification(name, f"line {source.line_number(header.sizes.start)} gives NPTS and DT")
 
 
 def read(source: Source, request: Request) -> list[Channel]:
@@ -52,7 +54,9 @@ def read(source: Source, request: Request) -> list[Channel]:
     """
     header = _header(source)
     assert header is not None
-    _refuse_other_quantities(source, header)
+    other = _other_quantity(header)
+    if other:
+        raise source.error(f"this PEER file holds {other[0]}; give the AT2 file of the acceleration", other[1])
     at = header.sizes.start
     spelling = next((found[1] for line in header.titles if (found := _UNITS.search(line.text))), "")
     unit = request.units(source, find_unit(spelling), at)
@@ -88,15 +92,13 @@ def _header(source: Source) -> _Header | None:
     return None
 
 
-def _refuse_other_quantities(source: Source, header: _Header) -> None:
+def _other_quantity(header: _Header) -> tuple[str, int] | None:
+    """Return what the file holds instead of acceleration, and where it says so, or None."""
     for line in header.titles:
         found = _OTHER_QUANTITY.search(line.text)
         if found:
-            quantity = found[1].lower()
-            raise source.error(
-                f"this is a PEER {_EXTENSIONS[quantity]} file of {quantity}; give the AT2 file of the acceleration",
-                line.start,
-            )
+            return found[1].lower(), line.start
+    return None
 
 
 def _places(title: str) -> tuple[str, str, str]:

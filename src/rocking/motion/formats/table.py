@@ -81,7 +81,7 @@ def read(source: Source, request: Request) -> list[Channel]:
         values = values[1::2]
     acceleration = to_acceleration(source, shape.start, values, unit)
     facts = {"format": NAME, "file": source.file}
-    return [Channel("acceleration", 1, acceleration, dt, times, units=unit.name, station=source.stem, metadata=facts)]
+    return [Channel(source.stem, 1, acceleration, dt, times, units=unit.name, metadata=facts)]
 
 
 def _shape(source: Source) -> _Shape | None:

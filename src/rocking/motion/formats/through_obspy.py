@@ -16,6 +16,8 @@ from rocking.motion.formats.units import Unit
 
 #: PICKLE runs what a file tells it to; the other two open further files that a file names.
 _REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
+_SUFFIX = " (through ObsPy)"
+_REASON_LENGTH = 200
 
 
 def installed() -> bool:
@@ -30,11 +32,14 @@ def installed() -> bool:
 
 
 def recognise(source: Source) -> Identification | None:
-    """Return the format if one of ObsPy's readers claims the file."""
-    name = _format_name(source)
-    if name is None:
+    """Return the first format whose reader in ObsPy claims the file (and, of several, can read it)."""
+    claims = _claims(source)
+    if not claims:
         return None
-    return Identification(f"{name} (through ObsPy)", f"ObsPy's {name} reader recognises it")
+    name = claims[0]
+    if len(claims) > 1:
+        name = next((each for each in claims if not isinstance(_traces(source, each), str)), name)
+    return Identification(f"{name}{_SUFFIX}", f"ObsPy's {name} reader recognises it")
 
 
 def read(source: Source, request: Request) -> list[Channel]:
@@ -45,58 +50,61 @@ def read(source: Source, request: Request) -> list[Channel]:
     UnreadableRecord
         If ObsPy fails, a trace is not of finite numbers, or units are not given.
     """
-    name = _format_name(source)
+    identification = recognise(source)
+    assert identification is not None
     unit = request.units(source, None, None)
+    name = identification.format.removesuffix(_SUFFIX)
     traces = _traces(source, name)
-    return [_channel(source, request, unit, trace, f"trace {number}", number) for number, trace in enumerate(traces, 1)]
+    if isinstance(traces, str):
+        raise source.error(f"ObsPy's {name} reader cannot read this ({traces}); get the record again")
+    return [_channel(source, request, unit, trace, identification.format, n) for n, trace in enumerate(traces, 1)]
 
 
-def _channel(source: Source, request: Request, unit: Unit, trace: Any, label: str, number: int) -> Channel:
+def _channel(source: Source, request: Request, unit: Unit, trace: Any, form: str, number: int) -> Channel:
     stats = trace.stats
+    if np.ma.is_masked(trace.data):
+        raise source.error(f"trace {number} has gaps; get a record without gaps")
     try:
         with np.errstate(all="ignore"):
-            values = np.asarray(trace.data, dtype=np.float64) * float(stats.calib)
+            values = np.asarray(trace.data, dtype=np.float64).reshape(len(trace.data)) * float(stats.calib)
         dt, station = float(stats.delta), f"{stats.network}.{stats.station}".strip(".")
     except (TypeError, ValueError) as error:
-        raise source.error(f"{label} does not hold plain numbers; choose another file") from error
-    if values.ndim != 1 or np.ma.is_masked(trace.data):
-        raise source.error(f"{label} has gaps; get a record without gaps")
+        raise source.error(f"trace {number} does not hold plain numbers; choose another file") from error
     return Channel(
-        name=str(stats.channel) or label,
+        name=str(stats.channel) or f"trace {number}",
         number=number,
         acceleration=to_acceleration(source, None, values, unit),
         dt=request.step(source, dt, None),
         units=unit.name,
         station=station,
-        metadata={"format": f"{stats.get('_format', '')} (through ObsPy)", "file": source.file},
+        metadata={"format": form, "file": source.file},
     )
 
 
-def _format_name(source: Source) -> str | None:
+def _claims(source: Source) -> list[str]:
+    """Return the names of the formats whose readers say that the file is theirs."""
     if not installed():
-        return None
+        return []
     from obspy.core.util.base import ENTRY_POINTS
 
-    return next(
-        (str(name) for name in ENTRY_POINTS["waveform"] if name not in _REFUSED and _claims(name, source)),
-        None,
-    )
+    return [str(name) for name in ENTRY_POINTS["waveform"] if name not in _REFUSED and _claimed_by(name, source)]
 
 
-def _claims(name: str, source: Source) -> bool:
+def _claimed_by(name: str, source: Source) -> bool:
     from obspy.core.util.misc import buffered_load_entry_point
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            claims = buffered_load_entry_point("obspy", f"obspy.plugin.waveform.{name}", "isFormat")
-            return bool(claims(io.BytesIO(source.raw)))
+            is_format = buffered_load_entry_point("obspy", f"obspy.plugin.waveform.{name}", "isFormat")
+            return bool(is_format(io.BytesIO(source.raw)))
         except Exception:
             # A reader that stumbles over foreign bytes (they raise anything) does not claim them.
             return False
 
 
-def _traces(source: Source, name: str | None) -> Any:
+def _traces(source: Source, name: str) -> Any:
+    """Return ObsPy's traces, or the reason why there are none."""
     import obspy
 
     with warnings.catch_warnings():
@@ -105,8 +113,5 @@ def _traces(source: Source, name: str | None) -> Any:
             traces = obspy.read(io.BytesIO(source.raw), format=name)
         except Exception as error:
             # ObsPy's readers raise whatever their parsing ran into.
-            reason = " ".join(str(error).split())[:200] or type(error).__name__
-            raise source.error(f"ObsPy's {name} reader cannot read this ({reason}); get the record again") from error
-    if not len(traces):
-        raise source.error(f"ObsPy's {name} reader finds no trace in this file; get the record again")
-    return traces
+            return " ".join(str(error).split())[:_REASON_LENGTH] or type(error).__name__
+    return traces if len(traces) else "it holds no trace"

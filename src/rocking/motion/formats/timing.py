@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 _JITTER = 1e-6
 _MOST_DECIMALS = 9
 
+#: Rounded times leave the best even grid by one unit of their last decimal, and a little for that grid's own error.
+_SPREAD = 1.25
+
 #: Later times are mistakes, s (30,000 years).
 _LATEST = 1e12
 
@@ -31,14 +34,14 @@ def even_step(times: NDArray[np.float64]) -> float | None:
     mean = float(times[-1] - times[0]) / intervals
     rounding = 4.0 * float(np.spacing(np.abs(times).max()))
     resolution = _resolution(times, rounding)
-    if resolution > mean * (1.0 + _JITTER):
+    multiple = round(mean / resolution) * resolution if resolution else 0.0
+    if abs(multiple - mean) <= (resolution + rounding) / intervals:
+        # The decimals can write this step, so nothing is rounded: a missing sample must not pass for rounding.
+        return _simplest_fit(times, multiple, rounding, _JITTER * mean + rounding)
+    if resolution > 0.5 * mean:
         return None
-    step = _simplest(mean, max(resolution, _JITTER * mean, rounding) / intervals)
-    deviation = times - times[0] - step * np.arange(len(times))
-    # A step that the decimals can write leaves no rounding: then a whole missing sample must not pass for it.
-    writable = resolution == 0.0 or abs(step / resolution - round(step / resolution)) <= _JITTER
-    allowed = rounding + (_JITTER * mean if writable else resolution * (1.0 + _JITTER))
-    return step if float(deviation.max() - deviation.min()) <= allowed else None
+    allowed = max(_SPREAD * resolution, _JITTER * mean) + rounding
+    return _simplest_fit(times, _slope(times), (_SPREAD - 1.0) * resolution + rounding, allowed)
 
 
 def _resolution(times: NDArray[np.float64], rounding: float) -> float:
@@ -50,6 +53,18 @@ def _resolution(times: NDArray[np.float64], rounding: float) -> float:
     return 0.0
 
 
-def _simplest(value: float, tolerance: float) -> float:
-    candidates = (float(f"{value:.{digits}g}") for digits in range(1, 17))
-    return next((each for each in candidates if abs(each - value) <= tolerance), value)
+def _slope(times: NDArray[np.float64]) -> float:
+    """Return the least-squares step."""
+    index = np.arange(len(times)) - 0.5 * (len(times) - 1)
+    return float(index @ times / (index @ index))
+
+
+def _simplest_fit(times: NDArray[np.float64], step: float, drift: float, allowed: float) -> float | None:
+    """Return the step of fewest digits that stays within `drift` of `step`, s, over all the times.
+
+    None if the times leave its grid by more than `allowed`.
+    """
+    candidates = (float(f"{step:.{digits}g}") for digits in range(1, 18))
+    simplest = next((each for each in candidates if abs(each - step) * len(times) <= drift), step)
+    spread = float(np.ptp(times - simplest * np.arange(len(times))))
+    return simplest if spread <= allowed else None

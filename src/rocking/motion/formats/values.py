@@ -140,7 +140,7 @@ def _read_columns(source: Source, start: int, end: int, layout: Layout | None, f
         except _BadNumberError as columns:
             # The reading that got further is the one that the file was written for: its complaint helps.
             bad = max(free, columns, key=lambda each: each.at)
-    raise not_a_number(source, bad.token, bad.at)
+    raise not_a_number(source, bad.token, bad.at) from None
 
 
 def _read(source: Source, start: int, end: int, layout: Layout | None) -> Floats:

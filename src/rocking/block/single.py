@@ -67,7 +67,7 @@ class Block:
     --------
     >>> block = Block(half_width=0.2, half_height=1.0)
     >>> round(block.alpha, 6), round(block.p, 6), round(block.restitution, 6)
-    (0.197396, 2.685604, 0.942308)
+    (0.197396, 2.685546, 0.942308)
     >>> round(block.minimum_acceleration, 6)
     1.96133
     """

@@ -1,0 +1,161 @@
+"""Many blocks as a struct of arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rocking.block.single import Block
+from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import InvalidBlock
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Any number n of blocks, each array of shape (n, 2): side +, side -.
+
+    Parameters
+    ----------
+    p : array_like
+        Frequency parameters, rad/s.
+    alpha : array_like
+        Slendernesses, rad.
+    restitution : array_like, optional
+        Factors on the angular speed on leaving a side; Housner's from `alpha` by default.
+    gravity : float
+        Acceleration of gravity, m/s^2.
+
+    All broadcast against each other: a number, shape (n,) for symmetric blocks, or shape (n, 2).
+
+    Raises
+    ------
+    InvalidBlock
+        If a value is out of its range; the message says which block.
+
+    Examples
+    --------
+    >>> blocks = Blocks(p=[1.5, 3.0], alpha=0.2)
+    >>> len(blocks), blocks[1].p, blocks.is_symmetric
+    (2, 3.0, True)
+    """
+
+    p: Floats
+    alpha: Floats
+    restitution: Floats
+    gravity: float = STANDARD_GRAVITY
+
+    def __init__(
+        self,
+        p: ArrayLike,
+        alpha: ArrayLike,
+        restitution: ArrayLike | None = None,
+        *,
+        gravity: float = STANDARD_GRAVITY,
+    ) -> None:
+        if restitution is None:
+            restitution = 1.0 - 1.5 * np.sin(np.asarray(alpha, dtype=np.float64)) ** 2
+        try:
+            columns = [_columns(values) for values in (p, alpha, restitution)]
+            arrays = np.broadcast_arrays(*columns)
+        except (TypeError, ValueError):
+            raise InvalidBlock(
+                "p, alpha and restitution must be numbers, or arrays of shape (n,) or (n, 2) with one n"
+            ) from None
+        if not (math.isfinite(gravity) and gravity > 0.0):
+            raise InvalidBlock(f"gravity must be positive, in m/s^2, not {gravity}")
+        _check(arrays[0] > 0.0, arrays[0], "p must be positive, in rad/s")
+        _check((arrays[1] > 0.0) & (arrays[1] < 0.5 * np.pi), arrays[1], "alpha must be between 0 and pi/2 rad")
+        _check((arrays[2] > 0.0) & (arrays[2] <= 1.0), arrays[2], "restitution must be in (0, 1]; give restitution=")
+        for name, array in zip(("p", "alpha", "restitution"), arrays, strict=True):
+            held = np.array(array)
+            held.flags.writeable = False
+            object.__setattr__(self, name, held)
+        object.__setattr__(self, "gravity", float(gravity))
+
+    @classmethod
+    def grid(
+        cls,
+        *,
+        p: Sequence[float] | Floats,
+        alpha: Sequence[float] | Floats,
+        restitution: Sequence[float] | Floats | None = None,
+        gravity: float = STANDARD_GRAVITY,
+    ) -> Blocks:
+        """Symmetric blocks for every combination of parameters, the last one varying fastest.
+
+        Parameters
+        ----------
+        p, alpha, restitution : sequence of float
+            Values of each parameter; without restitution, Housner's from alpha.
+        gravity : float
+            Acceleration of gravity, m/s^2.
+
+        Examples
+        --------
+        >>> len(Blocks.grid(p=[1.0, 2.0, 3.0], alpha=[0.1, 0.2], restitution=[0.9]))
+        6
+        """
+        axes = [np.atleast_1d(np.asarray(axis, dtype=np.float64)) for axis in (p, alpha)]
+        if restitution is not None:
+            axes.append(np.atleast_1d(np.asarray(restitution, dtype=np.float64)))
+        if any(axis.ndim != 1 or axis.size == 0 for axis in axes):
+            raise InvalidBlock("each parameter of a grid must be a number or a sequence of at least one number")
+        columns = [column.ravel() for column in np.meshgrid(*axes, indexing="ij")]
+        return cls(*columns, gravity=gravity)
+
+    @classmethod
+    def of(cls, blocks: Iterable[Block]) -> Blocks:
+        """Gather single blocks, all under the same gravity.
+
+        Examples
+        --------
+        >>> Blocks.of([Block(0.2, 1.0), Block(0.1, 0.5)]).p.shape
+        (2, 2)
+        """
+        gathered = list(blocks)
+        gravities = {block.gravity for block in gathered}
+        if len(gravities) != 1:
+            raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same gravity")
+        rows = [[(side.p, side.alpha, side.restitution) for side in block.sides] for block in gathered]
+        table = np.array(rows)
+        return cls(table[..., 0], table[..., 1], table[..., 2], gravity=gravities.pop())
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether both sides of every block are equal."""
+        return all(np.array_equal(array[:, 0], array[:, 1]) for array in (self.p, self.alpha, self.restitution))
+
+    def __len__(self) -> int:
+        return len(self.p)
+
+    def __getitem__(self, index: int) -> Block:
+        p, alpha, e = (array[index] for array in (self.p, self.alpha, self.restitution))
+        return Block.from_parameters(tuple(p), tuple(alpha), tuple(e), gravity=self.gravity)
+
+    def __iter__(self) -> Iterator[Block]:
+        return (self[index] for index in range(len(self)))
+
+    def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
+        """Return some of the blocks: a slice, indices, or a mask."""
+        return Blocks(self.p[index], self.alpha[index], self.restitution[index], gravity=self.gravity)
+
+
+def _columns(values: ArrayLike) -> Floats:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim == 2 and array.shape[1] == 2:
+        return array
+    if array.ndim > 1:
+        raise ValueError
+    return np.repeat(np.atleast_1d(array)[:, None], 2, axis=1)
+
+
+def _check(good: NDArray[np.bool_], values: Floats, rule: str) -> None:
+    bad = np.argwhere(~good)
+    if len(bad):
+        raise InvalidBlock(f"{rule}, not {values[tuple(bad[0])]:g} (block {bad[0][0]})")

@@ -1,0 +1,81 @@
+"""Checks and broadcasting of the dimensionless parameters, shared by all functions of the package."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rocking.errors import InvalidOption
+
+FloatArray = NDArray[np.float64]
+
+#: Frequencies (forcing over the block's p) for which double precision resolves the problem.
+LOWEST_FREQUENCY: Final = 1e-6
+HIGHEST_FREQUENCY: Final = 1e6
+
+#: Closer to one a sequence takes more than a million impacts; at one it never ends.
+LARGEST_RESTITUTION: Final = 0.99999
+
+
+def checked_amplitude(a: ArrayLike) -> FloatArray:
+    """Amplitudes as an array; any finite number is one."""
+    return _finite(a, "a", "the acceleration amplitude over g alpha")
+
+
+def checked_frequency(omega: ArrayLike) -> FloatArray:
+    """Frequencies as an array."""
+    values = _finite(omega, "omega", "the forcing frequency over p")
+    usable = (values >= LOWEST_FREQUENCY) & (values <= HIGHEST_FREQUENCY)
+    _require(usable, values, "omega", f"between {LOWEST_FREQUENCY:g} and {HIGHEST_FREQUENCY:g}")
+    return values
+
+
+def checked_restitution(eta: ArrayLike) -> FloatArray:
+    """Coefficients of restitution as an array."""
+    values = _finite(eta, "eta", "the coefficient of restitution")
+    usable = (values > 0.0) & ((values <= LARGEST_RESTITUTION) | (values == 1.0))
+    _require(usable, values, "eta", f"above 0 and at most {LARGEST_RESTITUTION:g}, or exactly 1")
+    return values
+
+
+def checked_count(value: int, name: str, lowest: int, highest: int) -> int:
+    """A whole number within bounds."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not lowest <= value <= highest:
+        raise InvalidOption(f"{name} must be a whole number from {lowest} to {highest}, not {value!r}")
+    return int(value)
+
+
+def single(values: FloatArray, name: str) -> float:
+    """The one value of a parameter that may not be an array."""
+    if values.ndim:
+        raise InvalidOption(f"{name} must be a single number here, not an array of shape {values.shape}")
+    return float(values)
+
+
+def broadcast(*parameters: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
+    """Common shape of the parameters, and each as a flat array of that size."""
+    try:
+        shape = np.broadcast_shapes(*(parameter.shape for parameter in parameters))
+    except ValueError:
+        shapes = ", ".join(str(parameter.shape) for parameter in parameters)
+        raise InvalidOption(f"the parameters' shapes {shapes} do not broadcast: make them compatible") from None
+    return shape, [np.broadcast_to(parameter, shape).ravel() for parameter in parameters]
+
+
+def _finite(given: ArrayLike, name: str, meaning: str) -> FloatArray:
+    try:
+        values = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidOption(f"{name} ({meaning}) must be a number or an array of numbers, not {given!r}") from None
+    _require(np.isfinite(values), values, name, f"finite ({meaning})")
+    return values
+
+
+def _require(usable: NDArray[np.bool_], values: FloatArray, name: str, condition: str) -> None:
+    if usable.all():
+        return
+    index = np.argwhere(~usable)[0]
+    where = f" at index {tuple(map(int, index))}" if values.ndim else ""
+    raise InvalidOption(f"{name} must be {condition}, not {values[tuple(index)]:g}{where}")

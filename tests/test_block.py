@@ -1,0 +1,134 @@
+"""Blocks: parameters from sizes, pivots and frames; thresholds; what cannot stand."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rocking import Block, Blocks, InvalidBlock
+
+sizes = st.floats(0.01, 20.0)
+
+
+@given(sizes, sizes)
+def test_a_rectangle_is_the_body_with_its_own_inertia(b, h):
+    if math.atan2(b, h) > 0.9:
+        return
+    rectangle = Block(b, h)
+    body = Block.from_pivots((b, b), h, math.sqrt((b * b + h * h) / 3.0))
+    for name in ("p", "alpha", "restitution", "radius"):
+        assert getattr(body, name) == pytest.approx(getattr(rectangle, name), rel=1e-13)
+
+
+@given(sizes, sizes, sizes, sizes)
+def test_pivot_restitution_conserves_angular_momentum_about_the_new_pivot(plus, minus, h, k):
+    kept = k * k + h * h - plus * minus
+    if kept <= 1e-3:
+        return
+    try:
+        block = Block.from_pivots((plus, minus), h, k)
+    except InvalidBlock:
+        assert kept / min(k * k + plus**2 + h * h, k * k + minus**2 + h * h) > 1.0
+        return
+    # Momentum about the new pivot: spin of the body plus moment of the centre's momentum, before and after.
+    for i, (left, entered) in enumerate(((plus, minus), (minus, plus))):
+        velocity = np.array([h, left])  # of the centre for unit angular speed about the pivot that is left
+        lever = np.array([-entered, h])
+        before = k * k + (lever[1] * velocity[0] + lever[0] * velocity[1])
+        after = k * k + entered**2 + h * h
+        assert block.sides[i].restitution == pytest.approx(before / after, rel=1e-12)
+
+
+def test_two_sided_body_from_unequal_pivots():
+    block = Block.from_pivots((0.2, 0.15), 0.6, 0.4)
+    assert block.alpha == (math.atan2(0.2, 0.6), math.atan2(0.15, 0.6))
+    radii = math.hypot(0.2, 0.6), math.hypot(0.15, 0.6)
+    assert block.p == pytest.approx([math.sqrt(9.80665 * r / (0.16 + r * r)) for r in radii], rel=1e-15)
+    assert not block.is_symmetric
+
+
+@given(st.floats(0.0, 50.0))
+def test_frame_is_the_lagrangian_of_columns_and_beam(gamma):
+    b, h = 0.5, 3.0
+    frame, radius = Block.from_frame(b, h, gamma), math.hypot(b, h)
+    # Kinetic energy of one column about its corner, plus its share of a beam that moves with its top (2R away).
+    inertia = 4.0 / 3.0 * radius**2 + 4.0 * gamma * radius**2
+    stiffness = 9.80665 * radius * (1.0 + 2.0 * gamma)
+    assert frame.p == pytest.approx(math.sqrt(stiffness / inertia), rel=1e-13)
+    assert frame.alpha == Block(b, h).alpha
+
+
+def test_thresholds_of_both_models():
+    block = Block.from_parameters(p=(2.0, 2.5), alpha=(0.1, 0.3), restitution=0.9)
+    g = block.gravity
+    assert block.uplift_thresholds("linear") == (g * 0.1, g * 0.3)
+    assert block.minimum_acceleration == (g * math.tan(0.1), g * math.tan(0.3))
+
+
+def test_inertia_needs_the_mass():
+    assert Block(0.2, 1.0).inertia is None
+    assert Block(0.2, 1.0, mass=300.0).inertia == pytest.approx(300.0 * 4.0 / 3.0 * 1.04)
+
+
+def test_parameters_give_the_rectangles_radius():
+    block = Block(0.3, 1.1)
+    assert Block.from_parameters(block.p, block.alpha).radius == pytest.approx(block.radius, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("make", "word"),
+    [
+        (lambda: Block(0.0, 1.0), "half_width"),
+        (lambda: Block(0.2, -1.0), "half_height"),
+        (lambda: Block(math.nan, 1.0), "half_width"),
+        (lambda: Block(0.2, math.inf), "half_height"),
+        (lambda: Block("wide", 1.0), "half_width"),
+        (lambda: Block(0.2, 1.0, restitution=0.0), "restitution"),
+        (lambda: Block(0.2, 1.0, restitution=1.01), "restitution"),
+        (lambda: Block(0.2, 1.0, restitution=(0.9, 0.9, 0.9)), "pair"),
+        (lambda: Block(1.0, 0.5), "restitution="),
+        (lambda: Block(0.2, 1.0, gravity=0.0), "gravity"),
+        (lambda: Block(0.2, 1.0, mass=-1.0), "mass"),
+        (lambda: Block.from_parameters(-1.0, 0.2), "p must"),
+        (lambda: Block.from_parameters(1.0, math.pi / 2), "pi/2"),
+        (lambda: Block.from_parameters(1.0, 0.97), "restitution="),
+        (lambda: Block.from_pivots((0.2, 0.0), 1.0, 0.3), "distances"),
+        (lambda: Block.from_pivots((2.0, 2.0), 0.1, 0.3), "restitution="),
+        (lambda: Block.from_frame(0.2, 1.0, -0.1), "mass_ratio"),
+    ],
+)
+def test_what_cannot_stand_is_refused_in_one_sentence(make, word):
+    with pytest.raises(InvalidBlock) as caught:
+        make()
+    assert word in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_blocks_broadcast_and_index():
+    blocks = Blocks.grid(p=[1.0, 2.0], alpha=[0.1, 0.2, 0.3], restitution=0.9)
+    assert len(blocks) == 6
+    assert [block.alpha for block in blocks] == [0.1, 0.2, 0.3] * 2
+    assert blocks[4] == Block.from_parameters(2.0, 0.2, 0.9)
+    assert len(blocks.select(blocks.alpha[:, 0] > 0.15)) == 4
+    two_sided = Blocks(p=[[1.0, 2.0]], alpha=0.2, restitution=[0.9, 0.8])
+    assert two_sided[1].p == (1.0, 2.0)
+    assert not two_sided.is_symmetric
+
+
+@pytest.mark.parametrize(
+    ("make", "word"),
+    [
+        (lambda: Blocks(p=[1.0, -2.0], alpha=0.2), "block 1"),
+        (lambda: Blocks(p=[1.0], alpha=[0.2, np.nan]), "alpha"),
+        (lambda: Blocks(p=[1.0], alpha=[1.2]), "restitution"),
+        (lambda: Blocks(p=[1.0, 2.0], alpha=[0.1, 0.2, 0.3]), "shape"),
+        (lambda: Blocks.grid(p=[], alpha=[0.1]), "grid"),
+        (lambda: Blocks.of([]), "at least one"),
+        (lambda: Blocks(p="fast", alpha=0.1), "numbers"),
+    ],
+)
+def test_bad_arrays_of_blocks_are_refused(make, word):
+    with pytest.raises(InvalidBlock, match=word):
+        make()

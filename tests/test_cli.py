@@ -1,0 +1,188 @@
+"""The command line: results, files, exit codes, and one line for every mistake."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rocking.cli import main
+
+BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
+RECORD = "el-centro-meloland-270"
+
+
+@pytest.fixture
+def run(capsys):
+    def call(*arguments):
+        code = 0
+        try:
+            main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            code = stop.code or 0
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+def test_simulate_prints_a_verdict(run):
+    code, out, err = run("simulate", "ridgecrest-clc-090", *BLOCK)
+    assert (code, err) == (0, "")
+    for word in ("uplift", "impacts", "complete chattering proven", "peak rotation", "friction", "verdict"):
+        assert word in out
+
+
+def test_simulate_json_is_the_response(run):
+    code, out, _ = run("simulate", RECORD, "--p", "2.5,2.2", "--alpha", "0.12,0.2", "--restitution", "0.9,0.85", "--json")
+    assert code == 0
+    result = json.loads(out)
+    import rocking
+
+    block = rocking.Block.from_parameters((2.5, 2.2), (0.12, 0.2), (0.9, 0.85))
+    response = rocking.simulate(block, rocking.records.load(RECORD))
+    assert result["peak_rotation_rad"] == response.peak_rotation
+    assert [event["time"] for event in result["events"]] == list(response.events["time"])
+    assert result["overturn_time_s"] is None or response.overturned
+
+
+def test_simulate_writes_what_it_says(run, tmp_path):
+    code, out, _ = run("simulate", RECORD, *BLOCK, "--out", tmp_path / "new" / "folder", "--model", "linear")
+    assert code == 0
+    names = {path.name for path in (tmp_path / "new" / "folder").iterdir()}
+    expected = {"events.csv", "response.csv", "response.nc", "response.pdf", "response.png", "result.json"}
+    assert names == expected
+    assert all(name in out for name in names)
+
+
+def test_scale_and_treatments_are_passed_on(run):
+    _, out, _ = run("simulate", RECORD, *BLOCK, "--scale", "0.01", "--json")
+    assert json.loads(out)["events"] == []
+    _, out, _ = run("simulate", RECORD, *BLOCK, "--chattering", "velocity=1e-6", "--json")
+    assert "VelocityThreshold(threshold=1e-06)" in out
+
+
+def test_records_lists_what_ships(run):
+    code, out, _ = run("records", "--json")
+    assert code == 0
+    listed = {entry["name"]: entry for entry in json.loads(out)["records"]}
+    assert listed["ridgecrest-clc-090"]["pga_g"] == pytest.approx(0.344, abs=1e-3)
+    assert "ridgecrest-clc-090" in run("records")[1]
+
+
+def test_records_shows_what_a_file_was_taken_for(run, tmp_path):
+    file = tmp_path / "motion.txt"
+    file.write_text("0.0 0.0\n0.01 0.2\n0.02 -0.1\n")
+    code, out, _ = run("records", file, "--units", "g")
+    assert code == 0
+    assert "text table, since" in out
+    assert "0.2" in out
+
+
+def files(folder: Path) -> dict[str, Path]:
+    """One file for each way to spoil a record."""
+    spoilt = {
+        "empty": b"",
+        "binary": bytes(range(256)) * 20,
+        "npts": b"PEER NGA\nevent\nACCELERATION IN UNITS OF G\nNPTS= 7, DT= .01 SEC\n .1 .2 .3\n",
+        "token": b"0.0 0.0\n0.01 0.1\n0.02 oops\n0.03 0.1\n",
+        "nan": b"0.0 0.0\n0.01 nan\n0.02 0.1\n",
+    }
+    paths = {name: folder / name for name in spoilt}
+    for name, content in spoilt.items():
+        paths[name].write_bytes(content)
+    return paths | {"missing": folder / "nothing.AT2", "folder": folder}
+
+
+@pytest.mark.parametrize("name", ["empty", "binary", "npts", "token", "nan", "missing", "folder"])
+@pytest.mark.parametrize("command", ["simulate", "records"])
+def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command):
+    path = files(tmp_path)[name]
+    options = [*BLOCK, "--units", "g"] if command == "simulate" else ["--units", "g"]
+    code, out, err = run(command, path, *options)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert err.startswith("rocking: ")
+    assert path.name in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        ([RECORD], "--half-width"),
+        ([RECORD, "--half-width", "0.2"], "--half-height"),
+        ([RECORD, *BLOCK, "--p", "2"], "either"),
+        ([RECORD, "--half-width", "0", "--half-height", "1"], "half_width"),
+        ([RECORD, "--half-width", "-1", "--half-height", "1"], "half_width"),
+        ([RECORD, "--half-width", "2", "--half-height", "1"], "restitution="),
+        ([RECORD, *BLOCK, "--restitution", "1.5"], "restitution"),
+        ([RECORD, *BLOCK, "--restitution", "high"], "--restitution"),
+        ([RECORD, *BLOCK, "--model", "cubic"], "cubic"),
+        ([RECORD, *BLOCK, "--chattering", "hope"], "hope"),
+        ([RECORD, *BLOCK, "--chattering", "velocity=0"], "positive"),
+        ([RECORD, *BLOCK, "--chattering", "time=3"], "no parameter"),
+        ([RECORD, *BLOCK, "--chattering", "time"], "sinusoidal"),
+        ([RECORD, *BLOCK, "--duration", "-3"], "duration"),
+        ([RECORD, *BLOCK, "--scale", "nan"], "scale"),
+        ([RECORD, *BLOCK, "--bogus"], "--bogus"),
+        ([RECORD, *BLOCK, "--p"], "--p"),
+        (["ridgecrest-clc-9", *BLOCK], "ridgecrest-clc-9"),
+        ([], "MOTION"),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_2(run, arguments, word):
+    code, out, err = run("simulate", *arguments)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert word.lower() in err.lower()
+
+
+def test_unknown_channel_names_those_there_are(run, shared):
+    path = shared / "records" / "shippable" / "CICLC.v1"
+    code, _, err = run("simulate", path, *BLOCK, "--channel", "9")
+    assert code == 2
+    assert "360 Deg" in err
+    code, _, err = run("simulate", path, *BLOCK)
+    assert code == 2
+    assert "360 Deg" in err
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused_before_work(run, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    code, out, err = run("simulate", RECORD, *BLOCK, "--out", blocked / "results")
+    assert (code, out) == (2, "")
+    assert "--out" in err
+
+
+def test_no_arguments_shows_the_help(run):
+    code, out, _ = run()
+    assert code == 0
+    assert "simulate" in out
+
+
+def test_a_closed_pipe_is_no_traceback():
+    command = [sys.executable, "-c", "from rocking.cli import main; main(['records'])"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        process.wait(timeout=60)
+        assert b"Traceback" not in process.stderr.read()
+
+
+def test_help_starts_without_the_heavy_libraries():
+    probe = (
+        "import sys\nfrom rocking.cli import main\n"
+        "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "print(sorted({'numba', 'scipy', 'xarray', 'matplotlib'} & set(sys.modules)), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, env=os.environ, check=True)
+    assert done.stderr.strip() == "[]"
+
+
+def test_json_has_no_nan(run):
+    _, out, _ = run("simulate", RECORD, *BLOCK, "--chattering", "velocity", "--json")
+    assert "NaN" not in out
+    assert np.isfinite(json.loads(out)["duration_s"])

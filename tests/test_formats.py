@@ -1,0 +1,709 @@
+"""Readers of strong-motion records: what each format says comes out, and what is wrong with a file is said."""
+
+import io
+import os
+import pickle
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from oracles import record_files as written
+
+from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
+from rocking.motion.formats import Channel, channels, identify, read, source, through_obspy, values
+from rocking.motion.formats.timing import even_step
+
+GRAVITY = 9.80665
+SERIES = np.array(written.series(1)) / 100.0
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Callable[[str | bytes], Path]:
+    """Write a file and return its path; the name tells nothing about its format."""
+
+    def write(content: str | bytes) -> Path:
+        path = tmp_path / "record.dat"
+        path.write_bytes(content.encode("latin-1") if isinstance(content, str) else content)
+        return path
+
+    return write
+
+
+def complaint(path: Path | str, error: type[RockingError] = UnreadableRecord, **request: object) -> str:
+    """The message with which reading fails."""
+    with pytest.raises(error) as caught:
+        read(path, **request)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert not message.endswith(".")
+    return message
+
+
+# The fixtures
+
+
+def test_fixtures_are_what_their_writer_writes() -> None:
+    for name, content in written.fixtures().items():
+        assert (written.FOLDER / name).read_bytes() == content.encode(), name
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "channel", "resolution"),
+    [
+        ("nga.at2", "PEER AT2", None, 1e-7 * GRAVITY),
+        ("old.at2", "PEER AT2", None, 1e-7 * GRAVITY),
+        ("two.v1", "CSMIP V1", 1, 1e-6 * GRAVITY),
+        ("pairs.v1", "CSMIP V1", "EW", 1e-4 * GRAVITY),
+        ("two.v2", "CSMIP V2", 1, 1e-7),
+        ("two.v2c", "COSMOS", 1, 1e-7),
+        ("single.v2c", "COSMOS", None, 1e-6),
+        ("even.smc", "USGS SMC", None, 1e-4),
+        ("esm.asc", "ESM", None, 1e-8),
+    ],
+)
+def test_a_record_comes_out_as_printed(name: str, form: str, channel: int | str | None, resolution: float) -> None:
+    path = written.FOLDER / name
+    motion = read(path, channel=channel)
+    times, acceleration = motion.samples
+    assert identify(path).format == form
+    assert motion.step == 0.005
+    np.testing.assert_allclose(times, 0.005 * np.arange(written.POINTS), atol=1e-15)
+    np.testing.assert_allclose(acceleration, SERIES, rtol=0.0, atol=0.51 * resolution)
+
+
+def test_every_number_is_the_double_nearest_to_the_printed_one() -> None:
+    printed = [float(line) for line in (written.FOLDER / "esm.asc").read_text().splitlines()[-written.POINTS :]]
+    (channel,) = channels(written.FOLDER / "esm.asc")
+    assert channel.acceleration.tolist() == [value / 100.0 for value in printed]
+
+
+def test_columns_that_touch_are_split_by_the_stated_format() -> None:
+    text = (written.FOLDER / "two.v2c").read_text()
+    assert "1234.50000" in text
+    assert "-250.12500-999.50000" in text.replace("1234.50000  -0.50000", "") or "-.50000-999.50000" in text
+    motion = read(written.FOLDER / "two.v2c", channel="Up")
+    assert motion.samples[1][:5].tolist() == [-1.5025, -2.50125, 12.345, -0.005, -9.995]
+
+
+def test_velocities_and_displacements_are_not_taken_for_acceleration() -> None:
+    for name in ("two.v2", "two.v2c"):
+        found = channels(written.FOLDER / name)
+        assert [channel.number for channel in found] == [1, 2]
+        assert all(len(channel.acceleration) == written.POINTS for channel in found)
+    assert read(written.FOLDER / "two.v2", channel=2).pga == pytest.approx(max(map(abs, written.series(2))) / 100.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [
+        ("nga.vt2", "line 3: this PEER file holds velocity"),
+        ("nga.dt2", "line 3: this PEER file holds displacement"),
+        ("velocity.smc", "line 1: this SMC file holds 'velocity'"),
+        ("velocity.asc", "line 24: this ESM file holds 'velocity'"),
+        ("velocity.v2c", "this file holds 'velocity'"),
+        ("raw.v0c", "this file holds 'raw accel.'"),
+    ],
+)
+def test_files_without_acceleration_are_refused_and_say_what_they_hold(name: str, what: str) -> None:
+    assert what in complaint(written.FOLDER / name)
+    assert identify(written.FOLDER / name).format
+
+
+def test_film_records_keep_their_uneven_times() -> None:
+    (film,) = channels(written.FOLDER / "film.smc")
+    assert film.dt is None
+    assert film.times is not None
+    np.testing.assert_allclose(film.times, written.film_times(), atol=1e-12)
+    assert film.motion().step is None
+    even, uneven = channels(written.FOLDER / "pairs.v1")
+    assert (even.dt, even.times) == (0.005, None)
+    assert uneven.times is not None
+    np.testing.assert_allclose(uneven.times, written.film_times(), atol=1e-12)
+    assert uneven.motion().duration == pytest.approx(written.film_times()[-1])
+
+
+def test_labels_of_a_channel() -> None:
+    first, up = channels(written.FOLDER / "two.v1")
+    assert (first.name, first.number, first.azimuth, first.station) == ("90 Deg", 1, 90.0, "Testville - Town Hall")
+    assert (up.name, up.number, up.azimuth) == ("Up", 2, None)
+    assert first.metadata["location"] == "Ground"
+    assert first.metadata["station channel"] == "5"
+    (hne,) = channels(written.FOLDER / "esm.asc")
+    assert (hne.name, hne.azimuth, hne.units, hne.station) == ("HNE", 90.0, "cm/s^2", "TT.TST1")
+    (smc,) = channels(written.FOLDER / "even.smc")
+    assert (smc.name, smc.azimuth, smc.station) == ("090", 90.0, "Testville Town Hall")
+    (at2,) = channels(written.FOLDER / "nga.at2")
+    assert (at2.name, at2.station, at2.event, at2.units) == ("090", "Town Hall", "Somewhere-01, 1/2/1999", "G")
+    cosmos = channels(written.FOLDER / "two.v2c")[1]
+    assert (cosmos.name, cosmos.number, cosmos.azimuth) == ("Up", 2, None)
+    assert cosmos.metadata["location"] == "Ground floor"
+
+
+def test_a_channel_is_immutable_and_survives_pickling() -> None:
+    channel = channels(written.FOLDER / "two.v1")[0]
+    with pytest.raises(ValueError, match="read-only"):
+        channel.acceleration[0] = 1.0
+    with pytest.raises(TypeError):
+        channel.metadata["file"] = "other"  # type: ignore[index]
+    copy = pickle.loads(pickle.dumps(channel))
+    assert copy.metadata == channel.metadata
+    assert copy.motion().pga == channel.motion().pga
+    with pytest.raises(InvalidMotion, match="dt or its times"):
+        Channel("up", 1, np.zeros(3))
+
+
+def test_a_motion_says_where_it_comes_from() -> None:
+    motion = read(written.FOLDER / "two.v1", channel=2)
+    assert motion.name == "Testville - Town Hall Up"
+    assert motion.description.family == "record"
+    for fact in ("CSMIP V1", "two.v1", "2 'Up'"):
+        assert fact in motion.description.text
+    assert str(written.FOLDER) not in motion.description.text
+
+
+# Channels
+
+
+def test_one_channel_is_chosen_by_number_or_name() -> None:
+    path = written.FOLDER / "two.v1"
+    up = read(path, channel=2).pga
+    for same in ("2", "Up", "UP", " up "):
+        assert read(path, channel=same).pga == up
+    assert read(path, channel="90").pga == read(path, channel="90 deg").pga == read(path, channel=1).pga != up
+    assert read(written.FOLDER / "nga.at2", channel=1).pga == read(written.FOLDER / "nga.at2").pga
+
+
+def test_a_channel_not_chosen_or_unknown_lists_those_there_are() -> None:
+    path = written.FOLDER / "two.v1"
+    assert "holds 2 channels; give channel= as one of 1 '90 Deg', 2 'Up'" in complaint(path)
+    assert "no channel 3; give one of 1 '90 Deg', 2 'Up'" in complaint(path, channel=3)
+    assert "no channel 'north'" in complaint(path, channel="north")
+    assert "no channel ''" in complaint(path, channel="")
+
+
+def test_two_channels_of_one_name_ask_for_the_number(file: Callable[[str], Path]) -> None:
+    path = file(written.csmip_v1([(1, "Up", SERIES.tolist()), (2, "Up", SERIES.tolist())]))
+    assert "2 channels are called 'Up'" in complaint(path, channel="Up")
+    assert read(path, channel=2).pga > 0.0
+
+
+# PEER
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        "NPTS=   37, DT= .0050 SEC,",
+        "NPTS=     37, DT=   .0050 SEC",
+        "NPTS=37,DT=.005",
+        "NPTS = 37 , DT = 0.005 SEC",
+        "npts=   37, dt=   5.0e-3 sec",
+        "NPTS=    37, DT=  5.000D-03 SEC",
+        "NPTS: 37 DT: 0.005",
+        "   37    0.0050    NPTS, DT",
+        "   37    .00500    NPTS,DT",
+        "37, 0.005, npts, dt",
+        "   37    0.0050    NPTS, DT   FILTER POINTS: HP=0.20 Hz LP=25.0 Hz",
+    ],
+)
+def test_at2_headers_of_all_shapes(sizes: str, file: Callable[[str], Path]) -> None:
+    motion = read(file(written.at2((SERIES / GRAVITY).tolist(), sizes)))
+    assert motion.step == 0.005
+    assert len(motion.samples[0]) == 37
+
+
+def test_at2_may_touch_and_may_lack_the_units_line(file: Callable[[str], Path]) -> None:
+    packed = "".join(f"{value:15.8E}" for value in (-0.5, -0.25, 0.125, -0.0625, -0.03125)) + "\n"
+    text = f"header\nNPTS=5, DT=.01\n{packed}"
+    assert "does not say its units; give units=" in complaint(file(text))
+    assert read(file(text), units="m/s2").samples[1].tolist() == [-0.5, -0.25, 0.125, -0.0625, -0.03125]
+
+
+def test_at2_with_a_wrong_npts_names_both_numbers(file: Callable[[str], Path]) -> None:
+    for stated in (36, 38, 5372, 999_999_999_999):
+        message = complaint(file(written.at2((SERIES / GRAVITY).tolist(), f"NPTS= {stated}, DT= .005 SEC")))
+        assert f"line 4: NPTS is {stated} but 37 values follow" in message
+
+
+def test_a_step_that_is_not_positive_is_refused(file: Callable[[str], Path]) -> None:
+    for dt in ("0.0", "-.01", "1E999", "0"):
+        assert "line 4: the sampling step is" in complaint(file(written.at2(SERIES.tolist(), f"NPTS=37, DT={dt} SEC")))
+
+
+def test_a_spoilt_number_is_named_with_its_line(file: Callable[[str], Path]) -> None:
+    text = (written.FOLDER / "nga.at2").read_text().splitlines(keepends=True)
+    spoilt = text[6].split()[2]
+    for bad in (".12x4567E-01", "NaN", "-inf", "1E999", "--.1", "1_0", "0x10", "********", "\xb5"):
+        lines = [*text[:6], text[6].replace(spoilt, bad), *text[7:]]
+        message = complaint(file("".join(lines)))
+        assert f"line 7: {bad!r} is not a" in message
+
+
+def test_spoilt_numbers_elsewhere(file: Callable[[str], Path]) -> None:
+    for name, row, channel in (("two.v1", 30, 1), ("two.v2", 48, 1), ("two.v2c", 52, 1), ("even.smc", 31, None)):
+        lines = (written.FOLDER / name).read_text().splitlines(keepends=True)
+        lines[row - 1] = lines[row - 1][:13] + "?" + lines[row - 1][14:]
+        message = complaint(file("".join(lines)), channel=channel)
+        assert f"line {row}: " in message
+        assert "?" in message
+        assert "is not a number" in message
+
+
+# COSMOS, CSMIP, SMC, K-NET, ESM
+
+
+def test_cosmos_takes_the_step_that_fits_the_duration(file: Callable[[str], Path]) -> None:
+    long = written.series(1, 2000)
+    assert read(file(written.cosmos(long, step_ms=5.0, raw_step=0.02))).step == 0.005
+    assert read(file(written.cosmos(long, step_ms=-999.0, raw_step=0.005))).step == 0.005
+    stretched = written.cosmos(long, step_ms=5.0, raw_step=0.02).replace("approx   10 secs", "approx   40 secs")
+    assert read(file(stretched)).step == 0.02
+    wrong = written.cosmos(long).replace("approx   10 secs", "approx   90 secs")
+    assert "2000 points at 0.005 s do not last 90 s" in complaint(file(wrong))
+    assert "give no sampling step" in complaint(file(written.cosmos(long, step_ms=-999.0, raw_step=-999.0)))
+
+
+def test_cosmos_flags_are_not_taken_for_acceleration(file: Callable[[str], Path]) -> None:
+    values = written.series(1)
+    values[7] = -999.0
+    assert "which here means 'unknown'" in complaint(file(written.cosmos(values)))
+
+
+def test_cosmos_in_g(file: Callable[[str], Path]) -> None:
+    motion = read(file(written.cosmos((SERIES / GRAVITY).tolist(), units="g (02)")))
+    np.testing.assert_allclose(motion.samples[1], SERIES, atol=0.51e-5 * GRAVITY)
+
+
+def test_csmip_v2_takes_the_finer_step_of_the_real_header(file: Callable[[str], Path]) -> None:
+    path = file(written.csmip_v2([(1, "Up", written.series(1))], dt=0.0078125))
+    assert " .008 sec" in path.read_text()
+    assert read(path).step == 0.0078125
+    other = path.read_text().replace(" .0078125", " .0200000")
+    assert read(file(other)).step == 0.008
+
+
+def test_a_channel_cut_short_is_refused(file: Callable[[str], Path]) -> None:
+    for name, lines, what in (
+        ("two.v1", 31, "37 values but"),
+        ("two.v1", 20, "ends this channel's header"),
+        ("two.v2", 49, "37 values but"),
+        ("two.v2", 30, "ends this channel's header"),
+        ("two.v2c", 52, "37 values but"),
+        ("two.v2c", 16, "100 values but 20 follow"),
+        ("even.smc", 31, "37 values but"),
+        ("even.smc", 20, "ends within its header"),
+        ("esm.asc", 50, "NDATA is 37 but"),
+        ("knet.ns", 12, "'Scale Factor'"),
+        ("pairs.v1", 30, "74 values but"),
+    ):
+        cut = "".join((written.FOLDER / name).read_text().splitlines(keepends=True)[:lines])
+        message = complaint(file(cut), channel=1, **({} if "knet" not in name else {"dt": 0.01}))
+        assert what in message or "knet" in name, (name, message)
+
+
+def test_smc_unknown_values_are_refused(file: Callable[[str], Path]) -> None:
+    text = (written.FOLDER / "even.smc").read_text()
+    lines = text.splitlines(keepends=True)
+    lines[-1] = "  1.7E+38\n"
+    assert "which means 'unknown'" in complaint(file("".join(lines).replace("        37", "        33", 1)))
+
+
+def test_knet_counts_keep_their_offset() -> None:
+    (channel,) = channels(written.FOLDER / "knet.ns")
+    expected = np.array(written.counts(1, 200)) * 3920.0 / 6182761.0 / 100.0
+    np.testing.assert_allclose(channel.acceleration, expected, rtol=1e-15)
+    assert channel.acceleration.mean() > 0.05
+    assert channel.metadata["offset"].startswith("kept")
+    assert (channel.name, channel.azimuth, channel.dt) == ("N-S", 0.0, 0.01)
+    (kik,) = channels(written.FOLDER / "kiknet.ew2")
+    assert (kik.name, kik.azimuth, kik.dt) == ("E-W", 90.0, 0.005)
+
+
+def test_knet_shorter_than_its_duration_is_refused(file: Callable[[str], Path]) -> None:
+    lines = (written.FOLDER / "knet.ns").read_text().splitlines(keepends=True)
+    message = complaint(file("".join(lines[:-13])))
+    assert "line 12: 2 s at 100 Hz make 200 samples but 96 follow" in message
+    for key, value in (("Scale Factor      3920", "Scale Factor      0"), ("100Hz", "0Hz"), ("100Hz", "fast")):
+        assert "get the record again" in complaint(file("".join(lines).replace(key, value)))
+
+
+def test_knet_agrees_with_obspy() -> None:
+    obspy = pytest.importorskip("obspy")
+    for name in ("knet.ns", "kiknet.ew2"):
+        (trace,) = obspy.read(written.FOLDER / name, format="KNET")
+        (channel,) = channels(written.FOLDER / name)
+        assert channel.dt == trace.stats.delta
+        assert channel.station == trace.stats.station
+        np.testing.assert_allclose(channel.acceleration, trace.data * trace.stats.calib, rtol=1e-15)
+
+
+def test_esm_without_units_asks_for_them(file: Callable[[str], Path]) -> None:
+    text = "".join(
+        line for line in written.esm(written.series(1)).splitlines(keepends=True) if not line.startswith("UNITS")
+    )
+    assert "give units=" in complaint(file(text))
+    assert read(file(text), units="gal").pga == read(written.FOLDER / "esm.asc").pga
+
+
+# Text tables
+
+
+@pytest.mark.parametrize(
+    ("text", "request_"),
+    [
+        ("0.5\n-1.5\n2.0\n", {"dt": 0.01}),
+        ("  0.5  \n\n-1.5\n 2.0", {"dt": 0.01}),
+        ("# a comment\nacceleration\n0.5\n% another\n-1.5\n! and\n//this\n2.0\n", {"dt": 0.01}),
+        ("0.5D0\n-1.5d+0\n0.2D+01\n", {"dt": 0.01}),
+        ("0.00 0.5\n0.01 -1.5\n0.02 2.0\n", {}),
+        ("0.00\t0.5\n0.01\t-1.5\n0.02\t2.0\n", {}),
+        ("t,a\n0.00,0.5\n0.01,-1.5\n0.02,2.0\n", {}),
+        ("0.00, 0.5,\n0.01, -1.5,\n0.02, 2.0,\n", {}),
+        ("0,00;0,5\n0,01;-1,5\n0,02;2,0\n", {}),
+        ("0.00;0.5\n0.01;-1.5\n0.02;2.0\n", {"dt": 0.01}),
+        ("5.00 0.5\n5.01 -1.5\n5.02 2.0\n", {}),
+        ("\ufeff0.00 0.5\r\n0.01 -1.5\r\n0.02 2.0\r\n\x1a", {}),
+        ("0.00 0.5\r0.01 -1.5\r0.02 2.0\r", {}),
+        ("\f0.00 0.5\n\f0.01 -1.5\n0.02\f2.0\n", {}),
+    ],
+)
+def test_text_tables(text: str, request_: dict[str, float], file: Callable[[bytes], Path]) -> None:
+    motion = read(file(text.encode()), units="m/s2", **request_)
+    assert motion.step == 0.01
+    assert motion.samples[1].tolist() == [0.5, -1.5, 2.0]
+
+
+def test_text_as_windows_programs_save_it(file: Callable[[bytes], Path]) -> None:
+    assert read(file("0.00 0.5\r\n0.01 1.5\r\n".encode("utf-16")), units="g").pga == 1.5 * GRAVITY
+
+
+def test_uneven_times_make_an_uneven_motion(file: Callable[[str], Path]) -> None:
+    path = file("0.0 0\n0.1 1\n0.4 0\n")
+    assert read(path, units="m/s2").acceleration(0.25) == 0.5
+    assert "line 1: the times are not evenly 0.1 s apart" in complaint(path, units="m/s2", dt=0.1)
+
+
+@pytest.mark.parametrize(
+    ("text", "request_", "what"),
+    [
+        ("1\n2\n", {"units": "g"}, "line 1: the file does not say its sampling step; give dt= in seconds"),
+        ("1\n2\n", {"dt": 0.1}, "line 1: the file does not say its units; give units= as one of g, m/s2"),
+        ("0 1\n1 2\n1 3\n", {"units": "g"}, "line 3: the time does not increase from the row before"),
+        ("0 1\n\n#\n1 2\n-1 3\n", {"units": "g"}, "line 5: the time does not increase from the row before"),
+        ("0 1\n1 2\n2\n", {"units": "g"}, "line 3: here are 1 numbers, in the first row 2"),
+        ("0 1\n1 x2\n2 3\n", {"units": "g"}, "line 2: 'x2' is not a number"),
+        ("0 1\n1 nan\n2 3\n", {"units": "g"}, "line 2: 'nan' is not a finite number"),
+        ("0 1\n0.1 2\n0.2 3\n", {"units": "g", "dt": 0.2}, "line 1: the sampling step is 0.1 s, not dt = 0.2 s"),
+        ("1 2 3\n4 5 6\n", {"units": "g", "dt": 0.1}, "each line holds 3 numbers"),
+        ("1\n", {"units": "g", "dt": 0.1}, "line 1: 1 values are too few"),
+        ("0 1\n", {"units": "g"}, "line 1: 1 values are too few"),
+        ("1e308\n1e308\n", {"units": "g", "dt": 0.1}, "too large"),
+        ("-1e308 1\n1e308 1\n", {"units": "g"}, "the time does not increase"),
+        ("0 1\n1e200 2\n", {"units": "g"}, "the time does not increase"),
+    ],
+)
+def test_what_is_wrong_with_a_table(
+    text: str, request_: dict[str, object], what: str, file: Callable[[str], Path]
+) -> None:
+    assert what in complaint(file(text), **request_)
+
+
+def test_units() -> None:
+    path = written.FOLDER / "column.txt"
+    pga = {units: read(path, dt=0.005, units=units).pga for units in ("g", "m/s2", "cm/s2", "gal", "mm/s2")}
+    assert pga["cm/s2"] == pga["gal"] == pytest.approx(np.abs(SERIES).max(), abs=1e-8)
+    assert pga["m/s2"] == pytest.approx(100.0 * pga["gal"])
+    assert pga["mm/s2"] == pytest.approx(0.1 * pga["gal"])
+    assert pga["g"] == pytest.approx(pga["m/s2"] * GRAVITY)
+    assert read(path, dt=0.005, units="M/s^2").pga == pga["m/s2"]
+    for unknown in ("ft", "", "g/10", 3):
+        assert "are not known; give one of g, m/s2" in complaint(path, dt=0.005, units=unknown)
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.01, float("nan"), float("inf"), "fast", [0.01, 0.02], 10**400])
+def test_a_bad_dt_is_refused_before_the_file_is_opened(dt: object) -> None:
+    assert "the sampling step dt must be a positive number of seconds" in complaint("nowhere", InvalidMotion, dt=dt)
+
+
+def test_arguments_must_agree_with_the_file() -> None:
+    path = written.FOLDER / "nga.at2"
+    assert read(path, dt=0.005, units="g").pga == read(path).pga
+    assert "the sampling step is 0.005 s, not dt = 0.01 s" in complaint(path, dt=0.01)
+    assert "the units are g, not units = 'm/s2'" in complaint(path, units="m/s2")
+
+
+# Steps
+
+
+@given(
+    step=st.sampled_from([0.001, 0.0025, 0.0048828125, 0.005, 0.0078125, 0.01, 0.02, 1.0 / 3.0, 1.0]),
+    points=st.integers(30, 3000),
+    start=st.sampled_from([0.0, -2.5, 100.0]),
+)
+def test_even_times_give_their_step_whatever_their_decimals(step: float, points: int, start: float) -> None:
+    exact = start + step * np.arange(points)
+    assert even_step(exact) == pytest.approx(step, rel=1e-9)
+    for decimals in (3, 4, 6):
+        rounded = np.round(exact, decimals)
+        if 10.0**-decimals <= 0.5 * step:
+            found = even_step(rounded)
+            assert found is not None
+            assert abs(found - step) * (points - 1) <= 1.01 * 10.0**-decimals
+
+
+def test_a_missing_sample_is_not_even() -> None:
+    for step, decimals in ((0.01, 2), (0.005, 3), (0.0078125, 4), (0.02, 17)):
+        times = np.round(step * np.arange(2000), decimals)
+        assert even_step(np.delete(times, 1000)) is None
+        assert even_step(times) == pytest.approx(step, rel=1e-9)
+
+
+def test_a_step_of_short_digits_is_found_exactly() -> None:
+    assert even_step(np.round(0.005 * np.arange(5000), 3)) == 0.005
+    assert even_step(0.01 * np.arange(5000)) == 0.01
+    assert even_step(np.cumsum(np.full(5000, 0.02))) == 0.02
+
+
+# Text and numbers
+
+
+def test_line_ends_marks_and_page_breaks_do_not_matter(file: Callable[[bytes], Path]) -> None:
+    for name in ("nga.at2", "two.v1", "two.v2", "two.v2c", "even.smc", "knet.ns", "esm.asc"):
+        plain = (written.FOLDER / name).read_bytes()
+        expected = [channel.acceleration.tolist() for channel in channels(written.FOLDER / name)]
+        for variant in (
+            plain.replace(b"\n", b"\r\n"),
+            plain.replace(b"\n", b"\r"),
+            b"\xef\xbb\xbf" + plain,
+            plain + b"\x1a",
+            plain + b"\n\n  \n",
+            plain.rstrip(b"\n"),
+            plain.replace(b"Town", b"T\xf6wn").replace(b"Memo.", b"Memo. \xe9"),
+        ):
+            found = [channel.acceleration.tolist() for channel in channels(file(variant))]
+            assert found == expected, (name, variant[:40])
+
+
+def test_leading_blank_lines_and_page_breaks(file: Callable[[bytes], Path]) -> None:
+    for name in ("two.v1", "two.v2", "two.v2c", "even.smc"):
+        plain = (written.FOLDER / name).read_bytes()
+        expected = [channel.acceleration.tolist() for channel in channels(written.FOLDER / name)]
+        for variant in (b"\n\n" + plain, b"\f" + plain, plain.replace(b"\n", b"\n\f", 5)):
+            assert [channel.acceleration.tolist() for channel in channels(file(variant))] == expected
+
+
+@given(
+    numbers=st.lists(st.decimals(-99, 99, places=3).map(float), min_size=1, max_size=60),
+    per_line=st.integers(1, 12),
+    spare=st.integers(0, 3),
+)
+def test_touching_columns_are_split_as_written(numbers: list[float], per_line: int, spare: int) -> None:
+    text = [f"{number:.3f}" for number in numbers]
+    width = max(map(len, text)) + spare
+    block = written.rows([number.rjust(width) for number in text], per_line).encode()
+    origin = source.Source("f", block, block)
+    layout = values.Layout(per_line, width)
+    found = values.read_values(origin, 0, len(block), count=len(numbers), layout=layout)
+    assert found.tolist() == numbers
+
+
+def test_large_files_are_read_in_pieces_of_the_same_content(
+    monkeypatch: pytest.MonkeyPatch, file: Callable[[str], Path]
+) -> None:
+    expected = {
+        name: [c.acceleration.tolist() for c in channels(written.FOLDER / name)]
+        for name in ("two.v1", "pairs.v1", "two.v2c", "even.smc", "film.smc", "knet.ns")
+    }
+    monkeypatch.setattr(values, "_CHUNK", 100)
+    for name, accelerations in expected.items():
+        assert [c.acceleration.tolist() for c in channels(written.FOLDER / name)] == accelerations
+    lines = (written.FOLDER / "esm.asc").read_text().splitlines(keepends=True)
+    lines[-2] = "1.0 oops\n"
+    assert f"line {len(lines) - 1}: 'oops' is not a number" in complaint(file("".join(lines)))
+
+
+def test_one_endless_number_is_refused_quickly(file: Callable[[bytes], Path]) -> None:
+    assert "is not a number" in complaint(file(b"1\n" + b"1" * 10**6), dt=0.1, units="g")
+    header = written.at2([], "NPTS=2, DT=.01").encode()
+    assert "is not a number" in complaint(file(header + b"9" * 10**7))
+
+
+# Files
+
+
+def test_a_missing_file_a_folder_and_an_empty_file(tmp_path: Path, file: Callable[[bytes], Path]) -> None:
+    assert "there is no such file" in complaint(tmp_path / "none.at2")
+    assert "this is a folder" in complaint(tmp_path)
+    for blank in (b"", b" \r\n\t\n", b"\xef\xbb\xbf", b"\x1a"):
+        assert "this file is empty" in complaint(file(blank))
+    for impossible in ("nul\0byte", "x" * 5000, ""):
+        assert complaint(impossible)
+    assert "must be a file name" in complaint(3)  # type: ignore[arg-type]
+
+
+def test_a_device_and_a_pipe_are_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    assert "not a regular file" in complaint(tmp_path / "pipe")
+    assert "not a regular file" in complaint("/dev/zero")
+
+
+def test_a_file_that_may_not_be_read(monkeypatch: pytest.MonkeyPatch, file: Callable[[str], Path]) -> None:
+    path = file("1\n2\n")
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("builtins.open", refuse)
+    assert "may not be read" in complaint(path)
+    monkeypatch.setattr("builtins.open", lambda *_: (_ for _ in ()).throw(OSError(5, "Input/output error")))
+    assert "could not be read ([Errno 5] Input/output error)" in complaint(path)
+
+
+def test_a_file_beyond_the_limit_is_refused(monkeypatch: pytest.MonkeyPatch, file: Callable[[str], Path]) -> None:
+    monkeypatch.setattr(source, "SIZE_LIMIT", 2**20)
+    assert "larger than 1 MiB" in complaint(file("1\n" * 2**20))
+
+
+def test_paths_may_be_text_bytes_or_paths(file: Callable[[str], Path]) -> None:
+    path = file(written.fixtures()["nga.at2"])
+    assert read(path).pga == read(str(path)).pga == read(os.fsencode(path)).pga  # type: ignore[arg-type]
+
+
+def test_foreign_files_are_said_to_be_text_or_binary(file: Callable[[bytes], Path]) -> None:
+    assert "this is a binary file (byte 0 at 2)" in complaint(file(b"ab\x00cd\n"))
+    assert "this is text in no format known here" in complaint(file(b"Dear reader,\nthere is no record here.\n"))
+    assert "V3 file of spectra" in complaint(file(b"Response and Fourier Amplitude Spectra\n1 2 3\n"))
+
+
+# ObsPy
+
+
+def waveform(form: str, points: int = 50) -> bytes:
+    """A small file in one of ObsPy's formats, counts 0, 3, 6, ..."""
+    obspy = pytest.importorskip("obspy")
+    header = {"network": "TT", "station": "TST", "channel": "HNZ", "delta": 0.01}
+    stream = obspy.Stream([obspy.Trace(np.arange(0, 3 * points, 3, dtype=np.int32), header)])
+    with tempfile.NamedTemporaryFile() as place:
+        stream.write(place.name, format=form)
+        return Path(place.name).read_bytes()
+
+
+@pytest.mark.parametrize("form", ["MSEED", "GSE2", "SAC", "SLIST", "TSPAIR"])
+@pytest.mark.filterwarnings("ignore")
+def test_other_formats_go_through_obspy(form: str, file: Callable[[bytes], Path]) -> None:
+    path = file(waveform(form))
+    assert identify(path).format == f"{form} (through ObsPy)"
+    assert "does not say its units; give units=" in complaint(path)
+    (channel,) = channels(path, units="cm/s2")
+    assert (channel.name, channel.dt, len(channel.acceleration)) == ("HNZ", 0.01, 50)
+    np.testing.assert_allclose(channel.acceleration, 0.03 * np.arange(50), rtol=1e-6, atol=1e-12)
+
+
+def test_pickles_are_never_opened(file: Callable[[bytes], Path]) -> None:
+    obspy = pytest.importorskip("obspy")
+    buffer = io.BytesIO()
+    obspy.Stream([obspy.Trace(np.zeros(9))]).write(buffer, format="PICKLE")
+    assert "nor to ObsPy" in complaint(file(buffer.getvalue()), units="g")
+
+
+def test_what_obspy_cannot_read_is_one_sentence(file: Callable[[bytes], Path]) -> None:
+    assert complaint(file(waveform("MSEED")[:70]), units="g")
+    assert complaint(file(waveform("SAC")[:600]), units="g")
+
+
+def test_without_obspy_the_extra_is_named(monkeypatch: pytest.MonkeyPatch, file: Callable[[bytes], Path]) -> None:
+    path = file(waveform("MSEED"))
+    monkeypatch.setitem(sys.modules, "obspy", None)
+    assert not through_obspy.installed()
+    assert "install rocking[formats]" in complaint(path)
+    assert read(written.FOLDER / "knet.ns").pga > 0.0
+
+
+# Real records; each oracle is the file's own statement or a second, plain reading
+
+
+def by_columns(path: Path, start: int, stop: int, width: int) -> list[float]:
+    """The numbers of lines start + 1 ... stop, cut every `width` characters."""
+    lines = path.read_text("latin-1").splitlines()[start:stop]
+    return [float(line[i : i + width]) for line in lines for i in range(0, len(line.rstrip()), width)]
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "start", "stop", "peak", "time"),
+    [
+        ("CICLC.v1", 1, 28, 4020, 0.3442498, 234.36),
+        ("CICLC.v1", 2, 4049, 8059, 0.5107992, 235.7),
+        ("CITOW2.RAW", 1, 28, 4474, 0.4373068, 33.78),
+    ],
+)
+def test_real_v1(shared: Path, name: str, number: int, start: int, stop: int, peak: float, time: float) -> None:
+    path = shared / "records" / "shippable" / name
+    acceleration = channels(path)[number - 1].acceleration
+    times, _ = read(path, channel=number).samples
+    assert acceleration.tolist() == [value * GRAVITY for value in by_columns(path, start, stop, 9)]
+    largest = int(np.argmax(np.abs(acceleration)))
+    assert abs(acceleration[largest]) / GRAVITY == pytest.approx(peak, abs=0.51e-6)
+    assert times[largest] == pytest.approx(time, abs=1e-9)
+    assert len(channels(path)) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "peak", "time", "azimuth"),
+    [("CHAN14", 2.2509, 3.32, None), ("CHAN15", -3.0502, 4.06, 0.0), ("CHAN24", -2.9269, 5.16, 270.0)],
+)
+def test_real_v2(shared: Path, name: str, peak: float, time: float, azimuth: float | None) -> None:
+    path = shared / "records" / "shippable" / f"MELOLAND_{name}.V2"
+    (channel,) = channels(path)
+    times, acceleration = read(path).samples[0], channel.acceleration
+    assert acceleration.tolist() == [value / 100.0 for value in by_columns(path, 46, 758, 10)]
+    largest = int(np.argmax(np.abs(acceleration)))
+    assert acceleration[largest] == pytest.approx(peak, abs=1e-12)
+    # The header's time of the peak lags that of the sample it names by one.
+    assert times[largest] == pytest.approx(time, abs=0.0101)
+    assert channel.azimuth == azimuth
+
+
+@pytest.mark.parametrize(
+    ("name", "points", "dt", "peak"),
+    [
+        ("RSN6_IMPVALL.I_I-ELC180-hor1.AT2", 5372, 0.01, 0.2808),
+        ("RSN6_IMPVALL.I_I-ELC270-hor2.AT2", 5346, 0.01, 0.2107),
+        ("RSN6_IMPVALL.I_I-ELC-UP.AT2", 5378, 0.01, 0.1781),
+        ("RSN753_LOMAP_CLS000-hor1.AT2", 7997, 0.005, 0.6447),
+        ("RSN4863_CHUETSU_65036EW.AT2", 6000, 0.01, 0.3748),
+    ],
+)
+def test_real_at2(shared: Path, name: str, points: int, dt: float, peak: float) -> None:
+    path = shared / "records" / "test_only" / name
+    motion = read(path)
+    numbers = [float(token) for line in path.read_text().splitlines()[4:] for token in line.split()]
+    assert channels(path)[0].acceleration.tolist() == [number * GRAVITY for number in numbers]
+    assert (len(motion.samples[0]), motion.step) == (points, dt)
+    assert motion.pga / GRAVITY == pytest.approx(peak, abs=1e-4)
+
+
+def test_real_smc(shared: Path) -> None:
+    path = shared / "records" / "test_only" / "2516b_a.smc"
+    motion = read(path)
+    assert channels(path)[0].acceleration.tolist() == [value / 100.0 for value in by_columns(path, 35, 5185, 10)]
+    assert (len(motion.samples[0]), motion.step) == (41200, 0.005)
+    largest = int(np.argmax(np.abs(motion.samples[1])))
+    assert motion.samples[1][largest] == pytest.approx(0.39103935, abs=0.51e-5)
+    assert motion.samples[0][largest] == pytest.approx(47.615 - 0.005, abs=0.0101)
+
+
+def test_real_knet_of_obspy(file: Callable[[bytes], Path]) -> None:
+    obspy = pytest.importorskip("obspy")
+    path = Path(obspy.__file__).parent / "io" / "nied" / "tests" / "data" / "test.knet"
+    if not path.is_file():
+        pytest.skip("this ObsPy comes without its test data")
+    (trace,) = obspy.read(path, format="KNET")
+    (channel,) = channels(path)
+    assert len(channel.acceleration) == trace.stats.npts == 5900
+    np.testing.assert_allclose(channel.acceleration, trace.data * trace.stats.calib, rtol=1e-14)
+    assert np.abs(channel.acceleration - channel.acceleration.mean()).max() == pytest.approx(0.04383, abs=1e-4)

@@ -1,0 +1,293 @@
+"""Whatever bytes a record file holds, the readers answer with channels or with one sentence, quickly.
+
+A short version runs in the suite. The long one is a program:
+
+    python tests/test_formats_fuzz.py --inputs 1000000
+"""
+
+import argparse
+import functools
+import random
+import re
+import resource
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from oracles import record_files as written
+
+from rocking.errors import RockingError
+from rocking.motion.formats import channels, identify, read, through_obspy
+
+RECORDS = Path(__file__).resolve().parents[2] / "shared" / "records"
+
+#: What replaces a number, or is put anywhere.
+TOKENS = (
+    *(b"0", b"-1", b"1", b"nan", b"-inf", b"1e999", b"1e308", b"-1e308", b"5e-324", b"1e-308", b"99999999999", b"2"),
+    *(b"9" * 30, b"9" * 5000, b"-999", b"1.7e38", b"1.0D-3", b"1_0", b".", b"-", b"+.e", b"E", b"0.", b"-0.0", b"36"),
+    *(
+        b" ",
+        b"\n",
+        b"\r",
+        b"\f",
+        b"\t",
+        b"\0",
+        b"\x1a",
+        b"\v",
+        b"\xff",
+        b"\xef\xbb\xbf",
+        b"\xff\xfe",
+        b"\n\n\n",
+        b",",
+        b";",
+    ),
+    *(
+        b"#",
+        b"/&",
+        b"|",
+        b"NPTS",
+        b"DT=",
+        b"units of ",
+        b"End-of-data",
+        b"(8F10.5)",
+        b"(999F999.9)",
+        b"(0F0)",
+        b"(1E1)",
+    ),
+    *(
+        b"Uncorrected Accelerogram",
+        b"Corrected accelerogram\n",
+        b"points of accel data at 1 sec",
+        b"G/10",
+        b"1 VELOCITY",
+    ),
+)
+REQUESTS: tuple[dict[str, object], ...] = ({}, {"units": "g"}, {"units": "gal", "dt": 0.005}, {"dt": 0.01})
+
+Operation = tuple[int, float, float, int]
+_NUMBER = re.compile(rb"[+-]?\d*\.?\d+(?:[EeDd][+-]?\d+)?")
+
+
+def _flip(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    return data[:at] + bytes([data[at] ^ (1 << choice % 8)]) + data[at + 1 :] if at < len(data) else data
+
+
+def _delete(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    return data[:at] + data[at + length :]
+
+
+def _repeat(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    return data[:at] + data[at : at + length] * (1 + choice % 20) + data[at + length :]
+
+
+def _cut(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    return data[:at]
+
+
+def _insert(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    return data[:at] + TOKENS[choice % len(TOKENS)] + data[at:]
+
+
+def _renumber(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    found = _NUMBER.search(data, at)
+    return data if found is None else data[: found.start()] + TOKENS[choice % len(TOKENS)] + data[found.end() :]
+
+
+def _splice(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    return data[:at] + other[min(at, len(other) // 2) :]
+
+
+def _drop_line(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    lines = data.split(b"\n")
+    del lines[data.count(b"\n", 0, at)]
+    return b"\n".join(lines)
+
+
+def _swap_lines(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    lines = data.split(b"\n")
+    first, second = data.count(b"\n", 0, at), choice % len(lines)
+    lines[first], lines[second] = lines[second], lines[first]
+    return b"\n".join(lines)
+
+
+def _join_lines(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    return data[:at] + data[at:].replace(b"\n", b"", 1 + choice % 3)
+
+
+def _noise(data: bytes, at: int, length: int, choice: int, other: bytes) -> bytes:
+    return data[:at] + bytes((choice * k * k + 7 * k) % 256 for k in range(length % 97)) + data[at:]
+
+
+MUTATIONS: tuple[Callable[[bytes, int, int, int, bytes], bytes], ...] = (
+    *(_flip, _delete, _repeat, _cut, _insert, _insert, _renumber, _renumber, _renumber),
+    *(_splice, _drop_line, _swap_lines, _join_lines, _noise),
+)
+
+
+@functools.cache
+def seeds() -> list[bytes]:
+    """The fixtures, and the real headers before a few of their numbers where the real files are at hand."""
+    found = [content.encode() for content in written.fixtures().values()]
+    for name in ("CICLC.v1", "CITOW2.RAW"):
+        found += [b"".join(_shortened(path)) for path in (RECORDS / "shippable" / name,) if path.is_file()]
+    for path in sorted(RECORDS.glob("*/*.[AV]*2")):
+        lines = path.read_bytes().splitlines(keepends=True)
+        points = re.compile(rb"\b5\d\d\d\b|\b6000\b|\b7997\b")
+        found.append(
+            b"".join(points.sub(b"  40", line, count=1) for line in lines[: 51 if path.suffix == ".V2" else 12])
+        )
+    return found
+
+
+def _shortened(path: Path) -> Iterator[bytes]:
+    kept = 0
+    for line in path.read_bytes().splitlines(keepends=True):
+        if b"points at" in line:
+            line, kept = b"    40" + line[6:], 5
+        elif (
+            re.fullmatch(rb"[-\d. \r\n]+", line) and b"." in line and line.startswith((b"  .0", b" -.0")) and kept <= 0
+        ):
+            continue
+        else:
+            kept -= 1
+        yield line
+
+
+def mutated(seed: bytes, other: bytes, operations: list[Operation]) -> bytes:
+    """`seed` after the operations: each a mutation, a place and a length (as shares), and a choice."""
+    data = seed
+    for mutation, place, share, choice in operations:
+        at = min(int(place * len(data)), max(len(data) - 1, 0))
+        length = 1 + int(share**4 * min(len(data), 2000))
+        data = MUTATIONS[mutation % len(MUTATIONS)](data, at, length, choice, other)[:200_000]
+    return data
+
+
+def attempt(path: Path, content: bytes, request: dict[str, object]) -> bool:
+    """Read the content as a record; whether it was accepted. Anything but a RockingError in one line gets out."""
+    path.write_bytes(content)
+    try:
+        identify(path)
+        found = channels(path, **request)  # type: ignore[arg-type]
+        for channel in found:
+            assert np.isfinite(channel.acceleration).all()
+            channel.motion()
+        if len(found) == 1:
+            read(path, **request)  # type: ignore[arg-type]
+    except RockingError as error:
+        message = str(error)
+        assert message
+        assert "\n" not in message
+        assert len(message) < 4000
+        return False
+    return True
+
+
+OPERATIONS = st.lists(
+    st.tuples(st.integers(0, len(MUTATIONS) - 1), st.floats(0, 1), st.floats(0, 1), st.integers(0, 10 * len(TOKENS))),
+    max_size=5,
+)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("fuzz") / "record.dat"
+
+
+def test_seeds_are_accepted_or_refused_as_they_are(place: Path) -> None:
+    accepted = sum(attempt(place, seed, {"units": "gal", "dt": 0.005}) for seed in seeds())
+    accepted += sum(attempt(place, seed, {}) for seed in seeds())
+    assert accepted >= 12
+
+
+@settings(max_examples=600, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    index=st.integers(0, 10**6), other=st.integers(0, 10**6), operations=OPERATIONS, request_=st.sampled_from(REQUESTS)
+)
+def test_spoilt_records_end_in_channels_or_one_sentence(
+    place: Path, index: int, other: int, operations: list[Operation], request_: dict[str, object]
+) -> None:
+    known = seeds()
+    attempt(place, mutated(known[index % len(known)], known[other % len(known)], operations), request_)
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(content=st.binary(max_size=500), request_=st.sampled_from(REQUESTS))
+def test_random_bytes_end_in_channels_or_one_sentence(place: Path, content: bytes, request_: dict[str, object]) -> None:
+    attempt(place, content, request_)
+
+
+def test_time_grows_no_faster_than_the_file(place: Path) -> None:
+    for unit in (
+        b"1 ",
+        b"\n",
+        b" ",
+        b"-",
+        b"NPTS",
+        b"NPTS= 1, DT= ",
+        b"/&\n",
+        b"1,",
+        b"| \n",
+        b"EVENT_NAME: \n",
+        b"1.5\n",
+    ):
+        for title in (b"", b"Corrected Accelerogram\n", b"Uncorrected Accelerogram\n", b"2 CORRECTED ACCELEROGRAM\n"):
+            start = time.process_time()
+            attempt(place, title + unit * (1_000_000 // len(unit)), {"units": "g", "dt": 0.01})
+            assert time.process_time() - start < 5.0, (unit, title)
+
+
+def main() -> int:
+    """Run the long version and print what it did; the number of failures is the exit status."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--inputs", type=int, default=1_000_000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=3600.0, help="stop after this time")
+    parser.add_argument("--obspy", action="store_true", help="let ObsPy try what no other reader takes (slow)")
+    parser.add_argument("--keep", type=Path, default=Path("fuzz-failures"), help="folder for inputs that fail")
+    arguments = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (4 * 2**30, 4 * 2**30))
+    warnings.simplefilter("error")
+    if not arguments.obspy:
+        through_obspy.installed = lambda: False
+    chance, known = random.Random(arguments.seed), seeds()
+    done = accepted = failures = 0
+    slowest, begin = 0.0, time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "record.dat"
+        while done < arguments.inputs and time.monotonic() - begin < arguments.seconds:
+            operations = [
+                (chance.randrange(len(MUTATIONS)), chance.random(), chance.random(), chance.randrange(10_000))
+                for _ in range(chance.choice((1, 1, 1, 2, 2, 3, 5)))
+            ]
+            content = mutated(chance.choice(known), chance.choice(known), operations)
+            start = time.process_time()
+            try:
+                accepted += attempt(path, content, chance.choice(REQUESTS))
+            except Exception:
+                failures += 1
+                arguments.keep.mkdir(exist_ok=True)
+                (arguments.keep / f"{arguments.seed}-{done}.dat").write_bytes(content)
+                traceback.print_exc()
+            slowest = max(slowest, time.process_time() - start)
+            done += 1
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(
+        f"{done} inputs in {time.monotonic() - begin:.0f} s: {accepted} accepted, {failures} failures; "
+        f"slowest {slowest:.2f} s of processor time, largest memory {memory:.0f} MiB"
+    )
+    return min(failures, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,187 @@
+"""What processing does to a motion, step by step."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from rocking.errors import InvalidMotion
+from rocking.motion import pulses, records
+from rocking.motion.motion import Motion
+
+STEP = 0.01
+TIMES = STEP * np.arange(4001)
+
+
+def sampled(function):
+    return Motion.from_samples(function(TIMES), STEP)
+
+
+def test_trim_keeps_the_samples_between_its_ends():
+    motion = sampled(np.sin)
+    part = motion.processed(trim=(1.234, 5.678))
+    assert_array_equal(part.samples[1][:-1], motion.samples[1][123:568])
+    assert part.duration == pytest.approx(4.45)
+    assert part.step == STEP
+    assert part.history == ("trimmed to 1.23-5.68 s",)
+
+
+def test_trim_of_a_pulse_cuts_exactly():
+    pulse = pulses.ricker(1.0, 1.0)
+    start, end = 2.0123, 3.3
+    part = pulse.processed(trim=(start, end))
+    times = np.linspace(0.0, end - start, 100)[1:-1]
+    assert_allclose(part.acceleration(times), pulse.acceleration(times + start), atol=1e-14)
+    assert part.duration == end - start
+    assert part.error == pulse.error
+    assert part.description.family == "processed symmetric Ricker"
+
+
+def test_trim_to_the_whole_changes_nothing():
+    for motion in (sampled(np.sin), pulses.half_sine(1.0, 0.7)):
+        same = motion.processed(trim=(0.0, motion.duration))
+        assert_array_equal(same.breakpoints, motion.breakpoints)
+        assert_allclose(same.coefficients, motion.coefficients, rtol=1e-9, atol=1e-13)
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(-5.0, 5.0), min_size=1, max_size=4))
+def test_a_baseline_polynomial_is_removed_exactly(polynomial):
+    motion = sampled(lambda t: np.polynomial.polynomial.polyval(t / 40.0, polynomial))
+    assert motion.processed(baseline=len(polynomial) - 1).pga <= 1e-13 * (1.0 + np.abs(polynomial).max())
+
+
+def test_a_baseline_is_the_least_squares_fit():
+    motion = sampled(lambda t: np.cos(3.0 * t) + 0.2 + 0.1 * t)
+    done = motion.processed(baseline=2)
+    fitted = np.polyval(np.polyfit(TIMES, motion.samples[1], 2), TIMES)
+    assert_allclose(done.samples[1], motion.samples[1] - fitted, atol=1e-12)
+    assert done.history == ("baseline of degree 2 removed",)
+
+
+def amplitude_after(frequency, corners, order=4):
+    """Factor on a long sine's amplitude in the middle of the motion, and the phase shift."""
+    motion = sampled(lambda t: np.sin(2 * math.pi * frequency * t))
+    middle = slice(1500, 2500)
+    out = motion.processed(band_pass=corners, order=order).samples[1][middle]
+    sine, cosine = np.sin(2 * math.pi * frequency * TIMES[middle]), np.cos(2 * math.pi * frequency * TIMES[middle])
+    a, b = np.linalg.lstsq(np.column_stack([sine, cosine]), out, rcond=None)[0]
+    return math.hypot(a, b), math.atan2(b, a)
+
+
+def test_a_band_pass_keeps_its_band_without_phase_shift():
+    gain, phase = amplitude_after(2.0, (0.2, 20.0))
+    assert gain == pytest.approx(1.0, abs=1e-6)
+    assert phase == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_the_gain_is_butterworths_squared(order):
+    """Forwards and backwards: 1/(1 + (f/fc)^(2 n)), with the bilinear warp of the frequency."""
+
+    def warped(frequency):
+        return math.tan(math.pi * frequency * STEP)
+
+    low = 1 / (1 + (warped(0.5) / warped(1.0)) ** (2 * order))
+    high = 1 / (1 + (warped(10.0) / warped(15.0)) ** (-2 * order))
+    assert amplitude_after(1.0, (0.5, None), order)[0] == pytest.approx(low, rel=1e-4)
+    assert amplitude_after(15.0, (None, 10.0), order)[0] == pytest.approx(high, rel=1e-4)
+
+
+def test_a_band_pass_takes_the_drift_out_of_a_record():
+    record = records.load("ridgecrest-clc-090")
+    done = record.processed(baseline=0, band_pass=(0.05, None))
+    assert record.pgd > 1.5
+    assert done.pgd < 0.25
+    assert done.pga == pytest.approx(record.pga, rel=0.002)
+    assert done.history == (
+        "baseline of degree 0 removed",
+        "band-passed 0.05-inf Hz, order 4 forwards and backwards",
+    )
+
+
+def test_resampling_to_a_finer_step_is_the_same_motion():
+    motion = Motion.from_samples([0.0, 1.0, -2.0, 0.5, 0.0], 0.02)
+    fine = motion.processed(resample=0.005)
+    times = np.linspace(0.0, 0.08, 77)
+    assert_allclose(fine.acceleration(times), motion.acceleration(times), atol=1e-13)
+    assert fine.step == 0.005
+    assert fine.duration == pytest.approx(0.08)
+    assert fine.history == ("resampled to a step of 0.005 s",)
+
+
+def test_resampling_to_a_coarser_step_takes_values_up_to_the_end():
+    coarse = Motion.from_samples([0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 0.01).processed(resample=0.02)
+    assert_allclose(coarse.samples[1], [0.0, 2.0, 4.0], atol=1e-14)
+
+
+def test_resampling_a_pulse_makes_it_fit_for_filters():
+    pulse = pulses.ricker(1.0, 1.0)
+    samples = pulse.processed(resample=0.01)
+    assert samples.error == 0.0
+    times = samples.breakpoints
+    assert_allclose(samples.acceleration(times[:-1]), pulse.acceleration(times[:-1]), atol=1e-15)
+    assert samples.processed(band_pass=(0.1, 25.0)).pga == pytest.approx(1.0, rel=0.01)
+
+
+def test_steps_are_taken_in_the_documented_order():
+    motion = sampled(lambda t: np.sin(5.0 * t) + 0.1 * t)
+    together = motion.processed(resample=0.02, band_pass=(0.1, 20.0), baseline=1, trim=(3.0, 33.0))
+    one_by_one = motion.processed(trim=(3.0, 33.0)).processed(baseline=1)
+    one_by_one = one_by_one.processed(band_pass=(0.1, 20.0)).processed(resample=0.02)
+    assert_array_equal(together.coefficients, one_by_one.coefficients)
+    assert together.history == one_by_one.history
+    assert [step.split()[0] for step in together.history] == ["trimmed", "baseline", "band-passed", "resampled"]
+    assert together.description.family == "processed samples"
+
+
+def test_processing_leaves_the_motion_itself_alone():
+    motion = sampled(np.sin)
+    before = motion.coefficients.copy()
+    motion.processed(trim=(1.0, 2.0), baseline=0)
+    assert_array_equal(motion.coefficients, before)
+    assert motion.history == ()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {},
+        {"trim": 5.0},
+        {"trim": (1.0, 2.0, 3.0)},
+        {"band_pass": 10.0},
+        {"trim": (5.0, 5.0)},
+        {"trim": (-1.0, 5.0)},
+        {"trim": (1.0, 50.0)},
+        {"trim": (1.0, 1.001)},
+        {"trim": (math.nan, 5.0)},
+        {"baseline": -1},
+        {"baseline": 1.5},
+        {"baseline": 11},
+        {"band_pass": (None, None)},
+        {"band_pass": (2.0, 1.0)},
+        {"band_pass": (1.0, 1.0)},
+        {"band_pass": (0.1, 50.0)},
+        {"band_pass": (0.0, 10.0)},
+        {"band_pass": (1e-9, 10.0)},
+        {"band_pass": (0.1, math.nan)},
+        {"band_pass": (0.1, 10.0), "order": 0},
+        {"band_pass": (0.1, 10.0), "order": 2.5},
+        {"resample": 0.0},
+        {"resample": math.inf},
+        {"resample": 100.0},
+        {"resample": 1e-9},
+    ],
+)
+def test_unusable_arguments_are_refused(arguments):
+    with pytest.raises(InvalidMotion):
+        sampled(np.sin).processed(**arguments)
+
+
+@pytest.mark.parametrize("arguments", [{"baseline": 0}, {"band_pass": (0.1, 10.0)}])
+def test_filters_ask_for_even_samples(arguments):
+    with pytest.raises(InvalidMotion, match="resample"):
+        pulses.ricker(1.0, 1.0).processed(**arguments)

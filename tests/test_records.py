@@ -1,0 +1,116 @@
+"""The shipped records: what was published, to the last digit, without a network."""
+
+import importlib.util
+import json
+import socket
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import UnreadableRecord
+from rocking.motion import records
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = ROOT / "src" / "rocking" / "motion" / "data"
+
+# As printed in the files' headers: g and s for Ridgecrest, cm/s^2 and s for El Centro.
+PUBLISHED_PEAKS = {
+    "ridgecrest-clc-090": (0.344 * STANDARD_GRAVITY, 234.36),
+    "ridgecrest-clc-360": (0.511 * STANDARD_GRAVITY, 235.70),
+    "ridgecrest-clc-up": (0.347 * STANDARD_GRAVITY, 234.39),
+    "ridgecrest-tow2-090": (0.437 * STANDARD_GRAVITY, 33.78),
+    "ridgecrest-tow2-360": (0.386 * STANDARD_GRAVITY, 33.76),
+    "ridgecrest-tow2-up": (0.360 * STANDARD_GRAVITY, 31.88),
+    "el-centro-meloland-360": (-3.0502, 4.06),
+    "el-centro-meloland-270": (-2.9269, 5.16),
+    "el-centro-meloland-up": (2.2509, 3.32),
+}
+
+FILES = {
+    "CICLC.v1": ("ridgecrest-clc-090", "ridgecrest-clc-360", "ridgecrest-clc-up"),
+    "CITOW2.RAW": ("ridgecrest-tow2-090", "ridgecrest-tow2-360", "ridgecrest-tow2-up"),
+    "MELOLAND_CHAN15.V2": ("el-centro-meloland-360",),
+    "MELOLAND_CHAN24.V2": ("el-centro-meloland-270",),
+    "MELOLAND_CHAN14.V2": ("el-centro-meloland-up",),
+}
+
+
+def test_all_channels_of_three_stations_ship():
+    assert sorted(records.names()) == sorted(PUBLISHED_PEAKS)
+
+
+@pytest.mark.parametrize("name", PUBLISHED_PEAKS)
+def test_the_peak_is_the_published_one(name):
+    peak, time = PUBLISHED_PEAKS[name]
+    acceleration = records.load(name).samples[1]
+    at = round(time / 0.01)
+    assert acceleration[at] == pytest.approx(peak, abs=0.0005 * STANDARD_GRAVITY)
+    assert np.abs(acceleration).argmax() == at
+
+
+@pytest.mark.parametrize("name", PUBLISHED_PEAKS)
+def test_a_record_says_where_it_comes_from(name):
+    motion, record = records.load(name), records.info(name)
+    assert motion.name == record.name == name
+    assert motion.step == record.step == 0.01
+    assert len(motion.breakpoints) == record.samples
+    assert motion.error == 0.0
+    assert motion.history == ()
+    assert motion.description.family == "record"
+    for fact in (record.event, record.station, record.direction, record.state, record.source, record.terms):
+        assert fact
+        assert fact in motion.description.text
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_values_are_those_of_the_published_file(file, shared):
+    from rocking.motion.formats import channels
+
+    found = channels(shared / "records" / "shippable" / file)
+    assert len(found) == len(FILES[file])
+    for channel, name in zip(found, FILES[file], strict=True):
+        times, acceleration = records.load(name).samples
+        assert_array_equal(acceleration[:-1], channel.acceleration[:-1])
+        assert acceleration[-1] == pytest.approx(channel.acceleration[-1], rel=1e-12)
+        assert channel.dt == times[1]
+
+
+def test_the_conversion_script_makes_the_shipped_files(shared, tmp_path, monkeypatch):
+    specification = importlib.util.spec_from_file_location("ship_records", ROOT / "scripts" / "ship_records.py")
+    script = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(script)
+    monkeypatch.setattr(script, "DATA", tmp_path)
+    monkeypatch.setattr("sys.argv", ["ship_records.py", str(shared / "records" / "shippable")])
+    script.main()
+    assert (tmp_path / "catalogue.json").read_text() == (DATA / "catalogue.json").read_text()
+    for archive in sorted(tmp_path.glob("*.npz")):
+        with np.load(archive) as made, np.load(DATA / archive.name) as shipped:
+            assert made.files == shipped.files
+            for channel in made.files:
+                assert_array_equal(made[channel], shipped[channel])
+
+
+def test_records_load_without_a_network(monkeypatch):
+    def refuse(*_, **__):
+        raise AssertionError("a shipped record opened a socket")
+
+    monkeypatch.setattr(socket, "socket", refuse)
+    assert records.load("el-centro-meloland-270").pgv == pytest.approx(0.89, abs=0.01)
+
+
+def test_the_shipped_files_are_small_and_name_their_sources():
+    assert sum(file.stat().st_size for file in DATA.iterdir()) < 600_000
+    sources = (DATA / "SOURCES.md").read_text("utf-8")
+    for record in json.loads((DATA / "catalogue.json").read_text("utf-8")).values():
+        assert record["terms"] in sources
+        assert record["source"] in sources
+
+
+def test_an_unknown_name_is_answered_with_a_near_one():
+    with pytest.raises(UnreadableRecord, match="did you mean 'ridgecrest-clc-090'"):
+        records.load("ridgecrest-clc-90")
+    with pytest.raises(UnreadableRecord, match="there are ridgecrest-clc-090, "):
+        records.info("zzz")

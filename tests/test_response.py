@@ -1,0 +1,245 @@
+"""What a response offers: evaluation, forces, sensitivities, export, treatments, and refusals."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import rocking
+from rocking import (
+    AsymptoticTime,
+    Block,
+    Certified,
+    IntervalThreshold,
+    InvalidOption,
+    OutputError,
+    VelocityThreshold,
+    simulate,
+)
+
+G = 9.80665
+
+
+def sine(amplitude, omega, block, cycles=2.5):
+    """Sine of dimensionless amplitude and frequency for a block (paper, Eq. 5)."""
+    return rocking.pulses.sine(amplitude * G * block.alpha, omega * block.p / (2 * math.pi), cycles=cycles)
+
+
+@pytest.fixture(scope="module")
+def block():
+    return Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
+
+
+@pytest.fixture(scope="module")
+def record():
+    return rocking.records.load("el-centro-meloland-270")
+
+
+@pytest.fixture(scope="module")
+def shaken(record):
+    return simulate(Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), record)
+
+
+def test_rotation_is_continuous_and_its_derivatives_agree(shaken):
+    times = np.linspace(0.0, shaken.duration, 20_001)[1:-1]
+    far = np.min(np.abs(times[:, None] - shaken.impacts["time"][None, :]), axis=1) > 2e-4
+    times = times[far & (shaken.rotation(times) != 0.0)]
+    h = 1e-5
+    slope = (shaken.rotation(times + h) - shaken.rotation(times - h)) / (2 * h)
+    assert np.max(np.abs(slope - shaken.angular_velocity(times))) < 1e-7
+    slope = (shaken.angular_velocity(times + h) - shaken.angular_velocity(times - h)) / (2 * h)
+    corners = np.abs(times / 0.01 - np.round(times / 0.01)) < 2e-3
+    assert np.max(np.abs(slope - shaken.angular_acceleration(times))[~corners]) < 1e-5
+
+
+def test_rotation_vanishes_at_impacts_and_speeds_match(shaken):
+    times = shaken.impacts["time"]
+    early = times < shaken.chattering["start"][0] if len(shaken.chattering) else np.ones(len(times), bool)
+    times = times[early]
+    assert np.max(np.abs(shaken.rotation(times))) < 1e-14
+    after = shaken.angular_velocity(np.nextafter(times, np.inf))
+    assert np.allclose(after, (shaken.impacts["side"] * shaken.impacts["speed_after"])[early], rtol=1e-9)
+
+
+def test_outside_the_response_there_is_nothing(shaken):
+    assert np.isnan(shaken.rotation([-0.1, shaken.duration + 0.1])).all()
+    assert shaken.rotation(np.zeros((2, 3))).shape == (2, 3)
+
+
+def test_peak_is_the_largest_rotation(shaken):
+    assert abs(shaken.rotation(shaken.peak_time)) == pytest.approx(shaken.peak_rotation, rel=1e-13)
+    dense = np.abs(shaken.rotation(np.linspace(0.0, shaken.duration, 200_001)))
+    assert dense.max() <= shaken.peak_rotation * (1 + 1e-12)
+    assert dense.max() == pytest.approx(shaken.peak_rotation, rel=1e-6)
+    assert shaken.peak_over_slenderness == pytest.approx(shaken.peak_rotation / 0.2)
+
+
+def test_forces_at_rest_are_those_of_a_fixed_body(record):
+    heavy = simulate(Block.from_parameters(p=2.0, alpha=0.5, restitution=0.9), record)
+    assert len(heavy.events) == 0
+    assert heavy.required_friction == pytest.approx(record.pga / G, rel=1e-12)
+    assert heavy.minimum_normal_force == 1.0
+
+
+def test_forces_follow_from_the_centre_of_mass(shaken, record):
+    """Newton's law on the centre of mass, whose path is differentiated numerically."""
+    side = shaken.block.sides[0]
+    h = 2e-4
+
+    def centre(t):
+        theta = shaken.rotation(t)
+        leaning = np.sign(theta)
+        psi = side.alpha - np.abs(theta)
+        return -leaning * side.radius * np.sin(psi), side.radius * np.cos(psi)
+
+    times = np.linspace(1.0, 20.0, 4001) + 0.005
+    calm = np.min(np.abs(times[:, None] - shaken.impacts["time"]), axis=1) > 5 * h
+    times = times[calm & (np.abs(shaken.rotation(times)) > 1e-4)]
+    x, y = (np.array(v) for v in zip(*(centre(times + k * h) for k in (-1, 0, 1)), strict=True))
+    accelerations = [(v[2] - 2 * v[1] + v[0]) / h**2 for v in (x, y)]
+    normal = 1.0 + accelerations[1] / G
+    assert np.allclose(shaken.normal_force(times), normal, atol=2e-4)
+    friction = np.abs(record.acceleration(times) + accelerations[0]) / G / normal
+    assert np.allclose(shaken.friction_demand(times), friction, atol=2e-3)
+
+
+def test_extreme_forces_bound_dense_samples(shaken):
+    times = np.linspace(0.0, shaken.duration, 300_001)
+    assert np.max(shaken.friction_demand(times)) <= shaken.required_friction * (1 + 1e-9)
+    assert np.min(shaken.normal_force(times)) >= shaken.minimum_normal_force * (1 - 1e-9)
+    assert np.max(shaken.friction_demand(times)) == pytest.approx(shaken.required_friction, rel=1e-3)
+
+
+def test_sensitivities_are_derivatives(record):
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    for model in ("linear", "nonlinear"):
+        step = 1e-9
+        low, base, high = (simulate(block, record.scaled(1 + k * step), model=model) for k in (-1, 0, 1))
+        first = 12
+        change = (high.impacts["time"][:first] - low.impacts["time"][:first]) / (2 * step)
+        assert np.allclose(base.impacts["sensitivity"][:first], change, rtol=2e-4, atol=1e-5)
+        change = (high.peak_rotation - low.peak_rotation) / (2 * step)
+        assert base.peak_sensitivity == pytest.approx(change, rel=1e-4)
+        assert base.events["sensitivity"][0] == pytest.approx(
+            (high.events["time"][0] - low.events["time"][0]) / (2 * step), rel=1e-4
+        )
+
+
+def test_a_response_that_nobody_can_know_is_flagged():
+    record = rocking.records.load("ridgecrest-clc-090")
+    block = Block(half_width=0.12, half_height=0.75)
+    base, nudged = simulate(block, record), simulate(block, record.scaled(1 + 2**-52))
+    assert base.ambiguous
+    assert abs(base.events["time"][-1] - nudged.events["time"][-1]) > 1e-6
+    assert not simulate(Block(half_width=0.12, half_height=0.55), record).ambiguous
+
+
+@pytest.mark.parametrize("how", ["velocity", "interval", "time"])
+def test_thresholds_come_close_to_the_proof(block, how):
+    motion = sine(1.03, 2.0, block)
+    proven = simulate(block, motion, model="linear").events
+    imposed = simulate(block, motion, model="linear", chattering=how).events
+    assert list(imposed["kind"]) == list(proven["kind"])
+    assert np.max(np.abs(imposed["time"] - proven["time"])) < (0.05 if how == "time" else 1e-6)
+
+
+def test_a_coarse_velocity_threshold_puts_the_block_to_rest_where_it_rocks(block):
+    """The paper's Fig. 11: a = 1.05 is above the critical amplitude, VelTol = 5e-2."""
+    motion = sine(1.05, 2.0, block)
+    end = 1.5 * math.pi
+    proven = simulate(block, motion, model="linear", duration=end).events
+    coarse = simulate(block, motion, model="linear", chattering=VelocityThreshold(5e-2), duration=end).events
+    assert "rest" not in list(proven["kind"])
+    assert "rest" in list(coarse["kind"])
+
+
+def test_without_proof_there_is_no_bracket(block):
+    response = simulate(block, sine(1.03, 2.0, block), model="linear", chattering="velocity")
+    assert np.isnan(response.chattering["lower"]).all()
+    assert simulate(block, sine(1.03, 2.0, block), model="linear").chattering["upper"].all()
+
+
+def test_tolerance_sets_the_width_of_the_bracket(block):
+    motion = sine(1.03, 2.0, block)
+    for tolerance in (1e-4, 1e-7, 1e-11):
+        rows = simulate(block, motion, model="linear", chattering=Certified(tolerance)).chattering
+        assert np.all(rows["upper"] - rows["lower"] <= tolerance)
+        assert np.all((rows["lower"] <= rows["end"]) & (rows["end"] <= rows["upper"]))
+
+
+def test_export_round_trips(shaken, tmp_path):
+    shaken.to_netcdf(tmp_path / "r.nc", dt=0.02)
+    with xr.open_dataset(tmp_path / "r.nc") as dataset:
+        assert np.allclose(dataset.rotation, shaken.rotation(dataset.time.values), atol=1e-15)
+        assert dataset.attrs["overturned"] == 0
+        assert list(dataset.event_kind.values) == list(shaken.events["kind"])
+    shaken.to_csv(tmp_path / "r.csv", dt=0.02)
+    table = np.loadtxt(tmp_path / "r.csv", delimiter=",", skiprows=1)
+    assert np.allclose(table[:, 1], shaken.rotation(table[:, 0]), atol=1e-12)
+    with pytest.raises(OutputError, match="nowhere"):
+        shaken.to_csv(tmp_path / "nowhere" / "r.csv")
+    with pytest.raises(InvalidOption, match="dt"):
+        shaken.to_xarray(dt=0.0)
+
+
+def test_every_kind_of_response_can_be_drawn(block, record):
+    fallen = simulate(Block.from_parameters(p=4.0, alpha=0.05, restitution=0.9), record)
+    assert fallen.overturned
+    still = simulate(Block.from_parameters(p=2.0, alpha=0.5, restitution=0.9), record)
+    free = simulate(block, None, initial_rotation=0.05)
+    for response in (fallen, still, free, simulate(block, sine(1.03, 2.0, block))):
+        assert len(response.plot().axes) >= 2
+
+
+def test_overturning_ends_at_a_quarter_turn(record):
+    fallen = simulate(Block.from_parameters(p=4.0, alpha=0.05, restitution=0.9), record)
+    assert fallen.peak_rotation == math.pi / 2
+    assert fallen.overturn_time == fallen.duration == fallen.peak_time == fallen.events["time"][-1]
+    assert abs(fallen.rotation(fallen.duration)) == pytest.approx(math.pi / 2, rel=1e-12)
+
+
+def test_a_stop_cuts_the_response_short(block, record, shaken):
+    cut = simulate(shaken.block, record, duration=10.0)
+    assert cut.duration == 10.0
+    times = np.linspace(0.0, 10.0, 501)
+    assert np.array_equal(cut.rotation(times[:-1]), shaken.rotation(times[:-1]))
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"model": "quadratic"}, "model"),
+        ({"chattering": "luck"}, "chattering"),
+        ({"duration": 0.0}, "duration"),
+        ({"duration": math.nan}, "duration"),
+        ({"initial_rotation": math.nan}, "initial_rotation"),
+        ({"initial_rotation": 2.0}, "pi/2"),
+        ({"initial_velocity": math.inf}, "initial_velocity"),
+        ({"chattering": AsymptoticTime()}, "sinusoidal"),
+    ],
+)
+def test_bad_options_are_refused_in_one_sentence(block, record, options, word):
+    with pytest.raises(InvalidOption, match=word):
+        simulate(block, record, **options)
+
+
+def test_a_block_that_never_rests_needs_a_duration(block):
+    bouncing = Block.from_parameters(p=1.0, alpha=0.2, restitution=1.0)
+    with pytest.raises(InvalidOption, match="duration="):
+        simulate(bouncing, None, initial_rotation=0.1)
+    response = simulate(bouncing, None, initial_rotation=0.1, duration=20.0)
+    assert response.duration == 20.0
+
+
+def test_a_block_on_its_corner_needs_a_duration():
+    block = Block.from_parameters(p=1.0, alpha=0.25, restitution=0.9)
+    with pytest.raises(InvalidOption, match="balances"):
+        simulate(block, None, model="linear", initial_rotation=0.25)
+
+
+@pytest.mark.parametrize("make", [Certified, VelocityThreshold, IntervalThreshold])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, "small"])
+def test_thresholds_must_be_positive(make, value):
+    with pytest.raises(InvalidOption, match="positive"):
+        make(value)
