@@ -41,7 +41,7 @@ html_show_sphinx = False
 
 def escape_bars(_app, _what, _name, _object, _options, lines):
     """Show |theta| in a docstring as it is; reStructuredText would take it for a substitution."""
-    lines[:] = [re.sub(r"\|(\w+)\|", r"\\|\1\\|", line) for line in lines]
+    lines[:] = [re.sub(r"\|([^|`\s]+)\|", r"\\|\1\\|", line) for line in lines]
 
 
 def setup(app):

@@ -84,8 +84,6 @@ def test_pages_load_nothing_from_the_network(tmp_path):
     for address in addresses:
         assert "//" not in address
         # Where a page asks for a file, the build must have put it there.
-        assert address.startswith("#") or (tmp_path / "html" / re.split("[?#]", address)[0]).is_file(), (
-            address
-        )
+        assert address.startswith("#") or (tmp_path / "html" / re.split("[?#]", address)[0]).is_file(), address
     for style in (tmp_path / "html" / "_static").rglob("*.css"):
         assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", style.read_text("utf-8"))

@@ -35,7 +35,13 @@ def _side_row(p: float, alpha: float, restitution: float, model: Model) -> list[
 
 
 def rules_of(
-    block: Block, motion: Motion | None, model: Model, treatment: Treatment, duration: float | None
+    block: Block,
+    motion: Motion | None,
+    model: Model,
+    treatment: Treatment,
+    duration: float | None,
+    *,
+    record: bool,
 ) -> state.Rules:
     """Rules of a simulation, checked.
 
@@ -59,6 +65,7 @@ def rules_of(
         tolerance=treatment.tolerance if isinstance(treatment, Certified) else 0.0,
         stop=math.inf if duration is None else float(duration),
         endless=duration is None,
+        record=record,
     )
 
 

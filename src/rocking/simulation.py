@@ -74,19 +74,20 @@ def simulate(
     (False, True, '4.235818')
     """
     how = treatment(chattering)
-    rules = rules_of(block, motion, model, how, duration)
+    rules = rules_of(block, motion, model, how, duration, record=True)
     shaking, sides = shaking_of(motion, block.gravity), sides_of(block, model)
     at, x = state.new_state()
     at[state.SIDE], x[state.U], x[state.V] = _initial_state(initial_rotation, initial_velocity)
     x[state.PEAK] = x[state.U]
     tables = state.new_tables(64 + int(_FIRST_ROWS * len(shaking.coefficients)))
     scratch = state.new_scratch(shaking.coefficients.shape[1])
-    ending = march(shaking, sides, rules, tables, scratch, at, x)
+    pieces = len(shaking.coefficients) + 1
+    ending = march(shaking, sides, rules, tables, scratch, at, x, pieces)
     while ending == status.FULL:
         if len(tables.nodes) > _MOST_ROWS:
             raise InvalidOption(f"the response takes more than {_MOST_ROWS} steps; give a shorter duration=")
         tables = state.grown(tables)
-        ending = march(shaking, sides, rules, tables, scratch, at, x)
+        ending = march(shaking, sides, rules, tables, scratch, at, x, pieces)
     if ending == status.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give duration= or another initial state")
     return Response.from_march(

@@ -38,7 +38,7 @@ def asymptotic_times(a: FloatArray, omega: FloatArray, eta: FloatArray) -> Float
 
 
 def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
-    """The paper's iterative procedure, cycle by cycle.
+    """Run the paper's iterative procedure, cycle by cycle.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> FloatArray:
     Examples
     --------
     >>> round(float(first_impact_speed(1.01, 2.0)), 6)
-    0.003755
+    0.003754
     """
     eps, omega2, frequency = _expansion_parameters(a, omega)
     second = 1.0 - 32.0 / 15.0 * (omega2 - 1.0) / omega2

@@ -273,9 +273,7 @@ def _resolved(
 ) -> tuple[NDArray[np.void], float, float, float]:
     """Impacts, time of rest and bracket; NaN: the capacity is used up, minus infinity: incomplete."""
     intervals, before, after = np.zeros((3, capacity))
-    count, rest, lower, upper = resolve(
-        a - 1.0, 1.0 / (omega * omega), eta, tolerance, intervals, before, after
-    )
+    count, rest, lower, upper = resolve(a - 1.0, 1.0 / (omega * omega), eta, tolerance, intervals, before, after)
     impacts = np.zeros(count, IMPACT)
     impacts["interval"] = intervals[:count] / omega
     impacts["time"] = np.cumsum(intervals[:count]) / omega
@@ -298,7 +296,7 @@ def _exact_times(a: FloatArray, omega: FloatArray, eta: FloatArray) -> FloatArra
 
 
 def _alike_together(order: NDArray[np.int64], eta: FloatArray) -> NDArray[np.int64]:
-    """The same sequences sorted by eta, coarsely (a radix sort)."""
+    """Sort the sequences by eta, coarsely (a radix sort)."""
     classes = (eta[order] * _RESTITUTION_CLASSES).astype(np.uint16)
     if order.size <= LANES or classes.min() == classes.max():
         return order

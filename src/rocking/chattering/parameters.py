@@ -20,12 +20,12 @@ LARGEST_RESTITUTION: Final = 0.99999
 
 
 def checked_amplitude(a: ArrayLike) -> FloatArray:
-    """Amplitudes as an array; any finite number is one."""
+    """Return amplitudes as an array; any finite number is one."""
     return _finite(a, "a", "the acceleration amplitude over g alpha")
 
 
 def checked_frequency(omega: ArrayLike) -> FloatArray:
-    """Frequencies as an array."""
+    """Return frequencies as an array."""
     values = _finite(omega, "omega", "the forcing frequency over p")
     usable = (values >= LOWEST_FREQUENCY) & (values <= HIGHEST_FREQUENCY)
     _require(usable, values, "omega", f"between {LOWEST_FREQUENCY:g} and {HIGHEST_FREQUENCY:g}")
@@ -33,7 +33,7 @@ def checked_frequency(omega: ArrayLike) -> FloatArray:
 
 
 def checked_restitution(eta: ArrayLike) -> FloatArray:
-    """Coefficients of restitution as an array."""
+    """Return coefficients of restitution as an array."""
     values = _finite(eta, "eta", "the coefficient of restitution")
     usable = (values > 0.0) & ((values <= LARGEST_RESTITUTION) | (values == 1.0))
     _require(usable, values, "eta", f"above 0 and at most {LARGEST_RESTITUTION:g}, or exactly 1")
@@ -41,21 +41,21 @@ def checked_restitution(eta: ArrayLike) -> FloatArray:
 
 
 def checked_count(value: int, name: str, lowest: int, highest: int) -> int:
-    """A whole number within bounds."""
+    """Check a whole number against bounds."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not lowest <= value <= highest:
         raise InvalidOption(f"{name} must be a whole number from {lowest} to {highest}, not {value!r}")
     return int(value)
 
 
 def single(values: FloatArray, name: str) -> float:
-    """The one value of a parameter that may not be an array."""
+    """Return the one value of a parameter that may not be an array."""
     if values.ndim:
         raise InvalidOption(f"{name} must be a single number here, not an array of shape {values.shape}")
     return float(values)
 
 
 def broadcast(*parameters: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Common shape of the parameters, and each as a flat array of that size."""
+    """Return the common shape of the parameters, and each as a flat array of that size."""
     try:
         shape = np.broadcast_shapes(*(parameter.shape for parameter in parameters))
     except ValueError:

@@ -145,7 +145,8 @@ def _radius(coefficients: FloatArray) -> FloatArray:
     """Limit of the ratios of successive coefficients, extrapolated linearly in 1/k."""
     k = coefficients.shape[-1] - 1
     ratios = coefficients[..., :-1] / coefficients[..., 1:]
-    return k * ratios[..., -1] - (k - 1) * ratios[..., -2]
+    radius: FloatArray = k * ratios[..., -1] - (k - 1) * ratios[..., -2]
+    return radius
 
 
 def _summed(coefficients: FloatArray, eps: FloatArray) -> FloatArray:

@@ -19,6 +19,8 @@ from rocking.kernels.state import (
     PEAK_CHANGE,
     PEAK_TIME,
     PIECE,
+    RESTED,
+    RESTING,
     RESTITUTION,
     RUN,
     RUN_START,
@@ -30,6 +32,7 @@ from rocking.kernels.state import (
     STILL,
     STRUCK,
     UPLIFTED,
+    UPLIFTS,
     U,
     V,
 )
@@ -39,6 +42,7 @@ from rocking.kernels.status import (
     DONE,
     FELL,
     FULL,
+    GOING,
     IMPACT,
     INTERVAL,
     OVERTURN,
@@ -58,17 +62,20 @@ _STUCK = 4
 
 
 @kernel
-def march(shaking, sides, rules, tables, scratch, at, x):
+def march(shaking, sides, rules, tables, scratch, at, x, pieces):
     """Follow one block through one motion, from the state (at, x) on; returns how it ended (`status`).
 
-    FULL means that a table has no room left: call again with larger tables and the same state.
+    GOING means that the first ``pieces`` of the motion's pieces are over; more than there are: go on to the end. FULL
+    means that a table has no room left: call again with larger tables and the same state.
     """
-    while has_room(tables, at):
-        if at[SIDE] == AT_REST and not wait_for_uplift(shaking, sides, rules, tables, scratch, at, x):
-            return DONE
+    while has_room(rules, tables, at):
+        if at[PIECE] >= pieces:
+            return GOING
+        if at[SIDE] == AT_REST and not wait_for_uplift(shaking, sides, rules, tables, scratch, at, x, pieces):
+            return DONE if pieces > shaking.coefficients.shape[0] else GOING
         outcome = follow_arc(shaking, sides, rules, tables, scratch, at, x)
         if outcome == IMPACT:
-            strike(shaking, sides, tables, at, x)
+            strike(shaking, sides, rules, tables, at, x)
             resting, lower, upper, to_rest = judge(shaking, sides, rules, scratch, at, x)
             if resting and not come_to_rest(shaking, rules, tables, lower, upper, to_rest, at, x):
                 return DONE
@@ -82,9 +89,9 @@ def march(shaking, sides, rules, tables, scratch, at, x):
 
 
 @leaf
-def has_room(tables, at):
+def has_room(rules, tables, at):
     """Whether every table has room for what one turn of the march can write."""
-    return (
+    return not rules.record or (
         at[NODES] + 3 <= tables.nodes.shape[0]
         and at[IMPACTS] < tables.impacts.shape[0]
         and at[EVENTS] + 2 <= tables.events.shape[0]
@@ -105,21 +112,26 @@ def sign_of(side):
 
 
 @routine
-def wait_for_uplift(shaking, sides, rules, tables, scratch, at, x):
-    """Stay at rest until the motion passes a threshold; False when it never does."""
-    write_node(tables, now(shaking, at, x), at, x)
-    piece, offset, side, jump = next_uplift(shaking, at[PIECE], x[OFFSET], sides, rules.stop, scratch.A, scratch.d)
-    if side == AT_REST or shaking.breakpoints[piece] + offset >= rules.stop:
+def wait_for_uplift(shaking, sides, rules, tables, scratch, at, x, pieces):
+    """Stay at rest until the motion passes a threshold; False when it does not within its first ``pieces`` pieces."""
+    stop = rules.stop
+    if pieces < shaking.breakpoints.shape[0]:
+        stop = min(stop, shaking.breakpoints[pieces])
+    write_node(rules, tables, now(shaking, at, x), at, x)
+    piece, offset, side, jump = next_uplift(shaking, at[PIECE], x[OFFSET], sides, stop, scratch.A, scratch.d)
+    if side == AT_REST or shaking.breakpoints[piece] + offset >= stop:
         x[END] = max(now(shaking, at, x), shaking.breakpoints[-1]) if rules.endless else rules.stop
         return False
     at[PIECE], x[OFFSET], at[SIDE] = piece, offset, side
     at[SMOOTH] = not jump
     x[U] = x[V] = x[DU] = x[DV] = 0.0
     x[UPLIFTED] = x[STRUCK] = now(shaking, at, x)
+    x[RESTING] += x[UPLIFTED] - x[RESTED]
+    at[UPLIFTS] += 1
     shift = 0.0
     if not jump:
         shift = -motion_at(shaking, piece, offset) / motion_slope(shaking, piece, offset)
-    write_event(tables, x[UPLIFTED], UPLIFT, shift, at)
+    write_event(rules, tables, x[UPLIFTED], UPLIFT, shift, at)
     return True
 
 
@@ -127,7 +139,7 @@ def wait_for_uplift(shaking, sides, rules, tables, scratch, at, x):
 def follow_arc(shaking, sides, rules, tables, scratch, at, x):
     """One Taylor step along the arc, or as much of it as its first event leaves."""
     start = now(shaking, at, x)
-    write_node(tables, start, at, x)
+    write_node(rules, tables, start, at, x)
     left, last = time_left(shaking, at[PIECE], x[OFFSET], rules.stop)
     if left <= 0.0:
         x[END] = rules.stop
@@ -142,20 +154,22 @@ def follow_arc(shaking, sides, rules, tables, scratch, at, x):
     outcome, t, u, v, _, top, height = advance(x[U], x[V], order, h, scratch.c, scratch.d)
     if height > x[PEAK]:
         x[PEAK], x[PEAK_TIME] = height, start + top
-        x[PEAK_CHANGE], _ = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, top)
-    x[DU], x[DV] = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, t)
+        if rules.record:
+            x[PEAK_CHANGE], _ = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, top)
+    if rules.record:
+        x[DU], x[DV] = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, t)
     at[STILL] = x[OFFSET] + t == x[OFFSET]
     x[OFFSET] += t
     x[U], x[V] = u, v
     if outcome == OVERTURN:
         x[END] = x[PEAK_TIME] = now(shaking, at, x)
         x[PEAK], x[PEAK_CHANGE] = QUARTER_TURN, 0.0
-        write_node(tables, x[END], at, x)
-        write_event(tables, x[END], TOPPLED, -x[DU] / v, at)
+        write_node(rules, tables, x[END], at, x)
+        write_event(rules, tables, x[END], TOPPLED, -x[DU] / v, at)
     elif outcome == STEP and t >= left:
         if last:
             x[END] = rules.stop
-            write_node(tables, rules.stop, at, x)
+            write_node(rules, tables, rules.stop, at, x)
             return _STOPPED
         at[PIECE] += 1
         x[OFFSET] = 0.0
@@ -163,7 +177,7 @@ def follow_arc(shaking, sides, rules, tables, scratch, at, x):
 
 
 @routine
-def strike(shaking, sides, tables, at, x):
+def strike(shaking, sides, rules, tables, at, x):
     """Impact: the angular speed drops, the side changes, and the variation jumps with them (saltation)."""
     time = now(shaking, at, x)
     settle(shaking, at, x)
@@ -176,8 +190,9 @@ def strike(shaking, sides, tables, at, x):
     at[SIDE], x[U], x[V] = entered, 0.0, e * speed
     x[DU] = -x[V] * shift
     x[DV] = e * faster + restoring(sides, entered, acceleration * shaking.inverse_g) * shift
-    row = tables.impacts[at[IMPACTS]]
-    row[0], row[1], row[2], row[3], row[4] = time, sign_of(entered), speed, x[V], shift
+    if rules.record:
+        row = tables.impacts[at[IMPACTS]]
+        row[0], row[1], row[2], row[3], row[4] = time, sign_of(entered), speed, x[V], shift
     at[IMPACTS] += 1
 
 
@@ -228,15 +243,18 @@ def come_to_rest(shaking, rules, tables, lower, upper, to_rest, at, x):
     time = now(shaking, at, x)
     if at[RUN] == 0:
         at[RUN], x[RUN_START] = 1, time
-    row = tables.sequences[at[SEQUENCES]]
-    row[0], row[1], row[2], row[3], row[4] = x[RUN_START], time + to_rest, time + lower, time + upper, at[RUN]
+    if rules.record:
+        row = tables.sequences[at[SEQUENCES]]
+        row[0], row[1], row[2], row[3], row[4] = x[RUN_START], time + to_rest, time + lower, time + upper, at[RUN]
     at[SEQUENCES] += 1
     at[RUN] = 0
     if time + to_rest >= rules.stop:
         x[END] = rules.stop
         return False
     at[SIDE], x[U], x[V] = AT_REST, 0.0, 0.0
-    write_event(tables, time + to_rest, REST, tables.impacts[at[IMPACTS] - 1, 4], at)
+    x[RESTED] = time + to_rest
+    if rules.record:
+        write_event(rules, tables, x[RESTED], REST, tables.impacts[at[IMPACTS] - 1, 4], at)
     x[OFFSET] += to_rest
     settle(shaking, at, x)
     return True
@@ -273,8 +291,10 @@ def settle(shaking, at, x):
 
 
 @leaf
-def write_node(tables, time, at, x):
+def write_node(rules, tables, time, at, x):
     """Write down the state."""
+    if not rules.record:
+        return
     row = tables.nodes[at[NODES]]
     row[0], row[1], row[2], row[3], row[4], row[5] = (
         time, at[PIECE], x[OFFSET], sign_of(at[SIDE]), x[U], x[V],
@@ -283,8 +303,10 @@ def write_node(tables, time, at, x):
 
 
 @leaf
-def write_event(tables, time, kind, shift, at):
+def write_event(rules, tables, time, kind, shift, at):
     """Write down an uplift, a rest or an overturning."""
+    if not rules.record:
+        return
     row = tables.events[at[EVENTS]]
     row[0], row[1], row[2], row[3] = time, kind, sign_of(at[SIDE]), shift
     at[EVENTS] += 1

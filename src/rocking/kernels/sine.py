@@ -89,7 +89,7 @@ def basis(q: float, delta: float, order: int) -> tuple[float, float, float, floa
 
 @routine
 def basis_anywhere(t: float, delta: float) -> tuple[float, float, float, float]:
-    """The same four functions at any t > 0: as short a sum as reaches full precision, closed form where none does."""
+    """Return the same at any t > 0: by the shortest sum of full precision, in closed form where there is none."""
     q = t * t
     reach = q * (1.0 + delta)
     if reach < REACH_SHORT:
@@ -105,7 +105,7 @@ def basis_anywhere(t: float, delta: float) -> tuple[float, float, float, float]:
 
 @leaf
 def closed_basis(t: float, delta: float) -> tuple[float, float, float, float]:
-    """The same four functions from their definitions, for long arcs."""
+    """Return the same from the definitions, for long arcs."""
     q = t * t
     growth = math.sqrt(delta) * t
     sine = math.sin(t) / t
@@ -211,7 +211,7 @@ def arc(
 def bracketed_arc(
     V: float, P: float, D: float, s: float, delta: float, left: float
 ) -> tuple[float, float, float, float]:
-    """The same by halving, where the estimate leads nowhere: a long arc, or one that never ends."""
+    """Find the same by halving, where the estimate leads nowhere: a long arc, or one that never ends."""
     if scaled_height(left, V, P, D, s, delta) >= 0.0:
         return math.nan, 0.0, 0.0, 0.0
     low = 0.0
@@ -288,9 +288,7 @@ def closure(V: float, P: float, D: float, eta: float) -> float:
 
 
 @leaf
-def bracket(
-    V: float, low: float, high: float, delta: float, eta: float
-) -> tuple[float, float]:
+def bracket(V: float, low: float, high: float, delta: float, eta: float) -> tuple[float, float]:
     """Bounds on the remaining phase on entering the second side at speed V, while low <= P <= high; NaN: no proof.
 
     On a side where the restoring acceleration stays within [m, M], comparison with two constant ones bounds an arc's
@@ -324,10 +322,8 @@ def arc_bounds(V: float, least: float, swing: float, delta: float) -> tuple[floa
 
 
 @leaf
-def bracket_in_window(
-    V: float, P: float, D: float, window: float, delta: float, eta: float
-) -> tuple[float, float]:
-    """The same from the bounds on P within a window of phase, which must end before x = pi and hold the upper bound.
+def bracket_in_window(V: float, P: float, D: float, window: float, delta: float, eta: float) -> tuple[float, float]:
+    """Return the same from bounds on P within a window, which must end before x = pi and hold the upper bound.
 
     P rises between the first impact and x = pi, by less than its second-order Taylor bound with |P''| <= a.
     """

@@ -22,9 +22,7 @@ _MAXIMUM_STEPS: Final = 400
 
 
 @kernel
-def critical_amplitudes(
-    omega: NDArray[np.float64], eta: NDArray[np.float64], amplitudes: NDArray[np.float64]
-) -> None:
+def critical_amplitudes(omega: NDArray[np.float64], eta: NDArray[np.float64], amplitudes: NDArray[np.float64]) -> None:
     """Critical amplitude for each omega and eta < 1."""
     for i in range(amplitudes.size):
         amplitudes[i] = 1.0 + critical_excess(1.0 / (omega[i] * omega[i]), eta[i])

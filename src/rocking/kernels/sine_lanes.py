@@ -136,9 +136,7 @@ def first_impacts(block: NDArray[np.float64]) -> None:
         before = x
         x, w, P, D, change = land(x, 0.0, 0.0, -kappa, 1.0, delta, basis(x * x, delta, LONGEST))
         landed = (
-            (change <= LARGEST_CORRECTION * before)
-            & (x < math.pi)
-            & (before * before * (1.0 + delta) <= REACH_LONGEST)
+            (change <= LARGEST_CORRECTION * before) & (x < math.pi) & (before * before * (1.0 + delta) <= REACH_LONGEST)
         )
         status = block[_STATUS * LANES + lane]
         block[_STATUS * LANES + lane] = status if landed else max(status, _LEFT_OVER)
@@ -212,7 +210,7 @@ def pass_pair(block: NDArray[np.float64], order: int, reach: float, corrections:
 def short_arc(
     V: float, P: float, D: float, s: float, delta: float, order: int, reach: float, corrections: int
 ) -> tuple[float, float, float, float, bool]:
-    """An arc by a fixed number of corrections, and whether these were enough."""
+    """Pass an arc with a fixed number of corrections, and tell whether these were enough."""
     t = guess_landing(V, P, D, s, delta)
     if corrections == 2:
         t, _, _, _, _ = land(t, V, P, D, s, delta, basis(t * t, delta, order))

@@ -54,9 +54,7 @@ def settled_bracket(x: float, V: float, P: float, D: float, delta: float, eta: f
 
 
 @leaf
-def next_arc(
-    x: float, V: float, P: float, D: float, s: float, delta: float
-) -> tuple[float, float, float, float]:
+def next_arc(x: float, V: float, P: float, D: float, s: float, delta: float) -> tuple[float, float, float, float]:
     """Duration, impact speed, P and D of the arc that starts at phase x; a block at rest stays so."""
     if V < STILL:
         return 0.0, 0.0, P, D

@@ -49,7 +49,9 @@ def phase_coefficients(delta: float, eta: float, order: int) -> Series:
 
 
 @_allocating
-def series_arc(v: Series, p: Series, d: Series, first_side: bool, delta: float) -> tuple[Series, Series, Series, Series]:
+def series_arc(
+    v: Series, p: Series, d: Series, first_side: bool, delta: float
+) -> tuple[Series, Series, Series, Series]:
     """One arc: scaled duration z and impact speed, p and d at the impact."""
     order = v.size
     mean = -raised(p, 1)
@@ -104,7 +106,7 @@ def leading_duration(v: float, p: float, d: float) -> float:
 
 @_allocating
 def series_basis(q: Series, delta: float) -> tuple[Series, Series, Series, Series]:
-    """The four basis functions of ``sine.basis`` at a series q without constant term."""
+    """Return the four basis functions of ``sine.basis`` at a series q without constant term."""
     order = q.size
     sine = np.zeros(order)
     versine = np.zeros(order)
@@ -142,9 +144,9 @@ def series_closure(v: Series, p: Series, d: Series, eta: float) -> Series:
     own_up = product(
         product(d, up2), (4.0 / 3.0) * raised(up, 3) - (2.0 / 3.0) * eta * raised(first_down, 2)
     ) + 2.0 * eta * product(up, drift_down)
-    own_down = product(
-        product(d, down2), (2.0 / 3.0) * eta * first_up - (4.0 / 3.0) * down
-    ) + 2.0 * eta * product(down, drift_up)
+    own_down = product(product(d, down2), (2.0 / 3.0) * eta * first_up - (4.0 / 3.0) * down) + 2.0 * eta * product(
+        down, drift_up
+    )
     second = (own_up + eta * eta * own_down) / (1.0 - eta**4)
     return product(v, first_up + product(v, second))
 
@@ -173,7 +175,7 @@ def square_root_of_two_plus(order: int) -> Series:
 
 @_allocating
 def product(a: Series, b: Series) -> Series:
-    """Truncated product."""
+    """Multiply, truncated."""
     c = np.zeros(a.size)
     for i in range(a.size):
         if a[i] != 0.0:
@@ -184,7 +186,7 @@ def product(a: Series, b: Series) -> Series:
 
 @_allocating
 def quotient(a: Series, b: Series) -> Series:
-    """Truncated quotient."""
+    """Divide, truncated."""
     c = np.zeros(a.size)
     for n in range(a.size):
         total = a[n]
@@ -196,7 +198,7 @@ def quotient(a: Series, b: Series) -> Series:
 
 @_allocating
 def reciprocal(a: Series) -> Series:
-    """Truncated reciprocal."""
+    """Invert, truncated."""
     one = np.zeros(a.size)
     one[0] = 1.0
     return quotient(one, a)
@@ -204,7 +206,7 @@ def reciprocal(a: Series) -> Series:
 
 @_allocating
 def raised(a: Series, power: int) -> Series:
-    """Times eps^power."""
+    """Multiply by eps^power."""
     b = np.zeros(a.size)
     for k in range(power, a.size):
         b[k] = a[k - power]

@@ -22,7 +22,10 @@ class Shaking(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """How to compute: model, end of chattering (see `status`), width of a good bracket (s), when to stop (s)."""
+    """How to compute: model, end of chattering (see `status`), width of a good bracket (s), when to stop (s).
+
+    ``record`` says whether the tables are written and variations carried, or only the state is kept.
+    """
 
     nonlinear: bool
     treatment: int
@@ -30,6 +33,7 @@ class Rules(NamedTuple):
     tolerance: float
     stop: float
     endless: bool
+    record: bool
 
 
 class Tables(NamedTuple):
@@ -71,11 +75,11 @@ STIFFNESS, SLENDERNESS, THRESHOLD, GAIN, RESTITUTION = range(5)
 
 # Integers of the state. RUN counts the impacts since chattering was proven, SMOOTH marks an uplift that is not a
 # jump, STILL an impact at which time did not advance, STALLED counts the rests that only that brought about.
-PIECE, SIDE, NODES, IMPACTS, EVENTS, SEQUENCES, RUN, SMOOTH, STILL, STALLED = range(10)
+PIECE, SIDE, NODES, IMPACTS, EVENTS, SEQUENCES, RUN, SMOOTH, STILL, STALLED, UPLIFTS = range(11)
 
 # Floats of the state: position in the motion, rotation, its rate, their variations, times of the last uplift, impact
 # and proof, the highest rotation so far, the end.
-OFFSET, U, V, DU, DV, UPLIFTED, STRUCK, RUN_START, PEAK, PEAK_TIME, PEAK_CHANGE, END = range(12)
+OFFSET, U, V, DU, DV, UPLIFTED, STRUCK, RESTED, RESTING, RUN_START, PEAK, PEAK_TIME, PEAK_CHANGE, END = range(14)
 
 #: Side index of a block at rest.
 AT_REST = -1
@@ -83,7 +87,7 @@ AT_REST = -1
 
 def new_state() -> tuple[Integers, Floats]:
     """State of a block at rest at time zero."""
-    at, x = np.zeros(STALLED + 1, dtype=np.int64), np.zeros(END + 1)
+    at, x = np.zeros(UPLIFTS + 1, dtype=np.int64), np.zeros(END + 1)
     at[SIDE] = AT_REST
     return at, x
 

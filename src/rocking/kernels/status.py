@@ -23,3 +23,4 @@ DONE: Final = 0
 FELL: Final = 1
 BALANCED: Final = 2
 FULL: Final = 3
+GOING: Final = 4

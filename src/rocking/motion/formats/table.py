@@ -1,7 +1,7 @@
 """Plain text and CSV: one column of accelerations with dt=, or times and accelerations; units= in any case.
 
 Heading lines and comments (#, %, !, //) are passed over. The delimiter is a semicolon (a comma is then the decimal
-sign), a comma, or blanks. Exponents may be Fortran's (1.0D-3).
+sign), a comma, or blanks; numbers may be quoted. Exponents may be Fortran's (1.0D-3).
 """
 
 from __future__ import annotations
@@ -97,12 +97,12 @@ def _shape(source: Source) -> _Shape | None:
 
 
 def _delimiter(line: Line) -> tuple[bytes, str]:
-    """Return what turns a row into blank-separated numbers that Python reads, and the delimiter's name."""
+    """Return what turns a row into numbers with points between blanks, and the delimiter's name."""
     if ";" in line.text:
-        return bytes.maketrans(b"Dd,;", b"EE. "), "a semicolon"
+        return bytes.maketrans(b',;"', b".  "), "a semicolon"
     if "," in line.text:
-        return bytes.maketrans(b"Dd,", b"EE "), "a comma"
-    return bytes.maketrans(b"Dd", b"EE"), "a blank"
+        return bytes.maketrans(b',"', b"  "), "a comma"
+    return bytes.maketrans(b'"', b" "), "a blank"
 
 
 def _values(source: Source, shape: _Shape) -> Floats:
@@ -141,7 +141,7 @@ def _first_bad(source: Source, rows: list[_Row], shape: _Shape) -> UnreadableRec
                 return not_a_number(source, token, row.at)
         if len(row.tokens) != shape.columns:
             return source.error(
-                f"here are {len(row.tokens)} numbers, in the first row {shape.columns}; make all rows alike", row.at
+                f"columns in this row: {len(row.tokens)}, in the first: {shape.columns}; make all rows alike", row.at
             )
     raise AssertionError("among rows that do not convert one is bad")
 

@@ -103,8 +103,8 @@ def bad_number(source: Source, start: int, end: int) -> UnreadableRecord:
 
 def not_a_number(source: Source, token: bytes, at: int) -> UnreadableRecord:
     """Return the error for a piece of text that should be a finite number."""
-    shown = token[:_SHOWN].decode("latin-1")
-    if parse(token) is None:
+    shown, number = token[:_SHOWN].decode("latin-1"), parse(token)
+    if number is None or np.isfinite(number):
         return source.error(f"{shown!r} is not a number; correct it or get the record again", at)
     return source.error(f"{shown!r} is not a finite number; a record needs a value at every instant", at)
 
@@ -120,13 +120,13 @@ def parse(token: bytes) -> float | None:
 
 
 def convert(tokens: list[bytes]) -> Floats | None:
-    """Return the numbers that the tokens (E exponents) write, or None if one is not a finite number."""
-    if not tokens:
-        return np.empty(0)
-    if max(map(len, tokens)) > _TOKEN_LIMIT or b"_" in b"".join(tokens):
-        return None
+    """Return the numbers that the tokens write (D exponents too), or None if one is not a finite number."""
+    joined = b" ".join(tokens)
+    if not tokens or b"_" in joined or max(map(len, tokens)) > _TOKEN_LIMIT:
+        return None if tokens else np.empty(0)
+    fortran = b"D" in joined or b"d" in joined
     try:
-        values = np.array(tokens, dtype=np.float64)
+        values = np.array(joined.translate(_FORTRAN_EXPONENT).split() if fortran else tokens, dtype=np.float64)
     except ValueError:
         return None
     return values if np.isfinite(values).all() else None
@@ -163,26 +163,30 @@ def _chunks(data: bytes, start: int, end: int, boundary: re.Pattern[bytes]) -> I
 
 
 def _convert_block(block: bytes, layout: Layout | None) -> Floats | None:
-    exponents = block.translate(_FORTRAN_EXPONENT) if b"D" in block or b"d" in block else block
-    tokens = exponents.split() if layout is None else _fields(exponents, layout)
+    tokens = block.split() if layout is None else _fields(block, layout)
     return None if tokens is None else convert(tokens)
 
 
 def _fields(block: bytes, layout: Layout) -> list[bytes] | None:
-    """Cut every line into columns (the last of a line may be missing), or return None if a line is too long."""
-    size = layout.per_line * layout.width
+    """Cut all lines into columns, of which the last of a line may be missing; None if a line does not fit."""
     lines = [line.rstrip() for line in block.split(b"\n")]
-    if b"\t" in block or max(map(len, lines)) > size:
+    if not all(_fits(line, layout) for line in lines):
         return None
-    padded = b"".join([line.ljust(size, b"\0") for line in lines])
+    padded = b"".join([line.ljust(layout.per_line * layout.width, b"\0") for line in lines])
     fields = np.frombuffer(padded, dtype=f"S{layout.width}")
     return list(fields[fields != b""].tolist())
+
+
+def _fits(line: bytes, layout: Layout) -> bool:
+    return len(line) <= layout.per_line * layout.width and b"\t" not in line
 
 
 def _first_bad(block: bytes, begin: int, layout: Layout | None) -> _BadNumberError:
     at = begin
     for line in block.split(b"\n"):
-        for token in line.split() if layout is None else _columns(line.rstrip(), layout):
+        if layout is not None and not _fits(line.rstrip(), layout):
+            return _BadNumberError(line.strip(), at)
+        for token in line.split() if layout is None else _columns(line.rstrip(), layout.width):
             number = parse(token)
             if number is None or not np.isfinite(number):
                 return _BadNumberError(token, at)
@@ -190,7 +194,5 @@ def _first_bad(block: bytes, begin: int, layout: Layout | None) -> _BadNumberErr
     raise AssertionError("in a block that does not convert one number is bad")
 
 
-def _columns(line: bytes, layout: Layout) -> list[bytes]:
-    if b"\t" in line or len(line) > layout.per_line * layout.width:
-        return [line]
-    return [line[i : i + layout.width] for i in range(0, len(line), layout.width)]
+def _columns(line: bytes, width: int) -> list[bytes]:
+    return [line[i : i + width] for i in range(0, len(line), width)]
