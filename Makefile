@@ -31,7 +31,7 @@ docs: .venv/.all ## build the documentation into docs/_build/html; a warning is 
 	$(BIN)/sphinx-build -W --keep-going -n -b html docs docs/_build/html
 
 bench: .venv/.all ## run the benchmarks
-	$(BIN)/python -m pytest benchmarks
+	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 clean: ## remove what the other targets made, but not the environment
 	rm -rf out build dist docs/_build docs/api/generated .pytest_cache .hypothesis .mypy_cache .ruff_cache \

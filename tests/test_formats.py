@@ -350,6 +350,74 @@ def test_esm_without_units_asks_for_them(file: Callable[[str], Path]) -> None:
     assert read(file(text), units="gal").pga == read(written.FOLDER / "esm.asc").pga
 
 
+@pytest.mark.parametrize(
+    ("name", "old", "new", "what"),
+    [
+        ("two.v2c", "(Format v01.20", "(Formt v01.20", "line 111: a channel's title with '(Format v01.20 ...'"),
+        ("two.v2c", "velocity pts", "velocity xxx", "the line with the number of points should stand here"),
+        ("two.v2c", "100 Integer-header", "100 Integr-header", "a line '... integer-header values follow'"),
+        (
+            "two.v1",
+            "Uncorrected Accel",
+            "Unocrrected Accel",
+            "a channel's 'Uncorrected Accelerogram' should begin here",
+        ),
+        ("two.v1", "at 200 pts", "at two pts", "the sampling rate 'two' is not a positive number"),
+        ("pairs.v1", "100.005", "100.000", "the times of the points that follow do not increase"),
+        (
+            "two.v2",
+            "accel data equally spaced at  .005",
+            "accel data equally spaced at  .0x5",
+            "the sampling step '.0x5' is not a number",
+        ),
+        ("esm.asc", "NDATA: 37", "NDATA: many", "line 13: NDATA is 'many', which is not a number"),
+        ("knet.ns", "Mag.   ", "Magn.  ", "line 5: the header line 'Mag.' should stand here"),
+        ("even.smc", "         2\n        37", "     20000\n        37", "20000 comment lines are too many"),
+        ("even.smc", "  2.0000000E+02", " -2.0000000E+02", "the sampling rate is -200 per second"),
+        ("even.smc", "  2.0000000E+02", "  1.7000000E+38", "nor are the values pairs of increasing time"),
+    ],
+)
+def test_a_header_that_does_not_fit_is_named(
+    name: str, old: str, new: str, what: str, file: Callable[[str], Path]
+) -> None:
+    text = (written.FOLDER / name).read_text()
+    assert old in text
+    spoilt = new.join(text.rsplit(old, 1))
+    assert what in complaint(file(spoilt), channel=1)
+
+
+def test_headers_without_labels_are_numbered(file: Callable[[str], Path]) -> None:
+    for name, label in (("two.v2c", "Sta Chan"), ("two.v1", "Chan ")):
+        (first, *_) = channels(file((written.FOLDER / name).read_text().replace(label, "???")))
+        assert (first.name, first.number, first.azimuth) == ("channel 1", 1, None)
+    (first, _) = channels(file((written.FOLDER / "two.v1").read_text().replace("Station No.", "???")))
+    assert first.station == ""
+
+
+def test_a_v2_of_little_more_than_data_is_read(file: Callable[[str], Path]) -> None:
+    motion = read(file("Corrected accelerogram\n 3 points of accel data equally spaced at .01 sec, in g\n 1 2 3\n"))
+    assert motion.samples[1].tolist() == [GRAVITY, 2.0 * GRAVITY, 3.0 * GRAVITY]
+    assert motion.step == 0.01
+
+
+def test_a_knet_header_cut_short_is_refused(file: Callable[[str], Path]) -> None:
+    lines = (written.FOLDER / "knet.ns").read_text().splitlines(keepends=True)
+    assert "ends within its header" in complaint(file("".join(lines[:15])))
+
+
+def test_even_pairs_in_smc_have_a_step(file: Callable[[str], Path]) -> None:
+    pairs = [x for k, value in enumerate(written.series(1)) for x in (0.005 * k, value)]
+    (channel,) = channels(file(written.smc(pairs, rate=None)))
+    assert channel.dt == 0.005
+    np.testing.assert_allclose(channel.acceleration, SERIES, atol=0.51e-4)
+
+
+def test_wrong_counts_are_not_mended_by_columns_that_do_not_fit(file: Callable[[str], Path]) -> None:
+    text = written.cosmos([1.5] * 37).replace("      37 acceleration", "      38 acceleration")
+    assert "38 values but 37 follow" in complaint(file(text.replace("(8F10.5)", "(2F10.5)")))
+    assert "NPTS is 3 but 0 values follow" in complaint(file(written.at2([], "NPTS= 3, DT= .01")))
+
+
 # Text tables
 
 
@@ -459,6 +527,7 @@ def test_even_times_give_their_step_whatever_their_decimals(step: float, points:
 
 
 def test_a_missing_sample_is_not_even() -> None:
+    assert even_step(np.round(0.015 * np.arange(100), 2)) is None
     for step, decimals in ((0.01, 2), (0.005, 3), (0.0078125, 4), (0.02, 17)):
         times = np.round(step * np.arange(2000), decimals)
         assert even_step(np.delete(times, 1000)) is None
@@ -616,6 +685,18 @@ def test_pickles_are_never_opened(file: Callable[[bytes], Path]) -> None:
 def test_what_obspy_cannot_read_is_one_sentence(file: Callable[[bytes], Path]) -> None:
     assert complaint(file(waveform("MSEED")[:70]), units="g")
     assert complaint(file(waveform("SAC")[:600]), units="g")
+
+
+def test_traces_with_gaps_or_without_numbers_are_refused(
+    monkeypatch: pytest.MonkeyPatch, file: Callable[[bytes], Path]
+) -> None:
+    obspy = pytest.importorskip("obspy")
+    path = file(waveform("MSEED"))
+    gaps = np.ma.masked_array(np.arange(5.0), [False, True, False, False, False])
+    for data, what in ((gaps, "trace 1 has gaps"), (np.array(["a", "b"]), "does not hold plain numbers")):
+        stream = obspy.Stream([obspy.Trace(data)])
+        monkeypatch.setattr(through_obspy, "_traces", lambda *_, stream=stream: stream)
+        assert what in complaint(path, units="g")
 
 
 def test_without_obspy_the_extra_is_named(monkeypatch: pytest.MonkeyPatch, file: Callable[[bytes], Path]) -> None:

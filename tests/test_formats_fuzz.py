@@ -11,7 +11,6 @@ import random
 import re
 import resource
 import sys
-import tempfile
 import time
 import traceback
 import warnings
@@ -27,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from oracles import record_files as written
 
 from rocking.errors import RockingError
-from rocking.motion.formats import channels, identify, read, through_obspy
+from rocking.motion.formats import channels, identify, read, source, through_obspy
 
 RECORDS = Path(__file__).resolve().parents[2] / "shared" / "records"
 
@@ -173,17 +172,15 @@ def mutated(seed: bytes, other: bytes, operations: list[Operation]) -> bytes:
     return data
 
 
-def attempt(path: Path, content: bytes, request: dict[str, object]) -> bool:
-    """Read the content as a record; whether it was accepted. Anything but a RockingError in one line gets out."""
-    path.write_bytes(content)
+def attempt(path: Path, request: dict[str, object]) -> bool:
+    """Read a record; whether it was accepted. Anything but a RockingError of one line gets out."""
     try:
         identify(path)
         found = channels(path, **request)  # type: ignore[arg-type]
         for channel in found:
             assert np.isfinite(channel.acceleration).all()
             channel.motion()
-        if len(found) == 1:
-            read(path, **request)  # type: ignore[arg-type]
+        read(path, channel=found[0].number, **request)  # type: ignore[arg-type]
     except RockingError as error:
         message = str(error)
         assert message
@@ -205,9 +202,12 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_seeds_are_accepted_or_refused_as_they_are(place: Path) -> None:
-    accepted = sum(attempt(place, seed, {"units": "gal", "dt": 0.005}) for seed in seeds())
-    accepted += sum(attempt(place, seed, {}) for seed in seeds())
-    assert accepted >= 12
+    accepted = 0
+    for seed in seeds():
+        place.write_bytes(seed)
+        accepted += attempt(place, {}) or attempt(place, {"units": "gal", "dt": 0.005})
+    # The files of velocities, displacements and raw counts are refused.
+    assert accepted == len(seeds()) - 6
 
 
 @settings(max_examples=600, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -218,13 +218,15 @@ def test_spoilt_records_end_in_channels_or_one_sentence(
     place: Path, index: int, other: int, operations: list[Operation], request_: dict[str, object]
 ) -> None:
     known = seeds()
-    attempt(place, mutated(known[index % len(known)], known[other % len(known)], operations), request_)
+    place.write_bytes(mutated(known[index % len(known)], known[other % len(known)], operations))
+    attempt(place, request_)
 
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=500), request_=st.sampled_from(REQUESTS))
 def test_random_bytes_end_in_channels_or_one_sentence(place: Path, content: bytes, request_: dict[str, object]) -> None:
-    attempt(place, content, request_)
+    place.write_bytes(content)
+    attempt(place, request_)
 
 
 def test_time_grows_no_faster_than_the_file(place: Path) -> None:
@@ -242,8 +244,9 @@ def test_time_grows_no_faster_than_the_file(place: Path) -> None:
         b"1.5\n",
     ):
         for title in (b"", b"Corrected Accelerogram\n", b"Uncorrected Accelerogram\n", b"2 CORRECTED ACCELEROGRAM\n"):
+            place.write_bytes(title + unit * (1_000_000 // len(unit)))
             start = time.process_time()
-            attempt(place, title + unit * (1_000_000 // len(unit)), {"units": "g", "dt": 0.01})
+            attempt(place, {"units": "g", "dt": 0.01})
             assert time.process_time() - start < 5.0, (unit, title)
 
 
@@ -261,26 +264,26 @@ def main() -> int:
     if not arguments.obspy:
         through_obspy.installed = lambda: False
     chance, known = random.Random(arguments.seed), seeds()
-    done = accepted = failures = 0
+    content, done, accepted, failures = b"", 0, 0, 0
+    # Straight from memory: opening files takes most of the time, and is not what varies.
+    source._content = lambda name: content
     slowest, begin = 0.0, time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "record.dat"
-        while done < arguments.inputs and time.monotonic() - begin < arguments.seconds:
-            operations = [
-                (chance.randrange(len(MUTATIONS)), chance.random(), chance.random(), chance.randrange(10_000))
-                for _ in range(chance.choice((1, 1, 1, 2, 2, 3, 5)))
-            ]
-            content = mutated(chance.choice(known), chance.choice(known), operations)
-            start = time.process_time()
-            try:
-                accepted += attempt(path, content, chance.choice(REQUESTS))
-            except Exception:
-                failures += 1
-                arguments.keep.mkdir(exist_ok=True)
-                (arguments.keep / f"{arguments.seed}-{done}.dat").write_bytes(content)
-                traceback.print_exc()
-            slowest = max(slowest, time.process_time() - start)
-            done += 1
+    while done < arguments.inputs and time.monotonic() - begin < arguments.seconds:
+        operations = [
+            (chance.randrange(len(MUTATIONS)), chance.random(), chance.random(), chance.randrange(10_000))
+            for _ in range(chance.choice((1, 1, 1, 2, 2, 3, 5)))
+        ]
+        content = mutated(chance.choice(known), chance.choice(known), operations)
+        start = time.process_time()
+        try:
+            accepted += attempt(Path("record.dat"), chance.choice(REQUESTS))
+        except Exception:
+            failures += 1
+            arguments.keep.mkdir(exist_ok=True)
+            (arguments.keep / f"{arguments.seed}-{done}.dat").write_bytes(content)
+            traceback.print_exc()
+        slowest = max(slowest, time.process_time() - start)
+        done += 1
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(
         f"{done} inputs in {time.monotonic() - begin:.0f} s: {accepted} accepted, {failures} failures; "

@@ -115,6 +115,19 @@ def test_energy_is_constant_along_free_arcs(case: Case, share: float, moving: bo
 
 @quick
 @given(cases())
+def test_the_peak_is_the_largest_rotation(case: Case) -> None:
+    response = case.simulate()
+    edges = np.concatenate([[0.0], response.events["time"], response.impacts["time"], [response.duration]])
+    edges = np.unique(edges[edges <= response.duration])
+    times = (edges[:-1, None] + np.linspace(0.0, 1.0, 50, endpoint=False) * np.diff(edges)[:, None]).ravel()
+    rotation = np.abs(response.rotation(times))
+    peak = np.abs(response.rotation(response.peak_time))
+    assert np.max(rotation, initial=0.0) <= response.peak_rotation * (1.0 + 1e-12)
+    assert_allclose(peak, response.peak_rotation, rtol=1e-9)
+
+
+@quick
+@given(cases())
 def test_the_mirrored_motion_mirrors_the_response_exactly(case: Case) -> None:
     assert case.motion is not None
     mirrored = Case(

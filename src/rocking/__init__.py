@@ -8,6 +8,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from rocking import chattering
     from rocking.block import Block, Blocks
+    from rocking.ensemble import simulate_many
     from rocking.errors import (
         InvalidBlock,
         InvalidMotion,
@@ -42,6 +43,7 @@ __all__ = [
     "read",
     "records",
     "simulate",
+    "simulate_many",
 ]
 
 # Public names are imported when they are first used, so that `import rocking` and the command line start at once.
@@ -65,6 +67,7 @@ _HOMES = {
     "read": "rocking.motion.formats",
     "records": "rocking.motion.records",
     "simulate": "rocking.simulation",
+    "simulate_many": "rocking.ensemble",
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rocking.block import Block
+from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption
 from rocking.kernels import state, status
 from rocking.kernels.march import march
@@ -73,9 +73,10 @@ def simulate(
     >>> response.overturned, len(response.impacts) > 50, f"{response.events['time'][-1]:.6f}"
     (False, True, '4.235818')
     """
-    how = treatment(chattering)
-    rules = rules_of(block, motion, model, how, duration, record=True)
-    shaking, sides = shaking_of(motion, block.gravity), sides_of(block, model)
+    how, blocks = treatment(chattering), Blocks.of([block])
+    rules = rules_of(blocks, model, how, duration, record=True)
+    shaking = shaking_of(motion, block.gravity)
+    sides = sides_of(blocks, model, how.limits(blocks, motion))[0]
     at, x = state.new_state()
     at[state.SIDE], x[state.U], x[state.V] = _initial_state(initial_rotation, initial_velocity)
     x[state.PEAK] = x[state.U]

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
-from rocking.block import Block
+import numpy as np
+
+from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.kernels import status
+from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
 
 
@@ -37,9 +41,11 @@ class Certified:
     def __post_init__(self) -> None:
         _positive(self.tolerance, "tolerance", "s")
 
-    def code_and_limits(self, block: Block, motion: Motion | None) -> tuple[int, tuple[float, float]]:
-        """Code and threshold of each side for the kernels."""
-        return status.CERTIFIED, (0.0, 0.0)
+    code: ClassVar[int] = status.CERTIFIED
+
+    def limits(self, blocks: Blocks, motion: Motion | None) -> Floats:
+        """Nothing to compare with."""
+        return np.zeros_like(blocks.p)
 
 
 @dataclass(frozen=True)
@@ -62,10 +68,11 @@ class VelocityThreshold:
     def __post_init__(self) -> None:
         _positive(self.threshold, "threshold", "as a fraction of p alpha")
 
-    def code_and_limits(self, block: Block, motion: Motion | None) -> tuple[int, tuple[float, float]]:
-        """Code and threshold of each side for the kernels, rad/s."""
-        plus, minus = (self.threshold * side.p * side.alpha for side in block.sides)
-        return status.VELOCITY, (plus, minus)
+    code: ClassVar[int] = status.VELOCITY
+
+    def limits(self, blocks: Blocks, motion: Motion | None) -> Floats:
+        """Threshold of every side, rad/s."""
+        return self.threshold * blocks.p * blocks.alpha
 
 
 @dataclass(frozen=True)
@@ -88,9 +95,11 @@ class IntervalThreshold:
     def __post_init__(self) -> None:
         _positive(self.threshold, "threshold", "s")
 
-    def code_and_limits(self, block: Block, motion: Motion | None) -> tuple[int, tuple[float, float]]:
-        """Code and threshold of each side for the kernels, s."""
-        return status.INTERVAL, (self.threshold, self.threshold)
+    code: ClassVar[int] = status.INTERVAL
+
+    def limits(self, blocks: Blocks, motion: Motion | None) -> Floats:
+        """Threshold of every side, s."""
+        return np.full_like(blocks.p, self.threshold)
 
 
 @dataclass(frozen=True)
@@ -101,25 +110,27 @@ class AsymptoticTime:
     block never rests; where Eq. 65 exceeds the true time, it rests once time no longer advances between impacts.
     """
 
-    def code_and_limits(self, block: Block, motion: Motion | None) -> tuple[int, tuple[float, float]]:
-        """Code and chattering time for the kernels, s."""
+    code: ClassVar[int] = status.TIME
+
+    def limits(self, blocks: Blocks, motion: Motion | None) -> Floats:
+        """Chattering time of every side, s; infinite where chattering is not complete."""
         if motion is None or motion.description.family != "sine":
             raise InvalidOption(
                 'chattering="time" is the scheme for sinusoidal motions (rocking.pulses.sine), not for '
                 f'{"free rocking" if motion is None else motion.description.family}; use "certified"'
             )
-        if not block.is_symmetric:
+        if not blocks.is_symmetric:
             raise InvalidOption('chattering="time" is for symmetric blocks; use "certified"')
         from rocking.kernels import paper
 
-        side = block.sides[0]
         parameters = motion.description.parameters
-        amplitude = abs(parameters["amplitude"]) / (block.gravity * side.alpha)
-        frequency = 2.0 * math.pi * parameters["frequency"] / side.p
-        if amplitude < 1.0 or amplitude >= paper.eq76(frequency, side.restitution):
-            return status.TIME, (math.inf, math.inf)
-        time = paper.eq65_time(amplitude, frequency, side.restitution) / side.p
-        return status.TIME, (time, time)
+        amplitude = abs(parameters["amplitude"]) / (blocks.gravity * blocks.alpha)
+        frequency = 2.0 * np.pi * parameters["frequency"] / blocks.p
+        times = np.full_like(blocks.p, np.inf)
+        for k in np.ndindex(times.shape):
+            if 1.0 <= amplitude[k] < paper.eq76(frequency[k], blocks.restitution[k]):
+                times[k] = paper.eq65_time(amplitude[k], frequency[k], blocks.restitution[k]) / blocks.p[k]
+        return times
 
 
 Treatment = Certified | VelocityThreshold | IntervalThreshold | AsymptoticTime

@@ -66,6 +66,11 @@ def pairs(low: float, high: float, *, symmetric: bool | None = None) -> st.Searc
     return equal if symmetric else different
 
 
+def amplitudes() -> st.SearchStrategy[float]:
+    """Largest acceleration over the threshold of uplift: a few times, or hardly more."""
+    return between(1.05, 4.0) | between(-8.0, -1.0).map(lambda exponent: 1.0 + 10.0**exponent)
+
+
 @st.composite
 def records(draw: st.DrawFn, threshold: float, *, dt: float | None = None) -> rocking.Motion:
     """Filtered noise between samples joined by lines, a few times the acceleration that uplifts the block."""
@@ -75,13 +80,13 @@ def records(draw: st.DrawFn, threshold: float, *, dt: float | None = None) -> ro
     smooth = draw(st.integers(1, 8))
     noise = np.random.default_rng(seed).normal(size=samples + smooth)
     acceleration = np.convolve(noise, np.ones(smooth), mode="valid")[:samples]
-    pga = draw(between(1.05, 4.0)) * threshold
+    pga = draw(amplitudes()) * threshold
     return rocking.Motion.from_samples(acceleration * (pga / np.max(np.abs(acceleration))), step)
 
 
 @st.composite
 def pulses(draw: st.DrawFn, threshold: float) -> rocking.Motion:
-    amplitude = draw(between(1.02, 3.0)) * threshold * draw(st.sampled_from([1.0, -1.0]))
+    amplitude = draw(amplitudes()) * threshold * draw(st.sampled_from([1.0, -1.0]))
     frequency = draw(between(0.4, 4.0))
     family = draw(st.sampled_from(["sine", "half_sine", "one_cosine", "ricker", "triangular", "rectangular"]))
     if family == "sine":

@@ -19,7 +19,9 @@ from oracles.scipy_events import equation_of_motion
 
 POINTS_PER_PIECE = 48
 LAST_SHARE = 1e-3
-"""Share of an arc before its end that is left out of the search, since rotation goes to zero there."""
+"""Share of an arc before its end that is left out of the search, since rotation goes to zero there..."""
+ROUNDING = 2.0**-50
+"""... and share of the time: where the arc ends is known no better."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ def examine(problem: Problem, arc: Arc) -> Finding:
             else _nonlinear(problem, arc.side, begin, end, u, v)
         )
         elapsed = begin - arc.start
-        span = min(end, arc.end - LAST_SHARE * (arc.end - arc.start)) - begin
+        last = arc.end - LAST_SHARE * (arc.end - arc.start) - ROUNDING * arc.end
+        span = min(end, last) - begin
         if span > 0.0:
             lowest = min(lowest, _lowest(path, elapsed, span))
         u, v = (float(x[0]) for x in path(np.array([end - begin])))

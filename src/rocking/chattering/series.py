@@ -166,7 +166,7 @@ def _coefficients(omega: FloatArray, eta: FloatArray, order: int) -> FloatArray:
         coefficients[i] = phase_coefficients(1.0 / (w * w), float(restitutions[i]), order) / w
         if not np.isfinite(coefficients[i]).all():
             raise InvalidOption(
-                f"the expansion at omega = {w:g}, eta = {restitutions[i]:g} is not resolved to order {order}: "
-                "its coefficients grow too fast; lower the order"
+                f"the expansion at omega = {w:g}, eta = {restitutions[i]:g} is not resolved to order {order} "
+                "in double precision: lower the order, or take eta further from 1"
             )
     return coefficients.reshape((*shape, order))

@@ -14,8 +14,8 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def kernel(function: F) -> F:
-    """Compile an entry point that Python calls: cached on disk."""
-    compiled: F = numba.njit(cache=True, error_model="numpy", _nrt=False)(function)
+    """Compile an entry point that Python calls: cached on disk, and free of Python's lock while it runs."""
+    compiled: F = numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function)
     return compiled
 
 

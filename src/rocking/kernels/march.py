@@ -13,6 +13,7 @@ from rocking.kernels.state import (
     END,
     EVENTS,
     IMPACTS,
+    LIMIT,
     NODES,
     OFFSET,
     PEAK,
@@ -121,6 +122,8 @@ def wait_for_uplift(shaking, sides, rules, tables, scratch, at, x, pieces):
     piece, offset, side, jump = next_uplift(shaking, at[PIECE], x[OFFSET], sides, stop, scratch.A, scratch.d)
     if side == AT_REST or shaking.breakpoints[piece] + offset >= stop:
         x[END] = max(now(shaking, at, x), shaking.breakpoints[-1]) if rules.endless else rules.stop
+        if pieces > shaking.coefficients.shape[0]:
+            x[RESTING] += x[END] - x[RESTED]
         return False
     at[PIECE], x[OFFSET], at[SIDE] = piece, offset, side
     at[SMOOTH] = not jump
@@ -210,7 +213,7 @@ def judge(shaking, sides, rules, scratch, at, x):
         at[RUN] = 0
         return True, np.nan, np.nan, 0.0
     if rules.treatment != CERTIFIED:
-        return imposed(rules, side, v, interval, time - x[UPLIFTED]), np.nan, np.nan, 0.0
+        return imposed(rules, sides[side, LIMIT], v, interval, time - x[UPLIFTED]), np.nan, np.nan, 0.0
     lower, upper = prove_rest(shaking, sides, rules.nonlinear, scratch.A, v, side, at[PIECE], x[OFFSET])
     if not upper >= 0.0:
         at[RUN] = 0
@@ -228,13 +231,13 @@ def judge(shaking, sides, rules, scratch, at, x):
 
 
 @leaf
-def imposed(rules, side, v, interval, since_uplift):
+def imposed(rules, limit, v, interval, since_uplift):
     """Whether a treatment other than the certificate brings the block to rest at this impact."""
     if rules.treatment == VELOCITY:
-        return v <= rules.limit[side]
+        return v <= limit
     if rules.treatment == INTERVAL:
-        return interval <= rules.limit[side]
-    return rules.treatment == TIME and since_uplift >= rules.limit[side]
+        return interval <= limit
+    return rules.treatment == TIME and since_uplift >= limit
 
 
 @routine
@@ -310,3 +313,10 @@ def write_event(rules, tables, time, kind, shift, at):
     row = tables.events[at[EVENTS]]
     row[0], row[1], row[2], row[3] = time, kind, sign_of(at[SIDE]), shift
     at[EVENTS] += 1
+
+
+@kernel
+def march_each(shaking, sides, rules, tables, scratch, at, x, endings):
+    """March many blocks, one after the other, each from its own state to its own end (`status`)."""
+    for k in range(sides.shape[0]):
+        endings[k] = march(shaking, sides[k], rules, tables, scratch, at[k], x[k], shaking.coefficients.shape[0] + 1)

@@ -40,7 +40,7 @@ REACH_LONGEST: Final = 12.0
 #: A fourth-order correction of this relative size leaves an error below one ulp.
 LARGEST_CORRECTION: Final = 1e-4
 
-#: Extrapolations above the second-order closure, and the relative size of the last at which it is taken.
+#: Extrapolations above the second-order closure, and the relative agreement at which their result is taken.
 LEVELS: Final = 5
 CLOSED: Final = 1e-13
 
@@ -268,6 +268,15 @@ def extrapolate(
 
 
 @leaf
+def agree(remaining: float, less_extrapolated: float, expected: float, x: float) -> bool:
+    """Whether the remaining phase is settled: the last extrapolation changed little, and so did the last pair.
+
+    The first alone deceives where Q is small, the second where Q is close to one.
+    """
+    return (abs(remaining - less_extrapolated) <= CLOSED * x) & (abs(remaining - expected) <= CLOSED * x)
+
+
+@leaf
 def closure(V: float, P: float, D: float, eta: float) -> float:
     """Remaining phase to second order in the speed V with which the second side is entered.
 
@@ -353,11 +362,12 @@ def settle(x: float, V: float, P: float, D: float, delta: float, eta: float) -> 
     for pair in range(_MAXIMUM_PAIRS):
         if V < STILL:
             return x
+        expected = table[LEVELS] - gone
         table = extrapolate(closure(V, P, D, eta), gone, Q, table)
         remaining = table[LEVELS]
         if (
             pair > LEVELS
-            and abs(remaining - table[LEVELS - 1]) <= CLOSED * x
+            and agree(remaining, table[LEVELS - 1], expected, x)
             and proven(x, V, P, D, delta, eta, remaining)
         ):
             return x + remaining

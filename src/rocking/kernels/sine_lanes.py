@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from rocking.kernels.compiled import leaf, routine
 from rocking.kernels.sine import (
-    CLOSED,
     LARGEST_CORRECTION,
     LARGEST_EXCESS,
     LEVELS,
@@ -29,6 +28,7 @@ from rocking.kernels.sine import (
     REACH_MEDIUM,
     REACH_SHORT,
     SHORT,
+    agree,
     basis,
     closure,
     extrapolate,
@@ -238,7 +238,9 @@ def close(block: NDArray[np.float64], ready: bool) -> tuple[int, float]:
         new = extrapolate(T, block[_GONE * LANES + lane], eta * eta, old)
         for k in range(LEVELS + 1):
             block[(_TABLE + k) * LANES + lane] = new[k] if runs else old[k]
-        closed = ready & runs & (abs(new[LEVELS] - new[LEVELS - 1]) <= CLOSED * block[_X * LANES + lane])
+        expected = old[LEVELS] - block[_GONE * LANES + lane]
+        settled = agree(new[LEVELS], new[LEVELS - 1], expected, block[_X * LANES + lane])
+        closed = ready & runs & settled
         block[_STATUS * LANES + lane] = _CLOSING if closed else status
     running = 0
     reach = 0.0

@@ -36,10 +36,14 @@ def phase_coefficients(delta: float, eta: float, order: int) -> Series:
     table = np.zeros((LEVELS + 1, order))
     gone = np.zeros(order)
     for pair in range(_MAXIMUM_PAIRS):
+        expected = table[LEVELS] - gone
         extrapolate_series(table, series_closure(v, p, d, eta), gone, eta * eta)
-        change = np.abs(table[LEVELS] - table[LEVELS - 1])
+        remaining = table[LEVELS]
+        change = np.maximum(np.abs(remaining - table[LEVELS - 1]), np.abs(remaining - expected))
+        if not np.all(np.isfinite(change)):
+            break
         if pair > LEVELS and np.all(change <= _CLOSED * np.abs(x)):
-            return x + table[LEVELS]
+            return x + remaining
         second, w, p, d = series_arc(v, p, d, False, delta)
         first, w, p, d = series_arc(eta * w, p, d, True, delta)
         v = eta * w

@@ -29,7 +29,6 @@ class Rules(NamedTuple):
 
     nonlinear: bool
     treatment: int
-    limit: Floats
     tolerance: float
     stop: float
     endless: bool
@@ -70,8 +69,9 @@ class Scratch(NamedTuple):
     d: Floats
 
 
-# Columns of a block's side (rows: side +, side -).
-STIFFNESS, SLENDERNESS, THRESHOLD, GAIN, RESTITUTION = range(5)
+# Columns of a block's side (rows: side +, side -): p^2, alpha, uplift threshold in g, its gain (see `chatter`),
+# restitution, and the limit of a treatment other than the certificate.
+STIFFNESS, SLENDERNESS, THRESHOLD, GAIN, RESTITUTION, LIMIT = range(6)
 
 # Integers of the state. RUN counts the impacts since chattering was proven, SMOOTH marks an uplift that is not a
 # jump, STILL an impact at which time did not advance, STALLED counts the rests that only that brought about.

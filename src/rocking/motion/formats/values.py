@@ -121,12 +121,14 @@ def parse(token: bytes) -> float | None:
 
 def convert(tokens: list[bytes]) -> Floats | None:
     """Return the numbers that the tokens write (D exponents too), or None if one is not a finite number."""
-    joined = b" ".join(tokens)
-    if not tokens or b"_" in joined or max(map(len, tokens)) > _TOKEN_LIMIT:
-        return None if tokens else np.empty(0)
+    if not tokens:
+        return np.empty(0)
+    joined = b"\n".join(tokens)
+    if b"_" in joined or max(map(len, tokens)) > _TOKEN_LIMIT:
+        return None
     fortran = b"D" in joined or b"d" in joined
     try:
-        values = np.array(joined.translate(_FORTRAN_EXPONENT).split() if fortran else tokens, dtype=np.float64)
+        values = np.array(joined.translate(_FORTRAN_EXPONENT).split(b"\n") if fortran else tokens, dtype=np.float64)
     except ValueError:
         return None
     return values if np.isfinite(values).all() else None

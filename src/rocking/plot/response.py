@@ -1,4 +1,4 @@
-"""Figures drawn from arrays; this layer knows no class of the package."""
+"""Rotation above the ground motion that caused it, with impacts, rests and one chattering sequence."""
 
 from __future__ import annotations
 
@@ -6,38 +6,15 @@ import math
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rocking.plot.style import ABOVE, GROUND, INK, REST, STYLE, FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
-
-# Luminances differ, so that the figure reads in grey as well.
-INK = "#10243e"
-GROUND = "#94a0ad"
-REST = "#e3e6ea"
-ABOVE = "#b0390c"
-
 #: Rotations beyond this multiple of the slenderness are cut: past it a block only falls.
 LARGEST_RATIO_SHOWN: Final = 2.0
-
-STYLE: Final[dict[Any, Any]] = {
-    "font.size": 8.5,
-    "axes.titlesize": 8.5,
-    "axes.labelsize": 8.5,
-    "figure.titlesize": 9.5,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "legend.fontsize": 8.0,
-    "legend.frameon": False,
-}
 
 
 class ChatteringSequence(NamedTuple):

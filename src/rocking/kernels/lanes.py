@@ -1,0 +1,343 @@
+"""Many blocks through one evenly sampled record: together where nothing happens, one by one where something does.
+
+A lane is one block. Over each sample all lanes step together, in loops that vectorise; a lane in which the step may
+hold an event (an impact, a new peak, an overturning, an uplift) is left where it was, and `march` plays that sample
+for it exactly. What may hold an event is decided by bounds, never by sampling, so that no impact can be missed.
+
+In the linear model z = u''/p^2 = u - alpha - i a/g obeys z'' = p^2 z, whatever the (linear) motion, so one step adds a
+product with a matrix that is known beforehand; it is added to u, since u - z would lose the digits of small rotations.
+In the nonlinear model a step is a Taylor series of fixed order.
+
+Over a step of length h, u stays above the straight line between its ends less (h^2/8) max(u'', 0), and below it plus
+(h^2/8) max(-u'', 0). In the linear model the extrema of u'' = p^2 z are at the ends; in the nonlinear model they are
+bounded from the series' coefficients.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rocking.kernels.compiled import kernel, leaf, routine
+from rocking.kernels.impact import QUARTER_TURN
+from rocking.kernels.march import march
+from rocking.kernels.state import (
+    AT_REST,
+    OFFSET,
+    ORDER,
+    PEAK,
+    PIECE,
+    SIDE,
+    SLENDERNESS,
+    STIFFNESS,
+    THRESHOLD,
+    Floats,
+    Integers,
+    Rules,
+    Scratch,
+    Shaking,
+    Tables,
+    U,
+    V,
+)
+from rocking.kernels.status import GOING
+
+#: Lanes that step together. A constant, so that the compiler sees that the rows of the flat tables do not overlap.
+WIDTH = 64
+
+# Where each row of the lanes' flat table starts. State before and after the step: u, u', and (nonlinear) the sine and
+# cosine of alpha - u.
+U0, V0, S0, C0, U1, V1, S1, C1 = range(0, 8 * WIDTH, WIDTH)
+# Constants of the side that the lane is on: with x = p h, cosh x - 1, sinh x / p, h - sinh x / p, p sinh x (linear);
+# alpha, i/g, p^2, and the factor of the bounds.
+COSH, SINH, LAG, SINH_P, ALPHA, SIGN, LAMBDA, CURVE = range(8 * WIDTH, 16 * WIDTH, WIDTH)
+# Peak so far, and the accelerations beyond which a lane at rest uplifts.
+HIGHEST, ABOVE, BELOW = range(16 * WIDTH, 19 * WIDTH, WIDTH)
+ROWS = 19
+
+#: From a row before the step to the one after it.
+AFTER = U1 - U0
+
+
+class Room(NamedTuple):
+    """Room for the work: the lanes' table, their series (nonlinear), and their marks."""
+
+    lanes: Floats
+    series: Floats
+    events: Integers
+
+
+def new_room() -> Room:
+    """Room for one call of `run_lanes` at a time."""
+    return Room(np.zeros(ROWS * WIDTH), np.zeros(3 * (ORDER + 1) * WIDTH), np.zeros(WIDTH, dtype=np.int64))
+
+
+@kernel
+def run_lanes(
+    shaking: Shaking,
+    sides: Floats,
+    rules: Rules,
+    tables: Tables,
+    scratch: Scratch,
+    room: Room,
+    at: Integers,
+    x: Floats,
+    endings: Integers,
+) -> None:
+    """March every lane through a record of even samples, and on to its own end.
+
+    Parameters
+    ----------
+    shaking : Shaking
+        Pieces of degree 1 and equal length.
+    sides : ndarray, shape (n, 2, 6)
+        Blocks, as `march` takes them; n <= WIDTH.
+    at, x : ndarray, shapes (n, .), (n, .)
+        State of every lane at time zero; the last state on return.
+    endings : ndarray of int, shape (n,)
+        How each lane ended (`status`), written on return.
+    """
+    lanes, series, events = room.lanes, room.series, room.events
+    count = sides.shape[0]
+    h = shaking.breakpoints[1] - shaking.breakpoints[0]
+    order = 0 if not rules.nonlinear else series_order(sides, h)
+    pieces = shaking.coefficients.shape[0]
+    endings[:] = GOING
+    for lane in range(WIDTH):
+        freeze(lanes, lane, 0, np.inf)
+        events[lane] = 0
+    for lane in range(count):
+        load(shaking, sides, rules, lanes, at, x, lane, 0, h)
+    moving = count
+    start = shaking.coefficients[0, 0]
+    piece = 0
+    while piece < pieces and moving > 0 and shaking.breakpoints[piece + 1] <= rules.stop:
+        end = shaking.coefficients[piece, 0] + shaking.coefficients[piece, 1] * h
+        if rules.nonlinear:
+            busy = quiet_nonlinear(lanes, series, events, start, end, h, order)
+        else:
+            busy = quiet_linear(lanes, events, start, end, h)
+        if busy > 0:
+            for lane in range(count):
+                if events[lane] != 0:
+                    moving -= play(shaking, sides, rules, tables, scratch, lanes, at, x, endings, lane, piece, h)
+        for k in range(4 * WIDTH):
+            lanes[U0 + k] = lanes[U1 + k]
+        start = end
+        piece += 1
+    for lane in range(count):
+        if endings[lane] == GOING:
+            unload(lanes, at, x, lane, piece)
+            endings[lane] = march(shaking, sides[lane], rules, tables, scratch, at[lane], x[lane], pieces + 1)
+
+
+@routine
+def play(
+    shaking: Shaking,
+    sides: Floats,
+    rules: Rules,
+    tables: Tables,
+    scratch: Scratch,
+    lanes: Floats,
+    at: Integers,
+    x: Floats,
+    endings: Integers,
+    lane: int,
+    piece: int,
+    h: float,
+) -> int:
+    """Play one sample for one lane exactly; returns 1 when the lane has ended."""
+    unload(lanes, at, x, lane, piece)
+    endings[lane] = march(shaking, sides[lane], rules, tables, scratch, at[lane], x[lane], piece + 1)
+    load(shaking, sides, rules, lanes, at, x, lane, AFTER, h)
+    if endings[lane] == GOING:
+        return 0
+    freeze(lanes, lane, AFTER, np.inf)
+    return 1
+
+
+@routine
+def unload(lanes: Floats, at: Integers, x: Floats, lane: int, piece: int) -> None:
+    """Hand a lane's state before the step to the verbs of `march`."""
+    if at[lane, SIDE] == AT_REST:
+        if at[lane, PIECE] < piece:
+            at[lane, PIECE], x[lane, OFFSET] = piece, 0.0
+        return
+    at[lane, PIECE], x[lane, OFFSET] = piece, 0.0
+    x[lane, U], x[lane, V] = lanes[U0 + lane], lanes[V0 + lane]
+
+
+@routine
+def load(
+    shaking: Shaking,
+    sides: Floats,
+    rules: Rules,
+    lanes: Floats,
+    at: Integers,
+    x: Floats,
+    lane: int,
+    half: int,
+    h: float,
+) -> None:
+    """Take a lane's state back from the verbs of `march`, into the rows before (half 0) or after (AFTER) the step."""
+    side = at[lane, SIDE]
+    lanes[HIGHEST + lane] = x[lane, PEAK]
+    if side == AT_REST:
+        freeze(lanes, lane, half, 1.0)
+        lanes[ABOVE + lane] = sides[lane, 1, THRESHOLD] / shaking.inverse_g
+        lanes[BELOW + lane] = -sides[lane, 0, THRESHOLD] / shaking.inverse_g
+        return
+    stiffness, alpha = sides[lane, side, STIFFNESS], sides[lane, side, SLENDERNESS]
+    p = math.sqrt(stiffness)
+    sign = (1.0 - 2.0 * side) * shaking.inverse_g
+    half_sinh = math.sinh(0.5 * p * h)
+    sinh = math.sinh(p * h)
+    lanes[COSH + lane] = 2.0 * half_sinh * half_sinh
+    lanes[SINH + lane] = sinh / p
+    lanes[LAG + lane] = h - sinh / p
+    lanes[SINH_P + lane] = p * sinh
+    lanes[ALPHA + lane], lanes[SIGN + lane], lanes[LAMBDA + lane] = alpha, sign, stiffness
+    lanes[ABOVE + lane], lanes[BELOW + lane] = np.inf, -np.inf
+    u = x[lane, U]
+    lanes[U0 + half + lane], lanes[V0 + half + lane] = u, x[lane, V]
+    if rules.nonlinear:
+        lanes[CURVE + lane] = h * h / 8.0
+        lanes[S0 + half + lane], lanes[C0 + half + lane] = math.sin(alpha - u), math.cos(alpha - u)
+        return
+    lanes[CURVE + lane] = stiffness * h * h / 8.0
+
+
+@leaf
+def freeze(lanes: Floats, lane: int, half: int, limit: float) -> None:
+    """Constants with which a lane stays where it is: at rest, or (infinite limit) ended."""
+    for row in range(COSH, CURVE + WIDTH, WIDTH):
+        lanes[row + lane] = 0.0
+    lanes[U0 + half + lane], lanes[V0 + half + lane] = 1.0, 0.0
+    lanes[S0 + half + lane], lanes[C0 + half + lane] = 0.0, 1.0
+    lanes[ALPHA + lane] = 1.0
+    lanes[ABOVE + lane], lanes[BELOW + lane] = limit, -limit
+
+
+@routine
+def quiet_linear(lanes: Floats, events: Integers, start: float, end: float, h: float) -> int:
+    """Step all lanes through one sample of the linear model; mark and count those that may have an event in it."""
+    slope = (end - start) / h
+    above, below = max(start, end), min(start, end)
+    busy = 0
+    for lane in range(WIDTH):
+        u, v, sign, alpha = lanes[U0 + lane], lanes[V0 + lane], lanes[SIGN + lane], lanes[ALPHA + lane]
+        z = u - (alpha + sign * start)
+        drift = sign * slope
+        u1 = u + (lanes[COSH + lane] * z + (lanes[SINH + lane] * v + lanes[LAG + lane] * drift))
+        v1 = v + (lanes[SINH_P + lane] * z + lanes[COSH + lane] * (v - drift))
+        z1 = u1 - (alpha + sign * end)
+        dip = lanes[CURVE + lane] * max(max(z, z1), 0.0)
+        bulge = lanes[CURVE + lane] * max(max(-z, -z1), 0.0)
+        lanes[U1 + lane], lanes[V1 + lane] = u1, v1
+        event = (
+            (min(u, u1) <= dip)
+            | ((v > 0.0) & (v1 <= 0.0) & (max(u, u1) + bulge > lanes[HIGHEST + lane]))
+            | (u1 >= QUARTER_TURN)
+            | (above > lanes[ABOVE + lane])
+            | (below < lanes[BELOW + lane])
+        )
+        events[lane] = event
+        busy += event
+    return busy
+
+
+@routine
+def series_order(sides: Floats, h: float) -> int:
+    """Order of the nonlinear lanes' series: enough for the fastest block to double precision."""
+    fastest = 0.0
+    for lane in range(sides.shape[0]):
+        fastest = max(fastest, max(sides[lane, 0, STIFFNESS], sides[lane, 1, STIFFNESS]))
+    # Up to where it falls, a block's rotation changes at no more than about twice p.
+    x = 2.0 * math.sqrt(fastest) * h
+    term = 1.0
+    for k in range(1, ORDER):
+        term *= x / k
+        if term < 2.0**-54:
+            return max(4, k)
+    return ORDER
+
+
+@routine
+def quiet_nonlinear(
+    lanes: Floats, series: Floats, events: Integers, start: float, end: float, h: float, order: int
+) -> int:
+    """Step all lanes through one sample of the nonlinear model; mark and count those that may have an event in it."""
+    slope = (end - start) / h
+    sine, cosine = ORDER + 1, 2 * (ORDER + 1)
+    for lane in range(WIDTH):
+        series[0 * WIDTH + lane], series[1 * WIDTH + lane] = lanes[U0 + lane], lanes[V0 + lane]
+        series[(sine) * WIDTH + lane], series[(cosine) * WIDTH + lane] = lanes[S0 + lane], lanes[C0 + lane]
+    for k in range(order - 1):
+        weight = 1.0 / ((k + 1.0) * (k + 2.0))
+        inverse = 1.0 / (k + 1.0)
+        for lane in range(WIDTH):
+            ground = lanes[SIGN + lane]
+            value = series[(sine + k) * WIDTH + lane] + ground * start * series[(cosine + k) * WIDTH + lane]
+            if k > 0:
+                value += ground * slope * series[(cosine + k - 1) * WIDTH + lane]
+            series[(k + 2) * WIDTH + lane] = -lanes[LAMBDA + lane] * weight * value
+        for lane in range(WIDTH):
+            series[(sine + k + 1) * WIDTH + lane] = -series[1 * WIDTH + lane] * series[(cosine + k) * WIDTH + lane]
+            series[(cosine + k + 1) * WIDTH + lane] = series[1 * WIDTH + lane] * series[(sine + k) * WIDTH + lane]
+        for j in range(1, k + 1):
+            factor = j + 1.0
+            for lane in range(WIDTH):
+                rate = factor * series[(j + 1) * WIDTH + lane]
+                series[(sine + k + 1) * WIDTH + lane] -= rate * series[(cosine + k - j) * WIDTH + lane]
+                series[(cosine + k + 1) * WIDTH + lane] += rate * series[(sine + k - j) * WIDTH + lane]
+        for lane in range(WIDTH):
+            series[(sine + k + 1) * WIDTH + lane] *= inverse
+            series[(cosine + k + 1) * WIDTH + lane] *= inverse
+    return sum_series(lanes, series, events, start, end, h, order)
+
+
+@leaf
+def sum_series(lanes: Floats, series: Floats, events: Integers, start: float, end: float, h: float, order: int) -> int:
+    """Ends of the nonlinear lanes' step, and which of them may have an event in it."""
+    sine, cosine = ORDER + 1, 2 * (ORDER + 1)
+    for lane in range(WIDTH):
+        lanes[U1 + lane] = series[(order) * WIDTH + lane]
+        lanes[V1 + lane] = order * series[(order) * WIDTH + lane]
+        lanes[S1 + lane] = series[(sine + order - 1) * WIDTH + lane]
+        lanes[C1 + lane] = series[(cosine + order - 1) * WIDTH + lane]
+    for k in range(order - 1, -1, -1):
+        for lane in range(WIDTH):
+            lanes[U1 + lane] = lanes[U1 + lane] * h + series[(k) * WIDTH + lane]
+        if k > 0:
+            for lane in range(WIDTH):
+                lanes[V1 + lane] = lanes[V1 + lane] * h + k * series[(k) * WIDTH + lane]
+        if k < order - 1:
+            for lane in range(WIDTH):
+                lanes[S1 + lane] = lanes[S1 + lane] * h + series[(sine + k) * WIDTH + lane]
+                lanes[C1 + lane] = lanes[C1 + lane] * h + series[(cosine + k) * WIDTH + lane]
+    above, below = max(start, end), min(start, end)
+    # u'' over the step is 2 c2 give or take the sum of the other terms' sizes.
+    for lane in range(WIDTH):
+        series[(cosine) * WIDTH + lane] = 0.0
+    power = h
+    for k in range(3, order + 1):
+        factor = k * (k - 1) * power
+        for lane in range(WIDTH):
+            series[(cosine) * WIDTH + lane] += factor * abs(series[(k) * WIDTH + lane])
+        power *= h
+    busy = 0
+    for lane in range(WIDTH):
+        u, v, u1, v1 = lanes[U0 + lane], lanes[V0 + lane], lanes[U1 + lane], lanes[V1 + lane]
+        curvature, spread = 2.0 * series[2 * WIDTH + lane], series[(cosine) * WIDTH + lane]
+        dip = lanes[CURVE + lane] * max(curvature + spread, 0.0)
+        bulge = lanes[CURVE + lane] * max(spread - curvature, 0.0)
+        event = (
+            (min(u, u1) <= dip)
+            | ((v > 0.0) & (v1 <= 0.0) & (max(u, u1) + bulge > lanes[HIGHEST + lane]))
+            | (u1 >= QUARTER_TURN)
+            | (above > lanes[ABOVE + lane])
+            | (below < lanes[BELOW + lane])
+        )
+        events[lane] = event
+        busy += event
+    return busy

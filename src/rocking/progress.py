@@ -1,0 +1,70 @@
+"""A progress bar for work that takes long, drawn only where a person is watching."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import rich.progress
+
+#: Work that is over sooner than this shows no bar, s.
+_PATIENCE = 1.0
+
+
+class Progress:
+    """Progress bar on stderr, drawn once the work has taken a second.
+
+    Parameters
+    ----------
+    what : str
+        What is being done.
+    total : int
+        Number of steps.
+    show : bool, optional
+        By default only if stderr is a terminal.
+
+    Examples
+    --------
+    >>> with Progress("counting", total=3, show=False) as progress:
+    ...     for _ in range(3):
+    ...         progress.advance()
+    """
+
+    def __init__(self, what: str, total: int, *, show: bool | None = None) -> None:
+        self._what, self._total = what, total
+        self._show = sys.stderr.isatty() if show is None else show
+        self._start = time.monotonic()
+        self._done = 0
+        self._bar: rich.progress.Progress | None = None
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def advance(self, steps: int = 1) -> None:
+        """Count steps that are done."""
+        self._done += steps
+        if not self._show or time.monotonic() - self._start < _PATIENCE:
+            return
+        if self._bar is None:
+            self._bar = _started(self._what, self._total)
+        self._bar.update(self._bar.task_ids[0], completed=self._done)
+
+
+def _started(what: str, total: int) -> rich.progress.Progress:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    bar = Progress(*columns, console=Console(stderr=True), transient=True)
+    bar.add_task(what, total=total)
+    bar.start()
+    return bar

@@ -1,0 +1,227 @@
+"""The exact chattering time: against references, proofs in ball arithmetic, another path, and itself."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from flint import arb
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles.sine_chattering import settle
+
+from rocking import chattering
+from rocking.chattering import duration
+from rocking.errors import InvalidOption
+
+EPS_SERIES_C1 = 10.827447906757
+
+
+@pytest.fixture(scope="module")
+def reference(shared):
+    return json.loads((shared / "reference" / "reference.json").read_text())
+
+
+def random_parameters(count, seed, spread=1.5):
+    """Omega in [0.4, 10], eta in [0.5, 0.97], and amplitudes on both sides of the critical one, many close to it."""
+    rng = np.random.default_rng(seed)
+    eta = rng.uniform(0.5, 0.97, count)
+    omega = np.exp(rng.uniform(np.log(0.4), np.log(10.0), count))
+    critical = chattering.critical_amplitude(omega, eta, method="approximation")
+    far = rng.uniform(0.0, spread, count)
+    near = 1.0 + rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-6.0, -2.0, count)
+    return 1.0 + (critical - 1.0) * np.where(rng.random(count) < 0.8, far, near), omega, eta
+
+
+def assert_proven(a, omega, eta):
+    """The product's answer is the one proven in ball arithmetic, up to what one ulp of a changes."""
+    time = float(chattering.chattering_time(a, omega, eta))
+    proof = settle(a, omega, eta)
+    assert np.isnan(time) == (proof.time is None)
+    if proof.time is None:
+        return
+    error = abs(float(proof.time.mid() - arb(time)))
+    if error > 1e-12 * time:
+        assert error < abs(float(settle(float(np.nextafter(a, 0.0)), omega, eta).time.mid() - proof.time.mid()))
+
+
+def test_chattering_times_of_the_reference(reference):
+    for case in reference["chattering_time"]:
+        time = chattering.chattering_time(case["a"], case["omega"], case["eta"])
+        assert time == pytest.approx(float(case["tau"]), rel=3e-14)
+
+
+def test_small_amplitudes_of_the_reference(reference):
+    for case in reference["small_epsilon_eta_092_omega_2"]:
+        eps = float(case["epsilon"])
+        a = 1.0 + eps
+        scaled = float(case["tau_times_omega_over_sqrt_epsilon"])
+        # The double a is not 1 + epsilon exactly: at leading order the time follows the square root of a - 1.
+        time = scaled / 2.0 * np.sqrt(eps) * np.sqrt((a - 1.0) / eps)
+        assert chattering.chattering_time(a, 2.0, 0.92) == pytest.approx(time, rel=3e-14 + 10 * abs((a - 1.0) / eps - 1.0))
+
+
+def test_share_of_half_a_period_depends_on_frequency_as_known():
+    omega = np.array([0.5, 1.0, 2.0, 5.0])
+    share = chattering.chattering_time(1.03, omega, 0.92) * omega / np.pi
+    assert share == pytest.approx([0.8068, 0.7308, 0.7168, 0.7131], abs=5e-5)
+
+
+def test_time_and_completeness_are_proven_in_ball_arithmetic():
+    for a, omega, eta in zip(*random_parameters(60, seed=3), strict=True):
+        assert_proven(float(a), float(omega), float(eta))
+
+
+@pytest.mark.parametrize("omega", [0.08, 0.3, 30.0, 1e3])
+@pytest.mark.parametrize("eta", [0.02, 0.3, 0.985])
+def test_time_is_proven_far_outside_the_usual_range(omega, eta):
+    critical = float(chattering.critical_amplitude(omega, eta))
+    for share in (1e-7, 0.1, 0.8, 0.999, 1.001):
+        assert_proven(1.0 + (critical - 1.0) * share, omega, eta)
+
+
+@pytest.mark.slow
+def test_a_thousand_times_are_proven_in_ball_arithmetic():
+    for a, omega, eta in zip(*random_parameters(1000, seed=4), strict=True):
+        assert_proven(float(a), float(omega), float(eta))
+
+
+def test_a_hundred_thousand_verdicts_agree_with_the_semianalytical_scheme():
+    a, omega, eta = random_parameters(100_000, seed=1)
+    exact = chattering.chattering_time(a, omega, eta)
+    resolved = chattering.chattering_time(a, omega, eta, method="semianalytical", resolved=1000)
+    both = np.isfinite(exact) & np.isfinite(resolved)
+    assert both.mean() > 0.5
+    differ = np.flatnonzero(np.isnan(exact) != np.isnan(resolved))
+    assert np.abs(a[differ] - chattering.critical_amplitude(omega[differ], eta[differ])).max(initial=0.0) < 1e-9
+    assert np.abs(exact[both] / resolved[both] - 1.0).max() < 1e-8
+
+
+def test_semianalytical_scheme_converges_like_the_square_of_what_remains():
+    exact = chattering.chattering_time(1.03, 2.0, 0.92)
+    resolved = np.array([40, 60, 80, 100])
+    times = np.array([chattering.chattering_time(1.03, 2.0, 0.92, method="semianalytical", resolved=int(n)) for n in resolved])
+    rates = np.diff(np.log(np.abs(times - exact))) / np.diff(resolved)
+    assert rates == pytest.approx(2.0 * np.log(0.92), rel=0.1)
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    st.floats(0.01, 0.99),
+    st.floats(0.05, 50.0),
+    st.floats(0.3, 0.97),
+    st.floats(1e-3, 0.1),
+)
+def test_stronger_shaking_chatters_longer(share, omega, eta, more):
+    critical = float(chattering.critical_amplitude(omega, eta)) - 1.0
+    weaker, stronger = chattering.chattering_time(
+        [1.0 + share * critical, 1.0 + min(1.0, share * (1.0 + more)) * critical * (1.0 - 1e-9)], omega, eta
+    )
+    assert 0.0 < weaker < stronger < np.pi / omega
+
+
+def test_weak_shaking_approaches_the_square_root_law():
+    eps = 1e-9
+    time = chattering.chattering_time(1.0 + eps, [0.5, 2.0, 9.0], 0.92)
+    assert time * [0.5, 2.0, 9.0] / np.sqrt((1.0 + eps) - 1.0) == pytest.approx(EPS_SERIES_C1, rel=1e-6)
+
+
+def test_the_curve_has_vertical_tangents_at_both_ends():
+    """The paper's two asymptotes of Fig. 5: slopes grow like distance^-1/2 at a = 1, distance^-0.4 at a_cr."""
+    critical = float(chattering.critical_amplitude(2.0, 0.92))
+    distance = np.array([1e-10, 1e-8])
+    start = chattering.chattering_time(1.0 + distance, 2.0, 0.92)
+    assert np.log(start[1] / start[0]) / np.log(100.0) == pytest.approx(0.5, abs=1e-3)
+    end = np.pi / 2.0 - chattering.chattering_time(critical - distance, 2.0, 0.92)
+    assert np.log(end[1] / end[0]) / np.log(100.0) == pytest.approx(0.600, abs=2e-3)
+
+
+def test_edges_of_the_definition():
+    times = chattering.chattering_time([0.5, 1.0, 1.03, 1.05, 1e300], 2.0, 0.92)
+    assert np.isnan(times[[0, 3, 4]]).all() and times[1] == 0.0 and times[2] > 0.0
+    assert np.isnan(chattering.chattering_time(1.001, 2.0, 1.0))
+    assert chattering.chattering_time(1.0, 2.0, 1.0) == 0.0
+    assert chattering.is_complete([0.9, 1.0, 1.03, 1.05], 2.0, 0.92).tolist() == [False, True, True, False]
+
+
+@pytest.mark.parametrize("method", ["exact", "asymptotic", "series", "semianalytical"])
+def test_every_method_broadcasts_and_knows_the_ends(method):
+    a = np.array([0.9, 1.0, 1.01])[:, None, None]
+    omega = np.array([1.0, 2.0])[:, None]
+    eta = np.array([0.8, 0.9, 0.92, 0.95])
+    times = chattering.chattering_time(a, omega, eta, method=method)
+    assert times.shape == (3, 2, 4)
+    assert np.isnan(times[0]).all() and (times[1] == 0.0).all()
+    single = chattering.chattering_time(1.01, 2.0, 0.92, method=method)
+    assert np.ndim(single) == 0 and single == pytest.approx(times[2, 1, 2], rel=1e-14)
+
+
+def test_a_time_does_not_depend_on_its_neighbours_in_the_array():
+    a, omega, eta = random_parameters(3000, seed=7)
+    together = chattering.chattering_time(a, omega, eta)
+    alone = np.array([chattering.chattering_time(*case) for case in zip(a[:300], omega[:300], eta[:300], strict=True)])
+    assert (np.isnan(together[:300]) == np.isnan(alone)).all()
+    away = chattering.critical_amplitude(omega[:300], eta[:300]) - a[:300] > 1e-4
+    assert np.nanmax(np.abs(together[:300] / alone - 1.0)[away]) < 1e-12
+
+
+def test_threads_give_the_same_bits(monkeypatch):
+    a, omega, eta = random_parameters(40_000, seed=8)
+    monkeypatch.setattr(duration, "_cores", lambda: 3)
+    shared_out = chattering.chattering_time(a, omega, eta)
+    monkeypatch.setattr(duration, "_cores", lambda: 1)
+    assert np.array_equal(shared_out, chattering.chattering_time(a, omega, eta), equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("given_parameters", "message"),
+    [
+        ((np.nan, 2.0, 0.92), "a must be finite"),
+        (([1.0, np.inf], 2.0, 0.92), r"at index \(1,\)"),
+        ((1.03, 0.0, 0.92), "omega must be between"),
+        ((1.03, -2.0, 0.92), "omega must be between"),
+        ((1.03, 1e7, 0.92), "omega must be between"),
+        ((1.03, 2.0, 0.0), "eta must be above 0"),
+        ((1.03, 2.0, 1.1), "eta must be above 0"),
+        ((1.03, 2.0, 0.9999999), "eta must be above 0"),
+        (("fast", 2.0, 0.92), "must be a number"),
+        (([1.0, 1.1], [1.0, 2.0, 3.0], 0.92), "do not broadcast"),
+    ],
+)
+def test_unusable_parameters_are_refused_in_one_sentence(given_parameters, message):
+    with pytest.raises(InvalidOption, match=message) as refusal:
+        chattering.chattering_time(*given_parameters)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"method": "euler"}, {"method": "series", "order": 0}, {"method": "series", "order": 2.5}, {"resolved": 0}],
+)
+def test_unusable_options_are_refused(options):
+    with pytest.raises(InvalidOption, match="must be"):
+        chattering.chattering_time(1.03, 2.0, 0.92, **options)
+
+
+def test_kernels_give_the_same_answers_uncompiled():
+    code = (
+        "from rocking import chattering as c;"
+        "print(c.chattering_time([1.03, 1.05, 1.3, 1.035], [2.0, 2.0, 0.2, 2.0], [0.92, 0.92, 0.5, 1e-3]).tolist(),"
+        "float(c.critical_amplitude(2.0, 0.5)), c.series_coefficients(2.0, 0.8, order=3).tolist(),"
+        "c.sequence(1.03, 2.0, 0.8).lower, c.chattering_time(1.03, 2.0, 0.9, method='semianalytical').tolist(),"
+        "c.chattering_time(1.03, 2.0, 0.9, method='asymptotic').tolist())"
+    )
+    outputs = [
+        subprocess.run(
+            [sys.executable, "-W", "error", "-c", code],
+            env=os.environ | {"NUMBA_DISABLE_JIT": switch},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for switch in ("0", "1")
+    ]
+    compiled, plain = (np.array(json.loads("[" + out.replace("nan", "null").replace(" ", ",").replace(",,", ",").replace("[", "").replace("]", "") + "]"), float) for out in outputs)
+    assert plain == pytest.approx(compiled, rel=1e-12, nan_ok=True)
