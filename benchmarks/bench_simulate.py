@@ -67,9 +67,7 @@ def compare(motion: rocking.Motion, samples: np.ndarray, model: str, parameters:
 
 def baseline(samples: np.ndarray, problem: Problem, rtol: float) -> float:
     dt = float(problem.breakpoints[1])
-    return integrate_as_practised(
-        samples, dt, problem, rtol=rtol, atol=1e-3 * rtol, max_step=2.0 * dt, rest_speed=1e-5
-    )
+    return integrate_as_practised(samples, dt, problem, rtol=rtol, atol=1e-3 * rtol, max_step=2.0 * dt, rest_speed=1e-5)
 
 
 def loosest_tolerance(samples: np.ndarray, problem: Problem, peak: float) -> tuple[float, float]:

@@ -60,7 +60,9 @@ def test_small_amplitudes_of_the_reference(reference):
         scaled = float(case["tau_times_omega_over_sqrt_epsilon"])
         # The double a is not 1 + epsilon exactly: at leading order the time follows the square root of a - 1.
         time = scaled / 2.0 * np.sqrt(eps) * np.sqrt((a - 1.0) / eps)
-        assert chattering.chattering_time(a, 2.0, 0.92) == pytest.approx(time, rel=3e-14 + 10 * abs((a - 1.0) / eps - 1.0))
+        assert chattering.chattering_time(a, 2.0, 0.92) == pytest.approx(
+            time, rel=3e-14 + 10 * abs((a - 1.0) / eps - 1.0)
+        )
 
 
 def test_share_of_half_a_period_depends_on_frequency_as_known():
@@ -102,7 +104,9 @@ def test_a_hundred_thousand_verdicts_agree_with_the_semianalytical_scheme():
 def test_semianalytical_scheme_converges_like_the_square_of_what_remains():
     exact = chattering.chattering_time(1.03, 2.0, 0.92)
     resolved = np.array([40, 60, 80, 100])
-    times = np.array([chattering.chattering_time(1.03, 2.0, 0.92, method="semianalytical", resolved=int(n)) for n in resolved])
+    times = np.array(
+        [chattering.chattering_time(1.03, 2.0, 0.92, method="semianalytical", resolved=int(n)) for n in resolved]
+    )
     rates = np.diff(np.log(np.abs(times - exact))) / np.diff(resolved)
     assert rates == pytest.approx(2.0 * np.log(0.92), rel=0.1)
 
@@ -205,23 +209,32 @@ def test_unusable_options_are_refused(options):
         chattering.chattering_time(1.03, 2.0, 0.92, **options)
 
 
+UNCOMPILED = """
+import json
+from rocking import chattering as c
+answers = [
+    *c.chattering_time([1.03, 1.05, 1.3, 1.035], [2.0, 2.0, 0.2, 2.0], [0.92, 0.92, 0.5, 1e-3]),
+    c.chattering_time(1.03, 2.0, 0.9, method="semianalytical"),
+    c.chattering_time(1.03, 2.0, 0.9, method="asymptotic"),
+    c.critical_amplitude(2.0, 0.5),
+    *c.series_coefficients(2.0, 0.8, order=3),
+    c.sequence(1.03, 2.0, 0.8).lower,
+]
+print(json.dumps([float(answer) for answer in answers]))
+"""
+
+
 def test_kernels_give_the_same_answers_uncompiled():
-    code = (
-        "from rocking import chattering as c;"
-        "print(c.chattering_time([1.03, 1.05, 1.3, 1.035], [2.0, 2.0, 0.2, 2.0], [0.92, 0.92, 0.5, 1e-3]).tolist(),"
-        "float(c.critical_amplitude(2.0, 0.5)), c.series_coefficients(2.0, 0.8, order=3).tolist(),"
-        "c.sequence(1.03, 2.0, 0.8).lower, c.chattering_time(1.03, 2.0, 0.9, method='semianalytical').tolist(),"
-        "c.chattering_time(1.03, 2.0, 0.9, method='asymptotic').tolist())"
+    plain, compiled = (
+        json.loads(
+            subprocess.run(
+                [sys.executable, "-W", "error", "-c", UNCOMPILED],
+                env=os.environ | {"NUMBA_DISABLE_JIT": switch},
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+        )
+        for switch in ("1", "0")
     )
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-W", "error", "-c", code],
-            env=os.environ | {"NUMBA_DISABLE_JIT": switch},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for switch in ("0", "1")
-    ]
-    compiled, plain = (np.array(json.loads("[" + out.replace("nan", "null").replace(" ", ",").replace(",,", ",").replace("[", "").replace("]", "") + "]"), float) for out in outputs)
     assert plain == pytest.approx(compiled, rel=1e-12, nan_ok=True)

@@ -26,10 +26,14 @@ def assert_no_impact_is_missed(case: Case) -> None:
     for arc in dense.arcs(events_of(response), impacts_of(response), end):
         finding = dense.examine(problem, arc)
         span = arc.end - arc.start
-        rounding = 4.0 * ULP * arc.end
+        p, alpha, _ = problem.side(arc.side)
+        of_time, of_acceleration = 4.0 * ULP * arc.end, 8.0 * ULP * p * p * alpha
+        in_speed = of_acceleration * span + 2.0 * p * p * alpha * of_time
         assert finding.lowest > 0.0, finding
-        assert abs(finding.time_error) <= 1e-9 * span + rounding, finding
-        assert abs(finding.speed_error) <= 1e-9 * arc.speed_at_end + 100.0 * rounding, finding
+        assert abs(finding.speed_error) <= 1e-10 * arc.speed_at_end + in_speed, finding
+        if arc.ended_by == "impact":
+            in_time = of_time + of_acceleration * span**2 / arc.speed_at_end
+            assert abs(finding.time_error) <= 1e-10 * span + in_time, finding
 
 
 @quick
@@ -38,7 +42,7 @@ def test_no_impact_is_missed_in_the_linear_model(case: Case) -> None:
     assert_no_impact_is_missed(case)
 
 
-@settings(quick, max_examples=40)
+@settings(quick, max_examples=25)
 @given(cases(model="nonlinear"))
 def test_no_impact_is_missed_in_the_nonlinear_model(case: Case) -> None:
     assert_no_impact_is_missed(case)
@@ -70,7 +74,7 @@ def test_the_angular_speed_never_grows_at_an_impact(case: Case) -> None:
 @quick
 @given(
     st.tuples(between(0.03, 0.4), between(0.03, 0.4)),
-    between(0.3, 2.0),
+    between(0.5, 2.0),
     between(0.05, 1.5),
     st.sampled_from(["linear", "nonlinear"]),
     st.data(),
@@ -156,7 +160,8 @@ def assert_same_course(
     assume(np.all(ULP * np.abs(one.events["sensitivity"]) <= 1e-12))
     assert [e[1:] for e in events_of(one)] == [e[1:] for e in events_of(other)]
     assert_allclose(other.events["time"], time * one.events["time"] + shift, rtol=0.0, atol=1e-10 * time)
-    assert_allclose(other.peak_rotation, size * one.peak_rotation, rtol=1e-9)
+    atol = 100.0 * ULP * abs(size * one.peak_sensitivity)
+    assert_allclose(other.peak_rotation, size * one.peak_rotation, rtol=1e-9, atol=atol)
 
 
 def resampled(case: Case, *, delay: int = 0, faster: float = 1.0, size: float = 1.0) -> rocking.Motion:

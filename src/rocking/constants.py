@@ -4,3 +4,6 @@ from typing import Final
 
 #: Standard acceleration of gravity, m/s^2; readers and blocks use the same value.
 STANDARD_GRAVITY: Final = 9.80665
+
+#: Version of the package.
+VERSION: Final = "0.1.0"

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import rocking
 from rocking.block import Block, Blocks
+from rocking.constants import VERSION
 from rocking.errors import InvalidOption
 from rocking.kernels import lanes, march, state, status
 from rocking.kernels.state import Floats
@@ -291,7 +291,7 @@ def _dataset(
         coordinates["polarity"] = ("polarity", ["+", "-"])
     coordinates |= _block_coordinates(blocks)
     attributes = {
-        "program": f"rocking {rocking.__version__}",
+        "program": f"rocking {VERSION}",
         "model": model,
         "chattering": repr(how),
         "polarity": polarity,

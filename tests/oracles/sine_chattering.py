@@ -1,4 +1,4 @@
-"""Independent answers to the dimensionless sine problem: 50-digit arithmetic, and proofs in ball arithmetic.
+"""Independent answers to the dimensionless sine problem: 80-digit arithmetic, and proofs in ball arithmetic.
 
 Both follow the paper's closed form between impacts (Eq. 6) in the time tau itself. Neither uses the product's
 variables, its series, its root finding, or its argument that every root before half a period is the first.
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import mpmath
 from flint import arb, arb_poly, ctx
 
-DIGITS = 50
+DIGITS = 80
 BITS = (200, 400, 800, 1600)
 """Precisions to try: balls of time and speed grow at each impact, so that long sequences need many bits."""
 

@@ -13,6 +13,7 @@ from rocking.chattering.duration import (
     is_complete,
     sequence,
 )
+from rocking.chattering.nonlinear import critical_amplitude_nonlinear
 from rocking.chattering.series import SeriesDiagnosis, series_coefficients, series_diagnosis
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "asymptotic_table",
     "chattering_time",
     "critical_amplitude",
+    "critical_amplitude_nonlinear",
     "first_impact_speed",
     "first_interval",
     "interval_ratios",

@@ -40,6 +40,13 @@ def checked_restitution(eta: ArrayLike) -> FloatArray:
     return values
 
 
+def checked_slenderness(alpha: ArrayLike) -> FloatArray:
+    """Return slenderness angles as an array."""
+    values = _finite(alpha, "alpha", "the slenderness angle in rad")
+    _require((values > 0.0) & (values < 0.5 * np.pi), values, "alpha", "between 0 and pi/2 rad")
+    return values
+
+
 def checked_count(value: int, name: str, lowest: int, highest: int) -> int:
     """Check a whole number against bounds."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not lowest <= value <= highest:

@@ -116,7 +116,8 @@ def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: i
     -----
     Error: the next terms, and a geometric sum with the limit of their ratio. Radius: the ratios c_{k-1}/c_k are
     extrapolated linearly in 1/k (Domb and Sykes). It agrees with a_cr - 1, where the chattering time has its branch
-    point, to a few per mille: the series converges wherever chattering is complete, and nowhere else.
+    point: to about one per cent from the 16 coefficients that are formed at least, to a few per mille from 40. So
+    the series converges wherever chattering is complete, and nowhere else.
 
     Examples
     --------

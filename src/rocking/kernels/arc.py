@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from rocking.kernels.compiled import leaf, routine
-from rocking.kernels.state import ORDER
+from rocking.kernels.state import ORDER, Floats, Scratch
 
 #: Terms below this fraction of the largest one no longer count.
 NEGLIGIBLE = 2.0**-58
@@ -24,23 +24,29 @@ _INVERSE = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
 
 
 @leaf
-def local_motion(coefficients, offset, factor, h, A):
+def local_motion(coefficients: Floats, offset: float, factor: float, h: float, A: Floats) -> int:
     """Motion's polynomial about ``offset``, times ``factor``, into A; returns the degree that counts within h."""
     degree = coefficients.shape[0] - 1
     for k in range(degree + 1):
         A[k] = coefficients[k] * factor
     if offset > 0.0:
-        for k in range(degree):
-            for j in range(degree - 1, k - 1, -1):
-                A[j] += offset * A[j + 1]
+        move(A, degree, offset)
     while degree > 1 and abs(A[degree]) * h**degree < NEGLIGIBLE * abs(A[0]):
         degree -= 1
     return degree
 
 
 @leaf
-def linear_order(lam, degree, h):
-    """Order at which a linear arc's series has converged over h <= 1/p, for a motion of some degree.
+def move(c: Floats, degree: int, t: float) -> None:
+    """Centre of a polynomial moved by t, in place."""
+    for k in range(degree):
+        for j in range(degree - 1, k - 1, -1):
+            c[j] += t * c[j + 1]
+
+
+@leaf
+def linear_order(lam: float, h: float) -> int:
+    """Order at which a linear arc's series has converged over h <= 1/p, for a motion of degree 0 or 1.
 
     Every coefficient after the motion's own follows from the one two before, so the ratio of c[k] h^k to c[2] h^2
     (slower than all that comes from the initial state) is known beforehand.
@@ -49,13 +55,29 @@ def linear_order(lam, degree, h):
     ratio = 1.0
     for k in range(2, ORDER - 2, 2):
         ratio *= squared * _WEIGHT[k]
-        if ratio <= NEGLIGIBLE and k >= degree + 1:
+        if ratio <= NEGLIGIBLE:
             return k + 1
     return ORDER
 
 
+@leaf
+def converged(c: Floats, degree: int, h: float) -> tuple[int, float]:
+    """Order at which a full series has converged over h, or else a step over which it has; returns (order, h')."""
+    largest = max(abs(c[0]), abs(c[1]) * h)
+    previous = term = largest
+    power = h * h
+    for k in range(2, ORDER + 1):
+        previous = term
+        term = abs(c[k]) * power
+        largest = max(largest, term)
+        if k > degree + 2 and term + previous <= NEGLIGIBLE * largest:
+            return k, h
+        power *= h
+    return ORDER, shortened(c, h)
+
+
 @routine
-def expand_linear(u, v, lam, alpha, A, degree, order, c):
+def expand_linear(u: float, v: float, lam: float, alpha: float, A: Floats, degree: int, order: int, c: Floats) -> None:
     """Series of a linear arc into c, up to ``order``."""
     c[0] = u
     c[1] = v
@@ -67,7 +89,9 @@ def expand_linear(u, v, lam, alpha, A, degree, order, c):
 
 
 @routine
-def expand_nonlinear(u, v, lam, alpha, A, degree, h, c, S, C):
+def expand_nonlinear(
+    u: float, v: float, lam: float, alpha: float, A: Floats, degree: int, h: float, c: Floats, S: Floats, C: Floats
+) -> tuple[int, float]:
     """Series of a nonlinear arc into c, of sin and cos(alpha - u) into S and C; returns (order, h')."""
     c[0] = u
     c[1] = v
@@ -97,20 +121,29 @@ def expand_nonlinear(u, v, lam, alpha, A, degree, h, c, S, C):
         if k > degree and term + previous <= NEGLIGIBLE * largest:
             return k + 2, h
         power *= h
-    return ORDER, h * shrink(previous * h, term, largest)
+    return ORDER, shortened(c, h)
+
+
+@routine
+def shortened(c: Floats, h: float) -> float:
+    """Step, not longer than h, at which the last two terms of a full series no longer count."""
+    excess = np.inf
+    while excess > 1.0:
+        largest = term = previous = 0.0
+        power = 1.0
+        for k in range(ORDER + 1):
+            previous = term
+            term = abs(c[k]) * power
+            largest = max(largest, term)
+            power *= h
+        excess = (term + previous) / (NEGLIGIBLE * largest)
+        if excess > 1.0:
+            h *= 0.9 * excess ** (-1.0 / ORDER)
+    return h
 
 
 @leaf
-def shrink(previous, term, largest):
-    """Factor on the step that brings the last two terms of a full series below what counts."""
-    excess = max(previous, term) / (NEGLIGIBLE * largest)
-    if excess <= 1.0:
-        return 1.0
-    return 0.9 * excess ** (-1.0 / ORDER)
-
-
-@leaf
-def evaluate(c, order, t):
+def evaluate(c: Floats, order: int, t: float) -> tuple[float, float, float]:
     """Rotation, velocity and acceleration (u, u', u'') of a series at time t after its centre."""
     u = c[order]
     v = 0.0
@@ -123,7 +156,9 @@ def evaluate(c, order, t):
 
 
 @routine
-def vary_linear(du, dv, lam, degree, order, t, scratch):
+def vary_linear(
+    du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Scratch
+) -> tuple[float, float]:
     """Variation (du, dv) after time t of a linear arc when the motion is scaled by 1 + epsilon.
 
     The variation obeys the arc's own equation with alpha = 0, so its series is an arc's series.
@@ -134,7 +169,9 @@ def vary_linear(du, dv, lam, degree, order, t, scratch):
 
 
 @routine
-def vary_nonlinear(du, dv, lam, degree, order, t, scratch):
+def vary_nonlinear(
+    du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Scratch
+) -> tuple[float, float]:
     """Variation (du, dv) after time t of a nonlinear arc when the motion is scaled by 1 + epsilon.
 
     Needs A, S and C as `expand_nonlinear` left them. Solves d'' = lam ((cos - A sin) d - A cos).

@@ -15,7 +15,10 @@ import numpy as np
 
 from rocking.kernels.arc import local_motion
 from rocking.kernels.compiled import leaf, routine
-from rocking.kernels.state import GAIN, RESTITUTION, STIFFNESS, THRESHOLD
+from rocking.kernels.state import GAIN, RESTITUTION, STIFFNESS, THRESHOLD, Floats, Shaking
+
+#: What is known of one side over a window, see `arc_bounds`.
+Bounds = tuple[float, float, float, float, float, float]
 
 #: Window of the proof over the first estimate of the remaining time.
 _WINDOW = 1.5
@@ -28,7 +31,7 @@ _ROUNDING = 2.0**-48
 
 
 @leaf
-def geometric_bracket(v, first, second, e_i, e_j):
+def geometric_bracket(v: float, first: Bounds, second: Bounds, e_i: float, e_j: float) -> tuple[float, float]:
     """Lower and upper bound on the time to rest, for bounds that hold as long as needed; NaN, NaN: no proof.
 
     ``first`` bounds the side that the block enters, ``second`` the other one; see `arc_bounds`.
@@ -38,34 +41,37 @@ def geometric_bracket(v, first, second, e_i, e_j):
     slowest = e_i * math.sqrt(max(0.0, 1.0 - change_i)) * v
     change_j, _, longest_j = arc_bounds(fastest, second)
     _, shortest_j, _ = arc_bounds(slowest, second)
-    most = fastest / v * e_j * math.sqrt(1.0 + change_j)
-    least = slowest / v * e_j * math.sqrt(max(0.0, 1.0 - change_j))
+    most = fastest / v * e_j * math.sqrt(1.0 + change_j) * (1.0 + _ROUNDING)
+    least = slowest / v * e_j * math.sqrt(max(0.0, 1.0 - change_j)) * (1.0 - _ROUNDING)
     if not most < 1.0:
         return np.nan, np.nan
-    return (shortest_i + shortest_j) / (1.0 - least), (longest_i + longest_j) / (1.0 - most)
+    lower = (shortest_i + shortest_j) / (1.0 - least)
+    upper = (longest_i + longest_j) / (1.0 - most)
+    return lower * (1.0 - _ROUNDING), upper * (1.0 + _ROUNDING)
 
 
 @leaf
-def arc_bounds(v, bounds):
+def arc_bounds(v: float, bounds: Bounds) -> tuple[float, float, float]:
     """Bounds on one arc of initial speed v: (|w^2/v^2 - 1| for its impact speed w, duration from, to); NaN: none.
 
-    ``bounds`` = (stiff, m, M, swing, rate): the restoring acceleration at zero rotation stays within [m, M] and
-    falls by at most stiff per unit of rotation; what the motion adds to it changes by at most ``swing``, and at
-    most ``rate`` times a time. The durations (2/sqrt(stiff)) atan(x), atanh(x), with x = sqrt(stiff) v/M and /m, are
-    replaced by the rational bounds x - x^3/3 and x + x^3/(3 (1 - x^2)), which need no transcendental function.
+    ``bounds`` = (stiff, m, M, swing, rate, leap): the restoring acceleration at zero rotation stays within [m, M] and
+    changes by at most stiff per unit of rotation; what the motion adds to it changes by at most ``swing``, and within
+    a time by at most ``rate`` times that time and ``leap``. The durations (2/sqrt(stiff)) atan(x), atanh(x), with
+    x = sqrt(stiff) v/M and /m, are replaced by the rational bounds x - x^3/3 and x + x^3/(3 (1 - x^2)), which need no
+    transcendental function.
     """
-    stiff, m, M, swing, rate = bounds
+    stiff, m, M, swing, rate, leap = bounds
     squared = stiff * v * v / (m * m)
     if not (m > 0.0 and squared < 1.0):
         return np.nan, np.nan, np.nan
     shortest = 2.0 * v / M * (1.0 - stiff * v * v / (3.0 * M * M))
     longest = 2.0 * v / m * (1.0 + squared / (3.0 * (1.0 - squared)))
-    change = 2.0 * min(swing, rate * longest) / (m * (1.0 + math.sqrt(1.0 - squared)))
+    change = 2.0 * min(swing, rate * longest + leap) / (m * (1.0 + math.sqrt(1.0 - squared)))
     return change, shortest, longest
 
 
 @leaf
-def remaining_time(v, g_i, g_j, rate_i, rate_j, e_i, e_j):
+def remaining_time(v: float, g_i: float, g_j: float, rate_i: float, rate_j: float, e_i: float, e_j: float) -> float:
     """Time to rest to second order in the speed, for restoring accelerations g_j and their rates of change.
 
     The first order is the paper's Eq. 75 (a geometric sum); the second lets the accelerations change linearly in
@@ -83,40 +89,42 @@ def remaining_time(v, g_i, g_j, rate_i, rate_j, e_i, e_j):
 
 
 @routine
-def motion_range(shaking, piece, offset, window, A):
-    """Bounds over a window that starts in a piece: least and greatest acceleration, steepest slope (inf: a jump).
+def motion_range(
+    shaking: Shaking, piece: int, offset: float, window: float, A: Floats
+) -> tuple[float, float, float, float]:
+    """Bounds over a window that starts in a piece: least and greatest acceleration, steepest slope, sum of all jumps.
 
-    NaN when the window spans too many pieces.
+    Rounding included. NaN when the window spans too many pieces. ``A`` is scratch space.
     """
     pieces = shaking.coefficients.shape[0]
-    low, high, steepest = np.inf, -np.inf, 0.0
-    end = motion_at(shaking, piece, offset)
+    low, high, steepest, leap = np.inf, -np.inf, 0.0, 0.0
     for _ in range(_LONGEST_WINDOW):
-        start = motion_at(shaking, piece, offset)
-        if abs(start - end) > _ROUNDING * max(abs(start), abs(end), abs(low), abs(high)):
-            steepest = np.inf
         if piece == pieces:
-            return min(low, 0.0), max(high, 0.0), steepest
+            return min(low, 0.0), max(high, 0.0), steepest, leap
         length = shaking.breakpoints[piece + 1] - shaking.breakpoints[piece]
         left = length - offset
-        least, most, slope = piece_range(shaking.coefficients[piece], offset, min(window, left), A)
+        least, most, slope, rounding = piece_range(shaking.coefficients[piece], offset, min(window, left), A)
         low, high, steepest = min(low, least), max(high, most), max(steepest, slope)
         if window <= left:
-            return low, high, steepest
-        end = motion_at(shaking, piece, length)
+            return low, high, steepest, leap
+        leap += abs(motion_at(shaking, piece + 1, 0.0) - motion_at(shaking, piece, length)) + rounding
         window -= left
         piece += 1
         offset = 0.0
-    return np.nan, np.nan, np.nan
+    return np.nan, np.nan, np.nan, np.nan
 
 
 @leaf
-def piece_range(coefficients, offset, window, A):
-    """Bounds on one piece over [offset, offset + window]: least, greatest, steepest; exact for degree 1, else tight."""
+def piece_range(coefficients: Floats, offset: float, window: float, A: Floats) -> tuple[float, float, float, float]:
+    """Bounds on one piece over [offset, offset + window]: least, greatest, steepest, and their allowance for rounding.
+
+    Exact for degree 1, else tight.
+    """
     if coefficients.shape[0] == 2:
         first = coefficients[0] + coefficients[1] * offset
         last = first + coefficients[1] * window
-        return min(first, last), max(first, last), abs(coefficients[1])
+        rounding = _ROUNDING * (abs(coefficients[0]) + max(abs(first), abs(last)))
+        return min(first, last) - rounding, max(first, last) + rounding, abs(coefficients[1]), rounding
     degree = local_motion(coefficients, offset, 1.0, window, A)
     low = high = A[0]
     steepest = 0.0
@@ -127,11 +135,25 @@ def piece_range(coefficients, offset, window, A):
         term = A[k] * power
         low += min(0.0, term)
         high += max(0.0, term)
-    return low, high, steepest
+    size, slope = sizes(coefficients, offset + window)
+    rounding = _ROUNDING * coefficients.shape[0] * size
+    return low - rounding, high + rounding, steepest + _ROUNDING * coefficients.shape[0] * slope, rounding
+
+
+@leaf
+def sizes(coefficients: Floats, t: float) -> tuple[float, float]:
+    """Sizes of the terms of a polynomial and of its slope at t, added up: what their rounding is a fraction of."""
+    size = slope = 0.0
+    for k in range(coefficients.shape[0] - 1, -1, -1):
+        slope = slope * t + size
+        size = size * t + abs(coefficients[k])
+    return size, slope
 
 
 @routine
-def prove_rest(shaking, sides, nonlinear, A, v, i, piece, offset):
+def prove_rest(
+    shaking: Shaking, sides: Floats, nonlinear: bool, A: Floats, v: float, i: int, piece: int, offset: float
+) -> tuple[float, float]:
     """Bracket on the time to rest from an impact that enters side i (0: +, 1: -) with speed v; NaN, NaN: no proof.
 
     ``A`` is scratch space.
@@ -144,20 +166,25 @@ def prove_rest(shaking, sides, nonlinear, A, v, i, piece, offset):
     if not (g_i > 0.0 and g_j > 0.0 and e_i * e_j < 1.0 and sides[i, STIFFNESS] * v * v < g_i * g_i):
         return np.nan, np.nan
     window = _WINDOW * 2.0 * v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)
-    low, high, steepest = motion_range(shaking, piece, offset, window, A)
+    # The rounding of the times decides on which side of a jump of the motion the window ends.
+    doubt = _ROUNDING * (shaking.breakpoints[piece] + offset)
+    low, high, steepest, leap = motion_range(shaking, piece, offset, window + doubt, A)
     low = low * shaking.inverse_g - shaking.error
     high = high * shaking.inverse_g + shaking.error
     steepest *= shaking.inverse_g
-    first = side_bounds(sides, i, nonlinear, low, high, steepest)
-    second = side_bounds(sides, j, nonlinear, low, high, steepest)
+    leap = leap * shaking.inverse_g + 2.0 * shaking.error
+    first = side_bounds(sides, i, nonlinear, low, high, steepest, leap)
+    second = side_bounds(sides, j, nonlinear, low, high, steepest, leap)
     lower, upper = geometric_bracket(v, first, second, e_i, e_j)
     if not upper <= window:
         return np.nan, np.nan
-    return lower * (1.0 - _ROUNDING), upper * (1.0 + _ROUNDING)
+    return lower, upper
 
 
 @leaf
-def side_bounds(sides, j, nonlinear, low, high, steepest):
+def side_bounds(
+    sides: Floats, j: int, nonlinear: bool, low: float, high: float, steepest: float, leap: float
+) -> Bounds:
     """Bounds on side j for `arc_bounds`, rounding included, while a/g stays within [low, high]."""
     sign = 1.0 - 2.0 * j
     one = sides[j, THRESHOLD] + sign * low
@@ -168,18 +195,18 @@ def side_bounds(sides, j, nonlinear, low, high, steepest):
     stiff = stiffness * (math.hypot(1.0, largest) if nonlinear else 1.0)
     m = sides[j, GAIN] * (min(one, other) - slack)
     M = sides[j, GAIN] * (max(one, other) + slack)
-    growth = 1.0 + _ROUNDING
-    return stiff * growth, m, M, stiffness * (high - low) * growth, stiffness * steepest * growth
+    grown = stiffness * (1.0 + _ROUNDING)
+    return stiff * (1.0 + _ROUNDING), m, M, grown * (high - low), grown * steepest, grown * leap
 
 
 @leaf
-def restoring(sides, j, acceleration):
+def restoring(sides: Floats, j: int, acceleration: float) -> float:
     """Side j's restoring acceleration at zero rotation, for a ground acceleration in units of g."""
     return sides[j, GAIN] * (sides[j, THRESHOLD] + (1.0 - 2.0 * j) * acceleration)
 
 
 @leaf
-def motion_at(shaking, piece, offset):
+def motion_at(shaking: Shaking, piece: int, offset: float) -> float:
     """Ground acceleration within a piece; zero after the last one."""
     coefficients = shaking.coefficients
     if piece == coefficients.shape[0]:
@@ -191,7 +218,7 @@ def motion_at(shaking, piece, offset):
 
 
 @leaf
-def motion_slope(shaking, piece, offset):
+def motion_slope(shaking: Shaking, piece: int, offset: float) -> float:
     """Rate of the ground acceleration within a piece; zero after the last one."""
     coefficients = shaking.coefficients
     if piece == coefficients.shape[0]:
@@ -203,7 +230,7 @@ def motion_slope(shaking, piece, offset):
 
 
 @leaf
-def time_to_rest(shaking, sides, v, i, piece, offset):
+def time_to_rest(shaking: Shaking, sides: Floats, v: float, i: int, piece: int, offset: float) -> float:
     """Estimate of the time to rest from an impact that enters side i with speed v (`remaining_time`)."""
     j = 1 - i
     here = motion_at(shaking, piece, offset) * shaking.inverse_g

@@ -4,11 +4,19 @@ import math
 
 import numpy as np
 
-from rocking.kernels.arc import evaluate, expand_linear, expand_nonlinear, linear_order, local_motion
+from rocking.kernels.arc import (
+    converged,
+    evaluate,
+    expand_linear,
+    expand_nonlinear,
+    linear_order,
+    local_motion,
+    move,
+)
 from rocking.kernels.chatter import motion_at, piece_range, restoring
 from rocking.kernels.compiled import leaf, routine
-from rocking.kernels.root import curvature_bound, first_passage, first_peak, first_root
-from rocking.kernels.state import AT_REST, SLENDERNESS, STIFFNESS, THRESHOLD
+from rocking.kernels.root import curvature_bound, first_root
+from rocking.kernels.state import AT_REST, ORDER, SLENDERNESS, STIFFNESS, THRESHOLD, Floats, Rules, Scratch, Shaking
 from rocking.kernels.status import IMPACT, OVERTURN, STEP
 
 QUARTER_TURN = 0.5 * math.pi
@@ -16,9 +24,12 @@ QUARTER_TURN = 0.5 * math.pi
 #: First step from an impact, over the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
 
+#: Accelerations closer to a threshold than this fraction of it are at the threshold.
+_ROUNDING = 2.0**-48
+
 
 @leaf
-def step_length(sides, side, u, v, left, acceleration):
+def step_length(sides: Floats, side: int, u: float, v: float, left: float, acceleration: float) -> float:
     """Length of the next Taylor step; ``acceleration`` is the motion's, now, in units of g."""
     h = min(left, 1.0 / math.sqrt(sides[side, STIFFNESS]))
     if u == 0.0 and v > 0.0:
@@ -29,7 +40,18 @@ def step_length(sides, side, u, v, left, acceleration):
 
 
 @routine
-def expand(shaking, sides, rules, scratch, side, piece, offset, u, v, left):
+def expand(
+    shaking: Shaking,
+    sides: Floats,
+    rules: Rules,
+    scratch: Scratch,
+    side: int,
+    piece: int,
+    offset: float,
+    u: float,
+    v: float,
+    left: float,
+) -> tuple[int, float, int]:
     """Series of the arc from a state into scratch; returns (order, step, degree of the motion)."""
     c, A = scratch.c, scratch.A
     h = step_length(sides, side, u, v, left, motion_at(shaking, piece, offset) * shaking.inverse_g)
@@ -41,17 +63,22 @@ def expand(shaking, sides, rules, scratch, side, piece, offset, u, v, left):
     stiffness, slenderness = sides[side, STIFFNESS], sides[side, SLENDERNESS]
     if rules.nonlinear:
         order, h = expand_nonlinear(u, v, stiffness, slenderness, A, degree, h, c, scratch.S, scratch.C)
-    else:
-        order = linear_order(stiffness, degree, h)
+    elif degree <= 1:
+        order = linear_order(stiffness, h)
         expand_linear(u, v, stiffness, slenderness, A, degree, order, c)
+    else:
+        expand_linear(u, v, stiffness, slenderness, A, degree, ORDER, c)
+        order, h = converged(c, degree, h)
     return order, h, degree
 
 
 @routine
-def advance(u, v, order, h, c, d):
+def advance(
+    u: float, v: float, order: int, h: float, c: Floats, d: Floats
+) -> tuple[int, float, float, float, float, float]:
     """Follow a series to its first event within h.
 
-    Returns (status, time, u, u', u'', time of the highest rotation on the way, that rotation). ``d`` is scratch.
+    Returns (status, time, u, u', time of the highest rotation on the way, that rotation). ``d`` is scratch space.
     """
     status = STEP
     lead = 0 if u > 0.0 else (1 if v > 0.0 else 2)
@@ -60,41 +87,98 @@ def advance(u, v, order, h, c, d):
         status = IMPACT
     else:
         time = h
-    end, speed, acceleration = evaluate(c, order, time)
+    end, speed, _ = evaluate(c, order, time)
+    if end <= 0.0:  # also without a root: one within rounding of the step's end must not be left behind
+        status, end = IMPACT, 0.0
     peak_time, peak = time, end
-    if v > 0.0 and v < curvature_bound(c, 0, order, time) * time:
-        top = first_peak(c, order, time, d)
-        if top == top:
-            peak_time = top
-            peak, _, _ = evaluate(c, order, top)
+    if turns(v, order, time, c):
+        peak_time, peak = highest(order, time, c, d)
     if peak >= QUARTER_TURN:
-        passage = first_passage(c, order, QUARTER_TURN, time, d)
-        if passage == passage:
-            end, speed, acceleration = evaluate(c, order, passage)
-            return OVERTURN, passage, QUARTER_TURN, speed, acceleration, passage, QUARTER_TURN
+        passage = first_passage(c, order, QUARTER_TURN, peak_time, d)
+        _, speed, _ = evaluate(c, order, passage)
+        return OVERTURN, passage, QUARTER_TURN, speed, passage, QUARTER_TURN
     if status == IMPACT:
         end = 0.0
-    return status, time, end, speed, acceleration, peak_time, peak
+    return status, time, end, speed, peak_time, peak
+
+
+@leaf
+def turns(v: float, order: int, h: float, c: Floats) -> bool:
+    """Whether a series may be higher within (0, h) than at both ends."""
+    if v > 0.0:
+        return v < curvature_bound(c, 0, order, h) * h
+    rise = v
+    power = h
+    for k in range(2, order + 1):
+        rise += max(0.0, c[k]) * power
+        power *= h
+    return rise > 0.0
 
 
 @routine
-def next_uplift(shaking, piece, offset, sides, stop, A, d):
+def highest(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
+    """Time and value of a series' maximum on (0, h], from one turning point to the next. ``d`` is scratch space."""
+    best_time = h
+    best, _, _ = evaluate(c, order, h)
+    for k in range(order):
+        d[k] = (k + 1) * c[k + 1]
+    t = 0.0
+    for _ in range(order):
+        lead = 0
+        while lead < order - 1 and d[lead] == 0.0:
+            lead += 1
+        rising = d[lead] > 0.0
+        if not rising:
+            for k in range(order):
+                d[k] = -d[k]
+        turn = first_root(d, lead, order - 1, h - t)
+        if not turn > 0.0:
+            break
+        t += turn
+        value, _, _ = evaluate(c, order, t)
+        if rising and value > best:
+            best_time, best = t, value
+        move(d, order - 1, turn)
+        d[0] = 0.0
+    return best_time, best
+
+
+@leaf
+def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> float:
+    """First time in (0, h] at which a series that starts below ``level``, and is not below it at h, reaches it.
+
+    ``d`` is scratch space.
+    """
+    d[0] = level - c[0]
+    for k in range(1, order + 1):
+        d[k] = -c[k]
+    time = first_root(d, 0, order, h)
+    return time if time == time else h
+
+
+@routine
+def next_uplift(
+    shaking: Shaking, piece: int, offset: float, sides: Floats, stop: float, A: Floats, d: Floats
+) -> tuple[int, float, int, bool]:
     """First instant from (piece, offset) at which the motion passes a side's threshold.
 
     Returns (piece, offset, side, whether it passes by a jump); side AT_REST when it never does before ``stop``.
+    ``A`` and ``d`` are scratch space.
     """
     plus, minus = sides[0, THRESHOLD], sides[1, THRESHOLD]
     while piece < shaking.coefficients.shape[0] and shaking.breakpoints[piece] + offset < stop:
         coefficients = shaking.coefficients[piece]
-        left = shaking.breakpoints[piece + 1] - shaking.breakpoints[piece] - offset
-        low, high, _ = piece_range(coefficients, offset, left, A)
+        length = shaking.breakpoints[piece + 1] - shaking.breakpoints[piece]
+        left = length - offset
+        low, high, _, _ = piece_range(coefficients, offset, left, A)
         if high * shaking.inverse_g > minus or -low * shaking.inverse_g > plus:
             degree = local_motion(coefficients, offset, shaking.inverse_g, left, A)
             to_plus, jump_plus = first_excess(A, degree, left, plus, -1.0, d)
             to_minus, jump_minus = first_excess(A, degree, left, minus, 1.0, d)
-            if to_plus < to_minus:
+            # A passing that rounding puts at the end of the piece is left to the next one, which may turn back.
+            if to_plus < to_minus and offset + to_plus < length:
                 return piece, offset + to_plus, 0, jump_plus
-            if to_minus < np.inf:
+            if to_minus < to_plus and offset + to_minus < length:
                 return piece, offset + to_minus, 1, jump_minus
         piece += 1
         offset = 0.0
@@ -102,24 +186,51 @@ def next_uplift(shaking, piece, offset, sides, stop, A, d):
 
 
 @routine
-def first_excess(A, degree, h, threshold, sign, d):
-    """First time in [0, h) from which sign * A(t) > threshold, and whether it is so at once; inf when never."""
-    if sign * A[0] > threshold:
+def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float, d: Floats) -> tuple[float, bool]:
+    """First time in [0, h) from which sign * A(t) > threshold, and whether it is so by a jump; inf when never.
+
+    ``d`` is scratch space.
+    """
+    gap = threshold - sign * A[0]
+    if gap < -_ROUNDING * threshold:
         return 0.0, True
     if degree <= 1:
-        gap = threshold - sign * A[0]
         rate = sign * A[1] if degree == 1 else 0.0
         if rate > 0.0 and gap < rate * h:
-            return gap / rate, False
+            return max(0.0, gap) / rate, False
         return np.inf, False
-    d[0] = threshold - sign * A[0]
+    d[0] = gap
     for k in range(1, degree + 1):
         d[k] = -sign * A[k]
-    if d[0] == 0.0 and d[1] < 0.0:
-        return 0.0, False
-    time = first_root(d, 0, degree, h)
-    if time == time and time < h:
-        _, slope, _ = evaluate(d, degree, time)
-        if slope < 0.0:
-            return time, False
-    return np.inf, False
+    return first_passing(d, degree, h), False
+
+
+@routine
+def first_passing(d: Floats, degree: int, h: float) -> float:
+    """First time in [0, h) from which a polynomial, not negative before, is negative beyond rounding; inf when never.
+
+    From a root that is but a touch the search goes on with what is left once the touch is divided out. Changes ``d``.
+    """
+    rounding = 0.0
+    for k in range(degree, -1, -1):
+        rounding = rounding * h + _ROUNDING * abs(d[k])
+    start = 0.0
+    for _ in range(degree + 1):
+        lead = 0
+        power = 1.0
+        while lead <= degree and abs(d[lead]) * power <= rounding:
+            lead += 1
+            power *= h - start
+        if lead > degree:
+            return np.inf
+        if d[lead] < 0.0:
+            return start
+        time = first_root(d, lead, degree, h - start)
+        if not start + time < h:
+            return np.inf
+        start += time
+        move(d, degree, time)
+        d[0] = 0.0
+        if d[2] > 0.0 and d[1] * d[1] <= 2.0 * d[2] * rounding:  # the dip that follows is lost in rounding
+            d[1] = 0.0
+    return np.inf

@@ -30,10 +30,15 @@ from rocking.kernels.state import (
     SMOOTH,
     STALLED,
     STIFFNESS,
-    STILL,
     STRUCK,
     UPLIFTED,
     UPLIFTS,
+    Floats,
+    Integers,
+    Rules,
+    Scratch,
+    Shaking,
+    Tables,
     U,
     V,
 )
@@ -63,7 +68,16 @@ _STUCK = 4
 
 
 @kernel
-def march(shaking, sides, rules, tables, scratch, at, x, pieces):
+def march(
+    shaking: Shaking,
+    sides: Floats,
+    rules: Rules,
+    tables: Tables,
+    scratch: Scratch,
+    at: Integers,
+    x: Floats,
+    pieces: int,
+) -> int:
     """Follow one block through one motion, from the state (at, x) on; returns how it ended (`status`).
 
     GOING means that the first ``pieces`` of the motion's pieces are over; more than there are: go on to the end. FULL
@@ -90,9 +104,9 @@ def march(shaking, sides, rules, tables, scratch, at, x, pieces):
 
 
 @leaf
-def has_room(rules, tables, at):
+def has_room(rules: Rules, tables: Tables, at: Integers) -> bool:
     """Whether every table has room for what one turn of the march can write."""
-    return not rules.record or (
+    return not rules.record or bool(
         at[NODES] + 3 <= tables.nodes.shape[0]
         and at[IMPACTS] < tables.impacts.shape[0]
         and at[EVENTS] + 2 <= tables.events.shape[0]
@@ -101,19 +115,28 @@ def has_room(rules, tables, at):
 
 
 @leaf
-def now(shaking, at, x):
+def now(shaking: Shaking, at: Integers, x: Floats) -> float:
     """Time of the state."""
     return shaking.breakpoints[at[PIECE]] + x[OFFSET]
 
 
 @leaf
-def sign_of(side):
+def sign_of(side: int) -> float:
     """Sign of the rotation on a side: +1, -1, and 0 at rest."""
     return 0.0 if side == AT_REST else 1.0 - 2.0 * side
 
 
 @routine
-def wait_for_uplift(shaking, sides, rules, tables, scratch, at, x, pieces):
+def wait_for_uplift(
+    shaking: Shaking,
+    sides: Floats,
+    rules: Rules,
+    tables: Tables,
+    scratch: Scratch,
+    at: Integers,
+    x: Floats,
+    pieces: int,
+) -> bool:
     """Stay at rest until the motion passes a threshold; False when it does not within its first ``pieces`` pieces."""
     stop = rules.stop
     if pieces < shaking.breakpoints.shape[0]:
@@ -139,7 +162,9 @@ def wait_for_uplift(shaking, sides, rules, tables, scratch, at, x, pieces):
 
 
 @routine
-def follow_arc(shaking, sides, rules, tables, scratch, at, x):
+def follow_arc(
+    shaking: Shaking, sides: Floats, rules: Rules, tables: Tables, scratch: Scratch, at: Integers, x: Floats
+) -> int:
     """One Taylor step along the arc, or as much of it as its first event leaves."""
     start = now(shaking, at, x)
     write_node(rules, tables, start, at, x)
@@ -154,41 +179,42 @@ def follow_arc(shaking, sides, rules, tables, scratch, at, x):
         at[SMOOTH] = 0
     if at[PIECE] == shaking.coefficients.shape[0] and x[V] == 0.0 and scratch.c[2] == 0.0 and rules.endless:
         return _STUCK
-    outcome, t, u, v, _, top, height = advance(x[U], x[V], order, h, scratch.c, scratch.d)
+    outcome, t, u, v, top, height = advance(x[U], x[V], order, h, scratch.c, scratch.d)
     if height > x[PEAK]:
         x[PEAK], x[PEAK_TIME] = height, start + top
         if rules.record:
             x[PEAK_CHANGE], _ = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, top)
     if rules.record:
         x[DU], x[DV] = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, t)
-    at[STILL] = x[OFFSET] + t == x[OFFSET]
-    x[OFFSET] += t
+    pass_time(t, x)
     x[U], x[V] = u, v
     if outcome == OVERTURN:
         x[END] = x[PEAK_TIME] = now(shaking, at, x)
         x[PEAK], x[PEAK_CHANGE] = QUARTER_TURN, 0.0
         write_node(rules, tables, x[END], at, x)
         write_event(rules, tables, x[END], TOPPLED, -x[DU] / v, at)
-    elif outcome == STEP and t >= left:
-        if last:
-            x[END] = rules.stop
-            write_node(rules, tables, rules.stop, at, x)
-            return _STOPPED
-        at[PIECE] += 1
-        x[OFFSET] = 0.0
+    elif outcome == STEP and last and t >= left:
+        x[END] = rules.stop
+        write_node(rules, tables, rules.stop, at, x)
+        return _STOPPED
+    elif outcome == STEP:
+        enter_piece(shaking, t >= left, at, x)
     return outcome
 
 
 @routine
-def strike(shaking, sides, rules, tables, at, x):
-    """Impact: the angular speed drops, the side changes, and the variation jumps with them (saltation)."""
-    time = now(shaking, at, x)
+def strike(shaking: Shaking, sides: Floats, rules: Rules, tables: Tables, at: Integers, x: Floats) -> None:
+    """Impact: the angular speed drops, the side changes, and the variation jumps with them (saltation).
+
+    Without any speed the time of the impact, and with it the variation, is not known at all: infinite or NaN.
+    """
     settle(shaking, at, x)
+    time = now(shaking, at, x)
     acceleration = motion_at(shaking, at[PIECE], x[OFFSET])
     left, entered = at[SIDE], 1 - at[SIDE]
     speed = max(0.0, -x[V])
     e = sides[left, RESTITUTION]
-    shift = x[DU] / speed
+    shift = x[DU] / speed if speed > 0.0 else np.inf
     faster = -(x[DV] - restoring(sides, left, acceleration * shaking.inverse_g) * shift)
     at[SIDE], x[U], x[V] = entered, 0.0, e * speed
     x[DU] = -x[V] * shift
@@ -200,7 +226,9 @@ def strike(shaking, sides, rules, tables, at, x):
 
 
 @routine
-def judge(shaking, sides, rules, scratch, at, x):
+def judge(
+    shaking: Shaking, sides: Floats, rules: Rules, scratch: Scratch, at: Integers, x: Floats
+) -> tuple[bool, float, float, float]:
     """Whether the block comes to rest from this impact on: proven, imposed, or because time no longer advances.
 
     Returns (resting, lower and upper bound on the time that it takes, estimate of it); NaN bounds: not proven.
@@ -208,30 +236,46 @@ def judge(shaking, sides, rules, scratch, at, x):
     time, v, side = now(shaking, at, x), x[V], at[SIDE]
     interval = time - x[STRUCK]
     x[STRUCK] = time
-    if v == 0.0 or at[STILL]:
-        at[STALLED] += at[STILL]
+    lower = upper = np.nan
+    if rules.treatment == CERTIFIED:
+        lower, upper = bracket(shaking, sides, rules, scratch, at, x)
+        if upper - lower <= max(rules.tolerance, 4.0 * allowance(time, upper, at, x)):
+            estimate = time_to_rest(shaking, sides, v, side, at[PIECE], x[OFFSET])
+            return True, lower, upper, min(max(estimate, lower), upper)
+    elif imposed(rules, sides[side, LIMIT], v, interval, time - x[UPLIFTED]):
+        return True, lower, upper, 0.0
+    if v == 0.0 or interval <= 0.0:
+        at[STALLED] += interval <= 0.0
         at[RUN] = 0
         return True, np.nan, np.nan, 0.0
-    if rules.treatment != CERTIFIED:
-        return imposed(rules, sides[side, LIMIT], v, interval, time - x[UPLIFTED]), np.nan, np.nan, 0.0
-    lower, upper = prove_rest(shaking, sides, rules.nonlinear, scratch.A, v, side, at[PIECE], x[OFFSET])
-    if not upper >= 0.0:
-        at[RUN] = 0
-        return False, lower, upper, 0.0
-    if at[RUN] == 0:
-        x[RUN_START] = time
-    at[RUN] += 1
-    # Room for the rounding of the arcs resolved since the first proof, and of the times themselves.
-    slack = 4.0 * _ULP * time + 8.0 * _ULP * (at[RUN] + 4) * (time + upper - x[RUN_START])
-    lower, upper = max(0.0, lower - slack), upper + slack
-    if upper - lower > max(rules.tolerance, 4.0 * slack):
-        return False, lower, upper, 0.0
-    estimate = time_to_rest(shaking, sides, v, side, at[PIECE], x[OFFSET])
-    return True, lower, upper, min(max(estimate, lower), upper)
+    return False, lower, upper, 0.0
 
 
 @leaf
-def imposed(rules, limit, v, interval, since_uplift):
+def bracket(
+    shaking: Shaking, sides: Floats, rules: Rules, scratch: Scratch, at: Integers, x: Floats
+) -> tuple[float, float]:
+    """Proven bounds on the time to rest, with room for the rounding of all times; NaN, NaN: no proof."""
+    time = now(shaking, at, x)
+    lower, upper = prove_rest(shaking, sides, rules.nonlinear, scratch.A, x[V], at[SIDE], at[PIECE], x[OFFSET])
+    if not upper >= 0.0:
+        at[RUN] = 0
+        return np.nan, np.nan
+    if at[RUN] == 0:
+        x[RUN_START] = time
+    at[RUN] += 1
+    slack = allowance(time, upper, at, x)
+    return max(0.0, lower - slack), upper + slack
+
+
+@leaf
+def allowance(time: float, upper: float, at: Integers, x: Floats) -> float:
+    """Room for the rounding of the times, and of the arcs resolved since the first proof."""
+    return float(4.0 * _ULP * time + 8.0 * _ULP * (at[RUN] + 4) * (time + upper - x[RUN_START]))
+
+
+@leaf
+def imposed(rules: Rules, limit: float, v: float, interval: float, since_uplift: float) -> bool:
     """Whether a treatment other than the certificate brings the block to rest at this impact."""
     if rules.treatment == VELOCITY:
         return v <= limit
@@ -241,7 +285,16 @@ def imposed(rules, limit, v, interval, since_uplift):
 
 
 @routine
-def come_to_rest(shaking, rules, tables, lower, upper, to_rest, at, x):
+def come_to_rest(
+    shaking: Shaking,
+    rules: Rules,
+    tables: Tables,
+    lower: float,
+    upper: float,
+    to_rest: float,
+    at: Integers,
+    x: Floats,
+) -> bool:
     """Close a sequence of impacts; False when the march stops before the block is at rest."""
     time = now(shaking, at, x)
     if at[RUN] == 0:
@@ -264,7 +317,9 @@ def come_to_rest(shaking, rules, tables, lower, upper, to_rest, at, x):
 
 
 @leaf
-def vary(sides, rules, scratch, du, dv, side, order, degree, t):
+def vary(
+    sides: Floats, rules: Rules, scratch: Scratch, du: float, dv: float, side: int, order: int, degree: int, t: float
+) -> tuple[float, float]:
     """Variation carried over a part of the step, linear or nonlinear."""
     stiffness = sides[side, STIFFNESS]
     if rules.nonlinear:
@@ -273,7 +328,7 @@ def vary(sides, rules, scratch, du, dv, side, order, degree, t):
 
 
 @leaf
-def time_left(shaking, piece, offset, stop):
+def time_left(shaking: Shaking, piece: int, offset: float, stop: float) -> tuple[float, bool]:
     """Time to the end of the piece, or to ``stop`` where that comes first, and whether it does."""
     until_stop = stop - shaking.breakpoints[piece] - offset
     if piece == shaking.coefficients.shape[0]:
@@ -283,7 +338,26 @@ def time_left(shaking, piece, offset, stop):
 
 
 @leaf
-def settle(shaking, at, x):
+def pass_time(t: float, x: Floats) -> None:
+    """Move on by t, and never by nothing, so that every march ends."""
+    start = x[OFFSET]
+    x[OFFSET] += t
+    if x[OFFSET] == start:
+        x[OFFSET] += _ULP * start
+
+
+@leaf
+def enter_piece(shaking: Shaking, over: bool, at: Integers, x: Floats) -> None:
+    """After a step: the start of the next piece if this one is over, by the step's length or by rounding."""
+    if over:
+        at[PIECE] += 1
+        x[OFFSET] = 0.0
+    else:
+        settle(shaking, at, x)
+
+
+@leaf
+def settle(shaking: Shaking, at: Integers, x: Floats) -> None:
     """Bring the offset inside its own piece."""
     while at[PIECE] < shaking.coefficients.shape[0]:
         length = shaking.breakpoints[at[PIECE] + 1] - shaking.breakpoints[at[PIECE]]
@@ -294,7 +368,7 @@ def settle(shaking, at, x):
 
 
 @leaf
-def write_node(rules, tables, time, at, x):
+def write_node(rules: Rules, tables: Tables, time: float, at: Integers, x: Floats) -> None:
     """Write down the state."""
     if not rules.record:
         return
@@ -306,7 +380,7 @@ def write_node(rules, tables, time, at, x):
 
 
 @leaf
-def write_event(rules, tables, time, kind, shift, at):
+def write_event(rules: Rules, tables: Tables, time: float, kind: int, shift: float, at: Integers) -> None:
     """Write down an uplift, a rest or an overturning."""
     if not rules.record:
         return
@@ -316,7 +390,16 @@ def write_event(rules, tables, time, kind, shift, at):
 
 
 @kernel
-def march_each(shaking, sides, rules, tables, scratch, at, x, endings):
+def march_each(
+    shaking: Shaking,
+    sides: Floats,
+    rules: Rules,
+    tables: Tables,
+    scratch: Scratch,
+    at: Integers,
+    x: Floats,
+    endings: Integers,
+) -> None:
     """March many blocks, one after the other, each from its own state to its own end (`status`)."""
     for k in range(sides.shape[0]):
         endings[k] = march(shaking, sides[k], rules, tables, scratch, at[k], x[k], shaking.coefficients.shape[0] + 1)

@@ -5,33 +5,41 @@ import math
 import numpy as np
 
 from rocking.kernels.compiled import leaf, routine
+from rocking.kernels.state import Floats
 
 _EPSILON = 2.0**-53
-_MAXIMUM_STEPS = 200
+
+#: Some six steps find a simple root; a near touch takes tens to thousands. A series that is still not negative after
+#: so many lies within 1e-10 of zero, relative to its curvature: that counts as a touch.
+_MAXIMUM_STEPS = 100_000
 
 
 @routine
-def first_root(c, lead, order, h):
+def first_root(c: Floats, lead: int, order: int, h: float) -> float:
     """First root in (0, h] of sum_k c[lead + k] t^k; NaN when there is none.
 
     The series is the paper's Eq. 20: what is left of Eq. 15 after division by t^lead. It must not be negative
     at 0. On [0, h] the second derivative is never below -bound, so the parabola with that curvature through the
     current value and slope lies below the series, and its root is a step that no root of the series can precede.
     Near a simple root the steps converge quadratically, always from the left.
+
+    A series that rounding makes negative at 0 counts as zero there, and that zero not as a root.
     """
     while lead < order and c[lead] == 0.0:
         lead += 1
     bound = curvature_bound(c, lead, order, h)
     t = 0.0
-    f = c[lead]
+    f = max(0.0, c[lead])
     slope = c[lead + 1] if lead < order else 0.0
+    if f == 0.0 and slope <= 0.0:
+        return np.nan
     for _ in range(_MAXIMUM_STEPS):
-        denominator = math.sqrt(slope * slope + 2.0 * bound * f) - slope
-        if not 2.0 * f <= denominator * (h - t):
+        root = math.sqrt(slope * slope + 2.0 * bound * f)
+        # The two forms of the parabola's root; neither subtracts numbers of the same sign.
+        above, below = (slope + root, bound) if slope > 0.0 else (2.0 * f, root - slope)
+        if not above <= below * (h - t):
             return np.nan
-        if f == 0.0 and slope >= 0.0:
-            return t if t > 0.0 else np.nan
-        step = 2.0 * f / denominator
+        step = above / below
         t += step
         if step <= _EPSILON * t:
             return t
@@ -42,7 +50,7 @@ def first_root(c, lead, order, h):
 
 
 @leaf
-def curvature_bound(c, lead, order, h):
+def curvature_bound(c: Floats, lead: int, order: int, h: float) -> float:
     """Bound B >= 0 with f'' >= -B on [0, h] for the deflated series f: terms that help are left out."""
     lowest = 0.0
     power = 1.0
@@ -55,7 +63,7 @@ def curvature_bound(c, lead, order, h):
 
 
 @leaf
-def deflated(c, lead, order, t):
+def deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float, float]:
     """Value and slope of sum_k c[lead + k] t^k."""
     f = c[order]
     slope = 0.0
@@ -63,20 +71,3 @@ def deflated(c, lead, order, t):
         slope = slope * t + f
         f = f * t + c[k]
     return f, slope
-
-
-@leaf
-def first_peak(c, order, h, d):
-    """First time in (0, h] at which a rising series stops rising; NaN when it does not. d is scratch space."""
-    for k in range(order):
-        d[k] = (k + 1) * c[k + 1]
-    return first_root(d, 0, order - 1, h)
-
-
-@leaf
-def first_passage(c, order, level, h, d):
-    """First time in (0, h] at which a series that starts below ``level`` reaches it; NaN when it does not."""
-    d[0] = level - c[0]
-    for k in range(1, order + 1):
-        d[k] = -c[k]
-    return first_root(d, 0, order, h)

@@ -22,6 +22,7 @@ it below. Hence no search for an earlier root; and an arc that is still up at x 
 import math
 from typing import Final
 
+from rocking.kernels.chatter import geometric_bracket
 from rocking.kernels.compiled import kernel, leaf, routine
 
 #: No first arc ends before x = pi beyond this a - 1: even without growth, U(pi) = pi kappa - pi^2/2 + 2.
@@ -49,6 +50,9 @@ SIXTH: Final = 1.0 / 6.0
 
 #: Window of the certificate over the estimate of the remaining time.
 WINDOW: Final = 1.5
+
+#: Relative allowance for what P has gathered of rounding over a sequence.
+_ROUNDING: Final = 1e-12
 
 #: Impact pairs after which a sequence is given up (eta = 0.99999 takes about a million).
 _MAXIMUM_PAIRS: Final = 5_000_000
@@ -146,7 +150,8 @@ def land(
 ) -> tuple[float, float, float, float, float]:
     """Correct an estimate t of an arc's duration to fourth order; ``shape`` holds the basis functions at t.
 
-    Returns the duration, the impact speed (positive), P and D at the impact, and the size of the correction.
+    Returns the duration, the impact speed (positive), P and D at the impact, and the size of the correction, larger
+    where the arc lands flat: relative to t, its fourth power is the error.
     """
     sine, versine, E, W = shape
     q = t * t
@@ -170,7 +175,7 @@ def land(
     mean = 1.0 - P_there
     P_impact = P_there + dt * (D_there + dt * (0.5 * mean - dt * D_there * SIXTH))
     D_impact = D_there + dt * (mean - dt * (0.5 * D_there + dt * mean * SIXTH))
-    return t + dt, impact_speed, P_impact, D_impact, abs(dt)
+    return t + dt, impact_speed, P_impact, D_impact, abs(dt) * (1.0 + t * abs(c2))
 
 
 @routine
@@ -297,56 +302,25 @@ def closure(V: float, P: float, D: float, eta: float) -> float:
 
 
 @leaf
-def bracket(V: float, low: float, high: float, delta: float, eta: float) -> tuple[float, float]:
-    """Bounds on the remaining phase on entering the second side at speed V, while low <= P <= high; NaN: no proof.
+def bracket(V: float, P: float, D: float, window: float, delta: float, eta: float) -> tuple[float, float]:
+    """Bounds on the remaining phase on entering the second side at speed V; NaN: no proof.
 
-    On a side where the restoring acceleration stays within [m, M], comparison with two constant ones bounds an arc's
-    duration and height, energy its impact speed; both sides together multiply the speed by less than one, and a
-    geometric sum bounds all that follows (documentation, "Theory").
+    They hold if the upper one lies within the window of phase and the window ends before x = pi: P rises there, at
+    a rate of D at first, and |P''| <= a.
     """
-    swing = high - low
-    gain_up, longest_up = arc_bounds(V, 2.0 - high, swing, delta)
-    gain_down, longest_down = arc_bounds(V, low, swing, delta)
-    fastest_up = eta * math.sqrt(1.0 + gain_up)
-    fastest_down = eta * math.sqrt(1.0 + gain_down)
-    slowest_up = eta * math.sqrt(max(0.0, 1.0 - gain_up))
-    slowest_down = eta * math.sqrt(max(0.0, 1.0 - gain_down))
-    upper = (longest_up + fastest_up * longest_down) / (1.0 - fastest_up * fastest_down)
-    lower = 2.0 * V * (1.0 / (2.0 - low) + slowest_up / high) / (1.0 - slowest_up * slowest_down)
-    shrinks = (fastest_up < 1.0) & (fastest_down < 1.0)
-    return lower if shrinks else math.nan, upper if shrinks else math.nan
-
-
-@leaf
-def arc_bounds(V: float, least: float, swing: float, delta: float) -> tuple[float, float]:
-    """Bound on |w^2/v^2 - 1| of an arc of speed v <= V and impact speed w, and on its duration at v = V; NaN: none.
-
-    z = sqrt(delta) V/m; the duration is below 2 V/m atanh(z)/z, here replaced by a rational bound.
-    """
-    squared = delta * V * V / (least * least)
-    bounded = (least > 0.0) & (squared < 1.0)
-    gain = 2.0 * swing / (least * (1.0 + math.sqrt(max(0.0, 1.0 - squared))))
-    longest = 2.0 * V / least * (1.0 + squared / (3.0 * (1.0 - squared)))
-    return gain if bounded else math.nan, longest if bounded else math.nan
-
-
-@leaf
-def bracket_in_window(V: float, P: float, D: float, window: float, delta: float, eta: float) -> tuple[float, float]:
-    """Return the same from bounds on P within a window, which must end before x = pi and hold the upper bound.
-
-    P rises between the first impact and x = pi, by less than its second-order Taylor bound with |P''| <= a.
-    """
-    amplitude = math.hypot(1.0 - P, D)
-    low = P * (1.0 - 1e-12)
-    high = (P + window * (D + 0.5 * window * amplitude)) * (1.0 + 1e-12)
-    return bracket(V, low, high, delta, eta)
+    rate = (D + window * math.hypot(1.0 - P, D)) * (1.0 + _ROUNDING)
+    low = P * (1.0 - _ROUNDING)
+    high = (P + window * rate) * (1.0 + _ROUNDING)
+    entered = (delta, 2.0 - high, 2.0 - low, high - low, rate, 0.0)
+    other = (delta, low, high, high - low, rate, 0.0)
+    return geometric_bracket(V, entered, other, eta, eta)
 
 
 @leaf
 def proven(x: float, V: float, P: float, D: float, delta: float, eta: float, remaining: float) -> bool:
     """Whether complete chattering is proven on entering the second side, with this remaining phase in the bracket."""
     window = WINDOW * remaining
-    lower, upper = bracket_in_window(V, P, D, window, delta, eta)
+    lower, upper = bracket(V, P, D, window, delta, eta)
     return upper <= window and lower <= remaining <= upper and x + window < math.pi
 
 

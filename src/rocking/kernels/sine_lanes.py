@@ -67,6 +67,9 @@ _CLOSING: Final = 1.0
 _LEFT_OVER: Final = 2.0
 _NEVER_UP: Final = 3.0
 
+#: No sequence's remaining phase has been seen to settle before its speed falls by the factor exp(-4).
+_FAR_FROM_REST: Final = 4.0
+
 #: Pairs after which the lanes that still run are left to the scalar path.
 _MAXIMUM_PAIRS: Final = 400
 
@@ -113,8 +116,11 @@ def load(block: NDArray[np.float64], lane: int, excess: float, omega: float, eta
 def advance(block: NDArray[np.float64]) -> None:
     """Take every lane to where its remaining phase is known, or as far as the lanes can."""
     first_impacts(block)
+    start = first_closure(block)
     for pair in range(_MAXIMUM_PAIRS):
-        running, reach = close(block, pair > LEVELS)
+        if pair >= start:
+            close(block, pair > start + LEVELS)
+        running, reach = survey(block)
         if running == 0:
             return
         if pair == 0 or reach > 0.8 * REACH_MEDIUM:
@@ -123,6 +129,27 @@ def advance(block: NDArray[np.float64]) -> None:
             pairs(block)
         else:
             late_pairs(block)
+
+
+@routine
+def first_closure(block: NDArray[np.float64]) -> int:
+    """Pair from which closing is tried: earlier, even the fastest lane of the block is too far from rest."""
+    smallest = 1.0
+    for lane in range(LANES):
+        smallest = min(smallest, block[_ETA * LANES + lane])
+    return max(0, int(-_FAR_FROM_REST / (2.0 * math.log(smallest))) - LEVELS)
+
+
+@leaf
+def survey(block: NDArray[np.float64]) -> tuple[int, float]:
+    """Count the lanes that still run, and find the reach of their longest arc."""
+    running = 0
+    reach = 0.0
+    for lane in range(LANES):
+        if block[_STATUS * LANES + lane] == _RUNNING:
+            running += 1
+            reach = max(reach, block[_REACH * LANES + lane])
+    return running, reach
 
 
 @routine
@@ -220,8 +247,8 @@ def short_arc(
 
 
 @routine
-def close(block: NDArray[np.float64], ready: bool) -> tuple[int, float]:
-    """Extrapolate every running lane; number of lanes that still run, and the reach of their longest arc."""
+def close(block: NDArray[np.float64], ready: bool) -> None:
+    """Extrapolate every running lane, and stop those whose remaining phase is settled."""
     for lane in range(LANES):
         eta = block[_ETA * LANES + lane]
         status = block[_STATUS * LANES + lane]
@@ -242,13 +269,6 @@ def close(block: NDArray[np.float64], ready: bool) -> tuple[int, float]:
         settled = agree(new[LEVELS], new[LEVELS - 1], expected, block[_X * LANES + lane])
         closed = ready & runs & settled
         block[_STATUS * LANES + lane] = _CLOSING if closed else status
-    running = 0
-    reach = 0.0
-    for lane in range(LANES):
-        if block[_STATUS * LANES + lane] == _RUNNING:
-            running += 1
-            reach = max(reach, block[_REACH * LANES + lane])
-    return running, reach
 
 
 @routine

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.kernels.compiled import kernel, leaf, routine
-from rocking.kernels.sine import STILL, WINDOW, arc, bracket_in_window, closure, first_arc, guess_landing
+from rocking.kernels.sine import STILL, WINDOW, arc, bracket, closure, first_arc, guess_landing
 
 
 @kernel
@@ -48,7 +48,7 @@ def resolve(
 def settled_bracket(x: float, V: float, P: float, D: float, delta: float, eta: float) -> tuple[float, float]:
     """Bracket on the remaining phase on entering the second side; NaN where the certificate does not hold."""
     window = WINDOW * closure(V, P, D, eta)
-    lower, upper = bracket_in_window(V, P, D, window, delta, eta)
+    lower, upper = bracket(V, P, D, window, delta, eta)
     holds = (upper <= window) & (x + window < math.pi)
     return lower if holds else math.nan, upper if holds else math.nan
 

@@ -74,8 +74,8 @@ class Scratch(NamedTuple):
 STIFFNESS, SLENDERNESS, THRESHOLD, GAIN, RESTITUTION, LIMIT = range(6)
 
 # Integers of the state. RUN counts the impacts since chattering was proven, SMOOTH marks an uplift that is not a
-# jump, STILL an impact at which time did not advance, STALLED counts the rests that only that brought about.
-PIECE, SIDE, NODES, IMPACTS, EVENTS, SEQUENCES, RUN, SMOOTH, STILL, STALLED, UPLIFTS = range(11)
+# jump, STALLED counts the rests brought about only because time did not advance from one impact to the next.
+PIECE, SIDE, NODES, IMPACTS, EVENTS, SEQUENCES, RUN, SMOOTH, STALLED, UPLIFTS = range(10)
 
 # Floats of the state: position in the motion, rotation, its rate, their variations, times of the last uplift, impact
 # and proof, the highest rotation so far, the end.
@@ -94,7 +94,7 @@ def new_state() -> tuple[Integers, Floats]:
 
 def new_scratch(columns: int) -> Scratch:
     """Scratch space for motions with that many coefficients in a piece."""
-    size = max(ORDER + 1, columns)
+    size = max(ORDER + 1, columns + 2)
     return Scratch(*(np.zeros(size) for _ in Scratch._fields))
 
 

@@ -5,14 +5,15 @@ import numpy as np
 from rocking.kernels.arc import evaluate
 from rocking.kernels.compiled import kernel
 from rocking.kernels.impact import expand
+from rocking.kernels.state import Floats, Integers, Scratch, Trail
 
 
 @kernel
-def trace(trail, scratch, times, rows, out):
+def trace(trail: Trail, scratch: Scratch, times: Floats, rows: Integers, out: Floats) -> None:
     """Write theta, theta', theta'' at times[k], in the step that starts at trail.nodes[rows[k]], into out[k].
 
-    Between the last resolved impact and rest the unresolved ones are left out: the block lies still there once its
-    last arc is over.
+    Between the last resolved impact and rest, or the end of the response, the unresolved ones are left out: the block
+    lies still there once its last arc is over.
     """
     shaking, sides, rules, nodes = trail.shaking, trail.sides, trail.rules, trail.nodes
     expanded = -1
@@ -33,7 +34,7 @@ def trace(trail, scratch, times, rows, out):
             )
             expanded = row
         u, v, w = evaluate(scratch.c, order, times[k] - shaking.breakpoints[piece] - nodes[row, 2])
-        if u < 0.0 and not last and nodes[row + 1, 3] == 0.0:
+        if u < 0.0 and (last or nodes[row + 1, 3] == 0.0):
             u = v = w = 0.0
         out[k, 0] = sign * u
         out[k, 1] = sign * v

@@ -1,0 +1,176 @@
+"""Block-steps per second: ensembles beside SciPy's event loop and beside a plain compiled Runge-Kutta loop.
+
+Usage: python benchmarks/bench_ensemble.py
+
+A block-step is one block through one sample of the record, whether it rocks, rests or has fallen. Times are processor
+times of one core in one run. The Runge-Kutta loop is what one writes with numba in an afternoon: one step per sample,
+an impact where the rotation has changed sign at the end of a step, rest below a velocity threshold.
+"""
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+import numpy as np
+
+import rocking
+from rocking.kernels import lanes
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from oracles.problem import Problem  # noqa: E402
+from oracles.scipy_events import integrate_as_practised  # noqa: E402
+
+EL_CENTRO = ROOT.parent / "shared" / "records" / "test_only" / "RSN6_IMPVALL.I_I-ELC180-hor1.AT2"
+SHIPPED = "el-centro-meloland-270"
+G = 9.80665
+REPETITIONS = 3
+SCIPY_SAMPLE = 12
+
+
+def main() -> None:
+    motion = rocking.read(EL_CENTRO) if EL_CENTRO.exists() else rocking.records.load(SHIPPED)
+    acceleration = np.asarray(motion.acceleration(motion.breakpoints))
+    blocks = rocking.Blocks.grid(p=np.linspace(1.5, 6.0, 100), alpha=np.linspace(0.08, 0.4, 100), restitution=0.9)
+    steps = len(blocks) * (len(acceleration) - 1)
+    print(f"{motion.name}: {len(acceleration)} samples, {len(blocks)} blocks, {steps:.3g} block-steps")
+    for model in ("linear", "nonlinear"):
+        report(model, motion, acceleration, blocks, steps)
+    smooth, limit = arithmetic()
+    print(
+        f"\nquiet linear step {smooth:.2f} ns per block; its {OPERATIONS} operations at the measured peak take {limit:.2f} ns"
+    )
+
+
+def report(model: str, motion: rocking.Motion, acceleration: np.ndarray, blocks: rocking.Blocks, steps: int) -> None:
+    """Print the rates of one model."""
+    own = shortest(lambda: rocking.simulate_many(blocks, motion, model=model, threads=1)) / steps
+    result = rocking.simulate_many(blocks, motion, model=model).isel(motion=0)
+    nonlinear = model == "nonlinear"
+    arguments = (acceleration, motion.step, blocks.p[:, 0].copy(), blocks.alpha[:, 0].copy(), 0.9, nonlinear)
+    plain = shortest(lambda: runge_kutta(*arguments)) / steps
+    baseline = scipy_time(model, acceleration, motion, blocks) / (len(acceleration) - 1)
+    print(
+        f"\n{model}: {float(result.impacts.mean()):.0f} impacts per block, {float(result.overturned.mean()):.0%} fall"
+    )
+    print(f"  lanes         {1e9 * own:10.2f} ns per block-step  {1.0 / own:9.3g} per second and core")
+    print(f"  Runge-Kutta   {1e9 * plain:10.2f} ns                {plain / own:9.2f} times the lanes' time")
+    print(f"  SciPy         {1e9 * baseline:10.0f} ns                {baseline / own:9.0f} times")
+
+
+def shortest(work: Callable[[], object]) -> float:
+    """Shortest processor time of a few calls, after one to compile."""
+    work()
+    best = math.inf
+    for _ in range(REPETITIONS):
+        start = time.process_time()
+        work()
+        best = min(best, time.process_time() - start)
+    return best
+
+
+def scipy_time(model: str, acceleration: np.ndarray, motion: rocking.Motion, blocks: rocking.Blocks) -> float:
+    """Mean processor time of SciPy's event loop per block, over a random sample of the blocks."""
+    chosen = np.random.default_rng(0).choice(len(blocks), SCIPY_SAMPLE, replace=False)
+    total = 0.0
+    for index in chosen:
+        block = blocks[int(index)]
+        pair = tuple((side.p, side.alpha, side.restitution) for side in block.sides)
+        p, alpha, e = zip(*pair, strict=True)
+        problem = Problem(model, p, alpha, e, motion.breakpoints, motion.coefficients)
+        start = time.process_time()
+        integrate_as_practised(
+            acceleration, motion.step, problem, rtol=1e-8, atol=1e-12, max_step=0.05, rest_speed=1e-6 * p[0] * alpha[0]
+        )
+        total += time.process_time() - start
+    return total / len(chosen)
+
+
+@numba.njit
+def slope(theta: float, ground: float, p: float, alpha: float, nonlinear: bool) -> float:
+    """Angular acceleration."""
+    side = 1.0 if theta >= 0.0 else -1.0
+    if nonlinear:
+        return -p * p * (math.sin(side * alpha - theta) + ground * math.cos(side * alpha - theta))
+    return p * p * (theta - side * alpha - ground)
+
+
+@numba.njit
+def runge_kutta(
+    acceleration: np.ndarray, h: float, ps: np.ndarray, alphas: np.ndarray, e: float, nonlinear: bool
+) -> np.ndarray:
+    """Peak rotation of every block, by a fixed-step loop with impacts on the sample grid."""
+    peaks = np.zeros(len(ps))
+    for k in range(len(ps)):
+        p, alpha = ps[k], alphas[k]
+        threshold = math.tan(alpha) if nonlinear else alpha
+        theta, rate, peak, resting = 0.0, 0.0, 0.0, True
+        for i in range(len(acceleration) - 1):
+            a0, a1 = acceleration[i] / G, acceleration[i + 1] / G
+            middle = 0.5 * (a0 + a1)
+            if resting:
+                if abs(a1) <= threshold:
+                    continue
+                resting = False
+                theta = -math.copysign(1e-12, a1)
+            k1 = slope(theta, a0, p, alpha, nonlinear)
+            v2 = rate + 0.5 * h * k1
+            k2 = slope(theta + 0.5 * h * rate, middle, p, alpha, nonlinear)
+            v3 = rate + 0.5 * h * k2
+            k3 = slope(theta + 0.5 * h * v2, middle, p, alpha, nonlinear)
+            v4 = rate + h * k3
+            k4 = slope(theta + h * v3, a1, p, alpha, nonlinear)
+            new = theta + h / 6.0 * (rate + 2.0 * v2 + 2.0 * v3 + v4)
+            rate += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            if new * theta < 0.0:
+                rate *= e
+                if abs(rate) < 1e-4 * p * alpha and abs(a1) <= threshold:
+                    resting, new, rate = True, 0.0, 0.0
+            theta = new
+            peak = max(peak, abs(theta))
+            if peak >= 0.5 * math.pi:
+                break
+        peaks[k] = peak
+    return peaks
+
+
+#: Multiplications, additions, comparisons and selections of one lane in `quiet_linear`.
+OPERATIONS = 34
+
+
+def arithmetic() -> tuple[float, float]:
+    """Time of a quiet linear step per lane, and the time its operations take at this core's measured rate, ns."""
+    room = lanes.new_room()
+    room.lanes[:] = 0.5
+    room.lanes[lanes.ABOVE : lanes.ABOVE + lanes.WIDTH] = np.inf
+    calls = 20_000
+    smooth = shortest(lambda: quiet_steps(room.lanes, room.events, calls)) / (calls * lanes.WIDTH)
+    work = np.full(64, 1.0)
+    rate = shortest(lambda: multiply_add(work, 200_000)) / (200_000 * 64 * 2)
+    return 1e9 * smooth, 1e9 * rate * OPERATIONS
+
+
+@numba.njit
+def quiet_steps(table: np.ndarray, events: np.ndarray, calls: int) -> int:
+    """Many quiet steps of the same lanes."""
+    busy = 0
+    for _ in range(calls):
+        busy += lanes.quiet_linear(table, events, 0.1, 0.2, 0.01)
+    return busy
+
+
+@numba.njit
+def multiply_add(work: np.ndarray, calls: int) -> float:
+    """Independent multiplications and additions, as many as the core can do."""
+    for _ in range(calls):
+        for k in range(64):
+            work[k] = work[k] * 0.999999 + 1e-6
+    return work[0]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""What engineers ask of many simulations: spectra, overturning, fragility, calibration.
+
+Names are imported when they are first used, so that the command line starts at once.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rocking.analysis.dynamic import dynamic_figure, incremental_dynamic_analysis
+    from rocking.analysis.fragility_function import Fragility, FragilityCurve, fit_fragility, fragility
+    from rocking.analysis.overturning import mode_name, overturning_figure, overturning_map
+    from rocking.analysis.spectrum import rocking_spectrum, spectrum_figure
+
+__all__ = [
+    "Fragility",
+    "FragilityCurve",
+    "dynamic_figure",
+    "fit_fragility",
+    "fragility",
+    "incremental_dynamic_analysis",
+    "mode_name",
+    "overturning_figure",
+    "overturning_map",
+    "rocking_spectrum",
+    "spectrum_figure",
+]
+
+_HOMES = {
+    "Fragility": "fragility_function",
+    "FragilityCurve": "fragility_function",
+    "dynamic_figure": "dynamic",
+    "fit_fragility": "fragility_function",
+    "fragility": "fragility_function",
+    "incremental_dynamic_analysis": "dynamic",
+    "mode_name": "overturning",
+    "overturning_figure": "overturning",
+    "overturning_map": "overturning",
+    "rocking_spectrum": "spectrum",
+    "spectrum_figure": "spectrum",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'rocking.analysis' has no attribute {name!r}")
+    return getattr(import_module(f"rocking.analysis.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,117 @@
+"""Where an outcome changes with the intensity of the motion: found on a grid, then refined by bisection."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.kernels.state import Floats, Integers
+from rocking.progress import Progress
+
+#: An interval of the grid is searched for regions no thinner than this part of it.
+_THINNEST: Final = 1.0 / 64.0
+
+
+@dataclass(frozen=True)
+class Boundaries:
+    """Changes of the outcome, each between a lower and a higher level, n in all; ordered by column, then level.
+
+    Attributes
+    ----------
+    column : ndarray of int
+        What is scaled: a column of the grid.
+    low, high : ndarray
+        Levels that bracket the change.
+    below, above : ndarray of int
+        Outcomes at these levels.
+    """
+
+    column: Integers
+    low: Floats
+    high: Floats
+    below: Integers
+    above: Integers
+
+    @property
+    def level(self) -> Floats:
+        """Middle of every bracket."""
+        return 0.5 * (self.low + self.high)
+
+
+def boundaries(
+    levels: Floats,
+    outcome: Integers,
+    outcome_of: Callable[[Integers, Floats], Integers],
+    *,
+    tolerance: float,
+    progress: bool | None = None,
+) -> Boundaries:
+    """Find all changes of the outcome between neighbouring levels of a grid, to a relative tolerance.
+
+    Parameters
+    ----------
+    levels : ndarray, shape (m,)
+        Increasing and positive.
+    outcome : ndarray of int, shape (m, columns)
+        Outcome at every level of every column.
+    outcome_of : callable
+        Outcomes for arrays of columns and levels.
+    tolerance : float
+        Width of each bracket over its level.
+    progress : bool, optional
+        Whether to draw a progress bar.
+
+    Notes
+    -----
+    Where a bisection meets a third outcome both halves are followed, down to 1/64 of the interval; outcomes confined
+    to less than that, or to between two levels with the same outcome, are passed over.
+    """
+    here = _on_grid(levels, outcome)
+    thinnest = _THINNEST * (here.high - here.low)
+    halvings = np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (tolerance * here.high))))
+    with Progress("refining", int(halvings.sum()), show=progress) as bar:
+        while (wide := _wide(here, tolerance)).any():
+            found = here.below.copy()
+            found[wide] = outcome_of(here.column[wide], here.level[wide])
+            here, thinnest = _halved(here, wide, found, thinnest)
+            bar.advance(int(wide.sum()))
+    return _ordered(here)
+
+
+def _wide(here: Boundaries, tolerance: float) -> NDArray[np.bool_]:
+    """Which brackets are wider than wanted, and hold a number between their ends."""
+    return (here.high - here.low > tolerance * here.high) & (here.level > here.low) & (here.level < here.high)
+
+
+def _on_grid(levels: Floats, outcome: Integers) -> Boundaries:
+    row, column = np.nonzero(outcome[1:] != outcome[:-1])
+    return Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
+
+
+def _halved(
+    here: Boundaries, wide: NDArray[np.bool_], found: Integers, thinnest: Floats
+) -> tuple[Boundaries, Floats]:
+    """Brackets after one bisection of the wide ones; those that hold a third outcome become two."""
+    middle = here.level
+    thick = here.high - here.low > thinnest
+    third = wide & thick & (found != here.below) & (found != here.above)
+    up = wide & (found == here.below)
+    lower = Boundaries(
+        here.column,
+        np.where(up, middle, here.low),
+        np.where(wide & ~up, middle, here.high),
+        here.below,
+        np.where(third, found, here.above),
+    )
+    upper = Boundaries(here.column[third], middle[third], here.high[third], found[third], here.above[third])
+    both = (np.concatenate(pair) for pair in zip(vars(lower).values(), vars(upper).values(), strict=True))
+    return Boundaries(*both), np.concatenate([thinnest, thinnest[third]])
+
+
+def _ordered(here: Boundaries) -> Boundaries:
+    order = np.lexsort((here.low, here.column))
+    return Boundaries(*(values[order] for values in vars(here).values()))

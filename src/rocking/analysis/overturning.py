@@ -1,0 +1,291 @@
+"""Overturning maps of pulses: amplitude against frequency, both dimensionless, every boundary refined."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking.analysis.boundaries import Boundaries, boundaries
+from rocking.analysis.pairs import simulate_pairs
+from rocking.block import Block, Blocks
+from rocking.constants import VERSION
+from rocking.errors import InvalidOption
+from rocking.kernels.state import Floats, Integers
+from rocking.motion import pulses
+from rocking.motion.motion import Motion
+from rocking.problem import Model
+from rocking.progress import Progress
+from rocking.simulation import simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+#: A pulse from its amplitude (m/s^2) and frequency (Hz), proportional to its amplitude.
+PulseFamily = Callable[[float, float], Motion]
+
+#: What a block that stays does; n >= 0 is a block that overturns after n impacts.
+NO_UPLIFT: Final = -3
+RESTS: Final = -2
+ROCKS: Final = -1
+
+_FAMILIES: Final[dict[str, Callable[..., Motion]]] = {
+    "sine": pulses.sine,
+    "half-sine": pulses.half_sine,
+    "one-sine": pulses.one_sine,
+    "one-cosine": pulses.one_cosine,
+    "ricker": pulses.ricker,
+    "mavroeidis-papageorgiou": pulses.mavroeidis_papageorgiou,
+}
+
+
+def overturning_map(
+    pulse: str | PulseFamily,
+    block: Block,
+    *,
+    amplitudes: ArrayLike,
+    frequencies: ArrayLike,
+    model: Model = "nonlinear",
+    tolerance: float = 1e-9,
+    progress: bool | None = None,
+    **parameters: Any,
+) -> xr.Dataset:
+    """Map what a pulse does to a block, over amplitude and frequency, and find the boundaries between the outcomes.
+
+    Parameters
+    ----------
+    pulse : str or callable
+        "sine" (give `cycles`), "half-sine", "one-sine", "one-cosine", "ricker" (`kind`) or "mavroeidis-papageorgiou"
+        (`phase`, `gamma`); or a function of amplitude (m/s^2) and frequency (Hz) that returns a motion proportional to
+        the amplitude.
+    block : Block
+        Its slenderness and restitution count; its p does not, since only ratios to it enter.
+    amplitudes : array_like, shape (m,)
+        Increasing amplitudes, over the smallest acceleration that lifts the block: g tan(alpha), in the linear model
+        g alpha. The amplitude of a Mavroeidis-Papageorgiou pulse is here its peak acceleration.
+    frequencies : array_like, shape (n,)
+        Increasing values of 2 pi f/p, f the pulse's frequency and p the block's (the smaller one of two sides).
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    tolerance : float
+        Boundaries are refined to this width, relative to the amplitude.
+    progress : bool, optional
+        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+    **parameters
+        Further numbers of a pulse given by name, as the function of that name in `rocking.pulses` takes them.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over (amplitude, frequency): mode, and peak_rotation (rad; pi/2 where the block overturns). Over (frequency):
+        overturning_amplitude, the lowest that overturns the block; NaN where none of the grid does, or its first
+        already does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and above it.
+
+        A mode is a whole number (`mode_name` says it in words). -3: no uplift. -2: rests, that is complete chattering
+        brings the block to rest at least once before the pulse is over. -1: rocks, that is it comes to rest only after
+        the pulse. n >= 0: overturns, after n impacts since it last uplifted.
+
+    Raises
+    ------
+    InvalidOption
+        If an argument is out of its range, or the block never comes to rest (restitution 1).
+
+    Notes
+    -----
+    By dimensional analysis one pulse of one frequency is enough: blocks of different p stand for the frequencies. Every
+    change of mode between neighbouring amplitudes of the grid is found by bisection, so a region that is not monotone
+    (overturning after one impact, safety above it, overturning without impact above that) keeps all its edges. What
+    lies between two neighbouring amplitudes of the same mode is not seen.
+
+    References
+    ----------
+    Zhang, J. and Makris, N. (2001). Rocking response of free-standing blocks under cycloidal pulses. Journal of
+    Engineering Mechanics 127(5), 473-483.
+
+    Examples
+    --------
+    The half sine of frequency 2 p that just overturns a slender block:
+
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> result = overturning_map("half-sine", block, amplitudes=[0.5, 1.5, 2.5], frequencies=[2.0], model="linear")
+    >>> [mode_name(mode) for mode in result.mode.values[:, 0]]
+    ['no uplift', 'rocks', 'overturns without impact']
+    >>> print(f"{float(result.overturning_amplitude[0]):.7f}")
+    1.8007239
+    """
+    levels, ratios = _axis(amplitudes, "amplitudes"), _axis(frequencies, "frequencies")
+    if not (isinstance(tolerance, float) and 0.0 < tolerance < 1.0):
+        raise InvalidOption(f"tolerance must be a number between 0 and 1, not {tolerance!r}")
+    if all(side.restitution == 1.0 for side in block.sides):
+        raise InvalidOption("a block with restitution 1 never comes to rest; an overturning map needs one below 1")
+    slowest = min(side.p for side in block.sides)
+    unit = _unit_pulse(pulse, slowest / (2.0 * math.pi), parameters)
+    problem = _Problem(_resized(block, ratios), unit, min(block.uplift_thresholds(model)), model)
+    modes, peaks = problem.grid(levels, progress)
+    edges = boundaries(levels, modes, problem.modes, tolerance=tolerance, progress=progress)
+    attributes = {
+        "program": f"rocking {VERSION}",
+        "model": model,
+        "block": f"{block.description}: alpha = {block.alpha} rad, restitution = {block.restitution}",
+        "pulse": f"{unit.name}: {unit.description.text}",
+        "tolerance": tolerance,
+    }
+    return _dataset(levels, ratios, modes, peaks, edges, attributes)
+
+
+def mode_name(mode: int) -> str:
+    """Return a mode of `overturning_map` in words.
+
+    Examples
+    --------
+    >>> mode_name(-2), mode_name(0), mode_name(1), mode_name(4)
+    ('rests', 'overturns without impact', 'overturns after 1 impact', 'overturns after 4 impacts')
+    """
+    if mode <= 0:
+        return {NO_UPLIFT: "no uplift", RESTS: "rests", ROCKS: "rocks", 0: "overturns without impact"}[int(mode)]
+    return f"overturns after {mode} impact{'s' if mode > 1 else ''}"
+
+
+def overturning_figure(dataset: xr.Dataset, *, title: str = "") -> Figure:
+    """Draw what `overturning_map` found: the modes as regions between the refined boundaries.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        From `overturning_map`.
+    title : str
+        Title; by default the pulse and the block.
+    """
+    from rocking.plot.analysis import regions_figure
+
+    modes = dataset.mode.values
+    columns = [dataset.boundary_frequency.values == ratio for ratio in dataset.frequency.values]
+    return regions_figure(
+        x=dataset.frequency.values,
+        y_range=(float(dataset.amplitude[0]), float(dataset.amplitude[-1])),
+        edges=[dataset.boundary_amplitude.values[here] for here in columns],
+        regions=[[modes[0, k], *dataset.mode_above.values[here]] for k, here in enumerate(columns)],
+        names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, dataset.mode_above.values)},
+        x_label="frequency of the pulse over p",
+        y_label="amplitude over the smallest that lifts the block",
+        title=title or f"{dataset.pulse.partition(':')[0]}, {dataset.block.rpartition(': ')[2]}, {dataset.model}",
+    )
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Blocks, one for every frequency, under multiples of one pulse."""
+
+    blocks: Blocks
+    unit: Motion
+    threshold: float
+    model: Model
+
+    def grid(self, levels: Floats, progress: bool | None) -> tuple[Integers, Floats]:
+        """Modes and peak rotations at every level, shape (levels, blocks)."""
+        shape = levels.size, len(self.blocks)
+        row, column = (index.ravel() for index in np.indices(shape))
+        with Progress("mapping", row.size, show=progress) as bar:
+            modes, peaks = self._followed(column, levels[row], bar.advance)
+        return modes.reshape(shape), peaks.reshape(shape)
+
+    def modes(self, column: Integers, level: Floats) -> Integers:
+        """Mode of each block given by its column, under its own level."""
+        return self._followed(column, level, lambda count: None)[0]
+
+    def _followed(self, column: Integers, level: Floats, done: Callable[[int], None]) -> tuple[Integers, Floats]:
+        blocks = self.blocks.select(column)
+        ends = simulate_pairs(blocks, self.unit, self.threshold * level, model=self.model, done=done)
+        rested = (ends.uplifts > 1) | ((ends.rests > 0) & (ends.last_rest <= self.unit.duration))
+        modes = np.where(ends.uplifts == 0, NO_UPLIFT, np.where(rested, RESTS, ROCKS))
+        modes[ends.overturned] = ends.impacts[ends.overturned]
+        for k in np.flatnonzero(ends.overturned & (ends.uplifts > 1)):
+            modes[k] = self._last_impacts(blocks[k], float(level[k]))
+        return modes, ends.peak
+
+    def _last_impacts(self, block: Block, level: float) -> int:
+        """Impacts since the last uplift, of a block that had been at rest in between."""
+        response = simulate(block, self.unit.scaled(self.threshold * level), model=self.model)
+        uplifts = response.events["time"][response.events["kind"] == "uplift"]
+        return int(np.sum(response.impacts["time"] >= uplifts[-1]))
+
+
+def _unit_pulse(pulse: str | PulseFamily, frequency: float, parameters: dict[str, Any]) -> Motion:
+    """Pulse of amplitude 1 m/s^2."""
+    if callable(pulse):
+        if parameters:
+            raise InvalidOption(f"a pulse given as a function takes no {', '.join(parameters)}; bind them to it")
+        return pulse(1.0, frequency)
+    name = pulse.lower().replace(" ", "-").replace("_", "-")
+    if name not in _FAMILIES:
+        raise InvalidOption(f"pulse must be one of {', '.join(_FAMILIES)}, or a function, not {pulse!r}")
+    family = _FAMILIES[name]
+    try:
+        inspect.signature(family).bind(1.0, frequency, **parameters)
+    except TypeError as error:
+        raise InvalidOption(f"the pulse {name!r} is not complete: {error}") from None
+    unit = family(1.0, frequency, **parameters)
+    return unit.scaled(pga=1.0) if family is pulses.mavroeidis_papageorgiou else unit
+
+
+def _resized(block: Block, ratios: Floats) -> Blocks:
+    """Blocks of the same shape, and of p such that the pulse, of the block's own frequency, has these ratios to it."""
+    p, alpha, restitution = (
+        np.array([getattr(side, name) for side in block.sides]) for name in ("p", "alpha", "restitution")
+    )
+    return Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
+
+
+def _axis(values: ArrayLike, name: str) -> Floats:
+    try:
+        axis = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidOption(f"{name} must be numbers, not {values!r}") from None
+    good = axis.ndim == 1 and axis.size > 0 and np.isfinite(axis).all()
+    if not (good and (axis > 0.0).all() and (np.diff(axis) > 0.0).all()):
+        raise InvalidOption(f"{name} must be positive finite numbers in increasing order")
+    return axis
+
+
+def _dataset(
+    levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, edges: Boundaries, attributes: dict[str, Any]
+) -> xr.Dataset:
+    import xarray as xr
+
+    lowest = np.full(ratios.size, np.nan)
+    overturns = np.flatnonzero((edges.above >= 0) & (edges.below < 0))[::-1]
+    lowest[edges.column[overturns]] = edges.level[overturns]
+    lowest[modes[0] >= 0] = np.nan
+    meaning = "-3: no uplift, -2: rests before the pulse is over, -1: rocks, n >= 0: overturns after n impacts"
+    over = "over the smallest acceleration that lifts the block"
+    return xr.Dataset(
+        {
+            "mode": (("amplitude", "frequency"), modes, {"long_name": meaning}),
+            "peak_rotation": (
+                ("amplitude", "frequency"),
+                peaks,
+                {"units": "rad", "long_name": "largest rotation in size"},
+            ),
+            "overturning_amplitude": (
+                "frequency",
+                lowest,
+                {"units": "1", "long_name": f"lowest amplitude that overturns the block, {over}"},
+            ),
+            "boundary_frequency": ("boundary", ratios[edges.column], {"units": "1"}),
+            "boundary_amplitude": ("boundary", edges.level, {"units": "1"}),
+            "mode_below": ("boundary", edges.below, {"long_name": meaning}),
+            "mode_above": ("boundary", edges.above, {"long_name": meaning}),
+        },
+        {
+            "amplitude": ("amplitude", levels, {"units": "1", "long_name": f"amplitude of the pulse {over}"}),
+            "frequency": ("frequency", ratios, {"units": "1", "long_name": "2 pi times the pulse's frequency, over p"}),
+        },
+        attributes,
+    )

@@ -1,0 +1,51 @@
+"""When a ground motion is beyond the thresholds of a block: the stretches in which none can stay at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rocking.chattering.parameters import FloatArray
+from rocking.motion import piecewise
+from rocking.motion.motion import Motion
+
+
+def exceedances(motion: Motion, thresholds: tuple[float, float]) -> FloatArray:
+    """Stretches of time in which a resting block would be lifted.
+
+    Parameters
+    ----------
+    motion : Motion
+        Ground motion a(t).
+    thresholds : pair of float
+        Accelerations, m/s^2, that lift the block to side + (where -a passes the first) and to side - (where a passes
+        the second), as `Block.uplift_thresholds` gives them.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Start and end of each stretch, s, in order; from the first start to the last end is the motion's bracketed
+        duration for this block.
+
+    Examples
+    --------
+    >>> import math, rocking
+    >>> exceedances(rocking.pulses.sine(2.0, 0.5, cycles=1), (1.0, 1.0)).round(9)
+    array([[0.16666667, 0.83333333],
+           [1.16666667, 1.83333333]])
+    """
+    plus, minus = thresholds
+    cuts = np.unique(np.concatenate([motion.breakpoints, _crossings(motion, -plus), _crossings(motion, minus)]))
+    acceleration = motion.acceleration(0.5 * (cuts[:-1] + cuts[1:]))
+    beyond = (acceleration > minus) | (acceleration < -plus)
+    return cuts[np.flatnonzero(np.diff(beyond, prepend=False, append=False))].reshape(-1, 2)
+
+
+def _crossings(motion: Motion, level: float) -> FloatArray:
+    """Times among which are all those at which the motion passes a level inside a piece, s."""
+    widths = np.diff(motion.breakpoints)
+    shifted = motion.coefficients.copy()
+    shifted[:, 0] -= level
+    offsets = piecewise.root_candidates(widths, shifted)
+    inside = (offsets > 0.0) & (offsets < widths[:, np.newaxis])
+    times: FloatArray = (motion.breakpoints[:-1, np.newaxis] + offsets)[inside]
+    return times

@@ -1,0 +1,101 @@
+"""Families of cases with two parameters, ready for `chattering_map`.
+
+Each function returns a callable that makes a `Case` from two dimensionless numbers, the first of them the amplitude
+``a``: the motion's peak acceleration over the smallest that lifts the block (g tan(alpha), in the linear model g alpha).
+Frequencies ``omega`` are 2 pi f over the block's p (the smaller one of a two-sided block).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+from rocking.block import Block
+from rocking.motion import pulses
+from rocking.motion.motion import Motion
+from rocking.problem import Model
+
+
+class Case(NamedTuple):
+    """A block, what shakes it, and the equation of motion."""
+
+    block: Block
+    motion: Motion
+    model: Model = "nonlinear"
+
+
+Family = Callable[[float, float], Case]
+
+
+def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Family:
+    """Sines: (a, omega).
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> case = sine(block, model="linear")(1.1, 3.0)
+    >>> round(case.motion.pga / (0.2 * block.gravity), 9)
+    1.1
+    """
+    scale = _threshold(block, model)
+    return lambda a, omega: Case(block, pulses.sine(a * scale, _hertz(block, omega), cycles=cycles), model)
+
+
+def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> Family:
+    """Half cycles of a sine with unequal amplitudes: (a, ratio).
+
+    The first lobe has the amplitude a, each other one `ratio` times that of the lobe before it: the shaking swells
+    (ratio above 1) or fades. Here a is the first lobe's, not the largest.
+    """
+    scale, frequency = _threshold(block, model), _hertz(block, omega)
+
+    def case(a: float, ratio: float) -> Case:
+        return Case(block, pulses.n_lobe([a * scale * ratio**k for k in range(count)], frequency), model)
+
+    return case
+
+
+def ricker(
+    block: Block, *, kind: Literal["symmetric", "antisymmetric"] = "symmetric", model: Model = "nonlinear"
+) -> Family:
+    """Ricker pulses: (a, omega)."""
+    scale = _threshold(block, model)
+    return lambda a, omega: Case(block, pulses.ricker(a * scale, _hertz(block, omega), kind=kind), model)
+
+
+def mavroeidis_papageorgiou(
+    block: Block, *, phase: float = 0.0, gamma: float = 3.0, model: Model = "nonlinear"
+) -> Family:
+    """Near-fault pulses of Mavroeidis and Papageorgiou: (a, omega)."""
+    scale = _threshold(block, model)
+
+    def case(a: float, omega: float) -> Case:
+        pulse = pulses.mavroeidis_papageorgiou(1.0, _hertz(block, omega), phase=phase, gamma=gamma)
+        return Case(block, pulse.scaled(pga=a * scale), model)
+
+    return case
+
+
+def record(
+    motion: Motion, alpha: float, restitution: float | None = None, *, model: Model = "nonlinear"
+) -> Callable[[float, float], Case]:
+    """One motion, scaled, under blocks of one shape and any size: (a, p), p in rad/s.
+
+    By dimensional analysis a smaller p is also the same block under a faster motion.
+    """
+
+    def case(a: float, p: float) -> Case:
+        block = Block.from_parameters(p, alpha, restitution)
+        return Case(block, motion.scaled(pga=a * _threshold(block, model)), model)
+
+    return case
+
+
+def _threshold(block: Block, model: Model) -> float:
+    return min(block.uplift_thresholds(model))
+
+
+def _hertz(block: Block, omega: float) -> float:
+    return omega * min(side.p for side in block.sides) / (2.0 * math.pi)

@@ -1,0 +1,185 @@
+"""Where chattering is complete: maps over the two parameters of any family of cases, by certified simulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from enum import IntEnum
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking.chattering.exceedance import exceedances
+from rocking.chattering.families import Case, Family
+from rocking.chattering.parameters import FloatArray
+from rocking.errors import InvalidOption
+from rocking.simulation import simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class Outcome(IntEnum):
+    """What becomes of the first uplift.
+
+    Attributes
+    ----------
+    NO_UPLIFT
+        The motion never passes a threshold.
+    COMPLETE
+        Complete chattering: the block is proven to rest before the motion passes a threshold again. Under a sine this
+        is the paper's definition, rest within half a period, a < a_cr.
+    RESTS_LATER
+        The motion passes a threshold again while the block rocks; it comes to rest later, before the last time.
+    RESTS_AT_LAST
+        It comes to rest only after the motion has passed a threshold for the last time.
+    OVERTURNS
+        It overturns without ever coming to rest.
+    """
+
+    NO_UPLIFT = 0
+    COMPLETE = 1
+    RESTS_LATER = 2
+    RESTS_AT_LAST = 3
+    OVERTURNS = 4
+
+
+class _Point(NamedTuple):
+    """One point of a map."""
+
+    outcome: int
+    uplift: float
+    rest: float
+    lower: float
+    upper: float
+    rests: int
+    overturned: bool
+
+
+def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> xr.Dataset:
+    """Simulate a family of cases over a grid, and tell where chattering after the first uplift is complete.
+
+    Parameters
+    ----------
+    family : callable
+        Makes a `Case` (block, motion, model) from two numbers: one of `rocking.chattering.families`, or your own.
+    parameters : mapping
+        Names and values of the two parameters, in the order in which the family takes them.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the two parameters: outcome (see `Outcome`), complete (whether it is COMPLETE), uplift and rest (times of
+        the first uplift and the first rest, s), lower and upper (the bracket proven on that rest, s), rests (how many
+        in all), overturned (sooner or later).
+
+    Raises
+    ------
+    InvalidOption
+        If there are not two parameters, or their values are not one-dimensional, finite and in increasing order.
+    RockingError
+        What the family itself raises for a pair of numbers.
+
+    Notes
+    -----
+    The paper leaves this open (section 5.2): "no criteria for the appearance of complete chattering [...] exist for more
+    complicated ground excitation waveforms". Rest is proven by certificate, point by point; a point takes about a
+    quarter of a millisecond.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> from rocking.chattering import families
+    >>> block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
+    >>> dataset = chattering_map(families.sine(block, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
+    >>> dataset.complete.values.tolist()
+    [[False, False], [True, True], [False, False]]
+    """
+    import xarray as xr
+
+    if len(parameters) != 2:
+        raise InvalidOption(f"a map has two parameters, not {len(parameters)}")
+    (first, x), (second, y) = ((name, _axis(values, name)) for name, values in parameters.items())
+    points = [_followed(family(float(one), float(other))) for one in x for other in y]
+    columns = {name: np.array(column) for name, column in zip(_Point._fields, zip(*points, strict=True), strict=True)}
+    attributes = {
+        "outcome": {"flag_values": [int(o) for o in Outcome], "flag_meanings": " ".join(o.name.lower() for o in Outcome)},
+        **{name: {"units": "s"} for name in ("uplift", "rest", "lower", "upper")},
+    }
+    dataset = xr.Dataset(
+        {
+            name: ((first, second), column.reshape(x.size, y.size), attributes.get(name, {}))
+            for name, column in columns.items()
+        },
+        {first: x, second: y},
+    )
+    return dataset.assign(complete=dataset.outcome == Outcome.COMPLETE)
+
+
+def map_figure(dataset: xr.Dataset, *, labels: Mapping[str, str] | None = None, title: str = "") -> Figure:
+    """Draw a map that `chattering_map` made: the first parameter upwards, the second to the right.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        From `chattering_map`.
+    labels : mapping of str to str, optional
+        What to write at the axes in place of the parameters' names.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    from rocking.plot.maps import outcome_figure
+
+    first, second = dataset.outcome.dims
+    written = labels or {}
+    return outcome_figure(
+        x=dataset[second].values,
+        y=dataset[first].values,
+        outcome=dataset.outcome.values,
+        meanings=[outcome.name.lower().replace("_", " ") for outcome in Outcome],
+        x_label=written.get(str(second), str(second)),
+        y_label=written.get(str(first), str(first)),
+        title=title,
+    )
+
+
+def _followed(case: Case) -> _Point:
+    response = simulate(case.block, case.motion, model=case.model)
+    events = response.events
+    if not len(events):
+        return _Point(Outcome.NO_UPLIFT, math.nan, math.nan, math.nan, math.nan, 0, False)
+    uplift = float(events["time"][0])
+    if not len(response.chattering):
+        return _Point(Outcome.OVERTURNS, uplift, math.nan, math.nan, math.nan, 0, response.overturned)
+    first = response.chattering[0]
+    # The first exceedance is the one that lifted the block.
+    later = exceedances(case.motion, case.block.uplift_thresholds(case.model))[1:, 0]
+    return _Point(
+        _outcome(float(first["upper"]), later),
+        uplift,
+        float(first["end"]),
+        float(first["lower"]),
+        float(first["upper"]),
+        len(response.chattering),
+        response.overturned,
+    )
+
+
+def _outcome(rest: float, later: FloatArray) -> Outcome:
+    """Outcome from the upper bound on the first rest and the later times at which a threshold is passed."""
+    if rest <= later.min(initial=math.inf):
+        return Outcome.COMPLETE
+    return Outcome.RESTS_LATER if rest <= later.max() else Outcome.RESTS_AT_LAST
+
+
+def _axis(values: ArrayLike, name: str) -> FloatArray:
+    axis = np.asarray(values, dtype=float)
+    if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or not (np.diff(axis) > 0.0).all():
+        raise InvalidOption(f"the values of {name} must be finite numbers in increasing order")
+    return axis

@@ -1,0 +1,170 @@
+"""One chattering sequence: its oscillations, and the ratios of its intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from rocking.plot.style import ABOVE, GROUND, INK, STYLE, FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Cycles that the details show: the first, and those after the impact with this number.
+_FIRST_CYCLES: Final = 5
+_LAST_CYCLES: Final = 5
+
+
+class Ratios(NamedTuple):
+    """Ratios of intervals of one sequence, their limit, and what to write above them."""
+
+    values: FloatArray
+    limit: float
+    title: str
+
+
+def chattering_figure(
+    *, time: FloatArray, rotation: FloatArray, impact_times: FloatArray, rest: float, late_impact: int
+) -> Figure:
+    """Draw a chattering sequence (a) with details of its first cycles (b) and of late ones (c).
+
+    Parameters
+    ----------
+    time, rotation : ndarray, shape (n,)
+        Dimensionless time since uplift, dense also between the late impacts, and rotation over slenderness.
+    impact_times : ndarray
+        Times of the impacts.
+    rest : float
+        Time of rest.
+    late_impact : int
+        Index into the impacts at which the second detail starts.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.0, 4.8), layout="constrained")
+        grid = figure.add_gridspec(2, 2)
+        whole, first, last = (figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1]))
+        _draw_whole(whole, time, rotation, impact_times, rest)
+        _draw_cycles(first, time, 1e3 * rotation, np.append(0.0, impact_times[:_FIRST_CYCLES]), 0)
+        first.set_title("(b) first cycles", loc="left")
+        first.set_xlabel(r"time since uplift, $\tau$")
+        origin = impact_times[late_impact]
+        scale = 1e3
+        chosen = scale * (impact_times[late_impact : late_impact + _LAST_CYCLES + 1] - origin)
+        magnified = 10.0 ** np.ceil(-np.log10(np.max(np.abs(rotation[time > origin]))))
+        _draw_cycles(last, scale * (time - origin), magnified * rotation, chosen, late_impact + 1)
+        last.set_title(rf"(c) cycles after impact {late_impact + 1}", loc="left")
+        last.set_xlabel(rf"$10^3\,(\tau - \tau_{{{late_impact + 1}}})$")
+        last.set_ylabel(rf"rotation, $10^{{{np.log10(magnified):.0f}}}\,\phi$")
+    return figure
+
+
+def _draw_whole(axes: Axes, time: FloatArray, rotation: FloatArray, impact_times: FloatArray, rest: float) -> None:
+    axes.axhline(0.0, color=INK, linewidth=0.4)
+    axes.plot(time, 1e3 * rotation, color=INK, linewidth=0.9)
+    axes.plot(
+        impact_times,
+        np.full(impact_times.size, 0.06),
+        "|",
+        color=INK,
+        markersize=6,
+        markeredgewidth=0.5,
+        transform=axes.get_xaxis_transform(),
+    )
+    axes.axvline(rest, color=ABOVE, linewidth=1.0, linestyle=(0, (4, 2)))
+    axes.annotate(
+        rf"at rest, $\tau_{{ch}}$ = {rest:.6f}",
+        (rest, 0.3),
+        xycoords=axes.get_xaxis_transform(),
+        xytext=(-6, 0),
+        textcoords="offset points",
+        ha="right",
+        color=ABOVE,
+    )
+    axes.set_xlim(0.0, 1.06 * rest)
+    _pad(axes, below=0.18)
+    axes.set_title("(a) the whole sequence, with its impacts as ticks", loc="left")
+    axes.set_xlabel(r"time since uplift, $\tau$")
+    axes.set_ylabel(r"rotation, $10^3\,\phi$")
+
+
+def _draw_cycles(axes: Axes, time: FloatArray, rotation: FloatArray, impacts: FloatArray, number: int) -> None:
+    """Draw the stretch between the given impacts, which are numbered from `number` on."""
+    margin = 0.06 * (impacts[-1] - impacts[0])
+    shown = (time >= impacts[0] - margin) & (time <= impacts[-1] + margin)
+    axes.axhline(0.0, color=INK, linewidth=0.4)
+    axes.plot(time[shown], rotation[shown], color=INK, linewidth=1.0)
+    axes.plot(impacts, np.zeros(impacts.size), "o", color=INK, markersize=3.4, markerfacecolor="white")
+    axes.set_xlim(impacts[0] - margin, impacts[-1] + margin)
+    low, high = axes.get_ylim()
+    # Neighbours lie close together: their labels stand above the curve, at two heights.
+    axes.set_ylim(low, high + 0.4 * (high - low))
+    for k, at in enumerate(impacts):
+        height = high + (0.16 if k % 2 else 0.3) * (high - low)
+        axes.plot([at, at], [0.0, height], color=GROUND, linewidth=0.6, zorder=0)
+        axes.annotate(rf"$\tau_{{{number + k}}}$", (at, height), ha="center", va="bottom")
+    axes.set_ylabel(r"rotation, $10^3\,\phi$")
+
+
+def ratio_figure(panels: Sequence[Ratios]) -> Figure:
+    """Draw the ratios of the intervals between every second impact, each panel with the limit.
+
+    Parameters
+    ----------
+    panels : sequence of Ratios
+        One for each panel, from left to right.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> figure = ratio_figure([Ratios(np.array([0.2, 1.0, 0.6, 0.9]), 0.8464, "a sequence")])
+    >>> figure.axes[0].get_title(loc="left")
+    '(a) a sequence'
+    """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.0, 2.9), layout="constrained")
+        for k, (panel, axes) in enumerate(zip(panels, figure.subplots(1, len(panels), squeeze=False)[0], strict=True)):
+            n = np.arange(panel.values.size)
+            for start, face, label in ((0, INK, "even $n$"), (1, "white", "odd $n$")):
+                chosen = slice(start, None, 2)
+                axes.plot(
+                    n[chosen], panel.values[chosen], "o", color=INK, markersize=3.0, markerfacecolor=face, label=label
+                )
+            axes.axhline(panel.limit, color=ABOVE, linewidth=0.9, linestyle=(0, (4, 2)), zorder=0)
+            axes.annotate(
+                rf"$\eta^2$ = {panel.limit:.4f}",
+                (0.98, panel.limit),
+                xycoords=axes.get_yaxis_transform(),
+                xytext=(0, -5),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                color=ABOVE,
+            )
+            axes.set_title(f"({'abcdef'[k]}) {panel.title}", loc="left")
+            axes.set_xlabel("impact $n$")
+            axes.grid(color=GROUND, linewidth=0.3, alpha=0.6)
+            axes.legend(loc="center right")
+        figure.axes[0].set_ylabel(r"$\Delta\tau_{n+2}\,/\,\Delta\tau_n$")
+    return figure
+
+
+def _pad(axes: Axes, *, below: float) -> None:
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - below * (high - low), high)

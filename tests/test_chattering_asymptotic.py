@@ -1,0 +1,80 @@
+"""The paper's asymptotic scheme: Eq. 65 against its printed terms, and against the exact sequence."""
+
+import json
+
+import numpy as np
+import pytest
+from oracles.paper_scheme import cycles
+
+from rocking import chattering
+from rocking.errors import InvalidOption
+
+
+def test_eq65_of_the_reference(shared):
+    reference = json.loads((shared / "reference" / "reference.json").read_text())
+    for case in reference["paper_scheme_eq65"]:
+        time = chattering.chattering_time(case["a"], case["omega"], case["eta"], method="asymptotic")
+        assert time == pytest.approx(case["tau"], rel=1e-13)
+
+
+@pytest.mark.parametrize(("a", "omega", "eta"), [(1.01, 2.0, 0.92), (1.03, 5.0, 0.6), (1.1, 0.5, 0.8)])
+def test_table_repeats_the_printed_equations(a, omega, eta):
+    """Amplitude and frequency cancel in the product's kernel; here they are in every term."""
+    table = chattering.asymptotic_table(a, omega, eta)
+    printed = np.array(cycles(a, omega, eta, 40))
+    assert table["term"][:40] == pytest.approx(printed.sum(axis=1), rel=1e-9)
+    assert (table["order"][:40] == np.where(printed[:, 0] > 0.0, 1, 3)).all()
+
+
+def test_table_adds_up_to_eq65():
+    table = chattering.asymptotic_table(1.02, 3.0, 0.9)
+    assert table["n"].tolist() == list(range(table.size))
+    assert table["sign"][:3].tolist() == [-1, 1, -1]
+    assert table["interval"] == pytest.approx(table["term"] * 0.02 ** (table["order"] / 2.0), rel=1e-12)
+    assert table["time"] == pytest.approx(np.cumsum(table["interval"]))
+    assert table["time"][-1] == pytest.approx(
+        chattering.chattering_time(1.02, 3.0, 0.9, method="asymptotic"), rel=1e-14
+    )
+    assert table["interval"][-2] < 1e-16 * table["time"][-1]
+
+
+def test_eq65_is_leading_order_right_and_never_incomplete():
+    eps = np.array([1e-6, 1e-5])
+    error = chattering.chattering_time(1.0 + eps, 2.0, 0.92, method="asymptotic") - chattering.chattering_time(
+        1.0 + eps, 2.0, 0.92
+    )
+    assert np.diff(np.log(error))[0] / np.log(10.0) == pytest.approx(1.5, abs=0.01)
+    critical = chattering.critical_amplitude(2.0, 0.92)
+    share = chattering.chattering_time(critical, 2.0, 0.92, method="asymptotic") * 2.0 / np.pi
+    assert share == pytest.approx(0.82, abs=0.005)
+
+
+def test_eq65_exceeds_the_true_time_below_1_027():
+    amplitudes = np.array([1.02, 1.026, 1.028, 1.03])
+    asymptotic = chattering.chattering_time(amplitudes, 2.0, 0.92, method="asymptotic")
+    assert (asymptotic > chattering.chattering_time(amplitudes, 2.0, 0.92)).tolist() == [True, True, False, False]
+
+
+@pytest.mark.parametrize("omega", [0.5, 1.0, 2.0, 8.0])
+def test_first_interval_and_speed_err_by_the_next_order(omega):
+    eps = np.array([1e-4, 1e-3])
+    first = [chattering.sequence(1.0 + e, omega, 0.9).impacts[0] for e in eps]
+    interval_error = chattering.first_interval(1.0 + eps, omega) - [impact["interval"] for impact in first]
+    speed_error = chattering.first_impact_speed(1.0 + eps, omega) - [impact["speed_before"] for impact in first]
+    assert np.diff(np.log(np.abs(interval_error)))[0] / np.log(10.0) == pytest.approx(2.5, abs=0.02)
+    assert np.diff(np.log(np.abs(speed_error)))[0] / np.log(10.0) == pytest.approx(3.5, abs=0.02)
+
+
+def test_first_interval_at_the_known_case():
+    assert chattering.sequence(1.01, 2.0, 0.92).impacts["interval"][0] == pytest.approx(0.2824230666, abs=1e-10)
+    assert chattering.first_interval(1.01, 2.0) == pytest.approx(0.2824230666, abs=5e-6)
+
+
+def test_asymptotic_functions_know_their_ends():
+    assert np.isinf(chattering.chattering_time(1.01, 2.0, 1.0, method="asymptotic"))
+    assert np.isnan(chattering.first_interval(0.9, 2.0)) and chattering.first_interval(1.0, 2.0) == 0.0
+    assert chattering.first_impact_speed([[1.0], [1.1]], [1.0, 2.0]).shape == (2, 2)
+    with pytest.raises(InvalidOption, match="below 1"):
+        chattering.asymptotic_table(1.01, 2.0, 1.0)
+    with pytest.raises(InvalidOption, match="lift off"):
+        chattering.asymptotic_table(0.9, 2.0, 0.9)

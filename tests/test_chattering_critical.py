@@ -1,0 +1,91 @@
+"""The critical amplitude: exact, proven from both sides, the paper's fits, and the closed approximation."""
+
+import json
+
+import numpy as np
+import pytest
+from oracles.sine_chattering import settle
+
+from rocking import chattering
+from rocking.chattering.critical_coefficients import LARGEST_ERROR
+from rocking.errors import InvalidOption
+
+
+def test_critical_amplitudes_of_the_reference(shared):
+    reference = json.loads((shared / "reference" / "reference.json").read_text())
+    for case in reference["critical_amplitude"]:
+        assert chattering.critical_amplitude(case["omega"], case["eta"]) == pytest.approx(case["value"], abs=1e-13)
+
+
+@pytest.mark.parametrize("omega", [0.3, 2.0, 30.0])
+@pytest.mark.parametrize("eta", [0.1, 0.5, 0.92, 0.975])
+def test_both_sides_of_the_critical_amplitude_are_proven(omega, eta):
+    critical = float(chattering.critical_amplitude(omega, eta))
+    assert settle(critical - 1e-13, omega, eta).time is not None
+    assert settle(critical + 1e-13, omega, eta).time is None
+
+
+def test_completeness_is_lost_once_and_for_all():
+    """So that the supremum of complete amplitudes is the boundary that root finding meets."""
+    rng = np.random.default_rng(0)
+    omega = 10.0 ** rng.uniform(-1.0, 2.0, (400, 1))
+    eta = rng.uniform(0.02, 0.98, (400, 1))
+    critical = chattering.critical_amplitude(omega, eta)
+    share = np.concatenate([rng.uniform(0.0, 2.0, (400, 30)), 1.0 + np.outer(np.ones(400), [-1e-9, 1e-9])], axis=1)
+    complete = chattering.is_complete(1.0 + (critical - 1.0) * share, omega, eta)
+    assert (complete == (share < 1.0)).all()
+    assert not chattering.is_complete(np.linspace(1.37, 30.0, 500), omega[:50], eta[:50]).any()
+
+
+@pytest.mark.parametrize(("eta", "exponent"), [(0.92, 0.6002), (0.5, 0.6116), (0.3, 0.6319)])
+def test_rest_approaches_half_a_period_by_the_exponent_of_the_scaled_map(eta, exponent):
+    critical = float(chattering.critical_amplitude(2.0, eta))
+    distance = np.array([1e-9, 1e-11])
+    left = np.pi / 2.0 - chattering.chattering_time(critical - distance, 2.0, eta)
+    assert np.log(left[0] / left[1]) / np.log(100.0) == pytest.approx(exponent, abs=0.006)
+
+
+def test_numbers_that_the_paper_states():
+    assert chattering.critical_amplitude(2.0, 0.92) == pytest.approx(1.038, abs=5e-4)
+    assert chattering.critical_amplitude(2.0, 0.92, method="eq76") == pytest.approx(1.038, abs=1e-3)
+    assert chattering.critical_amplitude(2.0, 0.92, method="eq77") == pytest.approx(1.038, abs=1e-3)
+    over_frequency = chattering.critical_amplitude(np.linspace(0.5, 8.0, 100), 0.92)
+    assert np.ptp(over_frequency) / over_frequency.mean() == pytest.approx(0.005, abs=5e-4)
+
+
+def test_the_fits_of_the_paper_err_as_known():
+    assert chattering.critical_amplitude(0.5, 0.5, method="eq76") == pytest.approx(1.0935, abs=1e-4)
+    assert chattering.critical_amplitude(0.5, 0.5) == pytest.approx(1.082087, abs=1e-6)
+    exact = chattering.critical_amplitude(0.5, 0.75)
+    assert chattering.critical_amplitude(0.5, 0.75, method="eq77") / exact - 1.0 == pytest.approx(0.026, abs=1e-3)
+
+
+def test_more_loss_at_impacts_allows_more_shaking():
+    eta = np.linspace(0.05, 0.999, 100)
+    for omega in (0.3, 2.0, 20.0):
+        assert (np.diff(chattering.critical_amplitude(omega, eta)) < 0.0).all()
+    assert chattering.critical_amplitude(2.0, 1.0) == 1.0
+
+
+def test_the_approximation_keeps_its_stated_error():
+    rng = np.random.default_rng(2)
+    omega = np.concatenate([rng.uniform(0.4, 10.0, 1500), [0.4, 0.4, 10.0, 10.0]])
+    eta = np.concatenate([rng.uniform(0.5, 0.97, 1500), [0.5, 0.97, 0.5, 0.97]])
+    error = chattering.critical_amplitude(omega, eta, method="approximation") - chattering.critical_amplitude(
+        omega, eta
+    )
+    assert np.abs(error).max() <= 1.02 * LARGEST_ERROR < 1e-7
+
+
+@pytest.mark.parametrize(("omega", "eta"), [(0.39, 0.9), (10.1, 0.9), (2.0, 0.49), (2.0, 0.98)])
+def test_the_approximation_refuses_what_it_was_not_made_for(omega, eta):
+    with pytest.raises(InvalidOption, match="holds for omega"):
+        chattering.critical_amplitude(omega, eta, method="approximation")
+
+
+def test_unusable_arguments_are_refused():
+    with pytest.raises(InvalidOption, match="method must be"):
+        chattering.critical_amplitude(2.0, 0.92, method="eq78")
+    with pytest.raises(InvalidOption, match="eta must be"):
+        chattering.critical_amplitude(2.0, np.nan)
+    assert chattering.critical_amplitude(np.ones((3, 1)), np.full(4, 0.9), method="eq77").shape == (3, 4)

@@ -1,0 +1,96 @@
+"""The consistent expansion: coefficients, rising order of its error, and where it stops converging."""
+
+import json
+
+import mpmath
+import numpy as np
+import pytest
+from oracles.sine_chattering import settle
+
+from rocking import chattering
+from rocking.errors import InvalidOption
+
+
+def test_coefficients_of_the_reference(shared):
+    known = json.loads((shared / "reference" / "reference.json").read_text())["series_at_eta_092"]
+    coefficients = chattering.series_coefficients(known["omega"], 0.92, order=4) * known["omega"]
+    assert coefficients[0] == pytest.approx(known["c1"], rel=1e-12)
+    assert coefficients[1] == pytest.approx(known["c3"], rel=1e-9)
+    assert coefficients[2:] == pytest.approx([known["c5"], known["c7"]], rel=1e-8)
+
+
+def test_frequency_enters_as_known(shared):
+    """C1 omega is free of omega, and C_{2k+1} omega a polynomial of degree k in 1/omega^2."""
+    known = json.loads((shared / "reference" / "reference.json").read_text())["series_at_eta_092"]
+    omega = np.array([0.5, 1.0, 2.0, 4.0, 8.0])
+    scaled = chattering.series_coefficients(omega, 0.92, order=4) * omega[:, None]
+    assert scaled[:, 0] == pytest.approx(known["c1"], rel=1e-12)
+    assert scaled[:, 1] == pytest.approx(known["A"] + known["B"] / omega**2, abs=1e-4)
+    for k in (1, 2, 3):
+        fit = np.polynomial.Polynomial.fit(omega**-2.0, scaled[:, k], k)
+        assert fit(omega**-2.0) == pytest.approx(scaled[:, k], rel=1e-10)
+
+
+def test_leading_coefficient_is_that_of_the_paper():
+    eps = 1e-12
+    asymptotic = chattering.chattering_time(1.0 + eps, 1.0, [0.5, 0.8, 0.97], method="asymptotic")
+    leading = chattering.series_coefficients(1.0, [0.5, 0.8, 0.97], order=1)[:, 0]
+    assert asymptotic / np.sqrt((1.0 + eps) - 1.0) == pytest.approx(leading, rel=1e-9)
+
+
+@pytest.mark.parametrize(("omega", "eta"), [(2.0, 0.92), (0.6, 0.7), (8.0, 0.5)])
+@pytest.mark.parametrize("terms", [1, 2, 3, 4])
+def test_the_error_rises_by_one_order_per_term(omega, eta, terms):
+    """Log-log slope k + 1/2 for k terms; the exact time from ball arithmetic, in differences too small for doubles."""
+    coefficients = chattering.series_coefficients(omega, eta, order=12)
+    radius = float(chattering.series_diagnosis(1.0, omega, eta).radius)
+    eps = radius * np.array([2.0**-8, 2.0**-7])
+    exact = [settle(1.0 + e, omega, eta, width=1e-24).time.mid() for e in eps]
+    partial = [float(sum(c * ((1.0 + e) - 1.0) ** k for k, c in enumerate(coefficients[:terms]))) for e in eps]
+    with mpmath.workdps(30):
+        errors = [
+            float(mpmath.mpf(x.str(30, radius=False)) - mpmath.sqrt(mpmath.mpf(1.0 + e) - 1) * mpmath.mpf(p))
+            for x, e, p in zip(exact, eps, partial, strict=True)
+        ]
+    assert np.log2(errors[1] / errors[0]) == pytest.approx(terms + 0.5, abs=0.05)
+
+
+def test_four_terms_beat_eq65_fifty_times():
+    exact = chattering.chattering_time(1.01, 2.0, 0.92)
+    series = chattering.chattering_time(1.01, 2.0, 0.92, method="series", order=4)
+    asymptotic = chattering.chattering_time(1.01, 2.0, 0.92, method="asymptotic")
+    assert abs(asymptotic - exact) > 50.0 * abs(series - exact)
+
+
+@pytest.mark.parametrize(("omega", "eta"), [(2.0, 0.92), (0.5, 0.5), (8.0, 0.75), (2.0, 0.97)])
+def test_the_series_converges_up_to_the_critical_amplitude(omega, eta):
+    critical = chattering.critical_amplitude(omega, eta) - 1.0
+    a = 1.0 + critical * np.array([0.5, 0.7, 0.9])
+    diagnosis = chattering.series_diagnosis(a, omega, eta, order=34)
+    assert diagnosis.radius == pytest.approx(critical, rel=3e-3)
+    error = np.abs(diagnosis.time - chattering.chattering_time(a, omega, eta))
+    assert (error < np.array([1e-10, 1e-6, 1e-3]) * diagnosis.time).all()
+    assert np.isinf(chattering.series_diagnosis(1.0 + 1.1 * critical, omega, eta).error)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4, 8, 16])
+def test_the_error_estimate_is_close(order):
+    a = np.array([1.001, 1.01, 1.02, 1.03])
+    diagnosis = chattering.series_diagnosis(a, 2.0, 0.92, order=order)
+    error = np.abs(diagnosis.time - chattering.chattering_time(a, 2.0, 0.92))
+    measurable = error > 1e-13
+    assert measurable.any()
+    assert (np.abs(np.log2(diagnosis.error / error))[measurable] < 1.0).all()
+
+
+def test_series_knows_its_ends():
+    assert np.isinf(chattering.series_coefficients(2.0, 1.0)).all()
+    assert chattering.series_coefficients([1.0, 2.0], [[0.5], [0.6], [0.7]], order=3).shape == (3, 2, 3)
+    diagnosis = chattering.series_diagnosis([0.5, 1.0], 2.0, 0.9)
+    assert np.isnan(diagnosis.time[0]) and diagnosis.time[1] == 0.0 and diagnosis.error[1] == 0.0
+    with pytest.raises(InvalidOption, match="order must be"):
+        chattering.series_coefficients(2.0, 0.9, order=41)
+    with pytest.raises(InvalidOption, match="below 1"):
+        chattering.series_diagnosis(1.01, 2.0, 1.0)
+    with pytest.raises(InvalidOption, match="not resolved"):
+        chattering.series_coefficients(1e-6, 0.9, order=40)

@@ -1,0 +1,230 @@
+"""Ensembles: the same answers as one simulation at a time, in every dimension of the product."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking import Block, Blocks, InvalidBlock, InvalidOption, VelocityThreshold, simulate, simulate_many
+
+ULP = 2.0**-52
+
+
+@pytest.fixture(scope="module")
+def records():
+    names = ("el-centro-meloland-270", "el-centro-meloland-360", "ridgecrest-tow2-090")
+    return [rocking.records.load(name) for name in names]
+
+
+def random_blocks(count, seed, *, two_sided=False):
+    rng = np.random.default_rng(seed)
+    shape = (count, 2) if two_sided else count
+    return Blocks(
+        p=rng.uniform(1.0, 7.0, shape), alpha=rng.uniform(0.06, 0.4, shape), restitution=rng.uniform(0.7, 0.98, shape)
+    )
+
+
+def is_known(response, model, block, motion):
+    """Whether one ulp of the motion leaves this response alone (the tolerance of agreement presumes it)."""
+    if response.ambiguous:
+        return False
+    nudged = simulate(block, motion.scaled(1.0 + ULP), model=model)
+    change = abs(nudged.peak_rotation - response.peak_rotation)
+    return nudged.overturned == response.overturned and change <= 1e-10 * response.peak_rotation
+
+
+def disagreements(blocks, motions, model, pairs):
+    """Pairs (motion, block) in which ensemble and single simulation differ though the response is known."""
+    result = simulate_many(blocks, motions, model=model)
+    found = []
+    for m, b in pairs:
+        response, cell = simulate(blocks[b], motions[m], model=model), result.isel(motion=m, block=b)
+        rests = int(np.sum(response.events["kind"] == "rest"))
+        uplifts = int(np.sum(response.events["kind"] == "uplift"))
+        same = (
+            response.overturned == bool(cell.overturned)
+            and (uplifts, rests) == (int(cell.uplifts), int(cell.rests))
+            and abs(response.peak_rotation - float(cell.peak_rotation)) <= 1e-9 * response.peak_rotation
+        )
+        if not same and is_known(response, model, blocks[b], motions[m]):
+            found.append((m, b, response.peak_rotation, float(cell.peak_rotation)))
+    return found
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize("two_sided", [False, True])
+def test_lanes_agree_with_single_simulations(records, model, two_sided):
+    blocks = random_blocks(40, 1, two_sided=two_sided)
+    pairs = [(m, b) for m in range(len(records)) for b in range(0, 40, 2)]
+    assert disagreements(blocks, records, model, pairs) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_lanes_agree_on_two_thousand_pairs(records, model):
+    blocks = random_blocks(700, 2, two_sided=True)
+    rng = np.random.default_rng(3)
+    pairs = list(zip(rng.integers(0, 3, 2000).tolist(), rng.integers(0, 700, 2000).tolist(), strict=True))
+    assert disagreements(blocks, records, model, pairs) == []
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_pulses_agree_with_single_simulations(model):
+    motions = [rocking.pulses.one_sine(3.0, 0.8), rocking.pulses.ricker(4.0, 1.2), rocking.pulses.rectangular(3.0, 0.4)]
+    blocks = random_blocks(30, 4)
+    pairs = [(m, b) for m in range(3) for b in range(30)]
+    assert disagreements(blocks, motions, model, pairs) == []
+
+
+def test_counts_and_times_are_those_of_the_response(records):
+    blocks = random_blocks(20, 5)
+    result = simulate_many(blocks, records[1], model="linear").isel(motion=0)
+    for b, block in enumerate(blocks):
+        response, cell = simulate(block, records[1], model="linear"), result.isel(block=b)
+        if response.ambiguous:
+            continue
+        assert len(response.impacts) == int(cell.impacts)
+        assert float(cell.time_at_rest) == pytest.approx(response.time_at_rest, abs=1e-6)
+        assert float(cell.peak_time) == pytest.approx(response.peak_time, abs=1e-6)
+
+
+def test_reversing_the_motion_mirrors_the_blocks(records):
+    blocks = random_blocks(70, 6, two_sided=True)
+    mirrored = Blocks(blocks.p[:, ::-1], blocks.alpha[:, ::-1], blocks.restitution[:, ::-1])
+    both = simulate_many(blocks, records[0], polarity="both")
+    assert list(both.polarity.values) == ["+", "-"]
+    flipped = simulate_many(mirrored, records[0])
+    assert np.array_equal(both.peak_rotation.sel(polarity="-").values, flipped.peak_rotation.values)
+    assert np.array_equal(
+        both.peak_rotation.sel(polarity="-").values,
+        simulate_many(blocks, records[0], polarity="-").peak_rotation.values,
+    )
+
+
+def test_scales_are_those_of_the_motion(records):
+    blocks = random_blocks(10, 7)
+    for measure, values, options in (
+        ("factor", [0.5, 1.5], {}),
+        ("pga", [1.0, 4.0], {}),
+        ("pgv", [0.3, 0.9], {}),
+        ("sa", [2.0, 6.0], {"period": 0.8}),
+    ):
+        result = simulate_many(blocks, records[:2], **{measure: values}, **options)
+        assert result.sizes == {"motion": 2, "scale": 2, "block": 10}
+        assert result.scale.attrs["measure"] == measure
+        for m, s in np.ndindex(2, 2):
+            scaled = records[m].scaled(**{measure: values[s]}, **options)
+            alone = simulate_many(blocks, scaled)
+            assert np.array_equal(result.peak_rotation[m, s], alone.peak_rotation[0])
+
+
+def test_threads_do_not_change_the_answers(records):
+    blocks = random_blocks(1300, 8)
+    one, many = (simulate_many(blocks, records[1], model="linear", threads=n) for n in (1, 3))
+    assert one.equals(many)
+
+
+def test_a_stop_inside_a_sample_is_kept_to(records):
+    blocks = random_blocks(30, 9)
+    result = simulate_many(blocks, records[0], duration=7.0037)
+    for b, block in enumerate(blocks):
+        response = simulate(block, records[0], duration=7.0037)
+        assert float(result.peak_rotation[0, b]) == pytest.approx(response.peak_rotation, rel=1e-9)
+
+
+def test_treatments_are_passed_on(records):
+    blocks = random_blocks(20, 10)
+    how = VelocityThreshold(1e-3)
+    result = simulate_many(blocks, records[1], chattering=how)
+    for b, block in enumerate(blocks):
+        response = simulate(block, records[1], chattering=how)
+        if not response.ambiguous:
+            assert int(result.impacts[0, b]) == len(response.impacts)
+
+
+def test_one_block_and_lists_of_blocks(records):
+    block = Block(0.2, 1.0)
+    alone = simulate_many(block, records[0])
+    assert alone.sizes == {"motion": 1, "block": 1}
+    pair = simulate_many([block, Block(0.15, 1.0)], records[:2])
+    assert float(pair.peak_rotation[0, 0]) == float(alone.peak_rotation[0, 0])
+
+
+def test_the_result_can_be_written_and_says_what_it_is(records, tmp_path):
+    result = simulate_many(Blocks.grid(p=[2.0, 3.0], alpha=[0.1, 0.2]), records[:2])
+    assert result.attrs["program"].startswith("rocking ")
+    assert list(result.motion.values) == [motion.name for motion in records[:2]]
+    assert result.p.values.tolist() == [2.0, 2.0, 3.0, 3.0]
+    assert result.peak_rotation.attrs["units"] == "rad"
+    result.to_netcdf(tmp_path / "many.nc", engine="h5netcdf")
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"pga": 1.0, "pgv": 1.0}, "one measure"),
+        ({"sa": 1.0}, "period="),
+        ({"period": 1.0}, "sa="),
+        ({"factor": []}, "positive"),
+        ({"factor": [1.0, -1.0]}, "positive"),
+        ({"pga": "strong"}, "pga"),
+        ({"polarity": "up"}, "polarity"),
+        ({"threads": 0}, "threads"),
+        ({"model": "cubic"}, "model"),
+        ({"duration": -1.0}, "duration"),
+    ],
+)
+def test_bad_options_are_refused(records, options, word):
+    with pytest.raises(InvalidOption, match=word):
+        simulate_many(Block(0.2, 1.0), records[0], **options)
+
+
+def test_nothing_to_simulate_is_refused(records):
+    with pytest.raises(InvalidOption, match="at least one motion"):
+        simulate_many(Block(0.2, 1.0), [])
+    with pytest.raises(InvalidBlock, match="at least one"):
+        simulate_many([], records[0])
+    with pytest.raises(InvalidOption, match="duration="):
+        simulate_many(Blocks(p=[1.0, 2.0], alpha=0.1, restitution=[0.9, 1.0]), records[0])
+
+
+LONG = """
+import numpy as np, rocking
+blocks = rocking.Blocks(p=np.linspace(1, 6, 400_000), alpha=0.2, restitution=0.9)
+motion = rocking.records.load("ridgecrest-tow2-090")
+print("ready", flush=True)
+rocking.simulate_many(blocks, motion)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
+def test_an_interrupt_returns_at_once(records):
+    simulate_many(Block(0.2, 1.0), records[2])  # so that the other process finds the kernels compiled
+    command = [sys.executable, "-c", LONG]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(2.0)
+        process.send_signal(signal.SIGINT)
+        start = time.monotonic()
+        process.wait(timeout=30)
+        assert time.monotonic() - start < 5.0
+        assert "KeyboardInterrupt" in process.stderr.read()
+
+
+@pytest.mark.slow
+def test_a_million_blocks_fit_into_a_gibibyte(records):
+    probe = (
+        "import numpy as np, resource, rocking\n"
+        "blocks = rocking.Blocks(p=np.linspace(1, 6, 1_000_000), alpha=0.35, restitution=0.9)\n"
+        "motion = rocking.records.load('el-centro-meloland-up')\n"
+        "result = rocking.simulate_many(blocks, motion, model='linear')\n"
+        "assert result.sizes['block'] == 1_000_000\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert float(done.stdout) < 1024.0
