@@ -1,8 +1,9 @@
 """Chattering times per second: this package against SciPy's event loop, in one run.
 
 Run ``python benchmarks/bench_chattering_time.py`` from the repository's root. The baseline is the loop of Fig. 8b as
-one writes it in Python: DOP853 with an event per impact, rtol 1e-12, until the speed falls below 1e-12, so that it too is
-accurate to 1e-9. Times are processor times of one core (other programs do not count), except where it says "wall".
+one writes it in Python: DOP853 with an event per impact, rtol 1e-12, until the speed falls below 1e-12, so that it
+too is accurate to 1e-9. Times are processor times of one core (other programs do not count), except where it says
+"wall".
 """
 
 import math
@@ -97,10 +98,9 @@ def main():
         duration._cores = lambda: 1
         each = seconds_per_call(lambda parameters=parameters: chattering.chattering_time(*parameters)) / LARGE
         duration._cores = cores
-        print(
-            f"{name}: {1e9 * each:.0f} ns, {1e-6 / each:.2f} million per second and core, "
-            f"{1e-6 * LARGE / wall:.2f} million per second on {cores()} cores (wall), {np.isnan(times).mean():.0%} incomplete"
-        )
+        print(f"{name}: {1e9 * each:.0f} ns, {1e-6 / each:.2f} million per second and core")
+        incomplete = np.isnan(times).mean()
+        print(f"  on {cores()} cores (wall) {1e-6 * LARGE / wall:.2f} million per second, {incomplete:.0%} incomplete")
         if parameters[0].min() == parameters[0].max():
             print(
                 f"  {baseline / each:,.0f} times SciPy per core, relative error {abs(times[0] / CASE_TIME - 1.0):.0e}"

@@ -200,22 +200,41 @@ def test_the_linear_response_scales_with_slenderness_and_motion(case: Case, fact
     assert_same_course(one, other, time=1.0, shift=0.0, size=factor)
 
 
+STEP = 1e-8
+
+
+def scaled_responses(case: Case) -> tuple[rocking.Response, rocking.Response, rocking.Response]:
+    """Responses to the motion and to the motion scaled a little up and down, with as many events and impacts."""
+    assert case.motion is not None
+    response, more, less = (replace(case, motion=case.motion.scaled(1.0 + i * STEP)).simulate() for i in (0, 1, -1))
+    assume(len(response.events) == len(more.events) == len(less.events))
+    assume(len(response.impacts) == len(more.impacts) == len(less.impacts))
+    return response, more, less
+
+
 @quick
 @given(cases(motion="record"))
 def test_sensitivities_are_derivatives_by_the_scale_of_the_motion(case: Case) -> None:
-    assert case.motion is not None
-    step = 1e-8
-    response = case.simulate()
-    more, less = (replace(case, motion=case.motion.scaled(1.0 + i * step)).simulate() for i in (1, -1))
+    response, more, less = scaled_responses(case)
     for rows in ("events", "impacts"):
         found, after, before = (getattr(r, rows) for r in (response, more, less))
-        assume(len(found) == len(after) == len(before))
-        tame = np.abs(found["sensitivity"]) < 100.0
-        slopes = (after["time"] - before["time"]) / (2.0 * step)
-        assert_allclose(slopes[tame], found["sensitivity"][tame], rtol=1e-3, atol=1e-5)
+        slopes = (after["time"] - before["time"]) / (2.0 * STEP)
+        chosen = np.abs(found["sensitivity"]) < 100.0
+        if rows == "events":
+            chosen &= found["kind"] != "rest"
+        assert_allclose(slopes[chosen], found["sensitivity"][chosen], rtol=1e-3, atol=1e-5)
     if abs(response.peak_sensitivity) < 100.0 * response.peak_rotation:
-        slope = (more.peak_rotation - less.peak_rotation) / (2.0 * step)
+        slope = (more.peak_rotation - less.peak_rotation) / (2.0 * STEP)
         assert_allclose(slope, response.peak_sensitivity, rtol=1e-3, atol=1e-5 * response.peak_rotation)
+
+
+@quick
+@given(cases(motion="record"))
+def test_sensitivities_of_rests_take_in_the_impacts_that_a_proof_has_summed(case: Case) -> None:
+    found, after, before = (r.events for r in scaled_responses(case))
+    slopes = (after["time"] - before["time"]) / (2.0 * STEP)
+    rests = (np.abs(found["sensitivity"]) < 100.0) & (found["kind"] == "rest")
+    assert_allclose(slopes[rests], found["sensitivity"][rests], rtol=1e-2, atol=1e-3)
 
 
 @pytest.mark.parametrize(

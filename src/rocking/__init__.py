@@ -3,7 +3,9 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rocking.constants import VERSION as __version__
+from rocking.constants import VERSION
+
+__version__ = VERSION
 
 if TYPE_CHECKING:
     from rocking import chattering

@@ -92,9 +92,7 @@ def _on_grid(levels: Floats, outcome: Integers) -> Boundaries:
     return Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
 
 
-def _halved(
-    here: Boundaries, wide: NDArray[np.bool_], found: Integers, thinnest: Floats
-) -> tuple[Boundaries, Floats]:
+def _halved(here: Boundaries, wide: NDArray[np.bool_], found: Integers, thinnest: Floats) -> tuple[Boundaries, Floats]:
     """Brackets after one bisection of the wide ones; those that hold a third outcome become two."""
     middle = here.level
     thick = here.high - here.low > thinnest

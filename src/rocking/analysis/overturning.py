@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis.boundaries import Boundaries, boundaries
+from rocking.analysis.checks import increasing_numbers, share
 from rocking.analysis.pairs import simulate_pairs
 from rocking.block import Block, Blocks
 from rocking.constants import VERSION
@@ -22,6 +23,7 @@ from rocking.motion.motion import Motion
 from rocking.problem import Model
 from rocking.progress import Progress
 from rocking.simulation import simulate
+from rocking.treatment import Certified
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -120,22 +122,22 @@ def overturning_map(
     >>> print(f"{float(result.overturning_amplitude[0]):.7f}")
     1.8007239
     """
-    levels, ratios = _axis(amplitudes, "amplitudes"), _axis(frequencies, "frequencies")
-    if not (isinstance(tolerance, float) and 0.0 < tolerance < 1.0):
-        raise InvalidOption(f"tolerance must be a number between 0 and 1, not {tolerance!r}")
+    levels, ratios = increasing_numbers(amplitudes, "amplitudes"), increasing_numbers(frequencies, "frequencies")
+    width = share(tolerance, "tolerance")
     if all(side.restitution == 1.0 for side in block.sides):
         raise InvalidOption("a block with restitution 1 never comes to rest; an overturning map needs one below 1")
     slowest = min(side.p for side in block.sides)
     unit = _unit_pulse(pulse, slowest / (2.0 * math.pi), parameters)
-    problem = _Problem(_resized(block, ratios), unit, min(block.uplift_thresholds(model)), model)
+    chattering = Certified(width * unit.duration)
+    problem = _Problem(_resized(block, ratios), unit, min(block.uplift_thresholds(model)), model, chattering)
     modes, peaks = problem.grid(levels, progress)
-    edges = boundaries(levels, modes, problem.modes, tolerance=tolerance, progress=progress)
+    edges = boundaries(levels, modes, problem.modes, tolerance=width, progress=progress)
     attributes = {
         "program": f"rocking {VERSION}",
         "model": model,
         "block": f"{block.description}: alpha = {block.alpha} rad, restitution = {block.restitution}",
         "pulse": f"{unit.name}: {unit.description.text}",
-        "tolerance": tolerance,
+        "tolerance": width,
     }
     return _dataset(levels, ratios, modes, peaks, edges, attributes)
 
@@ -187,6 +189,7 @@ class _Problem:
     unit: Motion
     threshold: float
     model: Model
+    chattering: Certified
 
     def grid(self, levels: Floats, progress: bool | None) -> tuple[Integers, Floats]:
         """Modes and peak rotations at every level, shape (levels, blocks)."""
@@ -202,12 +205,13 @@ class _Problem:
 
     def _followed(self, column: Integers, level: Floats, done: Callable[[int], None]) -> tuple[Integers, Floats]:
         blocks = self.blocks.select(column)
-        ends = simulate_pairs(blocks, self.unit, self.threshold * level, model=self.model, done=done)
+        factors = self.threshold * level
+        ends = simulate_pairs(blocks, self.unit, factors, model=self.model, chattering=self.chattering, done=done)
         rested = (ends.uplifts > 1) | ((ends.rests > 0) & (ends.last_rest <= self.unit.duration))
         modes = np.where(ends.uplifts == 0, NO_UPLIFT, np.where(rested, RESTS, ROCKS))
         modes[ends.overturned] = ends.impacts[ends.overturned]
         for k in np.flatnonzero(ends.overturned & (ends.uplifts > 1)):
-            modes[k] = self._last_impacts(blocks[k], float(level[k]))
+            modes[k] = self._last_impacts(blocks[int(k)], float(level[k]))
         return modes, ends.peak
 
     def _last_impacts(self, block: Block, level: float) -> int:
@@ -243,26 +247,15 @@ def _resized(block: Block, ratios: Floats) -> Blocks:
     return Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
 
 
-def _axis(values: ArrayLike, name: str) -> Floats:
-    try:
-        axis = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidOption(f"{name} must be numbers, not {values!r}") from None
-    good = axis.ndim == 1 and axis.size > 0 and np.isfinite(axis).all()
-    if not (good and (axis > 0.0).all() and (np.diff(axis) > 0.0).all()):
-        raise InvalidOption(f"{name} must be positive finite numbers in increasing order")
-    return axis
-
-
 def _dataset(
     levels: Floats, ratios: Floats, modes: Integers, peaks: Floats, edges: Boundaries, attributes: dict[str, Any]
 ) -> xr.Dataset:
     import xarray as xr
 
-    lowest = np.full(ratios.size, np.nan)
-    overturns = np.flatnonzero((edges.above >= 0) & (edges.below < 0))[::-1]
-    lowest[edges.column[overturns]] = edges.level[overturns]
-    lowest[modes[0] >= 0] = np.nan
+    lowest = np.full(ratios.size, np.inf)
+    overturns = (edges.above >= 0) & (edges.below < 0)
+    np.minimum.at(lowest, edges.column[overturns], edges.level[overturns])
+    lowest[np.isinf(lowest) | (modes[0] >= 0)] = np.nan
     meaning = "-3: no uplift, -2: rests before the pulse is over, -1: rocks, n >= 0: overturns after n impacts"
     over = "over the smallest acceleration that lifts the block"
     return xr.Dataset(

@@ -52,9 +52,10 @@ def simulate_pairs(
     factors: Floats,
     *,
     model: Model,
+    chattering: Certified,
     done: Callable[[int], None] = lambda count: None,
 ) -> Ends:
-    """Simulate block k under `motion` times factor k, on every core, with certified chattering.
+    """Simulate block k under `motion` times factor k, on every core.
 
     Parameters
     ----------
@@ -66,23 +67,25 @@ def simulate_pairs(
         Factor on the motion for each block.
     model : {"nonlinear", "linear"}
         Equation of motion.
+    chattering : Certified
+        Where only the verdict counts, a wide bracket on the time of rest is enough, and quicker; rest is proven anyway.
     done : callable
         Told how many simulations have just been finished.
     """
-    treatment = Certified()
-    rules = rules_of(blocks, model, treatment, None, record=False)
+    rules = rules_of(blocks, model, chattering, None, record=False)
     shaking = shaking_of(motion, blocks.gravity)
-    sides = sides_of(blocks, model, treatment.limits(blocks, motion))
-    at, x = (np.tile(array, (len(blocks), 1)) for array in state.new_state())
+    sides = sides_of(blocks, model, chattering.limits(blocks, motion))
+    integers, floats = state.new_state()
+    at, x = np.tile(integers, (len(blocks), 1)), np.tile(floats, (len(blocks), 1))
     endings = np.empty(len(blocks), dtype=np.int64)
 
     def run(chosen: Integers) -> int:
         factor = factors[chosen[0]]
         scaled = shaking._replace(coefficients=shaking.coefficients * factor, error=shaking.error * abs(factor))
         tables, scratch = state.new_tables(1), state.new_scratch(shaking.coefficients.shape[1])
-        here = at[chosen], x[chosen], endings[chosen]
-        march.march_each(scaled, sides[chosen], rules, tables, scratch, *here)
-        at[chosen], x[chosen], endings[chosen] = here
+        at_here, x_here, ending = at[chosen], x[chosen], endings[chosen]
+        march.march_each(scaled, sides[chosen], rules, tables, scratch, at_here, x_here, ending)
+        at[chosen], x[chosen], endings[chosen] = at_here, x_here, ending
         return len(chosen)
 
     with ThreadPoolExecutor(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None) as pool:
@@ -99,7 +102,7 @@ def simulate_pairs(
 
 
 def _tasks(factors: Floats) -> list[Integers]:
-    """Indices of the simulations that share a factor, and so a scaled motion, a few at a time."""
+    """List the simulations that share a factor, and so a scaled motion, a few at a time."""
     order = np.argsort(factors, kind="stable")
     starts = np.flatnonzero(np.diff(factors[order], prepend=np.nan) != 0.0)
     groups = np.split(order, starts[1:])

@@ -1,4 +1,4 @@
-"""Complete chattering within one response: every episode with its bracket, and how long the block rests amid the shaking."""
+"""Complete chattering in one response: each episode with its bracket, and how long the block rests amid the shaking."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class ChatteringEpisodes:
     Attributes
     ----------
     episodes : structured array
-        One row for each stretch of rocking that complete chattering ends: uplift (s; the start of the response where the
-        block was already moving); proven (time of the impact from which chattering is proven to be complete); rest, and
-        lower and upper bound on it (s); duration from uplift to rest (s); impacts resolved in it; ground acceleration at
-        rest (m/s^2).
+        One row for each stretch of rocking that complete chattering ends: uplift (s; 0 where the block was already
+        moving); proven (time of the impact from which chattering is proven to be complete, s); rest, and lower and
+        upper bound on it (s); duration from uplift to rest (s); impacts resolved in it; ground (acceleration at the
+        rest, m/s^2).
     shaking : tuple of float
         Bracketed duration: when the motion first passes a threshold of the block, and when it falls below one for the
         last time or the block has overturned, s; NaN where it never does.

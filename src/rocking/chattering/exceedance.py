@@ -41,7 +41,7 @@ def exceedances(motion: Motion, thresholds: tuple[float, float]) -> FloatArray:
 
 
 def _crossings(motion: Motion, level: float) -> FloatArray:
-    """Times among which are all those at which the motion passes a level inside a piece, s."""
+    """Find times, s, among which are all those at which the motion passes a level inside a piece."""
     widths = np.diff(motion.breakpoints)
     shifted = motion.coefficients.copy()
     shifted[:, 0] -= level

@@ -1,7 +1,7 @@
 """Families of cases with two parameters, ready for `chattering_map`.
 
-Each function returns a callable that makes a `Case` from two dimensionless numbers, the first of them the amplitude
-``a``: the motion's peak acceleration over the smallest that lifts the block (g tan(alpha), in the linear model g alpha).
+Each function returns a callable that makes a `Case` from two numbers, the first of them the amplitude ``a``: the
+motion's peak acceleration over the smallest that lifts the block (g tan(alpha), in the linear model g alpha).
 Frequencies ``omega`` are 2 pi f over the block's p (the smaller one of a two-sided block).
 """
 

@@ -37,6 +37,9 @@ class Outcome(IntEnum):
         It comes to rest only after the motion has passed a threshold for the last time.
     OVERTURNS
         It overturns without ever coming to rest.
+    UNPROVEN
+        Its first rest is not proven: double precision does not resolve the impacts, as where the motion passes a
+        threshold by no more than rounding.
     """
 
     NO_UPLIFT = 0
@@ -44,6 +47,7 @@ class Outcome(IntEnum):
     RESTS_LATER = 2
     RESTS_AT_LAST = 3
     OVERTURNS = 4
+    UNPROVEN = 5
 
 
 class _Point(NamedTuple):
@@ -84,9 +88,8 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> xr.Da
 
     Notes
     -----
-    The paper leaves this open (section 5.2): "no criteria for the appearance of complete chattering [...] exist for more
-    complicated ground excitation waveforms". Rest is proven by certificate, point by point; a point takes about a
-    quarter of a millisecond.
+    The paper leaves this open (end of its section 5.2): no criteria for complete chattering exist for waveforms other
+    than the sine. Here each rest is proven by certificate; a point takes one or two milliseconds.
 
     Examples
     --------
@@ -105,7 +108,10 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> xr.Da
     points = [_followed(family(float(one), float(other))) for one in x for other in y]
     columns = {name: np.array(column) for name, column in zip(_Point._fields, zip(*points, strict=True), strict=True)}
     attributes = {
-        "outcome": {"flag_values": [int(o) for o in Outcome], "flag_meanings": " ".join(o.name.lower() for o in Outcome)},
+        "outcome": {
+            "flag_values": [outcome.value for outcome in Outcome],
+            "flag_meanings": " ".join(outcome.name.lower() for outcome in Outcome),
+        },
         **{name: {"units": "s"} for name in ("uplift", "rest", "lower", "upper")},
     }
     dataset = xr.Dataset(
@@ -173,6 +179,8 @@ def _followed(case: Case) -> _Point:
 
 def _outcome(rest: float, later: FloatArray) -> Outcome:
     """Outcome from the upper bound on the first rest and the later times at which a threshold is passed."""
+    if math.isnan(rest):
+        return Outcome.UNPROVEN
     if rest <= later.min(initial=math.inf):
         return Outcome.COMPLETE
     return Outcome.RESTS_LATER if rest <= later.max() else Outcome.RESTS_AT_LAST

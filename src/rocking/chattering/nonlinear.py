@@ -44,8 +44,8 @@ def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayL
     Returns
     -------
     array of float
-        Ground acceleration over g tan(alpha), the block's own threshold of uplift, of the broadcast shape. To get it over
-        g alpha, as in the slender theory, multiply by tan(alpha)/alpha.
+        Ground acceleration over g tan(alpha), the block's own threshold of uplift, of the broadcast shape. Multiply by
+        tan(alpha)/alpha to get it over g alpha, as in the slender theory.
 
     Raises
     ------

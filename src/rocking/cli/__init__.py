@@ -20,6 +20,9 @@ app = App(
 for _command, _help in {
     "simulate": "Simulate one block under one record and say what happens to it.",
     "records": "List the shipped records, or show what a record file holds.",
+    "chatter": "Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.",
+    "critical": "Give the amplitude up to which chattering under a sine is complete, by every method.",
+    "paper": "Redraw the paper's figures from computation.",
 }.items():
     app.command(f"rocking.cli.{_command}:{_command}", name=_command, help=_help)
 

@@ -61,9 +61,9 @@ def arc_bounds(v: float, bounds: Bounds) -> tuple[float, float, float]:
     transcendental function.
     """
     stiff, m, M, swing, rate, leap = bounds
-    squared = stiff * v * v / (m * m)
-    if not (m > 0.0 and squared < 1.0):
+    if not (m > 0.0 and stiff * v * v < m * m):
         return np.nan, np.nan, np.nan
+    squared = stiff * v * v / (m * m)
     shortest = 2.0 * v / M * (1.0 - stiff * v * v / (3.0 * M * M))
     longest = 2.0 * v / m * (1.0 + squared / (3.0 * (1.0 - squared)))
     change = 2.0 * min(swing, rate * longest + leap) / (m * (1.0 + math.sqrt(1.0 - squared)))
@@ -125,19 +125,20 @@ def piece_range(coefficients: Floats, offset: float, window: float, A: Floats) -
         last = first + coefficients[1] * window
         rounding = _ROUNDING * (abs(coefficients[0]) + max(abs(first), abs(last)))
         return min(first, last) - rounding, max(first, last) + rounding, abs(coefficients[1]), rounding
-    degree = local_motion(coefficients, offset, 1.0, window, A)
+    columns = coefficients.shape[0]
+    local_motion(coefficients, offset, 1.0, window, A)
     low = high = A[0]
     steepest = 0.0
     power = 1.0
-    for k in range(1, degree + 1):
+    for k in range(1, columns):
         steepest += k * abs(A[k]) * power
         power *= window
         term = A[k] * power
         low += min(0.0, term)
         high += max(0.0, term)
     size, slope = sizes(coefficients, offset + window)
-    rounding = _ROUNDING * coefficients.shape[0] * size
-    return low - rounding, high + rounding, steepest + _ROUNDING * coefficients.shape[0] * slope, rounding
+    rounding = _ROUNDING * columns * size
+    return low - rounding, high + rounding, steepest + _ROUNDING * columns * slope, rounding
 
 
 @leaf

@@ -123,12 +123,13 @@ def highest(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
     for k in range(order):
         d[k] = (k + 1) * c[k + 1]
     t = 0.0
+    rising = True
     for _ in range(order):
         lead = 0
         while lead < order - 1 and d[lead] == 0.0:
             lead += 1
-        rising = d[lead] > 0.0
-        if not rising:
+        if d[lead] < 0.0:
+            rising = not rising
             for k in range(order):
                 d[k] = -d[k]
         turn = first_root(d, lead, order - 1, h - t)
@@ -196,7 +197,7 @@ def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float
         return 0.0, True
     if degree <= 1:
         rate = sign * A[1] if degree == 1 else 0.0
-        if rate > 0.0 and gap < rate * h:
+        if rate > 0.0 and gap < rate * h - _ROUNDING * threshold:
             return max(0.0, gap) / rate, False
         return np.inf, False
     d[0] = gap
@@ -209,7 +210,7 @@ def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float
 def first_passing(d: Floats, degree: int, h: float) -> float:
     """First time in [0, h) from which a polynomial, not negative before, is negative beyond rounding; inf when never.
 
-    From a root that is but a touch the search goes on with what is left once the touch is divided out. Changes ``d``.
+    From a root that is but a touch the search goes on with what is left once the root is divided out. Changes ``d``.
     """
     rounding = 0.0
     for k in range(degree, -1, -1):
@@ -228,9 +229,11 @@ def first_passing(d: Floats, degree: int, h: float) -> float:
         time = first_root(d, lead, degree, h - start)
         if not start + time < h:
             return np.inf
-        start += time
         move(d, degree, time)
+        start += time
+        if d[1] < 0.0 and d[1] * d[1] <= 2.0 * d[2] * rounding:  # a dip below zero that is lost in rounding
+            across = -2.0 * d[1] / d[2]
+            move(d, degree, across)
+            start += across
         d[0] = 0.0
-        if d[2] > 0.0 and d[1] * d[1] <= 2.0 * d[2] * rounding:  # the dip that follows is lost in rounding
-            d[1] = 0.0
     return np.inf

@@ -1,5 +1,7 @@
 """The whole response of one block to one motion: rest, uplift, arc, impact, and so on to the end."""
 
+import math
+
 import numpy as np
 
 from rocking.kernels.arc import vary_linear, vary_nonlinear
@@ -229,7 +231,7 @@ def strike(shaking: Shaking, sides: Floats, rules: Rules, tables: Tables, at: In
 def judge(
     shaking: Shaking, sides: Floats, rules: Rules, scratch: Scratch, at: Integers, x: Floats
 ) -> tuple[bool, float, float, float]:
-    """Whether the block comes to rest from this impact on: proven, imposed, or because time no longer advances.
+    """Whether the block comes to rest from this impact on: proven, imposed, or because time hardly advances any more.
 
     Returns (resting, lower and upper bound on the time that it takes, estimate of it); NaN bounds: not proven.
     """
@@ -244,8 +246,9 @@ def judge(
             return True, lower, upper, min(max(estimate, lower), upper)
     elif imposed(rules, sides[side, LIMIT], v, interval, time - x[UPLIFTED]):
         return True, lower, upper, 0.0
-    if v == 0.0 or interval <= 0.0:
-        at[STALLED] += interval <= 0.0
+    stalled = interval <= _ULP * (time + 1.0 / math.sqrt(sides[side, STIFFNESS]))
+    if v == 0.0 or stalled:
+        at[STALLED] += stalled
         at[RUN] = 0
         return True, np.nan, np.nan, 0.0
     return False, lower, upper, 0.0

@@ -175,7 +175,7 @@ def land(
     mean = 1.0 - P_there
     P_impact = P_there + dt * (D_there + dt * (0.5 * mean - dt * D_there * SIXTH))
     D_impact = D_there + dt * (mean - dt * (0.5 * D_there + dt * mean * SIXTH))
-    return t + dt, impact_speed, P_impact, D_impact, abs(dt) * (1.0 + t * abs(c2))
+    return t + dt, impact_speed, P_impact, D_impact, abs(dt) * (1.0 + abs(t * c2))
 
 
 @routine

@@ -180,7 +180,7 @@ def first_impacts(block: NDArray[np.float64]) -> None:
 @routine
 def early_pairs(block: NDArray[np.float64]) -> None:
     """One pair of impacts of every lane, for the long arcs at the start."""
-    pass_pair(block, LONG, REACH_LONG, 2)
+    pass_pair(block, LONG, REACH_LONG, 3)
 
 
 @routine
@@ -220,7 +220,9 @@ def pass_pair(block: NDArray[np.float64], order: int, reach: float, corrections:
         delta = block[_DELTA * LANES + lane]
         first, w, P, D, sound = short_arc(V, P, D, 1.0, delta, order, reach, corrections)
         x = block[_X * LANES + lane]
-        gone = block[_GONE * LANES + lane] + first
+        second = block[_GONE * LANES + lane]
+        gone = second + first
+        longer = first if first > second else second
         sound &= x + gone < math.pi
         status = block[_STATUS * LANES + lane]
         moves = sound & (status == _RUNNING)
@@ -229,7 +231,7 @@ def pass_pair(block: NDArray[np.float64], order: int, reach: float, corrections:
         block[_P * LANES + lane] = P if moves else block[_P * LANES + lane]
         block[_D * LANES + lane] = D if moves else block[_D * LANES + lane]
         block[_GONE * LANES + lane] = gone
-        block[_REACH * LANES + lane] = first * first * (1.0 + delta) if moves else 0.0
+        block[_REACH * LANES + lane] = longer * longer * (1.0 + delta) if moves else 0.0
         block[_STATUS * LANES + lane] = status if sound else max(status, _LEFT_OVER)
 
 
@@ -239,7 +241,7 @@ def short_arc(
 ) -> tuple[float, float, float, float, bool]:
     """Pass an arc with a fixed number of corrections, and tell whether these were enough."""
     t = guess_landing(V, P, D, s, delta)
-    if corrections == 2:
+    for _ in range(corrections - 1):
         t, _, _, _, _ = land(t, V, P, D, s, delta, basis(t * t, delta, order))
     landed, w, P_impact, D_impact, change = land(t, V, P, D, s, delta, basis(t * t, delta, order))
     sound = (change <= LARGEST_CORRECTION * t) & (t * t * (1.0 + delta) <= reach)

@@ -74,7 +74,7 @@ class Scratch(NamedTuple):
 STIFFNESS, SLENDERNESS, THRESHOLD, GAIN, RESTITUTION, LIMIT = range(6)
 
 # Integers of the state. RUN counts the impacts since chattering was proven, SMOOTH marks an uplift that is not a
-# jump, STALLED counts the rests brought about only because time did not advance from one impact to the next.
+# jump, STALLED counts the rests brought about only because time hardly advanced from one impact to the next.
 PIECE, SIDE, NODES, IMPACTS, EVENTS, SEQUENCES, RUN, SMOOTH, STALLED, UPLIFTS = range(10)
 
 # Floats of the state: position in the motion, rotation, its rate, their variations, times of the last uplift, impact

@@ -107,13 +107,14 @@ def surface_figure(*, omega: FloatArray, eta: FloatArray, exact: FloatArray, fit
         surface.set_title(r"(a) critical amplitude $a_{cr}$", loc="left")
         surface.set_ylabel(r"coefficient of restitution, $\eta$")
         percent = 100.0 * (fitted / exact - 1.0)
-        steps = np.array([-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0])
+        steps = np.array([-0.5, -0.25, 0.0, 0.25, 0.5, 1.0])
         shades = error.contourf(
             omega, eta, np.abs(percent).T, levels=[0.0, 0.1, 0.25, 0.5, 1.0, 2.0], cmap="Greys", vmax=3.0
         )
         shades.set_edgecolor("face")
         lines = error.contour(omega, eta, percent.T, levels=steps, colors=INK, linewidths=0.6)
-        _label(error.clabel(lines, fmt="%g", fontsize=7))
+        for text in error.clabel(lines, fmt="%g", fontsize=7):
+            text.set_clip_on(True)
         error.set_title("(b) error of Eq. 76, %", loc="left")
         for axes in (surface, error):
             axes.set_xlabel(r"frequency, $\omega = \omega_g / p$")

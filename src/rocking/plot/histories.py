@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-import numpy as np
-
 from rocking.plot.style import ABOVE, GROUND, INK, STYLE, FloatArray
 
 if TYPE_CHECKING:
@@ -18,8 +16,11 @@ _SCHEMES: Final[tuple[dict[str, Any], ...]] = (
     {"color": GROUND, "linewidth": 3.0},
     {"color": INK, "linewidth": 1.1},
     {"color": ABOVE, "linewidth": 1.3, "linestyle": (0, (4, 2))},
-    {"color": "#3c6aa0", "linewidth": 1.4, "linestyle": (0, (1, 1))},
+    {"color": "#3c6aa0", "linewidth": 1.8, "linestyle": (0, (1, 1))},
 )
+
+
+_MARK: Final[dict[str, Any]] = {"color": ABOVE, "markersize": 4.5, "markeredgewidth": 0.0, "zorder": 4}
 
 
 class Detail(NamedTuple):
@@ -31,14 +32,14 @@ class Detail(NamedTuple):
 
 
 class Mark(NamedTuple):
-    """An instant that is marked, with a text to the left of it."""
+    """An instant that is marked, with a text above it."""
 
     time: float
     text: str
 
 
 def excitation_figure(
-    *, time: FloatArray, acceleration: FloatArray, uplifts: FloatArray, rest: float, title: str
+    *, time: FloatArray, acceleration: FloatArray, marks: tuple[Mark, ...], rest: float, title: str
 ) -> Figure:
     """Draw a sine with the thresholds, its exceedances, the first two initiations and the time to the first rest.
 
@@ -46,8 +47,8 @@ def excitation_figure(
     ----------
     time, acceleration : ndarray, shape (n,)
         Time over the period and ground acceleration over g alpha.
-    uplifts : ndarray
-        Times at which a resting block is lifted, over the period.
+    marks : tuple of Mark, length 2
+        The first two initiations.
     rest : float
         Time of the first rest, over the period.
     title : str
@@ -64,9 +65,8 @@ def excitation_figure(
         figure = Figure(figsize=(7.0, 2.9), layout="constrained")
         axes = figure.add_subplot()
         _draw_excitation(axes, time, acceleration)
-        for at, text in zip(uplifts, ("1st initiation", "2nd initiation"), strict=False):
-            _mark(axes, Mark(float(at), text), 1.08)
-        first, second = uplifts[:2]
+        _mark_initiations(axes, marks)
+        first, second = (mark.time for mark in marks)
         for end, height, text in ((rest, 0.0, r"$\tau_{ch}$"), (second, -0.45, "$T/2$")):
             axes.annotate("", (end, height), (first, height), arrowprops={"arrowstyle": "<->", "linewidth": 0.8})
             axes.annotate(
@@ -74,11 +74,10 @@ def excitation_figure(
             )
         axes.plot([rest, rest], [-0.75, 0.1], color=ABOVE, linewidth=0.9, linestyle=(0, (4, 2)))
         axes.annotate("at rest", (rest, -0.75), xytext=(-3, 0), textcoords="offset points", ha="right", color=ABOVE)
-        axes.set_ylim(-1.35, 1.45)
         axes.set_xlim(time[0], time[-1])
         axes.set_title(title, loc="left")
         axes.set_xlabel("time over period, $t/T$")
-        axes.legend(loc="upper right", ncols=2)
+        axes.legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.04))
     return figure
 
 
@@ -117,6 +116,7 @@ def history_figure(
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.0, 4.6), layout="constrained")
@@ -126,17 +126,21 @@ def history_figure(
         response.set_ylim(*(1e3 * limit for limit in limits))
         response.set_ylabel(r"rotation, $10^3\,\theta/\alpha$")
         response.set_title(title, loc="left")
-        for mark in marks:
-            _mark(response, mark, 0.0)
+        highest = 1e3 * max(float(rotation.max()) for rotation in rotations.values())
+        response.set_yticks([tick for tick in response.get_yticks() if 1e3 * limits[0] <= tick <= highest])
+        response.plot([mark.time for mark in marks], [0.0] * len(marks), "^", **_MARK)
         inset = response.inset_axes(detail.place)
         _draw_responses(inset, time, rotations)
         inset.set_xlim(*detail.time)
         inset.set_ylim(*(1e3 * limit for limit in detail.rotation))
         inset.tick_params(labelsize=7)
+        inset.yaxis.tick_right()
+        inset.xaxis.set_major_locator(MaxNLocator(6))
         for spine in inset.spines.values():
             spine.set_visible(True)
-        response.indicate_inset_zoom(inset, edgecolor=INK, linewidth=0.6)
+        response.indicate_inset_zoom(inset, edgecolor=INK, linewidth=0.6, zorder=0.5)
         _draw_excitation(excitation, time, acceleration)
+        _mark_initiations(excitation, marks)
         excitation.set_xlabel("time over period, $t/T$")
         figure.legend(*response.get_legend_handles_labels(), loc="outside lower center", ncols=len(rotations))
     return figure
@@ -159,14 +163,17 @@ def _draw_excitation(axes: Axes, time: FloatArray, acceleration: FloatArray) -> 
     axes.set_ylabel(r"$\ddot u_g / (g\alpha)$")
 
 
-def _mark(axes: Axes, mark: Mark, height: float) -> None:
-    axes.plot(mark.time, height, "^", color=ABOVE, markersize=5.0, markeredgewidth=0.0, zorder=4)
-    axes.annotate(
-        mark.text,
-        (mark.time, height),
-        xytext=(-4, 4),
-        textcoords="offset points",
-        ha="right",
-        color=ABOVE,
-        fontsize=7.5,
-    )
+def _mark_initiations(axes: Axes, marks: tuple[Mark, ...]) -> None:
+    axes.set_ylim(-1.35, 1.75)
+    axes.set_yticks([-1.0, 0.0, 1.0])
+    for mark in marks:
+        axes.plot(mark.time, 1.12, "v", **_MARK)
+        axes.annotate(
+            mark.text,
+            (mark.time, 1.12),
+            xytext=(0, 4),
+            textcoords="offset points",
+            ha="center",
+            color=ABOVE,
+            fontsize=7.5,
+        )

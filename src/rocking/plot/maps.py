@@ -13,8 +13,8 @@ from rocking.plot.style import STYLE, FloatArray
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: From harmless to the worst; each is darker than the one before.
-_COLOURS: Final = ("#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47")
+#: From harmless to the worst, each darker than the one before; the last stands out.
+_COLOURS: Final = ("#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a23c")
 
 
 def outcome_figure(
@@ -27,7 +27,7 @@ def outcome_figure(
     y_label: str,
     title: str,
 ) -> Figure:
-    """Draw which of up to five outcomes each point of a grid has.
+    """Draw which of up to six outcomes each point of a grid has.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def outcome_figure(
     outcome : ndarray of int, shape (len(y), len(x))
         Number of the outcome at each point.
     meanings : sequence of str
-        What the outcomes 0, 1, ... mean, from the lightest colour to the darkest.
+        What the outcomes 0, 1, ... mean, from the lightest colour to the darkest; the last stands out.
     x_label, y_label, title : str
         Texts.
 

@@ -1,4 +1,4 @@
-"""The block and the excitation of the paper's Figs 2, 4 and 9 to 11: p = 1 rad/s, alpha = 0.2, eta = 0.92, omega = 2."""
+"""Block and excitation of the paper's Figs 2, 4 and 9 to 11: p = 1 rad/s, alpha = 0.2, eta = 0.92, omega = 2."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def simulated(a: float, treatment: str | Treatment) -> Response:
 
 
 def dense_times(impacts: FloatArray, end: float, *, shortest: float = 0.0) -> FloatArray:
-    """Times from 0 to the end: even ones, and some within each arc that is not shorter than the shortest."""
+    """Lay times from 0 to the end: even ones, and some within each arc that is not shorter than the shortest."""
     marks = np.concatenate([[0.0], impacts[impacts < end], [end]])
     lengths = np.diff(marks)
     long = lengths >= shortest

@@ -64,8 +64,10 @@ def figure_6() -> PaperFigure:
     statements = (
         Statement("a_cr rises as eta falls, at every omega", "yes", _yes(rising)),
         Statement("the influence of omega falls as eta rises", "yes", _yes(bool((np.diff(spread) < 0.0).all()))),
-        Statement(f"spread of a_cr over omega for eta > {_PRACTICAL:g}, %", '"independent"', float(practical.max())),
-        Statement("largest error of Eq. 76, %", "none given", 100.0 * float(error[worst])),
+        Statement(
+            f"spread of a_cr over omega for eta > {_PRACTICAL:g}, %", '"independent"', float(practical.max()), digits=3
+        ),
+        Statement("largest error of Eq. 76, %", "none given", 100.0 * float(error[worst]), digits=3),
         Statement(
             f"Eq. 76 there, at omega = {_FREQUENCIES[worst[0]]:g}, eta = {_RESTITUTIONS[worst[1]]:g}",
             float(fitted[worst]),
@@ -88,7 +90,7 @@ def figure_7() -> PaperFigure:
     critical = {name: critical_amplitude(_FREQUENCIES, ETA, method=name) for name in labels}
     exact = critical["exact"]
     statements = (
-        Statement("spread of a_cr from omega = 0.5 to 8, %", 0.5, float(_spread(exact[:, np.newaxis])[0])),
+        Statement("spread of a_cr from omega = 0.5 to 8, %", 0.5, float(_spread(exact[:, np.newaxis])[0]), digits=3),
         Statement("a_cr at omega = 0.5 (paper: Eq. 76)", float(critical["eq76"][0]), float(exact[0])),
         Statement("a_cr at omega = 8 (paper: Eq. 76)", float(critical["eq76"][-1]), float(exact[-1])),
         Statement(
@@ -127,19 +129,23 @@ def _duration_statements(critical: float) -> tuple[Statement, ...]:
             "vertical asymptote at a = 1: tau_ch goes like a - 1 to the power",
             "below 1",
             _exponent(_over_half_period(starts, "exact")),
+            digits=4,
         ),
         Statement(
             "vertical asymptote at a_cr: T/2 - tau_ch goes like a_cr - a to the power",
             "below 1",
             _exponent(1.0 - _over_half_period(ends, "exact")),
+            digits=4,
         ),
         Statement(
             "Eq. 65 at a_cr, over T/2 (exact: 1)",
             '"fails"',
             float(_over_half_period(np.array([critical]), "asymptotic")[0]),
         ),
-        Statement("largest error of Eq. 65 up to 90 % of the way to a_cr, %", '"almost perfectly"', asymptotic),
-        Statement("the same of Eq. 75 with 60 impacts resolved, %", '"remarkable agreement"', semianalytical),
+        Statement(
+            "largest error of Eq. 65 up to 90 % of the way to a_cr, %", '"almost perfectly"', asymptotic, digits=3
+        ),
+        Statement("the same of Eq. 75 with 60 impacts resolved, %", '"remarkable agreement"', semianalytical, digits=2),
         Statement("tau_ch/(T/2) at a = 1.03, eta = 0.92", '"solely on a and eta"', by_frequency),
     )
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 #: Columns of equal length by name; a name ends in its unit where there is one.
 Table = Mapping[str, NDArray[np.generic]]
 
-_DOTS_PER_INCH: Final = 150
+_DOTS_PER_INCH: Final = 200
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,14 @@ class Statement:
         The paper's number or words.
     here : float or str
         Ours.
+    digits : int
+        Significant digits worth writing.
     """
 
     claim: str
     paper: float | str
     here: float | str
+    digits: int = 7
 
     @property
     def difference(self) -> float | None:
@@ -46,6 +49,19 @@ class Statement:
         if isinstance(self.paper, str) or isinstance(self.here, str):
             return None
         return self.here - self.paper
+
+    def shown(self) -> str:
+        """One line: paper, here, difference."""
+        paper, here, difference = self.cells()
+        return f"{paper} in the paper, {here} here{difference and f', {difference}'}"
+
+    def cells(self) -> tuple[str, str, str]:
+        """Paper, here and difference as texts."""
+        difference = "" if self.difference is None else f"{self.difference:+.2g}"
+        return self._written(self.paper), self._written(self.here), difference
+
+    def _written(self, value: float | str) -> str:
+        return value if isinstance(value, str) else f"{value:.{self.digits}g}"
 
 
 @dataclass(frozen=True, eq=False)

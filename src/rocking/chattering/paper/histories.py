@@ -48,7 +48,7 @@ class _View(NamedTuple):
 _VIEWS: Final = {
     9: _View((-1.15e-3, 2.7e-3), Detail((0.44, 0.6), (-1.5e-4, 1.5e-4), (0.3, 0.66, 0.62, 0.32))),
     10: _View((-1.15e-3, 2.7e-3), Detail((0.552, 0.574), (-3e-6, 3e-6), (0.3, 0.66, 0.62, 0.32))),
-    11: _View((-17e-3, 9.5e-3), Detail((0.36, 0.8), (-1.6e-3, 1.6e-3), (0.06, 0.07, 0.4, 0.36))),
+    11: _View((-17e-3, 9.5e-3), Detail((0.36, 0.8), (-1.6e-3, 1.6e-3), (0.06, 0.13, 0.38, 0.34))),
 }
 
 
@@ -71,7 +71,7 @@ def figure_4() -> PaperFigure:
             excitation_figure,
             time=time,
             acceleration=acceleration,
-            uplifts=uplifts,
+            marks=_initiations({"certified": response}),
             rest=float(rests[0]),
             title=_title(_COMPLETE),
         ),
@@ -105,7 +105,10 @@ def figure_10() -> PaperFigure:
                 f"{_words(name)}: rests in 2.5 T (certified: {_rests(certified)})", "shown", float(_rests(response))
             ),
             Statement(
-                f"{_words(name)}: first rest, after certified, s", '"properly"', _first(response) - _first(certified)
+                f"{_words(name)}: first rest, after certified, s",
+                '"properly"',
+                _first(response) - _first(certified),
+                digits=3,
             ),
         ]
     return _history(10, "complete chattering by both schemes", _COMPLETE, responses, tuple(statements))
@@ -127,6 +130,7 @@ def figure_11() -> PaperFigure:
             f"{_words('veltol_5e-2')}: peak rotation over the certified one",
             '"completely different"',
             coarse.peak_rotation / certified.peak_rotation,
+            digits=4,
         ),
     )
     return _history(11, "incomplete chattering, and a wrong rest", _INCOMPLETE, responses, statements)

@@ -1,0 +1,88 @@
+"""Intensity measures of a motion, and those that count it in a block's own units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from rocking.block import Block, Blocks
+from rocking.errors import InvalidOption
+from rocking.kernels.state import Floats
+from rocking.motion.motion import Motion
+from rocking.problem import Model
+
+MeasureName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
+
+_UNITS: Final[dict[str, str]] = {"pga": "m/s^2", "pgv": "m/s", "sa": "m/s^2", "pga_ratio": "1", "pgv_ratio": "1"}
+
+
+@dataclass(frozen=True)
+class Measure:
+    """How intensity is measured.
+
+    Parameters
+    ----------
+    name : {"pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
+        Peak acceleration (m/s^2), peak velocity (m/s), spectral acceleration (m/s^2); or a block's own dimensionless
+        ones: peak acceleration over the smallest that lifts it, PGA/(g tan alpha), and peak velocity over that
+        acceleration in the block's time, p PGV/(g tan alpha). In the linear model alpha stands for tan alpha.
+    period, damping : float
+        Oscillator of "sa": s, and fraction of critical.
+
+    Raises
+    ------
+    InvalidOption
+        If there is no such measure, or `period` is missing or out of place.
+    """
+
+    name: MeasureName
+    period: float | None = None
+    damping: float = 0.05
+
+    def __post_init__(self) -> None:
+        if self.name not in get_args(MeasureName):
+            raise InvalidOption(f"measure must be one of {', '.join(get_args(MeasureName))}, not {self.name!r}")
+        if (self.name == "sa") != (self.period is not None):
+            raise InvalidOption('period= (s) goes with measure="sa", and only with it')
+
+    @property
+    def units(self) -> str:
+        """Units of the measure; "1" if it has none."""
+        return _UNITS[self.name]
+
+    @property
+    def label(self) -> str:
+        """Name and units for a figure."""
+        if self.name == "sa":
+            return f"spectral acceleration at {self.period:g} s (m/s²)"
+        return {
+            "pga": "peak ground acceleration (m/s²)",
+            "pgv": "peak ground velocity (m/s)",
+            "pga_ratio": "PGA / (g tan α)",
+            "pgv_ratio": "p PGV / (g tan α)",
+        }[self.name]
+
+    @property
+    def of_motion(self) -> Literal["pga", "pgv", "sa"]:
+        """Measure of the motion alone that this one counts."""
+        return "sa" if self.name == "sa" else "pga" if self.name.startswith("pga") else "pgv"
+
+    def of(self, motion: Motion) -> float:
+        """Measure of the motion alone, in SI units."""
+        if self.of_motion == "sa":
+            assert self.period is not None
+            return motion.spectral_acceleration(self.period, self.damping)
+        return motion.pga if self.of_motion == "pga" else motion.pgv
+
+    def unit_of(self, blocks: Blocks, model: Model) -> Floats:
+        """Return what counts as 1 for each block, in SI units: the block's own unit, or 1."""
+        if self.units != "1":
+            return np.ones(len(blocks))
+        lifting = np.array([min(block.uplift_thresholds(model)) for block in blocks])
+        return lifting if self.name == "pga_ratio" else lifting / blocks.p.min(axis=1)
+
+    def options(self) -> dict[str, float]:
+        """Further arguments of `simulate_many` and `Motion.scaled`."""
+        return {} if self.period is None else {"period": self.period, "damping": self.damping}

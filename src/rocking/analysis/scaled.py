@@ -1,0 +1,72 @@
+"""Every block under every motion, scaled to levels of an intensity measure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rocking.analysis.measures import Measure
+from rocking.block import Block, Blocks
+from rocking.ensemble import simulate_many
+from rocking.errors import InvalidMotion, InvalidOption
+from rocking.kernels.state import Floats
+from rocking.motion.motion import Motion
+from rocking.problem import Model
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def several_blocks(blocks: Blocks | Block | Sequence[Block]) -> Blocks:
+    """Blocks as a struct of arrays."""
+    if isinstance(blocks, Blocks):
+        return blocks
+    return Blocks.of([blocks] if isinstance(blocks, Block) else blocks)
+
+
+def several_motions(motions: Motion | Sequence[Motion], measure: Measure) -> tuple[list[Motion], Floats]:
+    """Motions and their measures.
+
+    Raises
+    ------
+    InvalidOption
+        If there is none.
+    InvalidMotion
+        If one is zero throughout.
+    """
+    shaken = [motions] if isinstance(motions, Motion) else list(motions)
+    if not shaken:
+        raise InvalidOption("motions must hold at least one motion")
+    values = np.array([measure.of(motion) for motion in shaken])
+    if not np.all(values > 0.0):
+        raise InvalidMotion(f"{shaken[int(np.argmin(values))].name} is zero throughout and has no intensity")
+    return shaken, values
+
+
+def simulate_levels(
+    blocks: Blocks, motions: Sequence[Motion], measure: Measure, levels: Floats, *, model: Model, **options: Any
+) -> xr.Dataset:
+    """Simulate every block under every motion at every level; as `simulate_many`, with the dimension ``level``.
+
+    Parameters
+    ----------
+    blocks, motions, model, **options
+        As for `simulate_many`.
+    measure : Measure
+        What the motions are scaled to; one that counts in a block's own unit scales them for each block.
+    levels : ndarray
+        Levels of the measure.
+    """
+    import xarray as xr
+
+    units = measure.unit_of(blocks, model)
+    groups = [np.flatnonzero(units == unit) for unit in np.unique(units)]
+    parts = []
+    for group in groups:
+        targets = {measure.of_motion: levels * units[group[0]], **measure.options()}
+        parts.append(simulate_many(blocks.select(group), motions, model=model, **targets, **options))
+        parts[-1] = parts[-1].assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units}))
+    whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
+    return whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")

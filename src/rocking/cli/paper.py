@@ -1,0 +1,28 @@
+"""`rocking paper`: the paper's figures, redrawn from computation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rocking.chattering.paper import FIGURES, paper_figure
+from rocking.cli import options
+
+
+def paper(*, out: Path, figure: int | None = None) -> None:
+    """Redraw the paper's figures from computation: PDF, PNG, the data as CSV, and what the paper states in numbers.
+
+    Parameters
+    ----------
+    out
+        Folder for the files.
+    figure
+        Number of one figure; all of them by default.
+    """
+    folder = options.output_folder(out)
+    for number in FIGURES if figure is None else [figure]:
+        drawn = paper_figure(number)
+        print(f"Fig. {drawn.number}: {drawn.title}")
+        for statement in drawn.statements:
+            print(f"  {statement.claim}: {statement.shown()}")
+        for path in drawn.write(folder):
+            print(f"  {path}")
