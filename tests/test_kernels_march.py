@@ -338,13 +338,45 @@ def test_every_march_ends_and_stays_sound(case: dict[str, object]) -> None:
 def assert_traced_well(found: Run) -> None:
     """Continuous across the nodes, zero at impacts, with the velocities of the impact table, and never NaN."""
     nodes, impacts = found.nodes, found.impacts
-    times = np.linspace(0.0, found.x[state.END], 400)
-    assert np.all(np.isfinite(found.traced(times)))
-    rocking = np.flatnonzero((nodes[:-1, 3] != 0.0) & (nodes[1:, 3] != 0.0) & (nodes[1:, 0] > nodes[:-1, 0]))
-    left, right = found.traced(nodes[rocking + 1, 0], rocking), found.traced(nodes[rocking + 1, 0], rocking + 1)
-    p = np.sqrt(np.max(found.trail.sides[:, 0]))
-    struck = np.isin(rocking + 1, np.searchsorted(nodes[:, 0], impacts[:, 0], side="left")) | (
-        nodes[rocking, 3] != nodes[rocking + 1, 3]
-    )
-    rounding = 1e-14 * (1.0 + nodes[rocking + 1, 0])[~struck] * (1.0 + np.abs(right[~struck]).T @ [1.0, 1.0 / p, 0.0] if False else 1.0)
-    assert np.all(np.abs(left[~struck, 0] - right[~struck, 0]) <= rounding)
+    assert np.all(np.isfinite(found.traced(np.linspace(0.0, found.x[state.END], 400))))
+    steps = np.flatnonzero((nodes[:-1, 3] != 0.0) & (nodes[1:, 3] != 0.0))
+    ends = nodes[steps + 1, 0]
+    left, right = found.traced(ends, steps), found.traced(ends, steps + 1)
+    jump = np.abs(left - right)
+    span = ends - nodes[steps, 0] + ends
+    impact = np.isin(ends, impacts[:, 0])
+    smooth = ~impact
+    size = np.abs(left) + np.abs(right)
+    assert np.all(jump[smooth, 0] <= 1e-14 * (size[:, 0] + size[:, 1] * span)[smooth])
+    assert np.all(jump[smooth, 1] <= 1e-14 * (size[:, 1] + size[:, 2] * span)[smooth])
+    rows = impacts[np.searchsorted(impacts[:, 0], ends[impact])]
+    for rotation, velocity, speed in ((*left[impact, :2].T, rows[:, 2]), (*right[impact, :2].T, rows[:, 3])):
+        assert np.all(np.abs(rotation) <= 1e-15 * ends[impact] * speed + 1e-14 * speed * (span - ends)[impact])
+        assert np.all(np.abs(velocity - rows[:, 1] * speed) <= 1e-14 * (speed + (size[:, 2] * span)[impact]))
+
+
+@pytest.mark.parametrize("nonlinear", [False, True])
+@pytest.mark.parametrize("columns", [2, 5])
+def test_the_trace_is_continuous_and_agrees_with_the_impacts(nonlinear: bool, columns: int) -> None:
+    for seed in range(3):
+        shaking = record(seed)
+        rows = np.zeros((len(shaking.coefficients), columns))
+        rows[:, :2] = shaking.coefficients
+        found = run(shaking._replace(coefficients=rows), nonlinear=nonlinear)
+        assert len(found.impacts) > 10
+        assert_sound(found)
+        assert_traced_well(found)
+
+
+def test_the_trace_lies_still_between_the_last_arc_resolved_and_rest() -> None:
+    found = run(FREE, velocity=0.1)
+    last, rest = found.impacts[-1, 0], found.events[-1, 0]
+    assert np.all(found.traced(np.linspace(last, rest, 9)[1:]) == 0.0)
+    assert np.all(found.traced(np.linspace(found.impacts[-2, 0], last, 9)[1:-1])[:, 0] != 0.0)
+
+
+def test_the_trace_does_not_depend_on_the_order_of_the_times() -> None:
+    found = run(record(2), nonlinear=True)
+    times = np.linspace(0.0, found.x[state.END], 500)
+    shuffled = np.random.default_rng(0).permutation(500)
+    assert_array_equal(found.traced(times[shuffled]), found.traced(times)[shuffled])

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rocking.analysis.dynamic import dynamic_figure, incremental_dynamic_analysis
-    from rocking.analysis.fragility_function import Fragility, FragilityCurve, fit_fragility, fragility
+    from rocking.analysis.fragility_curve import Fragility, FragilityCurve
+    from rocking.analysis.fragility_function import fit_fragility, fragility
     from rocking.analysis.overturning import mode_name, overturning_figure, overturning_map
     from rocking.analysis.spectrum import rocking_spectrum, spectrum_figure
 
@@ -27,8 +28,8 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Fragility": "fragility_function",
-    "FragilityCurve": "fragility_function",
+    "Fragility": "fragility_curve",
+    "FragilityCurve": "fragility_curve",
     "dynamic_figure": "dynamic",
     "fit_fragility": "fragility_function",
     "fragility": "fragility_function",

@@ -192,7 +192,7 @@ def _until_overturned(
 
     whole: list[xr.Dataset] = []
     for start in range(0, _MOST, _CHUNK):
-        levels = first * _STEP ** np.arange(start, start + _CHUNK)
+        levels = first * np.power(_STEP, np.arange(start, start + _CHUNK, dtype=np.float64))
         whole.append(simulate_levels(blocks, motions, measure, levels, **options))
         fell = xr.concat([part.overturned for part in whole], "level")
         lowest = fell.level.where(fell).min("level")

@@ -7,7 +7,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from rocking.block import Block, Blocks
+from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
@@ -51,6 +51,11 @@ class Measure:
     def units(self) -> str:
         """Units of the measure; "1" if it has none."""
         return _UNITS[self.name]
+
+    @property
+    def column(self) -> str:
+        """Name with units for a table."""
+        return {"pga": "pga_m_per_s2", "pgv": "pgv_m_per_s", "sa": "sa_m_per_s2"}.get(self.name, self.name)
 
     @property
     def label(self) -> str:

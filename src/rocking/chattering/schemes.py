@@ -93,7 +93,7 @@ class SchemeOutcome:
         if self.missed.size:
             faults.append(f"{_count(self.missed.size, 'rest')} missed, the first at {self.missed[0]:.6f} s")
         if self.overturns_wrongly:
-            faults.append("overturns" if self.response.overturned else "does not overturn")
+            faults.append("overturns, wrongly" if self.response.overturned else "does not overturn, wrongly")
         if self.response.stalled:
             faults.append(f"{_count(self.response.stalled, 'rest')} only as time no longer advanced")
         return "; ".join(faults) or "every rest found, no other"

@@ -15,7 +15,7 @@ import numpy as np
 
 from rocking.kernels.arc import local_motion
 from rocking.kernels.compiled import leaf, routine
-from rocking.kernels.state import GAIN, RESTITUTION, STIFFNESS, THRESHOLD, Floats, Shaking
+from rocking.kernels.state import GAIN, RESTITUTION, SLENDERNESS, STIFFNESS, THRESHOLD, Floats, Shaking
 
 #: What is known of one side over a window, see `arc_bounds`.
 Bounds = tuple[float, float, float, float, float, float]
@@ -71,11 +71,22 @@ def arc_bounds(v: float, bounds: Bounds) -> tuple[float, float, float]:
 
 
 @leaf
-def remaining_time(v: float, g_i: float, g_j: float, rate_i: float, rate_j: float, e_i: float, e_j: float) -> float:
-    """Time to rest to second order in the speed, for restoring accelerations g_j and their rates of change.
+def remaining_time(
+    v: float,
+    g_i: float,
+    g_j: float,
+    rate_i: float,
+    rate_j: float,
+    stiff_i: float,
+    stiff_j: float,
+    e_i: float,
+    e_j: float,
+) -> float:
+    """Time to rest, for restoring accelerations g at zero rotation that change at a rate, and fall by stiff times u.
 
-    The first order is the paper's Eq. 75 (a geometric sum); the second lets the accelerations change linearly in
-    time: T_i(v, t) = A_i v + B_i v^2 solved from T_i = (arc) + T_j(next impact).
+    The first order in the speed is the paper's Eq. 75 (a geometric sum); the second lets the accelerations change
+    linearly in time: T_i(v, t) = A_i v + B_i v^2 solved from T_i = (arc) + T_j(next impact). Of the third order only
+    what stiff adds to every arc is kept, the whole of it under a constant acceleration.
     """
     pair = e_i * e_j
     A_i = 2.0 * (1.0 / g_i + e_i / g_j) / (1.0 - pair)
@@ -85,7 +96,8 @@ def remaining_time(v: float, g_i: float, g_j: float, rate_i: float, rate_j: floa
     own_i = -4.0 / 3.0 * rate_i / g_i**3 + e_i * (2.0 / 3.0 * A_j * rate_i / g_i**2 + 2.0 * drift_j / g_i)
     own_j = -4.0 / 3.0 * rate_j / g_j**3 + e_j * (2.0 / 3.0 * A_i * rate_j / g_j**2 + 2.0 * drift_i / g_j)
     B_i = (own_i + e_i * e_i * own_j) / (1.0 - pair * pair)
-    return v * (A_i + v * B_i)
+    C_i = 2.0 / 3.0 * (stiff_i / g_i**3 + e_i**3 * stiff_j / g_j**3) / (1.0 - pair**3)
+    return v * (A_i + v * (B_i + v * C_i))
 
 
 @routine
@@ -231,13 +243,31 @@ def motion_slope(shaking: Shaking, piece: int, offset: float) -> float:
 
 
 @leaf
-def time_to_rest(shaking: Shaking, sides: Floats, v: float, i: int, piece: int, offset: float) -> float:
+def time_to_rest(
+    shaking: Shaking, sides: Floats, nonlinear: bool, v: float, i: int, piece: int, offset: float
+) -> float:
     """Estimate of the time to rest from an impact that enters side i with speed v (`remaining_time`)."""
     j = 1 - i
     here = motion_at(shaking, piece, offset) * shaking.inverse_g
     slope = motion_slope(shaking, piece, offset) * shaking.inverse_g
     sign = 1.0 - 2.0 * i
     return remaining_time(
-        v, restoring(sides, i, here), restoring(sides, j, here),
-        sides[i, GAIN] * sign * slope, -sides[j, GAIN] * sign * slope, sides[i, RESTITUTION], sides[j, RESTITUTION],
-    )  # fmt: skip
+        v,
+        restoring(sides, i, here),
+        restoring(sides, j, here),
+        sides[i, GAIN] * sign * slope,
+        -sides[j, GAIN] * sign * slope,
+        stiffness_at_rest(sides, i, nonlinear, sign * here),
+        stiffness_at_rest(sides, j, nonlinear, -sign * here),
+        sides[i, RESTITUTION],
+        sides[j, RESTITUTION],
+    )
+
+
+@leaf
+def stiffness_at_rest(sides: Floats, j: int, nonlinear: bool, push: float) -> float:
+    """Rate at which side j's restoring acceleration falls with rotation, at zero rotation; push = j a/g."""
+    if not nonlinear:
+        return sides[j, STIFFNESS]
+    alpha = sides[j, SLENDERNESS]
+    return sides[j, STIFFNESS] * (math.cos(alpha) - push * math.sin(alpha))

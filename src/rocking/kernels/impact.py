@@ -13,16 +13,31 @@ from rocking.kernels.arc import (
     local_motion,
     move,
 )
-from rocking.kernels.chatter import motion_at, piece_range, restoring
+from rocking.kernels.chatter import motion_at, motion_slope, piece_range, restoring
 from rocking.kernels.compiled import leaf, routine
 from rocking.kernels.root import curvature_bound, first_root
-from rocking.kernels.state import AT_REST, ORDER, SLENDERNESS, STIFFNESS, THRESHOLD, Floats, Rules, Scratch, Shaking
+from rocking.kernels.state import (
+    AT_REST,
+    GAIN,
+    ORDER,
+    SLENDERNESS,
+    STIFFNESS,
+    THRESHOLD,
+    Floats,
+    Rules,
+    Scratch,
+    Shaking,
+)
 from rocking.kernels.status import IMPACT, OVERTURN, STEP
 
 QUARTER_TURN = 0.5 * math.pi
 
 #: First step from an impact, over the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
+
+#: Largest (p t)^2 for which the terms of `short_series` are enough, and the most Newton steps of `short_arc`.
+_SHORT = 2e-3
+_NEWTON_STEPS = 6
 
 #: Accelerations closer to a threshold than this fraction of it are at the threshold.
 _ROUNDING = 2.0**-48
@@ -70,6 +85,53 @@ def expand(
         expand_linear(u, v, stiffness, slenderness, A, degree, ORDER, c)
         order, h = converged(c, degree, h)
     return order, h, degree
+
+
+@leaf
+def short_arc(
+    shaking: Shaking, sides: Floats, side: int, piece: int, offset: float, v: float, left: float
+) -> tuple[float, float, float]:
+    """Whole arc of the linear model from an impact to the next, where it is short and ends within the piece.
+
+    Returns (duration, speed at its end, bound on its height); NaN where it is not that simple. The series is that of
+    `expand_linear`, in registers. With u = c1 t + c2 t^2 + ..., all even coefficients are negative, and the odd ones
+    from c3 on have its sign, so that u/t falls all the way where 2 c2 + 4.04 max(c3, 0) t < 0: Newton's root is the
+    first. Where u'' < 0 throughout, the arc lies below its tangents at both ends, which bounds its height.
+    """
+    lam = sides[side, STIFFNESS]
+    g = restoring(sides, side, motion_at(shaking, piece, offset) * shaking.inverse_g)
+    rate = sides[side, GAIN] * (1.0 - 2.0 * side) * motion_slope(shaking, piece, offset) * shaking.inverse_g
+    c2 = -0.5 * g
+    c3 = (lam * v - rate) * (1.0 / 6.0)
+    root = c2 * c2 - 4.0 * c3 * v
+    if not (g > 0.0 and root > 0.0):
+        return np.nan, np.nan, np.nan
+    t = 2.0 * v / (math.sqrt(root) - c2)
+    simple = t < left and lam * t * t < _SHORT and c2 + 2.02 * max(c3, 0.0) * t < 0.0
+    if not (simple and lam * v * t + max(-rate, 0.0) * t < g):
+        return np.nan, np.nan, np.nan
+    for _ in range(_NEWTON_STEPS):
+        f, slope = short_series(v, c2, c3, lam, t)
+        step = f / slope
+        t -= step
+        if abs(step) < 1e-8 * t:
+            break
+    if not t < left:
+        return np.nan, np.nan, np.nan
+    _, slope = short_series(v, c2, c3, lam, t)
+    speed = -t * slope  # u' = u/t + t (u/t)', and u = 0
+    return t, speed, v * speed * t / (v + speed)
+
+
+@leaf
+def short_series(v: float, c2: float, c3: float, lam: float, t: float) -> tuple[float, float]:
+    """u/t and its slope, for c[k + 2] = lam c[k]/((k + 1)(k + 2)) from c2 and c3 on and (p t)^2 <= _SHORT."""
+    x = lam * t * t
+    even = c2 * (1.0 + x * (1.0 / 12.0 + x * (1.0 / 360.0 + x * (1.0 / 20160.0))))
+    odd = c3 * (1.0 + x * (1.0 / 20.0 + x * (1.0 / 840.0 + x * (1.0 / 60480.0))))
+    even_slope = c2 * (1.0 + x * (1.0 / 4.0 + x * (1.0 / 72.0 + x * (1.0 / 2880.0))))
+    odd_slope = c3 * (2.0 + x * (1.0 / 5.0 + x * (1.0 / 140.0 + x * (1.0 / 7560.0))))
+    return v + t * (even + t * odd), even_slope + t * odd_slope
 
 
 @routine

@@ -7,7 +7,7 @@ import numpy as np
 from rocking.kernels.arc import vary_linear, vary_nonlinear
 from rocking.kernels.chatter import motion_at, motion_slope, prove_rest, restoring, time_to_rest
 from rocking.kernels.compiled import kernel, leaf, routine
-from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift
+from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift, short_arc
 from rocking.kernels.state import (
     AT_REST,
     DU,
@@ -35,6 +35,7 @@ from rocking.kernels.state import (
     STRUCK,
     UPLIFTED,
     UPLIFTS,
+    WORTH,
     Floats,
     Integers,
     Rules,
@@ -63,6 +64,9 @@ from rocking.kernels.status import (
 )
 
 _ULP = 2.0**-52
+
+#: A proof that failed, or whose bracket is too wide, is tried again once the speed has fallen by this factor.
+_SLOWER = 0.8
 
 # Further outcomes of an arc, besides STEP, IMPACT and OVERTURN.
 _STOPPED = 3
@@ -154,6 +158,7 @@ def wait_for_uplift(
     at[SMOOTH] = not jump
     x[U] = x[V] = x[DU] = x[DV] = 0.0
     x[UPLIFTED] = x[STRUCK] = now(shaking, at, x)
+    x[WORTH] = np.inf
     x[RESTING] += x[UPLIFTED] - x[RESTED]
     at[UPLIFTS] += 1
     shift = 0.0
@@ -175,6 +180,12 @@ def follow_arc(
         x[END] = rules.stop
         return _STOPPED
     side = at[SIDE]
+    if not rules.record and not rules.nonlinear and x[U] == 0.0 and x[V] > 0.0 and shaking.coefficients.shape[1] == 2:
+        t, speed, height = short_arc(shaking, sides, side, at[PIECE], x[OFFSET], x[V], left)
+        if height <= x[PEAK]:
+            pass_time(t, x)
+            x[V] = -speed
+            return IMPACT
     order, h, degree = expand(shaking, sides, rules, scratch, side, at[PIECE], x[OFFSET], x[U], x[V], left)
     if at[SMOOTH]:  # the acceleration at an uplift is zero, whatever rounding says
         scratch.c[2] = 0.0
@@ -184,10 +195,8 @@ def follow_arc(
     outcome, t, u, v, top, height = advance(x[U], x[V], order, h, scratch.c, scratch.d)
     if height > x[PEAK]:
         x[PEAK], x[PEAK_TIME] = height, start + top
-        if rules.record:
-            x[PEAK_CHANGE], _ = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, top)
-    if rules.record:
-        x[DU], x[DV] = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, t)
+        x[PEAK_CHANGE], _ = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, top)
+    x[DU], x[DV] = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, t)
     pass_time(t, x)
     x[U], x[V] = u, v
     if outcome == OVERTURN:
@@ -208,7 +217,7 @@ def follow_arc(
 def strike(shaking: Shaking, sides: Floats, rules: Rules, tables: Tables, at: Integers, x: Floats) -> None:
     """Impact: the angular speed drops, the side changes, and the variation jumps with them (saltation).
 
-    Without any speed the time of the impact, and with it the variation, is not known at all: infinite or NaN.
+    Without any speed the impact might come at any time, and the block is at rest.
     """
     settle(shaking, at, x)
     time = now(shaking, at, x)
@@ -216,14 +225,17 @@ def strike(shaking: Shaking, sides: Floats, rules: Rules, tables: Tables, at: In
     left, entered = at[SIDE], 1 - at[SIDE]
     speed = max(0.0, -x[V])
     e = sides[left, RESTITUTION]
-    shift = x[DU] / speed if speed > 0.0 else np.inf
-    faster = -(x[DV] - restoring(sides, left, acceleration * shaking.inverse_g) * shift)
     at[SIDE], x[U], x[V] = entered, 0.0, e * speed
-    x[DU] = -x[V] * shift
-    x[DV] = e * faster + restoring(sides, entered, acceleration * shaking.inverse_g) * shift
+    shift = np.inf
+    if speed > 0.0:
+        shift = x[DU] / speed
+        faster = -(x[DV] - restoring(sides, left, acceleration * shaking.inverse_g) * shift)
+        x[DU] = -x[V] * shift
+        x[DV] = e * faster + restoring(sides, entered, acceleration * shaking.inverse_g) * shift
     if rules.record:
-        row = tables.impacts[at[IMPACTS]]
-        row[0], row[1], row[2], row[3], row[4] = time, sign_of(entered), speed, x[V], shift
+        k = at[IMPACTS]
+        tables.impacts[k, 0], tables.impacts[k, 1] = time, sign_of(entered)
+        tables.impacts[k, 2], tables.impacts[k, 3], tables.impacts[k, 4] = speed, x[V], shift
     at[IMPACTS] += 1
 
 
@@ -240,15 +252,16 @@ def judge(
     x[STRUCK] = time
     lower = upper = np.nan
     if rules.treatment == CERTIFIED:
-        lower, upper = bracket(shaking, sides, rules, scratch, at, x)
+        if worth_proving(at, x):
+            lower, upper = bracket(shaking, sides, rules, scratch, at, x)
         if upper - lower <= max(rules.tolerance, 4.0 * allowance(time, upper, at, x)):
-            estimate = time_to_rest(shaking, sides, v, side, at[PIECE], x[OFFSET])
+            estimate = time_to_rest(shaking, sides, rules.nonlinear, v, side, at[PIECE], x[OFFSET])
             return True, lower, upper, min(max(estimate, lower), upper)
     elif imposed(rules, sides[side, LIMIT], v, interval, time - x[UPLIFTED]):
         return True, lower, upper, 0.0
-    stalled = interval <= _ULP * (time + 1.0 / math.sqrt(sides[side, STIFFNESS]))
-    if v == 0.0 or stalled:
-        at[STALLED] += stalled
+    standing = stalled(shaking, sides, interval, at, x)
+    if v == 0.0 or standing:
+        at[STALLED] += standing
         at[RUN] = 0
         return True, np.nan, np.nan, 0.0
     return False, lower, upper, 0.0
@@ -262,19 +275,42 @@ def bracket(
     time = now(shaking, at, x)
     lower, upper = prove_rest(shaking, sides, rules.nonlinear, scratch.A, x[V], at[SIDE], at[PIECE], x[OFFSET])
     if not upper >= 0.0:
-        at[RUN] = 0
+        x[WORTH] = _SLOWER * x[V]
         return np.nan, np.nan
     if at[RUN] == 0:
-        x[RUN_START] = time
-    at[RUN] += 1
+        at[RUN], x[RUN_START] = 1, time
     slack = allowance(time, upper, at, x)
-    return max(0.0, lower - slack), upper + slack
+    lower, upper = max(0.0, lower - slack), upper + slack
+    # A bracket's width is about quadratic in the speed.
+    x[WORTH] = x[V] * min(_SLOWER, math.sqrt(rules.tolerance / (upper - lower)))
+    return lower, upper
+
+
+@leaf
+def worth_proving(at: Integers, x: Floats) -> bool:
+    """Whether the block has become so much slower since the last proof was tried that another may bring more."""
+    if at[RUN] > 0:
+        at[RUN] += 1
+    if x[V] <= x[WORTH]:
+        return True
+    if at[RUN] == 0:
+        x[WORTH] = max(x[WORTH], _SLOWER * x[V])
+    return False
 
 
 @leaf
 def allowance(time: float, upper: float, at: Integers, x: Floats) -> float:
     """Room for the rounding of the times, and of the arcs resolved since the first proof."""
     return float(4.0 * _ULP * time + 8.0 * _ULP * (at[RUN] + 4) * (time + upper - x[RUN_START]))
+
+
+@leaf
+def stalled(shaking: Shaking, sides: Floats, interval: float, at: Integers, x: Floats) -> bool:
+    """Whether time hardly advanced since the last impact, and will not until the next."""
+    fastest = max(sides[0, STIFFNESS], sides[1, STIFFNESS])
+    least = _ULP * (now(shaking, at, x) + 1.0 / math.sqrt(fastest))
+    pressed = restoring(sides, at[SIDE], motion_at(shaking, at[PIECE], x[OFFSET]) * shaking.inverse_g)
+    return bool(interval <= least and 2.0 * x[V] <= least * pressed)
 
 
 @leaf
@@ -303,8 +339,9 @@ def come_to_rest(
     if at[RUN] == 0:
         at[RUN], x[RUN_START] = 1, time
     if rules.record:
-        row = tables.sequences[at[SEQUENCES]]
-        row[0], row[1], row[2], row[3], row[4] = x[RUN_START], time + to_rest, time + lower, time + upper, at[RUN]
+        k = at[SEQUENCES]
+        tables.sequences[k, 0], tables.sequences[k, 1] = x[RUN_START], time + to_rest
+        tables.sequences[k, 2], tables.sequences[k, 3], tables.sequences[k, 4] = time + lower, time + upper, at[RUN]
     at[SEQUENCES] += 1
     at[RUN] = 0
     if time + to_rest >= rules.stop:
@@ -323,7 +360,9 @@ def come_to_rest(
 def vary(
     sides: Floats, rules: Rules, scratch: Scratch, du: float, dv: float, side: int, order: int, degree: int, t: float
 ) -> tuple[float, float]:
-    """Variation carried over a part of the step, linear or nonlinear."""
+    """Variation carried over a part of the step, linear or nonlinear; as it was if nothing is recorded."""
+    if not rules.record:
+        return du, dv
     stiffness = sides[side, STIFFNESS]
     if rules.nonlinear:
         return vary_nonlinear(du, dv, stiffness, degree, order, t, scratch)
@@ -375,10 +414,9 @@ def write_node(rules: Rules, tables: Tables, time: float, at: Integers, x: Float
     """Write down the state."""
     if not rules.record:
         return
-    row = tables.nodes[at[NODES]]
-    row[0], row[1], row[2], row[3], row[4], row[5] = (
-        time, at[PIECE], x[OFFSET], sign_of(at[SIDE]), x[U], x[V],
-    )  # fmt: skip
+    k = at[NODES]
+    tables.nodes[k, 0], tables.nodes[k, 1], tables.nodes[k, 2] = time, at[PIECE], x[OFFSET]
+    tables.nodes[k, 3], tables.nodes[k, 4], tables.nodes[k, 5] = sign_of(at[SIDE]), x[U], x[V]
     at[NODES] += 1
 
 
@@ -387,8 +425,9 @@ def write_event(rules: Rules, tables: Tables, time: float, kind: int, shift: flo
     """Write down an uplift, a rest or an overturning."""
     if not rules.record:
         return
-    row = tables.events[at[EVENTS]]
-    row[0], row[1], row[2], row[3] = time, kind, sign_of(at[SIDE]), shift
+    k = at[EVENTS]
+    tables.events[k, 0], tables.events[k, 1] = time, kind
+    tables.events[k, 2], tables.events[k, 3] = sign_of(at[SIDE]), shift
     at[EVENTS] += 1
 
 

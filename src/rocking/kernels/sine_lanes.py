@@ -67,6 +67,11 @@ _CLOSING: Final = 1.0
 _LEFT_OVER: Final = 2.0
 _NEVER_UP: Final = 3.0
 
+#: Reach of a block's longest arc above which the next pair takes two corrections, or more than the fewest terms; arcs
+#: become shorter, but that on the second side may first grow.
+_TWICE_CORRECTED: Final = 0.2 * REACH_MEDIUM
+_MORE_TERMS: Final = 0.8 * REACH_SHORT
+
 #: No sequence's remaining phase has been seen to settle before its speed falls by the factor exp(-4).
 _FAR_FROM_REST: Final = 4.0
 
@@ -123,9 +128,9 @@ def advance(block: NDArray[np.float64]) -> None:
         running, reach = survey(block)
         if running == 0:
             return
-        if pair == 0 or reach > 0.8 * REACH_MEDIUM:
+        if pair == 0 or reach > _TWICE_CORRECTED:
             early_pairs(block)
-        elif reach > 0.8 * REACH_SHORT:
+        elif reach > _MORE_TERMS:
             pairs(block)
         else:
             late_pairs(block)
@@ -180,7 +185,7 @@ def first_impacts(block: NDArray[np.float64]) -> None:
 @routine
 def early_pairs(block: NDArray[np.float64]) -> None:
     """One pair of impacts of every lane, for the long arcs at the start."""
-    pass_pair(block, LONG, REACH_LONG, 3)
+    pass_pair(block, LONG, REACH_LONG, 2)
 
 
 @routine

@@ -78,8 +78,8 @@ STIFFNESS, SLENDERNESS, THRESHOLD, GAIN, RESTITUTION, LIMIT = range(6)
 PIECE, SIDE, NODES, IMPACTS, EVENTS, SEQUENCES, RUN, SMOOTH, STALLED, UPLIFTS = range(10)
 
 # Floats of the state: position in the motion, rotation, its rate, their variations, times of the last uplift, impact
-# and proof, the highest rotation so far, the end.
-OFFSET, U, V, DU, DV, UPLIFTED, STRUCK, RESTED, RESTING, RUN_START, PEAK, PEAK_TIME, PEAK_CHANGE, END = range(14)
+# and proof, the speed below which a proof is worth trying, the highest rotation so far, the end.
+OFFSET, U, V, DU, DV, UPLIFTED, STRUCK, RESTED, RESTING, RUN_START, WORTH, PEAK, PEAK_TIME, PEAK_CHANGE, END = range(15)
 
 #: Side index of a block at rest.
 AT_REST = -1

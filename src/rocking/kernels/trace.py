@@ -33,7 +33,8 @@ def trace(trail: Trail, scratch: Scratch, times: Floats, rows: Integers, out: Fl
                 shaking, sides, rules, scratch, side, piece, nodes[row, 2], nodes[row, 4], nodes[row, 5], left
             )
             expanded = row
-        u, v, w = evaluate(scratch.c, order, times[k] - shaking.breakpoints[piece] - nodes[row, 2])
+        elapsed = max(0.0, times[k] - shaking.breakpoints[piece] - nodes[row, 2])
+        u, v, w = evaluate(scratch.c, order, elapsed)
         if u < 0.0 and (last or nodes[row + 1, 3] == 0.0):
             u = v = w = 0.0
         out[k, 0] = sign * u

@@ -255,6 +255,7 @@ def scaling_figure(*, motions: Sequence[ScaledMotion], level_label: str, title: 
         curves, bands = figure.subplots(1, 2, sharey=True, width_ratios=(2.2, 1.0))
         for k, motion in enumerate(motions):
             style = _CURVES[k % len(_CURVES)]
+            curves.plot(_cut(motion.peak), motion.levels, ".", markersize=2.5, color=style["color"])
             curves.plot(_cut(motion.peak), motion.levels, linewidth=1.0, label=motion.label, **style)
             for low, high in motion.bands:
                 bands.plot([k, k], [low, high], color=style["color"], linewidth=5.0, solid_capstyle="butt")

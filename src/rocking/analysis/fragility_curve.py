@@ -1,0 +1,313 @@
+"""Fragility curves: lognormals with confidence bands, and what they are written to."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking.analysis import lognormal, nrml
+from rocking.analysis.measures import Measure
+from rocking.block import Block
+from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import InvalidOption, OutputError
+from rocking.kernels.state import Floats
+from rocking.problem import Model
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Points of a curve in a table or a figure.
+_POINTS: Final = 201
+
+
+@dataclass(frozen=True, eq=False)
+class FragilityCurve:
+    """A lognormal fitted to outcomes: P(x) = Phi(ln(x/median)/dispersion).
+
+    Attributes
+    ----------
+    limit_state : str
+        Name of what is exceeded.
+    intensity, exceeded, trials : ndarray, shape (n,)
+        The data: outcomes that exceeded, of how many, at each intensity.
+    fitted : Probit
+        Intercept and slope of P = Phi(intercept + slope ln x).
+    covariance : ndarray, shape (2, 2)
+        Inverse of Fisher's expected information of intercept and slope.
+    replicates : Probit or None
+        Fits to resampled data, for bands by the bootstrap; None: bands come from the covariance.
+    degenerate : float
+        Share of the resampled data sets whose outcomes were separated or all alike; they count as steps.
+    confidence : float
+        Probability of the intervals and bands.
+    likelihood : Likelihood
+        At its maximum, and against one probability for all intensities.
+    goodness : Goodness
+        Pearson's test between groups of outcomes and the fit: one group for each intensity where each has five outcomes
+        or more (stripes), else up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow).
+    """
+
+    limit_state: str
+    intensity: Floats
+    exceeded: Floats
+    trials: Floats
+    fitted: lognormal.Probit
+    covariance: Floats
+    replicates: lognormal.Probit | None
+    degenerate: float
+    confidence: float
+    likelihood: lognormal.Likelihood
+    goodness: lognormal.Goodness
+
+    @property
+    def median(self) -> float:
+        """Intensity of probability one half."""
+        return math.exp(-float(self.fitted.intercept[0]) / float(self.fitted.slope[0]))
+
+    @property
+    def dispersion(self) -> float:
+        """Standard deviation of the logarithm of the intensity."""
+        return 1.0 / float(self.fitted.slope[0])
+
+    @property
+    def median_interval(self) -> tuple[float, float]:
+        """Confidence interval of the median."""
+        if self.replicates is not None:
+            with np.errstate(divide="ignore", over="ignore"):
+                return self._percentiles(np.exp(-self.replicates.intercept / self.replicates.slope))
+        intercept, slope = float(self.fitted.intercept[0]), float(self.fitted.slope[0])
+        gradient = np.array([-1.0 / slope, intercept / slope**2])
+        return self._around(math.log(self.median), gradient)
+
+    @property
+    def dispersion_interval(self) -> tuple[float, float]:
+        """Confidence interval of the dispersion; infinite where the data allow a slope that does not rise."""
+        if self.replicates is not None:
+            low, high = self._percentiles(self.replicates.slope)
+            return 1.0 / high if high > 0.0 else math.inf, 1.0 / low if low > 0.0 else math.inf
+        return self._around(math.log(self.dispersion), np.array([0.0, -self.dispersion]))
+
+    def probability(self, intensity: ArrayLike) -> Floats:
+        """Fitted probability at intensities, shaped like them.
+
+        Examples
+        --------
+        >>> from rocking.analysis import fit_fragility
+        >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
+        >>> curve.probability([curve.median, 0.0]).round(12).tolist()
+        [0.5, 0.0]
+        """
+        at = _intensities(intensity)
+        return self.fitted.probability(_logarithm(at).ravel())[0].reshape(at.shape)
+
+    def band(self, intensity: ArrayLike) -> tuple[Floats, Floats]:
+        """Lower and upper end of the pointwise confidence band of the probability.
+
+        From Fisher's information: Phi of the interval of intercept + slope ln x. By the bootstrap: percentiles.
+        """
+        from scipy.special import ndtr
+
+        at = _intensities(intensity)
+        z = _logarithm(at).ravel()
+        if self.replicates is not None:
+            ends = [0.5 - 0.5 * self.confidence, 0.5 + 0.5 * self.confidence]
+            low, high = np.quantile(self.replicates.probability(z), ends, axis=0)
+            return low.reshape(at.shape), high.reshape(at.shape)
+        middle = self.fitted.intercept[0] + self.fitted.slope[0] * z
+        finite = np.where(np.isfinite(z), z, 0.0)
+        powers = np.stack([np.ones_like(finite), finite])
+        reach = self._normal_quantile() * np.sqrt(np.einsum("jn,jk,kn->n", powers, self.covariance, powers))
+        low, high = np.asarray(ndtr(middle - reach)), np.asarray(ndtr(middle + reach))
+        return low.reshape(at.shape), high.reshape(at.shape)
+
+    def summary(self) -> dict[str, Any]:
+        """Parameters, intervals and tests by name."""
+        return {
+            "limit_state": self.limit_state,
+            "median": self.median,
+            "median_interval": list(self.median_interval),
+            "dispersion": self.dispersion,
+            "dispersion_interval": list(self.dispersion_interval),
+            "confidence": self.confidence,
+            "outcomes": int(self.trials.sum()),
+            "exceeded": int(self.exceeded.sum()),
+            "log_likelihood": self.likelihood.logarithm,
+            "likelihood_ratio": self.likelihood.ratio,
+            "likelihood_ratio_p_value": self.likelihood.p_value,
+            "goodness_statistic": self.goodness.statistic,
+            "goodness_freedom": self.goodness.freedom,
+            "goodness_p_value": self.goodness.p_value,
+            "degenerate_resamples": self.degenerate,
+        }
+
+    def _around(self, logarithm: float, gradient: Floats) -> tuple[float, float]:
+        reach = self._normal_quantile() * math.sqrt(float(gradient @ self.covariance @ gradient))
+        return math.exp(logarithm - reach), math.exp(logarithm + reach)
+
+    def _normal_quantile(self) -> float:
+        from scipy.special import ndtri
+
+        return float(ndtri(0.5 + 0.5 * self.confidence))
+
+    def _percentiles(self, values: Floats) -> tuple[float, float]:
+        ordered = np.sort(values)
+        reach = (0.5 - 0.5 * self.confidence) * (len(ordered) - 1)
+        return float(ordered[math.floor(reach)]), float(ordered[len(ordered) - 1 - math.floor(reach)])
+
+
+@dataclass(frozen=True, eq=False)
+class Fragility:
+    """Fragility curves of one or several limit states against one intensity measure.
+
+    Attributes
+    ----------
+    curves : tuple of FragilityCurve
+        One for each limit state.
+    measure : Measure
+        Intensity measure; intensities are in its SI units.
+    description : str
+        What was simulated or observed.
+    block : Block or None
+        The block, where there is one.
+    model : str
+        Equation of motion, which says how a block's own unit counts.
+    """
+
+    curves: tuple[FragilityCurve, ...]
+    measure: Measure
+    description: str
+    block: Block | None
+    model: Model
+
+    def curve(self, limit_state: str) -> FragilityCurve:
+        """Curve of a limit state.
+
+        Raises
+        ------
+        InvalidOption
+            If there is none of that name.
+        """
+        for curve in self.curves:
+            if curve.limit_state == limit_state:
+                return curve
+        names = ", ".join(curve.limit_state for curve in self.curves)
+        raise InvalidOption(f"there is no limit state {limit_state!r}; there are {names}")
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Lowest and highest intensity of the data."""
+        held = np.concatenate([curve.intensity for curve in self.curves])
+        return float(held.min()), float(held.max())
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the curves as columns: limit state, intensity (SI), probability, lower and upper end of the band.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        intensity = np.linspace(0.0, self.range[1], _POINTS)
+        try:
+            with Path(path).open("w", encoding="utf-8", newline="") as file:
+                table = csv.writer(file, lineterminator="\n")
+                table.writerow(["limit_state", self.measure.column, "probability", "lower", "upper"])
+                for curve in self.curves:
+                    columns = np.column_stack([intensity, curve.probability(intensity), *curve.band(intensity)])
+                    table.writerows([curve.limit_state, *(f"{value:.10g}" for value in row)] for row in columns)
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
+
+    def to_nrml(
+        self,
+        path: str | Path,
+        *,
+        taxonomy: str = "rocking-block",
+        format: nrml.Format = "continuous",
+        block: Block | None = None,
+        model_id: str = "rocking",
+        loss_category: nrml.LossCategory = "contents",
+        asset_category: str = "contents",
+    ) -> None:
+        """Write the curves as an OpenQuake fragility model, NRML 0.5.
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        taxonomy : str
+            Identifier of the fragility function, which the exposure model refers to.
+        format : {"continuous", "discrete"}
+            Lognormals by the mean and the standard deviation of the intensity (not of its logarithm, as OpenQuake
+            wants them), or probabilities at 40 intensities.
+        block : Block, optional
+            Block whose unit a dimensionless measure counts in, where the curves come from several.
+        model_id, loss_category, asset_category : str
+            Further attributes of the model; the loss category is one of structural, nonstructural, contents and
+            business_interruption.
+
+        Raises
+        ------
+        InvalidOption
+            If a name has a character that NRML does not allow, a block is needed, or the dispersion is too wide.
+        OutputError
+            If the file cannot be written.
+
+        Notes
+        -----
+        Units become OpenQuake's: PGA and SA in g, PGV in cm/s. A measure in a block's own unit becomes PGA or PGV of
+        that block. The range of validity is that of the data. A block cannot move below its uplift acceleration, which
+        is written as the limit of no damage of PGA.
+        """
+        chosen = self.block if block is None else block
+        scale = nrml.scale_of(self.measure, chosen, self.model)
+        lifting = None
+        if chosen is not None and scale.imt == "PGA":
+            lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
+        function = nrml.fragility_function(self.curves, scale, self.range, lifting, taxonomy, format)
+        states = [curve.limit_state for curve in self.curves]
+        nrml.write(path, function, states, nrml.Header(model_id, asset_category, loss_category, self.description))
+
+    def plot(self, *, title: str = "") -> Figure:
+        """Figure of the curves with their bands and the shares that were seen."""
+        from rocking.plot.analysis import FragilityLine, fragility_figure
+
+        intensity = np.linspace(0.0, self.range[1], _POINTS)
+        lines = []
+        for curve in self.curves:
+            at, seen = _shares_seen(curve)
+            text = f"{curve.limit_state}: median {curve.median:.4g}, dispersion {curve.dispersion:.3g}"
+            lines.append(FragilityLine(text, intensity, curve.probability(intensity), *curve.band(intensity), at, seen))
+        first = self.curves[0]
+        how = "bootstrap" if first.replicates is not None else "Fisher information"
+        return fragility_figure(
+            lines=lines,
+            intensity_label=self.measure.label,
+            band_label=f"{100 * first.confidence:g} % confidence ({how})",
+            title=title or self.description,
+        )
+
+
+def _shares_seen(curve: FragilityCurve) -> tuple[Floats, Floats]:
+    """Mean intensities and shares of the groups that the fit is tested in."""
+    group = lognormal.groups(np.log(curve.intensity), curve.trials)
+    held = np.bincount(group, curve.trials)
+    return np.bincount(group, curve.trials * curve.intensity) / held, np.bincount(group, curve.exceeded) / held
+
+
+def _intensities(intensity: ArrayLike) -> Floats:
+    at = np.asarray(intensity, dtype=np.float64)
+    if not np.all(at >= 0.0):
+        raise InvalidOption("intensities must be numbers that are not negative")
+    return at
+
+
+def _logarithm(intensity: Floats) -> Floats:
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(intensity))

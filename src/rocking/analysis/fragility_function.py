@@ -1,0 +1,282 @@
+"""Fragility: the probability that a block overturns, or passes a rotation, against the intensity of the motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking.analysis import lognormal
+from rocking.analysis.checks import increasing_numbers, positive_numbers, share
+from rocking.analysis.fragility_curve import Fragility, FragilityCurve
+from rocking.analysis.measures import Measure, MeasureName
+from rocking.analysis.scaled import several_blocks, several_motions, simulate_levels
+from rocking.block import Block, Blocks
+from rocking.ensemble import Polarity, simulate_many
+from rocking.errors import InvalidOption
+from rocking.kernels.state import Floats, Integers
+from rocking.motion.motion import Motion
+from rocking.problem import Model
+from rocking.treatment import Treatment
+
+Band = Literal["fisher", "bootstrap"]
+
+#: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
+OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
+
+
+def fragility(
+    blocks: Blocks | Block | Sequence[Block],
+    motions: Motion | Sequence[Motion],
+    *,
+    measure: MeasureName = "pga",
+    period: float | None = None,
+    damping: float = 0.05,
+    levels: ArrayLike | None = None,
+    limits: Mapping[str, float] = OVERTURNING,
+    model: Model = "nonlinear",
+    chattering: str | Treatment = "certified",
+    polarity: Polarity = "+",
+    confidence: float = 0.9,
+    band: Band = "fisher",
+    samples: int = 1000,
+    seed: int = 0,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Fragility:
+    """Simulate blocks under motions and fit the probability that a limit is exceeded against the intensity.
+
+    Parameters
+    ----------
+    blocks : Blocks, Block or sequence of Block
+        One block; or several whose outcomes are pooled, which makes sense against a measure in their own units.
+    motions : Motion or sequence of Motion
+        m motions.
+    measure : {"pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
+        Intensity measure: peak acceleration (m/s^2), peak velocity (m/s), spectral acceleration (m/s^2); or in each
+        block's own units PGA/(g tan alpha) and p PGV/(g tan alpha).
+    period, damping : float
+        Oscillator of "sa": s, and fraction of critical.
+    levels : array_like, optional
+        Stripes: every motion scaled to each of these levels. Without them a cloud: every motion as it is.
+    limits : mapping of str to float
+        Limit states: peak rotation over slenderness (the smaller one of two sides) that is exceeded; ``math.inf``
+        stands for overturning, the default.
+    model, chattering, polarity, threads, progress
+        As for `simulate_many`; with both polarities each motion counts twice.
+    confidence, band, samples, seed
+        As for `fit_fragility`; the bootstrap draws motions, each with all its outcomes.
+
+    Returns
+    -------
+    Fragility
+
+    Raises
+    ------
+    InvalidOption
+        If an argument is out of its range, or a lognormal cannot be fitted because the outcomes are all alike or
+        separated.
+    InvalidMotion
+        If a motion is zero throughout.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> motions = [rocking.pulses.one_sine(1.0, f) for f in np.linspace(0.3, 1.5, 13)]
+    >>> result = fragility(block, motions, measure="pga_ratio", levels=np.linspace(1.0, 9.0, 17))
+    >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
+    median 1.443, dispersion 0.524
+    """
+    many, how = several_blocks(blocks), Measure(measure, period, damping)
+    bands = _Bands(confidence, band, samples, seed)
+    if not limits:
+        raise InvalidOption("limits must name at least one limit state")
+    shaken, values = several_motions(motions, how)
+    options: dict[str, Any] = {"chattering": chattering, "polarity": polarity, "threads": threads, "progress": progress}
+    if levels is None:
+        table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
+        intensity = (values[:, None] / how.unit_of(many, model)[None, :])[None, :, :, None]
+    else:
+        stripes = increasing_numbers(levels, "levels")
+        table = simulate_levels(many, shaken, how, stripes, model=model, **options)
+        intensity = stripes[:, None, None, None]
+    if "polarity" not in table.dims:
+        table = table.expand_dims("polarity")
+    table = table.transpose("level", "motion", "block", "polarity")
+    ratio = table.peak_rotation.values / many.alpha.min(axis=1)[:, None]
+    ratio[table.overturned.values] = np.inf
+    clusters = np.broadcast_to(np.arange(len(shaken))[None, :, None, None], ratio.shape)
+    x = np.broadcast_to(intensity, ratio.shape).ravel()
+    curves = [
+        _curve(name, x, _passed(ratio, limit, name).ravel(), np.ones(x.size), clusters.ravel(), bands)
+        for name, limit in limits.items()
+    ]
+    described = _described(many, shaken, None if levels is None else len(intensity))
+    return Fragility(tuple(curves), how, described, many[0] if len(many) == 1 else None, model)
+
+
+def fit_fragility(
+    intensity: ArrayLike,
+    exceeded: ArrayLike | Mapping[str, ArrayLike],
+    *,
+    trials: ArrayLike = 1,
+    clusters: ArrayLike | None = None,
+    measure: MeasureName = "pga",
+    period: float | None = None,
+    damping: float = 0.05,
+    confidence: float = 0.9,
+    band: Band = "fisher",
+    samples: int = 1000,
+    seed: int = 0,
+    block: Block | None = None,
+    description: str = "observed outcomes",
+) -> Fragility:
+    """Fit a lognormal fragility to outcomes by maximum likelihood: a cloud (one outcome each) or stripes (counts).
+
+    Parameters
+    ----------
+    intensity : array_like, shape (n,)
+        Positive intensities, in SI units.
+    exceeded : array_like, shape (n,), or mapping of str to array_like
+        At each intensity, whether the limit was exceeded, or in how many trials; for several limit states a mapping
+        from their names. One without a name is called "overturning".
+    trials : array_like
+        Number of trials at each intensity.
+    clusters : array_like of int, shape (n,), optional
+        Which outcomes belong together (the motion, for instance), for the bootstrap; by default each is on its own.
+    measure, period, damping
+        What the intensity is, as for `fragility`.
+    confidence : float
+        Probability of the intervals and bands.
+    band : {"fisher", "bootstrap"}
+        Whether they come from Fisher's expected information, which takes all outcomes for independent and many; or from
+        fits to clusters drawn with replacement.
+    samples, seed : int
+        How many times the bootstrap draws, and the seed of its random numbers.
+    block : Block, optional
+        What was tested, for the units of `Fragility.to_nrml`.
+    description : str
+        What was observed.
+
+    Raises
+    ------
+    InvalidOption
+        If an argument is out of its range, or there is no best lognormal: no outcome exceeds the limit, or all do, or
+        they are separated (none up to some intensity and all from there on).
+
+    Notes
+    -----
+    The likelihood of P = Phi(ln(x/median)/dispersion) is that of independent binomial counts (Baker 2015). It has one
+    maximum, or none where the outcomes are separated.
+
+    References
+    ----------
+    Baker, J. W. (2015). Efficient analytical fragility function fitting using dynamic structural analysis. Earthquake
+    Spectra 31(1), 579-599.
+
+    Examples
+    --------
+    >>> result = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
+    >>> curve = result.curves[0]
+    >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
+    median 3.1509 m/s^2, dispersion 0.3042
+    """
+    x = positive_numbers(intensity, "intensity")
+    count = _whole(trials, "trials", x.size, 1.0, math.inf)
+    outcomes = exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}
+    groups = np.arange(x.size) if clusters is None else _clusters(clusters, x.size)
+    bands = _Bands(confidence, band, samples, seed)
+    curves = [
+        _curve(name, x, _whole(values, "exceeded", x.size, 0.0, count), count, groups, bands)
+        for name, values in outcomes.items()
+    ]
+    return Fragility(tuple(curves), Measure(measure, period, damping), description, block, "nonlinear")
+
+
+@dataclass(frozen=True)
+class _Bands:
+    """How intervals and bands are made."""
+
+    confidence: float
+    kind: Band
+    samples: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        share(self.confidence, "confidence")
+        if self.kind not in get_args(Band):
+            raise InvalidOption(f"band must be one of {', '.join(get_args(Band))}, not {self.kind!r}")
+        if not (isinstance(self.samples, int) and self.samples >= 1):
+            raise InvalidOption(f"samples must be a whole number of at least 1, not {self.samples!r}")
+        if not (isinstance(self.seed, int) and self.seed >= 0):
+            raise InvalidOption(f"seed must be a whole number that is not negative, not {self.seed!r}")
+
+
+def _curve(
+    name: str, intensity: Floats, exceeded: Floats, trials: Floats, clusters: Integers, bands: _Bands
+) -> FragilityCurve:
+    z = np.log(intensity)
+    fault = lognormal.separation(z, exceeded, trials)
+    if fault is not None:
+        raise InvalidOption(f"no lognormal can be fitted to {name!r}: {fault}")
+    fitted = lognormal.fit(z, exceeded[None, :], trials[None, :])
+    replicates, degenerate = None, 0
+    if bands.kind == "bootstrap":
+        replicates, degenerate = lognormal.resampled(z, exceeded, trials, clusters, bands.samples, bands.seed)
+    gained = lognormal.gain(z, exceeded, trials, fitted)
+    return FragilityCurve(
+        limit_state=name,
+        intensity=intensity,
+        exceeded=exceeded,
+        trials=trials,
+        fitted=fitted,
+        covariance=lognormal.covariance(z, trials, fitted),
+        replicates=replicates,
+        degenerate=degenerate / bands.samples,
+        confidence=bands.confidence,
+        likelihood=gained,
+        goodness=lognormal.goodness(z, exceeded, trials, fitted),
+    )
+
+
+def _passed(ratio: Floats, limit: float, name: str) -> Floats:
+    """Whether peak rotation over slenderness passes a limit: 1 or 0; infinite is overturning."""
+    if not (isinstance(limit, (int, float)) and limit >= 0.0):
+        raise InvalidOption(f"the limit {name!r} must be a rotation over slenderness, 0 or more, not {limit!r}")
+    return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
+
+
+def _whole(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
+    """Whole numbers, one for each intensity, between two bounds."""
+    try:
+        numbers = np.broadcast_to(np.asarray(values, dtype=np.float64), size)
+    except (TypeError, ValueError):
+        raise InvalidOption(f"{name} must hold one number for each of the {size} intensities") from None
+    if not np.all((numbers >= least) & (numbers <= np.asarray(most)) & (numbers == np.floor(numbers))):
+        raise InvalidOption(f"{name} must be whole numbers, at least {least:g} and no more than the trials")
+    return numbers
+
+
+def _clusters(clusters: ArrayLike, size: int) -> Integers:
+    labels = np.asarray(clusters)
+    if labels.shape != (size,):
+        raise InvalidOption(f"clusters must hold one label for each of the {size} intensities")
+    return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
+
+
+def _described(blocks: Blocks, motions: Sequence[Motion], stripes: int | None) -> str:
+    what = "1 block" if len(blocks) == 1 else f"{len(blocks)} blocks"
+    if len(blocks) == 1:
+        what = f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
+    how = "cloud" if stripes is None else f"{stripes} stripes"
+    return f"{what}, {len(motions)} motion{'s' if len(motions) > 1 else ''}, {how}"
+
+
+def _pair(sides: Floats) -> str:
+    return f"{sides[0]:.4g}" if sides[0] == sides[1] else f"({sides[0]:.4g}, {sides[1]:.4g})"

@@ -1,0 +1,278 @@
+"""Where chattering is complete under any motion: maps, exceedances of the thresholds, and episodes of a response."""
+
+import io
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rocking
+from rocking.chattering import chattering_time, critical_amplitude, families
+from rocking.chattering.episodes import chattering_episodes
+from rocking.chattering.exceedance import exceedances
+from rocking.chattering.families import Case
+from rocking.chattering.maps import Outcome, chattering_map, map_figure
+
+BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
+THRESHOLD = BLOCK.gravity * 0.2
+STATUE = rocking.Block(half_width=0.12, half_height=0.55)
+
+
+def outcome_of(motion, block=BLOCK, model="linear"):
+    dataset = chattering_map(lambda a, b: Case(block, motion, model), {"a": [1.0], "b": [1.0]})
+    return Outcome(dataset.outcome.item())
+
+
+# The region of complete chattering
+
+
+@pytest.mark.parametrize("eta", [0.6, 0.85, 0.92])
+@pytest.mark.parametrize("omega", [0.6, 2.0, 7.0])
+def test_under_a_sine_the_boundary_is_the_critical_amplitude(omega, eta):
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=eta)
+    critical = float(critical_amplitude(omega, eta))
+    around = critical + (critical - 1.0) * np.array([-1e-6, 1e-6])
+    dataset = chattering_map(families.sine(block, model="linear"), {"a": around, "omega": [omega]})
+    assert dataset.complete.values.ravel().tolist() == [True, False]
+
+
+def test_under_a_sine_the_time_to_rest_is_the_chattering_time():
+    a, omega = np.linspace(1.005, 1.035, 7), np.array([0.8, 2.0, 5.0])
+    dataset = chattering_map(families.sine(BLOCK, model="linear"), {"a": a, "omega": omega})
+    expected = chattering_time(a[:, np.newaxis], omega, 0.92) / 2.0
+    np.testing.assert_allclose((dataset.rest - dataset.uplift).values, expected, rtol=1e-10)
+    assert (dataset.lower <= dataset.rest).all()
+    assert (dataset.rest <= dataset.upper).all()
+    assert (dataset.upper - dataset.lower < 1e-11).all()
+
+
+def test_the_nonlinear_boundary_of_a_slender_block_is_near_the_linear_one():
+    slender = rocking.Block.from_parameters(p=2.0, alpha=0.02, restitution=0.92)
+    around = {"a": float(critical_amplitude(2.0, 0.92)) + np.array([-1e-4, 1e-4]), "omega": [2.0]}
+    assert chattering_map(families.sine(slender), around).complete.values.ravel().tolist() == [True, False]
+
+
+def lobes(*amplitudes):
+    return rocking.pulses.n_lobe([a * THRESHOLD for a in amplitudes], 2.0 / math.pi)
+
+
+def test_a_motion_below_the_threshold_lifts_nothing():
+    assert outcome_of(lobes(0.9, 0.99)) is Outcome.NO_UPLIFT
+
+
+def test_a_rest_before_the_next_exceedance_is_complete():
+    assert outcome_of(lobes(1.02, 1.02)) is Outcome.COMPLETE
+    # Nothing comes after a single lobe.
+    assert outcome_of(lobes(1.5)) is Outcome.COMPLETE
+
+
+def test_a_sequence_that_the_next_lobe_interrupts_is_not_complete():
+    assert outcome_of(lobes(1.1, 1.1)) is Outcome.RESTS_AT_LAST
+
+
+def test_a_rest_between_an_interruption_and_a_later_lobe_is_late():
+    assert outcome_of(lobes(1.1, 1.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.02)) is Outcome.RESTS_LATER
+
+
+def test_a_strong_motion_overturns():
+    assert outcome_of(lobes(9.0)) is Outcome.OVERTURNS
+
+
+def test_overturning_after_a_complete_sequence_is_both():
+    quiet = (0.0, 0.0, 0.0, 0.0)
+    dataset = chattering_map(
+        lambda a, b: Case(BLOCK, lobes(1.02, *quiet, a), "linear"), {"strong": [1.5, 9.0], "any": [0.0]}
+    )
+    assert dataset.complete.all()
+    assert dataset.overturned.values.ravel().tolist() == [False, True]
+    assert dataset.rests.values.ravel().tolist() == [2, 1]
+
+
+def test_a_motion_that_just_touches_the_threshold_is_not_proven():
+    record = rocking.records.load("ridgecrest-clc-090").processed(trim=(225.0, 245.0))
+    dataset = chattering_map(families.record(record, 0.2, 0.92), {"a": [1.0], "p": [2.0]})
+    assert dataset.outcome.item() == Outcome.UNPROVEN
+    assert not dataset.complete.item()
+
+
+def test_a_map_tells_its_outcomes_and_units_and_can_be_stored(tmp_path):
+    dataset = chattering_map(families.sine(BLOCK, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
+    assert dataset.outcome.dims == ("a", "omega")
+    assert dataset.outcome.attrs["flag_meanings"].split()[Outcome.COMPLETE] == "complete"
+    assert dataset.rest.attrs["units"] == "s"
+    dataset.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
+    import xarray as xr
+
+    with xr.open_dataset(tmp_path / "map.nc", engine="h5netcdf") as stored:
+        np.testing.assert_array_equal(stored.outcome, dataset.outcome)
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"a": [1.0]},
+        {"a": [1.0], "b": [1.0], "c": [1.0]},
+        {"a": [], "b": [1.0]},
+        {"a": [1.0, math.nan], "b": [1.0]},
+        {"a": [2.0, 1.0], "b": [1.0]},
+        {"a": 1.0, "b": [1.0]},
+    ],
+)
+def test_unusable_parameters_are_refused(parameters):
+    with pytest.raises(rocking.InvalidOption):
+        chattering_map(families.sine(BLOCK), parameters)
+
+
+def test_a_map_is_drawn_with_the_outcomes_that_it_has():
+    dataset = chattering_map(families.sine(BLOCK, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
+    figure = map_figure(dataset, labels={"a": "amplitude"}, title="A map")
+    (axes,) = figure.axes
+    assert (axes.get_ylabel(), axes.get_xlabel()) == ("amplitude", "omega")
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["no uplift", "complete", "rests at last"]
+    figure.savefig(io.BytesIO(), format="pdf")
+
+
+# Families
+
+
+@pytest.mark.parametrize(
+    "family",
+    [families.sine, families.ricker, lambda b, **k: families.ricker(b, kind="antisymmetric", **k)],
+)
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_the_amplitude_of_a_family_is_over_the_model_s_threshold(family, model):
+    case = family(BLOCK, model=model)(1.3, 3.0)
+    assert case.model == model
+    assert case.motion.pga == pytest.approx(1.3 * min(BLOCK.uplift_thresholds(model)), rel=1e-9)
+
+
+def test_a_near_fault_pulse_has_the_amplitude_asked_for():
+    case = families.mavroeidis_papageorgiou(BLOCK, phase=0.4, gamma=2.0)(1.2, 3.0)
+    assert case.motion.pga == pytest.approx(1.2 * BLOCK.minimum_acceleration, rel=1e-9)
+    assert case.motion.duration == pytest.approx(2.0 * 2.0 * math.pi / (3.0 * BLOCK.p))
+
+
+def test_lobes_swell_or_fade_by_the_ratio():
+    case = families.lobes(BLOCK, omega=2.0, count=3, model="linear")(1.1, 1.2)
+    quarter = 0.5 * math.pi / (2.0 * BLOCK.p)
+    peaks = case.motion.acceleration(quarter * np.array([1.0, 3.0, 5.0])) / THRESHOLD
+    np.testing.assert_allclose(peaks, [1.1, -1.32, 1.584], rtol=1e-12)
+
+
+def test_a_record_is_scaled_for_blocks_of_any_size():
+    motion = rocking.records.load("el-centro-meloland-270")
+    case = families.record(motion, 0.2, 0.9)(1.5, 3.0)
+    assert case.block.p == 3.0
+    assert case.motion.pga == pytest.approx(1.5 * case.block.minimum_acceleration, rel=1e-12)
+
+
+# Exceedances
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    samples=st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=30),
+    plus=st.floats(0.1, 2.0),
+    minus=st.floats(0.1, 2.0),
+    times=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=40),
+)
+def test_a_motion_is_beyond_a_threshold_within_the_exceedances_and_nowhere_else(samples, plus, minus, times):
+    motion = rocking.Motion.from_samples(samples, 0.5)
+    found = exceedances(motion, (plus, minus))
+    assert np.all(np.diff(found, axis=1) > 0.0)
+    instants = motion.duration * np.array(times)
+    # At the ends of a stretch rounding decides.
+    ends = np.append(found.ravel(), math.inf)
+    clear = np.min(np.abs(instants[:, np.newaxis] - ends), axis=1) > 1e-9
+    acceleration = motion.acceleration(instants)
+    beyond = (acceleration > minus) | (acceleration < -plus)
+    within = np.any((instants[:, np.newaxis] > found[:, 0]) & (instants[:, np.newaxis] < found[:, 1]), axis=1)
+    np.testing.assert_array_equal(within[clear], beyond[clear])
+
+
+def test_exceedances_of_a_pulse_start_where_a_resting_block_is_lifted():
+    motion = rocking.pulses.ricker(2.7 * THRESHOLD, 0.7)
+    starts = exceedances(motion, BLOCK.uplift_thresholds("linear"))[:, 0]
+    assert len(starts) == 3
+    response = rocking.simulate(BLOCK, motion, model="linear")
+    assert response.events["time"][0] == pytest.approx(starts[0], abs=1e-12)
+
+
+def test_the_two_sides_have_thresholds_of_their_own():
+    motion = rocking.pulses.sine(1.0, 1.0, cycles=1)
+    assert exceedances(motion, (2.0, 0.5)).round(12).tolist() == [[round(1 / 12, 12), round(5 / 12, 12)]]
+    assert exceedances(motion, (0.5, 2.0)).round(12).tolist() == [[round(7 / 12, 12), round(11 / 12, 12)]]
+    assert exceedances(motion, (2.0, 2.0)).shape == (0, 2)
+
+
+# Episodes
+
+
+def test_episodes_under_a_record_are_those_of_the_response():
+    response = rocking.simulate(STATUE, rocking.records.load("ridgecrest-clc-090"))
+    found = chattering_episodes(response)
+    episodes = found.episodes
+    kinds, times = response.events["kind"], response.events["time"]
+    np.testing.assert_array_equal(episodes["uplift"], times[kinds == "uplift"])
+    np.testing.assert_array_equal(episodes["rest"], times[kinds == "rest"])
+    assert np.all(episodes["uplift"] < episodes["proven"])
+    assert np.all((episodes["lower"] <= episodes["rest"]) & (episodes["rest"] <= episodes["upper"]))
+    assert episodes["impacts"].sum() == len(response.impacts)
+    assert found.amid_shaking.tolist() == [True] * 5 + [False]
+    # It rests though the ground still shakes.
+    assert np.all(np.abs(episodes["ground"]) > 0.1)
+
+
+def test_the_share_at_rest_is_the_share_of_instants_at_which_the_block_does_not_move():
+    response = rocking.simulate(STATUE, rocking.records.load("ridgecrest-clc-360"))
+    found = chattering_episodes(response)
+    start, end = found.shaking
+    instants = np.linspace(start, end, 400_001)
+    still = np.mean((response.rotation(instants) == 0.0) & (response.angular_velocity(instants) == 0.0))
+    assert found.share_at_rest == pytest.approx(still, abs=1e-4)
+    assert 0.1 < found.share_at_rest < 0.9
+
+
+def test_a_delay_changes_no_episode():
+    record = rocking.records.load("ridgecrest-clc-090").processed(trim=(228.0, 245.0))
+    first, second = (chattering_episodes(rocking.simulate(STATUE, m)) for m in (record, record.delayed(3.0)))
+    np.testing.assert_allclose(second.episodes["duration"], first.episodes["duration"], atol=1e-9)
+    assert second.share_at_rest == pytest.approx(first.share_at_rest, abs=1e-9)
+
+
+def test_shaking_ends_when_the_block_has_overturned():
+    response = rocking.simulate(rocking.Block(0.05, 0.25), rocking.records.load("ridgecrest-clc-360"))
+    assert response.overturned
+    found = chattering_episodes(response)
+    assert len(found.episodes) == 3
+    assert found.shaking[1] <= response.overturn_time
+
+
+def test_rests_that_are_not_proven_are_no_episodes():
+    motion = rocking.pulses.sine(1.03 * THRESHOLD, BLOCK.p / math.pi, cycles=2)
+    response = rocking.simulate(BLOCK, motion, model="linear", chattering="velocity")
+    assert len(response.chattering) > 0
+    assert len(chattering_episodes(response).episodes) == 0
+
+
+def test_free_rocking_is_one_episode_without_shaking():
+    found = chattering_episodes(rocking.simulate(BLOCK, None, initial_rotation=0.05))
+    assert len(found.episodes) == 1
+    assert found.episodes["uplift"][0] == 0.0
+    assert math.isnan(found.share_at_rest)
+    assert not found.amid_shaking.any()
+    assert "never passes a threshold" in str(found)
+
+
+def test_a_motion_that_lifts_nothing_has_no_episode():
+    found = chattering_episodes(rocking.simulate(BLOCK, lobes(0.9), model="linear"))
+    assert len(found.episodes) == 0
+    assert math.isnan(found.share_at_rest)
+
+
+def test_episodes_print_as_a_table():
+    text = str(chattering_episodes(rocking.simulate(STATUE, rocking.records.load("ridgecrest-clc-090"))))
+    assert len(text.splitlines()) == 1 + 6 + 1
+    assert "of the shaking from" in text

@@ -1,0 +1,155 @@
+"""Every scheme that ends chattering against the certified response: right where it is right, and shown wrong where not."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rocking
+from rocking.chattering import chattering_time
+from rocking.chattering.schemes import SCHEMES, compare_schemes
+
+BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
+THRESHOLD = BLOCK.gravity * 0.2
+
+
+def sine(a, omega=2.0, cycles=2.5):
+    return rocking.pulses.sine(a * THRESHOLD, omega / (2.0 * math.pi), cycles=cycles)
+
+
+def compared(a, *schemes, omega=2.0, cycles=2.5):
+    return compare_schemes(BLOCK, sine(a, omega, cycles), schemes=schemes or SCHEMES, model="linear")
+
+
+def by_name(comparison):
+    return {repr(outcome.treatment): outcome for outcome in comparison.outcomes}
+
+
+def test_below_the_critical_amplitude_every_scheme_finds_every_rest_and_none_too_late():
+    comparison = compared(1.03)
+    assert len(comparison.outcomes) == len(SCHEMES)
+    for outcome in comparison.outcomes:
+        assert outcome.is_right
+        assert len(outcome.rests) == 5
+        assert np.all(outcome.rests["error"] < 0.0)
+
+
+def test_a_threshold_is_early_by_what_the_geometric_series_still_adds():
+    # After an impact that leaves speed v, arcs of 2 v/(1 -+ delta) follow (the paper's Eqs 67, 69 and 75).
+    outcome = compared(1.03, rocking.VelocityThreshold(1e-9)).outcomes[0]
+    first = outcome.rests[0]
+    delta = float(sine(1.03).acceleration(first["certified"])) / THRESHOLD
+    side = outcome.response.impacts[np.searchsorted(outcome.response.impacts["time"], first["time"])]["side"]
+    arcs = 2.0 * first["speed"] * (1.0 / (1.0 + side * delta) + 0.92 / (1.0 - side * delta))
+    # A time of rest has an absolute error of some 1e-15 s.
+    assert -first["error"] == pytest.approx(arcs / (1.0 - 0.92**2), rel=1e-6)
+
+
+def test_the_paper_s_figure_11_only_the_coarse_threshold_rests_wrongly():
+    outcomes = by_name(compared(1.05))
+    coarse = outcomes.pop("VelocityThreshold(threshold=0.05)")
+    assert all(outcome.is_right for outcome in outcomes.values())
+    assert coarse.false_rests.size == 4
+    assert coarse.false_rests[0] == pytest.approx(1.258442, abs=1e-6)
+    assert np.all(coarse.rests["speed"] <= 0.05)
+    assert coarse.rotation_error > 0.01
+    assert "4 false rests" in coarse.verdict
+
+
+def test_the_paper_s_scheme_rests_at_its_first_impact_past_eq_65():
+    outcome = compared(1.03, rocking.AsymptoticTime()).outcomes[0]
+    after = outcome.rests["time"][0] - outcome.response.events["time"][0]
+    eq65 = float(chattering_time(1.03, 2.0, 0.92, method="asymptotic"))
+    struck = outcome.response.impacts["time"] - outcome.response.events["time"][0]
+    assert after == struck[struck >= eq65][0]
+
+
+def test_where_eq_65_exceeds_the_true_time_the_rest_is_reported_as_stalled():
+    assert chattering_time(1.02, 2.0, 0.92, method="asymptotic") > chattering_time(1.02, 2.0, 0.92)
+    outcome = compared(1.02, rocking.AsymptoticTime()).outcomes[0]
+    assert outcome.is_right
+    assert outcome.response.stalled == 5
+    assert "time no longer advanced" in outcome.verdict
+    assert abs(outcome.largest_error) < 1e-12
+
+
+def test_a_coarse_threshold_hides_overturning():
+    comparison = compared(1.05, rocking.VelocityThreshold(5e-2), omega=1.0, cycles=4.0)
+    (outcome,) = comparison.outcomes
+    assert comparison.certified.overturned
+    assert not outcome.response.overturned
+    assert outcome.overturns_wrongly
+    assert not outcome.is_right
+    assert "does not overturn, wrongly" in outcome.verdict
+
+
+def test_a_rest_that_a_scheme_does_not_find_is_missed():
+    block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.705)
+    motion = rocking.pulses.n_lobe([3.34, 2.59, 1.85, 1.98, 3.1, 2.34], 0.3045)
+    comparison = compare_schemes(block, motion, schemes=[rocking.VelocityThreshold(0.3)], model="linear")
+    (outcome,) = comparison.outcomes
+    rests = comparison.certified.events["time"][comparison.certified.events["kind"] == "rest"]
+    np.testing.assert_array_equal(outcome.missed, rests)
+    assert "1 rest missed" in outcome.verdict
+    assert "overturns, wrongly" in outcome.verdict
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    lobes=st.lists(st.floats(0.5, 1.4), min_size=2, max_size=6),
+    omega=st.floats(1.0, 6.0),
+    eta=st.floats(0.5, 0.95),
+    threshold=st.floats(1e-4, 0.3),
+)
+def test_blocks_that_rest_together_are_lifted_together(lobes, omega, eta, threshold):
+    block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=eta)
+    motion = rocking.pulses.n_lobe([a * THRESHOLD for a in lobes], omega / (2.0 * math.pi))
+    comparison = compare_schemes(block, motion, schemes=[rocking.VelocityThreshold(threshold)], model="linear")
+    (outcome,) = comparison.outcomes
+
+    def lifted(response, rest):
+        events = response.events
+        after = events["time"][np.searchsorted(events["time"], rest, side="right") :]
+        return after[0] if after.size else math.inf
+
+    true = outcome.rests[~np.isnan(outcome.rests["certified"])]
+    for rest in true:
+        theirs, ours = lifted(outcome.response, rest["time"]), lifted(comparison.certified, rest["certified"])
+        assert theirs == pytest.approx(ours, abs=1e-12)
+    # Each certified rest has exactly one counterpart, or is missed.
+    assert len(np.unique(true["certified"])) == len(true)
+    assert len(true) + outcome.missed.size == len(comparison.certified.chattering)
+
+
+def test_schemes_that_do_not_apply_are_listed_with_the_reason():
+    record = rocking.records.load("ridgecrest-clc-090").processed(trim=(225.0, 245.0))
+    comparison = compare_schemes(rocking.Block(0.12, 0.55), record, schemes=[rocking.AsymptoticTime()])
+    assert comparison.outcomes == ()
+    ((scheme, reason),) = comparison.not_applicable
+    assert scheme == rocking.AsymptoticTime()
+    assert "sinusoidal" in reason
+    assert "not applicable" in str(comparison)
+
+
+def test_a_mistake_in_the_case_is_no_scheme_s_fault():
+    with pytest.raises(rocking.InvalidOption, match="model"):
+        compare_schemes(BLOCK, sine(1.03), model="cubic")
+
+
+def test_the_table_has_a_line_for_each_scheme():
+    lines = str(compared(1.05)).splitlines()
+    assert len(lines) == 2 + len(SCHEMES)
+    assert lines[1].startswith("certified")
+    assert any(line.startswith("velocity 0.05") and "false rest" in line for line in lines)
+
+
+def test_free_rocking_is_compared_too():
+    comparison = compare_schemes(
+        BLOCK, None, schemes=[rocking.IntervalThreshold(1e-6)], model="linear", initial_rotation=0.02
+    )
+    (outcome,) = comparison.outcomes
+    assert outcome.is_right
+    assert -1e-4 < outcome.largest_error < 0.0
+    assert outcome.peak_error == 0.0
