@@ -18,7 +18,7 @@ from rocking.kernels.arc import (
     vary_linear,
     vary_nonlinear,
 )
-from rocking.kernels.state import ORDER, Scratch, new_scratch
+from rocking.kernels.state import COSINE, GROUND, ORDER, SERIES, SINE, Floats, new_scratch
 
 ULP = 2.0**-52
 
@@ -96,21 +96,23 @@ def linear_series(
 ) -> tuple[np.ndarray, int, float]:
     """Series, its order and the step, as for an arc of a response."""
     scratch = new_scratch(len(A))
-    scratch.A[: len(A)] = A
+    scratch[GROUND][: len(A)] = A
     degree = len(A) - 1
     order = linear_order(lam, h) if degree <= 1 else ORDER
-    expand_linear(u, v, lam, alpha, scratch.A, degree, order, scratch.c)
+    expand_linear(u, v, lam, alpha, scratch[GROUND], degree, order, scratch[SERIES])
     if degree > 1:
-        order, h = converged(scratch.c, degree, h)
-    return scratch.c, order, h
+        order, h = converged(scratch[SERIES], degree, h)
+    return scratch[SERIES], order, h
 
 
 def nonlinear_series(
     u: float, v: float, lam: float, alpha: float, A: np.ndarray, h: float
-) -> tuple[Scratch, int, float]:
+) -> tuple[Floats, int, float]:
     scratch = new_scratch(len(A))
-    scratch.A[: len(A)] = A
-    order, h = expand_nonlinear(u, v, lam, alpha, scratch.A, len(A) - 1, h, scratch.c, scratch.S, scratch.C)
+    scratch[GROUND][: len(A)] = A
+    order, h = expand_nonlinear(
+        u, v, lam, alpha, scratch[GROUND], len(A) - 1, h, scratch[SERIES], scratch[SINE], scratch[COSINE]
+    )
     return scratch, order, h
 
 
@@ -155,7 +157,7 @@ def test_a_nonlinear_series_solves_the_equation_of_motion(
     motion = motion_over(A, 1.0 / p)
     scratch, order, h = nonlinear_series(u, v, p * p, alpha, motion, 1.0 / p)
     assert 0.0 < h <= 1.0 / p
-    assert_solves_the_nonlinear_equation(scratch.c, order, h, p * p, alpha, motion)
+    assert_solves_the_nonlinear_equation(scratch[SERIES], order, h, p * p, alpha, motion)
 
 
 @quick
@@ -165,9 +167,9 @@ def test_a_violent_motion_shortens_the_step_until_the_series_converges(v: float,
     scratch, order, h = nonlinear_series(0.3, v * p, p * p, 0.4, motion, 1.0 / p)
     assert order == ORDER
     assert 0.02 / p < h < 1.0 / p
-    last = max(abs(scratch.c[k]) * h**k for k in (order - 1, order))
-    assert last <= NEGLIGIBLE * max(abs(scratch.c[k]) * h**k for k in range(order + 1))
-    assert_solves_the_nonlinear_equation(scratch.c, order, h, p * p, 0.4, motion)
+    last = max(abs(scratch[SERIES][k]) * h**k for k in (order - 1, order))
+    assert last <= NEGLIGIBLE * max(abs(scratch[SERIES][k]) * h**k for k in range(order + 1))
+    assert_solves_the_nonlinear_equation(scratch[SERIES], order, h, p * p, 0.4, motion)
 
 
 @quick
@@ -179,7 +181,7 @@ def test_the_nonlinear_arc_of_a_slender_block_is_the_linear_one(u: float, v: flo
         motion = alpha * np.array([a, slope])
         one, order, _ = linear_series(alpha * u, alpha * v, 1.0, alpha, motion, 0.5)
         other, other_order, _ = nonlinear_series(alpha * u, alpha * v, 1.0, alpha, motion, 0.5)
-        return abs(evaluate(one, order, 0.5)[0] - evaluate(other.c, other_order, 0.5)[0]) / alpha
+        return abs(evaluate(one, order, 0.5)[0] - evaluate(other[SERIES], other_order, 0.5)[0]) / alpha
 
     assert difference(1e-3) <= 1e-5
     assert difference(1e-5) <= 1e-9
@@ -222,7 +224,7 @@ def test_the_variation_is_the_derivative_by_the_strength_of_the_motion(
         start = u + strength * du, v + strength * dv
         if nonlinear:
             scratch, order, _ = nonlinear_series(*start, p * p, 0.3, (1.0 + strength) * motion, step)
-            return np.array(evaluate(scratch.c, order, h)[:2])
+            return np.array(evaluate(scratch[SERIES], order, h)[:2])
         c, order, _ = linear_series(*start, p * p, 0.3, (1.0 + strength) * motion, step)
         return np.array(evaluate(c, order, h)[:2])
 

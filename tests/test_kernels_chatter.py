@@ -22,7 +22,7 @@ from rocking.kernels.chatter import (
     side_bounds,
     time_to_rest,
 )
-from rocking.kernels.state import Shaking, new_scratch
+from rocking.kernels.state import GROUND, Shaking, new_scratch
 
 GRAVITY = 9.80665
 
@@ -80,7 +80,7 @@ def speed(problem: Problem, side: int, time: float, share: float) -> float:
 def test_bounds_on_an_arc_hold_its_duration_and_its_impact(problem: Problem, side: int, share: float) -> None:
     v, i = speed(problem, side, 0.0, share), 1 - 2 * side
     window = 4.0 * v / problem.restoring(0.0, i)
-    low, high, *others = motion_range(shaking_of(problem), 0, 0.0, window, new_scratch(2).A)
+    low, high, *others = motion_range(shaking_of(problem), 0, 0.0, window, new_scratch(2)[GROUND])
     in_g = (x / GRAVITY for x in (low, high, *others))
     bounds = side_bounds(sides_of(problem), side, problem.model == "nonlinear", *in_g)
     change, shortest, longest = arc_bounds(v, bounds)
@@ -102,7 +102,7 @@ def test_the_bracket_holds_the_time_to_rest_whatever_jumps_lie_in_the_window(
         shaking_of(problem),
         sides_of(problem),
         problem.model == "nonlinear",
-        new_scratch(2).A,
+        new_scratch(2)[GROUND],
         v,
         side,
         piece,
@@ -122,7 +122,14 @@ def test_the_bracket_under_an_approximated_motion_holds_for_every_motion_so_near
     v, i = speed(problem, side, 0.0, share), 1 - 2 * side
     error *= GRAVITY * min(problem.alpha)
     lower, upper = prove_rest(
-        shaking_of(problem, error), sides_of(problem), problem.model == "nonlinear", new_scratch(2).A, v, side, 0, 0.0
+        shaking_of(problem, error),
+        sides_of(problem),
+        problem.model == "nonlinear",
+        new_scratch(2)[GROUND],
+        v,
+        side,
+        0,
+        0.0,
     )
     assume(upper > 0.0)
     flight = 2.0 * v / problem.restoring(0.0, i)
@@ -221,7 +228,7 @@ def test_a_window_over_too_many_pieces_proves_nothing_until_the_block_is_slower(
     problem = Problem(
         "linear", (2.0, 2.0), (0.2, 0.2), (0.9, 0.9), 1e-4 * np.arange(count + 1), np.full((count, 1), 0.1)
     )
-    arguments = shaking_of(problem), sides_of(problem), False, new_scratch(1).A
+    arguments = shaking_of(problem), sides_of(problem), False, new_scratch(1)[GROUND]
     assert np.all(np.isnan(prove_rest(*arguments, 5e-3, 0, 0, 0.0)))
     assert np.all(np.isfinite(prove_rest(*arguments, 1e-4, 0, 0, 0.0)))
 
@@ -231,7 +238,7 @@ def test_a_jump_just_past_the_end_of_a_window_is_not_ruled_out() -> None:
     late, length = 2.0**20, 1.0
     rows = np.array([[0.0, 0.0], [-0.5 * GRAVITY, 0.0]])
     problem = Problem("linear", (2.0, 2.0), (0.2, 0.2), (0.5, 0.5), np.array([late, late + length, late + 9.0]), rows)
-    shaking, sides, A = shaking_of(problem), sides_of(problem), new_scratch(2).A
+    shaking, sides, A = shaking_of(problem), sides_of(problem), new_scratch(2)[GROUND]
     v = 1e-8
     window = 1.5 * 2.0 * v * 1.5 / 0.8 / 0.75
     assert np.isfinite(prove_rest(shaking, sides, False, A, v, 0, 0, length - 1e-6)[1])
@@ -245,7 +252,7 @@ polynomials = st.lists(between(-10.0, 10.0), min_size=1, max_size=14)
 @quick
 @given(polynomials, between(0.0, 2.0), between(1e-3, 1.0))
 def test_the_range_of_a_piece_holds_all_its_values(A: list[float], offset: float, window: float) -> None:
-    low, high, steepest, _ = piece_range(np.array(A), offset, window, new_scratch(len(A)).A)
+    low, high, steepest, _ = piece_range(np.array(A), offset, window, new_scratch(len(A))[GROUND])
     polynomial = np.polynomial.Polynomial(A)
     times = offset + window * np.linspace(0.0, 1.0, 101)
     assert low <= np.min(polynomial(times))
@@ -257,7 +264,7 @@ def test_the_range_of_a_piece_holds_all_its_values(A: list[float], offset: float
 
 def test_the_range_of_a_piece_allows_for_the_rounding_of_large_terms_that_cancel() -> None:
     row, offset = np.array([1e3, -1e5]), 0.01 + 1e-12
-    low, high, _, _ = piece_range(row, offset, 0.0, new_scratch(2).A)
+    low, high, _, _ = piece_range(row, offset, 0.0, new_scratch(2)[GROUND])
     exact = Fraction(row[0]) + Fraction(row[1]) * Fraction(offset)
     assert Fraction(low) < exact < Fraction(high)
     assert high - low < 1e-10
@@ -269,7 +276,7 @@ def test_the_range_of_a_motion_holds_all_its_values_and_changes(problem: Problem
     shaking = shaking_of(problem)
     piece = int(np.searchsorted(problem.breakpoints, start, side="right")) - 1
     offset = start - problem.breakpoints[piece]
-    low, high, steepest, leap = motion_range(shaking, piece, offset, window, new_scratch(3).A)
+    low, high, steepest, leap = motion_range(shaking, piece, offset, window, new_scratch(3)[GROUND])
     times = start + np.sort(np.append(window * np.linspace(0.0, 1.0, 301), 0.0))
     values = np.array([problem.acceleration(t) for t in times])
     assert low <= np.min(values)
@@ -279,7 +286,7 @@ def test_the_range_of_a_motion_holds_all_its_values_and_changes(problem: Problem
 
 def test_after_the_motion_the_range_is_zero() -> None:
     problem = Problem("linear", (2.0, 2.0), (0.2, 0.2), (0.5, 0.5), np.array([0.0, 1.0]), np.array([[0.5, 0.2]]))
-    A = new_scratch(2).A
+    A = new_scratch(2)[GROUND]
     assert motion_range(shaking_of(problem), 1, 0.3, 5.0, A) == (0.0, 0.0, 0.0, 0.0)
     low, high, steepest, leap = motion_range(shaking_of(problem), 0, 0.5, 5.0, A)
     assert (low, high, steepest) == (0.0, pytest.approx(0.7), 0.2)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift
-from rocking.kernels.state import AT_REST, Rules, Shaking, new_scratch
+from rocking.kernels.state import AT_REST, GROUND, SERIES, SPARE, Rules, Shaking, new_scratch
 from rocking.kernels.status import CERTIFIED, IMPACT, OVERTURN, STEP
 
 ULP = 2.0**-52
@@ -77,7 +77,9 @@ def uplift(
 ) -> tuple[float, int, bool]:
     """Time, side, and whether by a jump."""
     scratch = new_scratch(shaking.coefficients.shape[1])
-    piece, offset, side, jump = next_uplift(shaking, piece, offset, sides(thresholds), stop, scratch.A, scratch.d)
+    piece, offset, side, jump = next_uplift(
+        shaking, piece, offset, sides(thresholds), stop, scratch[GROUND], scratch[SPARE]
+    )
     return shaking.breakpoints[piece] + offset if side != AT_REST else math.inf, side, jump
 
 
@@ -250,7 +252,7 @@ def test_a_step_after_an_impact_is_sized_by_the_arc_under_weak_and_violent_motio
     shaking, scratch = in_units_of_g([0.0, 9.0], [row]), new_scratch(columns)
     rules = Rules(nonlinear, CERTIFIED, 1e-12, math.inf, True, True)
     order, h, degree = expand(shaking, sides(), rules, scratch, PLUS, 0, 0.0, 0.0, 1e-3, 9.0)
-    status, time, *_ = advance(0.0, 1e-3, order, h, scratch.c, scratch.d)
+    status, time, *_ = advance(0.0, 1e-3, order, h, scratch[SERIES], scratch[SPARE])
     assert status == IMPACT
     assert time == pytest.approx(2e-3 / (4.0 * (0.2 + strength)), rel=0.03)
     assert (time < h <= 0.5, degree) == (True, 0 if columns == 1 else 1)

@@ -11,7 +11,18 @@ from numpy.testing import assert_array_equal
 
 from rocking.kernels import state, status
 from rocking.kernels.march import march
-from rocking.kernels.state import Rules, Shaking, Tables, Trail, new_scratch, new_state
+from rocking.kernels.state import (
+    EVENT_TABLE,
+    IMPACT_TABLE,
+    NODE_TABLE,
+    SEQUENCE_TABLE,
+    Floats,
+    Rules,
+    Shaking,
+    Trail,
+    new_scratch,
+    new_state,
+)
 from rocking.kernels.trace import trace
 
 G = 9.80665
@@ -77,7 +88,7 @@ def run(
     stop: float = math.inf,
     rotation: float = 0.0,
     velocity: float = 0.0,
-    tables: Tables | None = None,
+    tables: Floats | None = None,
 ) -> Run:
     rows = []
     for p_i, alpha_i, e_i in zip(p, alpha, e, strict=True):
@@ -85,7 +96,7 @@ def run(
         rows.append([p_i**2, alpha_i, threshold, gain, e_i, limit])
     sides = np.array(rows)
     rules = Rules(nonlinear, treatment, 1e-12, stop, stop == math.inf, True)
-    tables = tables or state.new_tables(4096)
+    tables = state.new_tables(4096) if tables is None else tables
     at, x = new_state()
     if rotation != 0.0 or velocity != 0.0:
         sign = math.copysign(1.0, rotation if rotation != 0.0 else velocity)
@@ -94,16 +105,16 @@ def run(
     scratch = new_scratch(shaking.coefficients.shape[1])
     pieces = len(shaking.coefficients) + 1
     ending = march(shaking, sides, rules, tables, scratch, at, x, pieces)
-    while ending == status.FULL and len(tables.nodes) < 200_000:
+    while ending == status.FULL and tables.shape[1] < 200_000:
         tables = state.grown(tables)
         ending = march(shaking, sides, rules, tables, scratch, at, x, pieces)
-    nodes = tables.nodes[: at[state.NODES]].copy()
+    nodes = tables[NODE_TABLE, : at[state.NODES]].copy()
     return Run(
         ending,
         nodes,
-        tables.impacts[: at[state.IMPACTS]],
-        tables.events[: at[state.EVENTS]],
-        tables.sequences[: at[state.SEQUENCES]],
+        tables[IMPACT_TABLE, : at[state.IMPACTS], :5],
+        tables[EVENT_TABLE, : at[state.EVENTS], :4],
+        tables[SEQUENCE_TABLE, : at[state.SEQUENCES], :5],
         at,
         x,
         Trail(shaking, sides, rules, nodes),
@@ -126,7 +137,7 @@ def assert_sound(found: Run) -> None:
 
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_a_march_that_runs_out_of_room_resumes_bit_for_bit(nonlinear: bool) -> None:
-    least = Tables(np.empty((3, 6)), np.empty((1, 5)), np.empty((2, 4)), np.empty((1, 5)))
+    least = np.empty((4, 3, 6))
     for seed in range(4):
         whole = run(record(seed), nonlinear=nonlinear)
         resumed = run(record(seed), nonlinear=nonlinear, tables=least)

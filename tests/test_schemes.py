@@ -1,4 +1,4 @@
-"""Every scheme that ends chattering against the certified response: right where it is right, and shown wrong where not."""
+"""Every scheme that ends chattering against the certified response: right where it is, and shown wrong where not."""
 
 import math
 

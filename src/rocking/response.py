@@ -100,12 +100,12 @@ class Response:
         model: Model,
         treatment: Treatment,
         trail: Trail,
-        tables: state.Tables,
+        tables: Floats,
         at: state.Integers,
         x: Floats,
     ) -> Response:
         """Response from the tables and the last state of a march."""
-        events = tables.events[: at[state.EVENTS]]
+        events = tables[state.EVENT_TABLE, : at[state.EVENTS]]
         overturned = bool(len(events)) and events[-1, 1] == status.TOPPLED
         return cls(
             block=block,
@@ -119,10 +119,10 @@ class Response:
             peak_sensitivity=float(x[state.PEAK_CHANGE]),
             duration=float(x[state.END]),
             events=_events(events),
-            impacts=_structured(tables.impacts[: at[state.IMPACTS]], IMPACT),
-            chattering=_structured(tables.sequences[: at[state.SEQUENCES]], CHATTERING),
+            impacts=_structured(tables[state.IMPACT_TABLE, : at[state.IMPACTS]], IMPACT),
+            chattering=_structured(tables[state.SEQUENCE_TABLE, : at[state.SEQUENCES]], CHATTERING),
             stalled=int(at[state.STALLED]),
-            trail=trail._replace(nodes=tables.nodes[: at[state.NODES]].copy()),
+            trail=trail._replace(nodes=tables[state.NODE_TABLE, : at[state.NODES]].copy()),
         )
 
     @property

@@ -85,14 +85,14 @@ def simulate(
     pieces = len(shaking.coefficients) + 1
     ending = march(shaking, sides, rules, tables, scratch, at, x, pieces)
     while ending == status.FULL:
-        if len(tables.nodes) > _MOST_ROWS:
+        if tables.shape[1] > _MOST_ROWS:
             raise InvalidOption(f"the response takes more than {_MOST_ROWS} steps; give a shorter duration=")
         tables = state.grown(tables)
         ending = march(shaking, sides, rules, tables, scratch, at, x, pieces)
     if ending == status.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give duration= or another initial state")
     return Response.from_march(
-        block, motion, model, how, state.Trail(shaking, sides, rules, tables.nodes), tables, at, x
+        block, motion, model, how, state.Trail(shaking, sides, rules, tables[state.NODE_TABLE]), tables, at, x
     )
 
 

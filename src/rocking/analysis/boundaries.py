@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rocking.kernels.state import Floats, Integers
 from rocking.progress import Progress
 
-#: An interval of the grid is searched for regions no thinner than this part of it.
-_THINNEST: Final = 1.0 / 64.0
+#: From so many changes on, no further ones are looked for in an interval of the grid.
+_MOST: Final = 64
 
 
 @dataclass(frozen=True)
@@ -67,17 +67,19 @@ def boundaries(
 
     Notes
     -----
-    Where a bisection meets a third outcome both halves are followed, down to 1/64 of the interval; outcomes confined
-    to less than that, or to between two levels with the same outcome, are passed over.
+    Where a bisection meets a third outcome both halves are followed, so each bracket ends with two outcomes that are
+    neighbours to within the tolerance. Only where an interval of the grid holds 64 changes or more, as between the
+    regions of a fractal, one is followed up for all that lie between two outcomes. Outcomes between two levels of the
+    grid with the same outcome are not seen.
     """
     here = _on_grid(levels, outcome)
-    thinnest = _THINNEST * (here.high - here.low)
+    origin = np.arange(len(here.level))
     halvings = np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (tolerance * here.high))))
     with Progress("refining", int(halvings.sum()), show=progress) as bar:
         while (wide := _wide(here, tolerance)).any():
             found = here.below.copy()
             found[wide] = outcome_of(here.column[wide], here.level[wide])
-            here, thinnest = _halved(here, wide, found, thinnest)
+            here, origin = _halved(here, wide, found, origin)
             bar.advance(int(wide.sum()))
     return _ordered(here)
 
@@ -92,11 +94,16 @@ def _on_grid(levels: Floats, outcome: Integers) -> Boundaries:
     return Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
 
 
-def _halved(here: Boundaries, wide: NDArray[np.bool_], found: Integers, thinnest: Floats) -> tuple[Boundaries, Floats]:
-    """Brackets after one bisection of the wide ones; those that hold a third outcome become two."""
+def _halved(
+    here: Boundaries, wide: NDArray[np.bool_], found: Integers, origin: Integers
+) -> tuple[Boundaries, Integers]:
+    """Brackets after one bisection of the wide ones; those that hold a third outcome become two.
+
+    `origin` is the interval of the grid that each comes from.
+    """
     middle = here.level
-    thick = here.high - here.low > thinnest
-    third = wide & thick & (found != here.below) & (found != here.above)
+    few = np.bincount(origin)[origin] < _MOST
+    third = wide & few & (found != here.below) & (found != here.above)
     up = wide & (found == here.below)
     lower = Boundaries(
         here.column,
@@ -107,7 +114,7 @@ def _halved(here: Boundaries, wide: NDArray[np.bool_], found: Integers, thinnest
     )
     upper = Boundaries(here.column[third], middle[third], here.high[third], found[third], here.above[third])
     both = (np.concatenate(pair) for pair in zip(vars(lower).values(), vars(upper).values(), strict=True))
-    return Boundaries(*both), np.concatenate([thinnest, thinnest[third]])
+    return Boundaries(*both), np.concatenate([origin, origin[third]])
 
 
 def _ordered(here: Boundaries) -> Boundaries:

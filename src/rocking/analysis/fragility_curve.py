@@ -90,7 +90,8 @@ class FragilityCurve:
         """Confidence interval of the dispersion; infinite where the data allow a slope that does not rise."""
         if self.replicates is not None:
             low, high = self._percentiles(self.replicates.slope)
-            return 1.0 / high if high > 0.0 else math.inf, 1.0 / low if low > 0.0 else math.inf
+            least = 0.0 if high >= lognormal.STEEP else 1.0 / high if high > 0.0 else math.inf
+            return least, 1.0 / low if low > 0.0 else math.inf
         return self._around(math.log(self.dispersion), np.array([0.0, -self.dispersion]))
 
     def probability(self, intensity: ArrayLike) -> Floats:
@@ -104,7 +105,7 @@ class FragilityCurve:
         [0.5, 0.0]
         """
         at = _intensities(intensity)
-        return self.fitted.probability(_logarithm(at).ravel())[0].reshape(at.shape)
+        return np.asarray(self.fitted.probability(_logarithm(at).ravel())[0].reshape(at.shape))
 
     def band(self, intensity: ArrayLike) -> tuple[Floats, Floats]:
         """Lower and upper end of the pointwise confidence band of the probability.

@@ -19,6 +19,9 @@ _ITERATIONS: Final = 100
 #: The likelihood is at its maximum when the parameters move by less than this part of themselves.
 _CONVERGED: Final = 1e-11
 
+#: Slope that stands for a step.
+STEEP: Final = 1e9
+
 #: Outcomes in a group of the test of fit, at least.
 _GROUP: Final = 5
 #: Groups that binary outcomes are put in, at most (Hosmer and Lemeshow).
@@ -207,10 +210,6 @@ def resampled(
     return fits, samples - int(overlap.sum())
 
 
-#: Slope of a step, in the logarithm of the intensity.
-_STEEP: Final = 1e9
-
-
 def _limits(z: Floats, exceeded: Floats, trials: Floats) -> tuple[Probit, NDArray[np.bool_]]:
     """Limits that likelihoods without a maximum tend to, and which of the fits have a maximum."""
     yes, no = exceeded > 0, exceeded < trials
@@ -219,7 +218,7 @@ def _limits(z: Floats, exceeded: Floats, trials: Floats) -> tuple[Probit, NDArra
     rising, falling = highest_no <= lowest_yes, highest_yes <= lowest_no
     never, always = ~yes.any(axis=1), ~no.any(axis=1)
     middle = np.where(rising, highest_no + lowest_yes, highest_yes + lowest_no) / 2.0
-    slope = np.where(rising, _STEEP, -_STEEP)
+    slope = np.where(rising, STEEP, -STEEP)
     slope[never | always] = 0.0
     with np.errstate(invalid="ignore"):
         intercept = -slope * middle

@@ -79,6 +79,7 @@ def write(path: str | Path, function: ET.Element, limit_states: Sequence[str], h
     ET.SubElement(model, "limitStates").text = " ".join(_name(state, "a limit state") for state in limit_states)
     model.append(function)
     ET.indent(root)
+    root.tail = "\n"
     try:
         ET.ElementTree(root).write(path, encoding="UTF-8", xml_declaration=True)
     except OSError as error:

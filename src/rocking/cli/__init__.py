@@ -23,6 +23,10 @@ for _command, _help in {
     "chatter": "Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.",
     "critical": "Give the amplitude up to which chattering under a sine is complete, by every method.",
     "paper": "Redraw the paper's figures from computation.",
+    "spectrum": "Compute rocking spectra: peak rotation against the size of the block.",
+    "map": "Map what a pulse does to a block, over amplitude and frequency.",
+    "ida": "Scale motions up until the block overturns and beyond (incremental dynamic analysis).",
+    "fragility": "Fit the probability that a block overturns against the intensity of the motions.",
 }.items():
     app.command(f"rocking.cli.{_command}:{_command}", name=_command, help=_help)
 

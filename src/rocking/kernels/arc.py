@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from rocking.kernels.compiled import leaf, routine
-from rocking.kernels.state import ORDER, Floats, Scratch
+from rocking.kernels.state import COSINE, GROUND, ORDER, SINE, SPARE, Floats
 
 #: Terms below this fraction of the largest one no longer count.
 NEGLIGIBLE = 2.0**-58
@@ -157,26 +157,26 @@ def evaluate(c: Floats, order: int, t: float) -> tuple[float, float, float]:
 
 @routine
 def vary_linear(
-    du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Scratch
+    du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Floats
 ) -> tuple[float, float]:
     """Variation (du, dv) after time t of a linear arc when the motion is scaled by 1 + epsilon.
 
     The variation obeys the arc's own equation with alpha = 0, so its series is an arc's series.
     """
-    expand_linear(du, dv, lam, 0.0, scratch.A, degree, order, scratch.d)
-    total, rate, _ = evaluate(scratch.d, order, t)
+    expand_linear(du, dv, lam, 0.0, scratch[GROUND], degree, order, scratch[SPARE])
+    total, rate, _ = evaluate(scratch[SPARE], order, t)
     return total, rate
 
 
 @routine
 def vary_nonlinear(
-    du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Scratch
+    du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Floats
 ) -> tuple[float, float]:
     """Variation (du, dv) after time t of a nonlinear arc when the motion is scaled by 1 + epsilon.
 
     Needs A, S and C as `expand_nonlinear` left them. Solves d'' = lam ((cos - A sin) d - A cos).
     """
-    A, S, C, d = scratch.A, scratch.S, scratch.C, scratch.d
+    A, S, C, d = scratch[GROUND], scratch[SINE], scratch[COSINE], scratch[SPARE]
     d[0] = du
     d[1] = dv
     for k in range(order - 1):

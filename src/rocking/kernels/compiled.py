@@ -8,8 +8,9 @@ import numba
 F = TypeVar("F", bound=Callable[..., object])
 
 # - error_model: a kernel that divides by zero goes on with inf or NaN and reports through its status.
-# - fast-math is never switched on: the proofs rest on IEEE rounding.
-# - _nrt=False, fastmath={"contract"}: kernels never allocate, so counting references to their array arguments (atomic operations, dearer
+# - fast-math is never switched on, but for contraction: the proofs rest on IEEE rounding, and a fused multiplication
+#   and addition only rounds once instead of twice.
+# - _nrt=False: kernels never allocate, so counting references to their array arguments (atomic operations, dearer
 #   than a whole Taylor step) is switched off.
 
 

@@ -18,14 +18,17 @@ from rocking.kernels.compiled import leaf, routine
 from rocking.kernels.root import curvature_bound, first_root
 from rocking.kernels.state import (
     AT_REST,
+    COSINE,
     GAIN,
+    GROUND,
     ORDER,
+    SERIES,
+    SINE,
     SLENDERNESS,
     STIFFNESS,
     THRESHOLD,
     Floats,
     Rules,
-    Scratch,
     Shaking,
 )
 from rocking.kernels.status import IMPACT, OVERTURN, STEP
@@ -59,7 +62,7 @@ def expand(
     shaking: Shaking,
     sides: Floats,
     rules: Rules,
-    scratch: Scratch,
+    scratch: Floats,
     side: int,
     piece: int,
     offset: float,
@@ -68,7 +71,7 @@ def expand(
     left: float,
 ) -> tuple[int, float, int]:
     """Series of the arc from a state into scratch; returns (order, step, degree of the motion)."""
-    c, A = scratch.c, scratch.A
+    c, A = scratch[SERIES], scratch[GROUND]
     h = step_length(sides, side, u, v, left, motion_at(shaking, piece, offset) * shaking.inverse_g)
     degree = 0
     A[0] = 0.0
@@ -77,7 +80,7 @@ def expand(
         degree = local_motion(shaking.coefficients[piece], offset, sign * shaking.inverse_g, h, A)
     stiffness, slenderness = sides[side, STIFFNESS], sides[side, SLENDERNESS]
     if rules.nonlinear:
-        order, h = expand_nonlinear(u, v, stiffness, slenderness, A, degree, h, c, scratch.S, scratch.C)
+        order, h = expand_nonlinear(u, v, stiffness, slenderness, A, degree, h, c, scratch[SINE], scratch[COSINE])
     elif degree <= 1:
         order = linear_order(stiffness, h)
         expand_linear(u, v, stiffness, slenderness, A, degree, order, c)

@@ -34,9 +34,7 @@ from rocking.kernels.state import (
     Floats,
     Integers,
     Rules,
-    Scratch,
     Shaking,
-    Tables,
     U,
     V,
 )
@@ -60,7 +58,7 @@ AFTER = U1 - U0
 
 
 class Room(NamedTuple):
-    """Room for the work: the lanes' table, their series (nonlinear), and their marks."""
+    """Room for the work: the lanes' flat table, their marks, and (nonlinear) the series of u, sin and cos(alpha - u)."""
 
     lanes: Floats
     series: Floats
@@ -69,7 +67,16 @@ class Room(NamedTuple):
 
 def new_room() -> Room:
     """Room for one call of `run_lanes` at a time."""
-    return Room(np.zeros(ROWS * WIDTH), np.zeros(3 * (ORDER + 1) * WIDTH), np.zeros(WIDTH, dtype=np.int64))
+    series = _on_cache_lines(3 * (ORDER + 1) * WIDTH).reshape(3, ORDER + 1, WIDTH)
+    return Room(_on_cache_lines(ROWS * WIDTH), series, np.zeros(WIDTH, dtype=np.int64))
+
+
+def _on_cache_lines(size: int) -> Floats:
+    """Zeros that start on a cache line: vectors that straddle two lines load at half the speed."""
+    line = 64
+    room = np.zeros(size + line // 8)
+    skip = -room.ctypes.data % line // 8
+    return room[skip : skip + size]
 
 
 @kernel
@@ -77,8 +84,8 @@ def run_lanes(
     shaking: Shaking,
     sides: Floats,
     rules: Rules,
-    tables: Tables,
-    scratch: Scratch,
+    tables: Floats,
+    scratch: Floats,
     room: Room,
     at: Integers,
     x: Floats,
@@ -136,8 +143,8 @@ def play(
     shaking: Shaking,
     sides: Floats,
     rules: Rules,
-    tables: Tables,
-    scratch: Scratch,
+    tables: Floats,
+    scratch: Floats,
     lanes: Floats,
     at: Integers,
     x: Floats,
@@ -252,12 +259,12 @@ def series_order(sides: Floats, h: float) -> int:
     fastest = 0.0
     for lane in range(sides.shape[0]):
         fastest = max(fastest, max(sides[lane, 0, STIFFNESS], sides[lane, 1, STIFFNESS]))
-    # Up to where it falls, a block's rotation changes at no more than about twice p.
-    x = 2.0 * math.sqrt(fastest) * h
+    # Until it falls, a block's rotation changes hardly faster than p.
+    x = 1.5 * math.sqrt(fastest) * h
     term = 1.0
     for k in range(1, ORDER):
         term *= x / k
-        if term < 2.0**-54:
+        if term < 2.0**-51:
             return max(4, k)
     return ORDER
 
@@ -268,69 +275,101 @@ def quiet_nonlinear(
 ) -> int:
     """Step all lanes through one sample of the nonlinear model; mark and count those that may have an event in it."""
     slope = (end - start) / h
-    sine, cosine = ORDER + 1, 2 * (ORDER + 1)
-    for lane in range(WIDTH):
-        series[0 * WIDTH + lane], series[1 * WIDTH + lane] = lanes[U0 + lane], lanes[V0 + lane]
-        series[(sine) * WIDTH + lane], series[(cosine) * WIDTH + lane] = lanes[S0 + lane], lanes[C0 + lane]
+    rotation, sine, cosine = series[0], series[1], series[2]
+    signs, stiffness = lanes[SIGN : SIGN + WIDTH], lanes[LAMBDA : LAMBDA + WIDTH]
+    copy(rotation[0], lanes[U0 : U0 + WIDTH])
+    copy(rotation[1], lanes[V0 : V0 + WIDTH])
+    copy(sine[0], lanes[S0 : S0 + WIDTH])
+    copy(cosine[0], lanes[C0 : C0 + WIDTH])
     for k in range(order - 1):
-        weight = 1.0 / ((k + 1.0) * (k + 2.0))
-        inverse = 1.0 / (k + 1.0)
-        for lane in range(WIDTH):
-            ground = lanes[SIGN + lane]
-            value = series[(sine + k) * WIDTH + lane] + ground * start * series[(cosine + k) * WIDTH + lane]
-            if k > 0:
-                value += ground * slope * series[(cosine + k - 1) * WIDTH + lane]
-            series[(k + 2) * WIDTH + lane] = -lanes[LAMBDA + lane] * weight * value
-        for lane in range(WIDTH):
-            series[(sine + k + 1) * WIDTH + lane] = -series[1 * WIDTH + lane] * series[(cosine + k) * WIDTH + lane]
-            series[(cosine + k + 1) * WIDTH + lane] = series[1 * WIDTH + lane] * series[(sine + k) * WIDTH + lane]
-        for j in range(1, k + 1):
-            factor = j + 1.0
-            for lane in range(WIDTH):
-                rate = factor * series[(j + 1) * WIDTH + lane]
-                series[(sine + k + 1) * WIDTH + lane] -= rate * series[(cosine + k - j) * WIDTH + lane]
-                series[(cosine + k + 1) * WIDTH + lane] += rate * series[(sine + k - j) * WIDTH + lane]
-        for lane in range(WIDTH):
-            series[(sine + k + 1) * WIDTH + lane] *= inverse
-            series[(cosine + k + 1) * WIDTH + lane] *= inverse
-    return sum_series(lanes, series, events, start, end, h, order)
+        accelerate(
+            rotation[k + 2], sine[k], cosine[k], cosine[max(k - 1, 0)], signs, stiffness,
+            start, slope if k > 0 else 0.0, 1.0 / ((k + 1.0) * (k + 2.0)),
+        )  # fmt: skip
+        clear(sine[k + 1])
+        clear(cosine[k + 1])
+        for j in range(k + 1):
+            turn(sine[k + 1], cosine[k + 1], rotation[j + 1], sine[k - j], cosine[k - j], (j + 1.0) / (k + 1.0))
+    sum_series(lanes[U1 : U1 + WIDTH], rotation, order, h, False)
+    sum_series(lanes[V1 : V1 + WIDTH], rotation, order, h, True)
+    sum_series(lanes[S1 : S1 + WIDTH], sine, order - 1, h, False)
+    sum_series(lanes[C1 : C1 + WIDTH], cosine, order - 1, h, False)
+    spread = cosine[0]
+    clear(spread)
+    for k in range(3, order + 1):
+        add_size(spread, rotation[k], k * (k - 1) * h ** (k - 2))
+    return mark_nonlinear(lanes, rotation[2], spread, events, max(start, end), min(start, end))
 
 
 @leaf
-def sum_series(lanes: Floats, series: Floats, events: Integers, start: float, end: float, h: float, order: int) -> int:
-    """Ends of the nonlinear lanes' step, and which of them may have an event in it."""
-    sine, cosine = ORDER + 1, 2 * (ORDER + 1)
+def copy(to: Floats, values: Floats) -> None:
+    """Copy a row."""
     for lane in range(WIDTH):
-        lanes[U1 + lane] = series[(order) * WIDTH + lane]
-        lanes[V1 + lane] = order * series[(order) * WIDTH + lane]
-        lanes[S1 + lane] = series[(sine + order - 1) * WIDTH + lane]
-        lanes[C1 + lane] = series[(cosine + order - 1) * WIDTH + lane]
-    for k in range(order - 1, -1, -1):
-        for lane in range(WIDTH):
-            lanes[U1 + lane] = lanes[U1 + lane] * h + series[(k) * WIDTH + lane]
-        if k > 0:
-            for lane in range(WIDTH):
-                lanes[V1 + lane] = lanes[V1 + lane] * h + k * series[(k) * WIDTH + lane]
-        if k < order - 1:
-            for lane in range(WIDTH):
-                lanes[S1 + lane] = lanes[S1 + lane] * h + series[(sine + k) * WIDTH + lane]
-                lanes[C1 + lane] = lanes[C1 + lane] * h + series[(cosine + k) * WIDTH + lane]
-    above, below = max(start, end), min(start, end)
-    # u'' over the step is 2 c2 give or take the sum of the other terms' sizes.
+        to[lane] = values[lane]
+
+
+@leaf
+def clear(to: Floats) -> None:
+    """Set a row to zero."""
     for lane in range(WIDTH):
-        series[(cosine) * WIDTH + lane] = 0.0
-    power = h
-    for k in range(3, order + 1):
-        factor = k * (k - 1) * power
+        to[lane] = 0.0
+
+
+@leaf
+def accelerate(
+    to: Floats,
+    sine: Floats,
+    cosine: Floats,
+    cosine_before: Floats,
+    signs: Floats,
+    stiffness: Floats,
+    start: float,
+    slope: float,
+    weight: float,
+) -> None:
+    """Next coefficient of the rotation, from those of sin and cos(alpha - u) and of the motion start + slope t."""
+    for lane in range(WIDTH):
+        push = start * cosine[lane] + slope * cosine_before[lane]
+        to[lane] = -weight * stiffness[lane] * (sine[lane] + signs[lane] * push)
+
+
+@leaf
+def turn(to_sine: Floats, to_cosine: Floats, rotation: Floats, sine: Floats, cosine: Floats, weight: float) -> None:
+    """One term of the recurrence of sin and cos(alpha - u)."""
+    for lane in range(WIDTH):
+        rate = weight * rotation[lane]
+        to_sine[lane] -= rate * cosine[lane]
+        to_cosine[lane] += rate * sine[lane]
+
+
+@leaf
+def sum_series(to: Floats, table: Floats, order: int, h: float, weighted: bool) -> None:
+    """Value of every lane's series at h, or (weighted) of its derivative."""
+    clear(to)
+    for k in range(order, 0 if weighted else -1, -1):
+        factor = float(k) if weighted else 1.0
+        term = table[k]
         for lane in range(WIDTH):
-            series[(cosine) * WIDTH + lane] += factor * abs(series[(k) * WIDTH + lane])
-        power *= h
+            to[lane] = to[lane] * h + factor * term[lane]
+
+
+@leaf
+def add_size(to: Floats, values: Floats, factor: float) -> None:
+    """Add the sizes of a row, times a factor."""
+    for lane in range(WIDTH):
+        to[lane] += factor * abs(values[lane])
+
+
+@leaf
+def mark_nonlinear(
+    lanes: Floats, half_curvature: Floats, spread: Floats, events: Integers, above: float, below: float
+) -> int:
+    """Mark and count the lanes that may have an event: u'' is twice c2, give or take the sizes of the other terms."""
     busy = 0
     for lane in range(WIDTH):
         u, v, u1, v1 = lanes[U0 + lane], lanes[V0 + lane], lanes[U1 + lane], lanes[V1 + lane]
-        curvature, spread = 2.0 * series[2 * WIDTH + lane], series[(cosine) * WIDTH + lane]
-        dip = lanes[CURVE + lane] * max(curvature + spread, 0.0)
-        bulge = lanes[CURVE + lane] * max(spread - curvature, 0.0)
+        dip = lanes[CURVE + lane] * max(2.0 * half_curvature[lane] + spread[lane], 0.0)
+        bulge = lanes[CURVE + lane] * max(spread[lane] - 2.0 * half_curvature[lane], 0.0)
         event = (
             (min(u, u1) <= dip)
             | ((v > 0.0) & (v1 <= 0.0) & (max(u, u1) + bulge > lanes[HIGHEST + lane]))

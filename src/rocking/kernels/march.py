@@ -13,9 +13,13 @@ from rocking.kernels.state import (
     DU,
     DV,
     END,
+    EVENT_TABLE,
     EVENTS,
+    GROUND,
+    IMPACT_TABLE,
     IMPACTS,
     LIMIT,
+    NODE_TABLE,
     NODES,
     OFFSET,
     PEAK,
@@ -27,9 +31,12 @@ from rocking.kernels.state import (
     RESTITUTION,
     RUN,
     RUN_START,
+    SEQUENCE_TABLE,
     SEQUENCES,
+    SERIES,
     SIDE,
     SMOOTH,
+    SPARE,
     STALLED,
     STIFFNESS,
     STRUCK,
@@ -39,9 +46,7 @@ from rocking.kernels.state import (
     Floats,
     Integers,
     Rules,
-    Scratch,
     Shaking,
-    Tables,
     U,
     V,
 )
@@ -78,8 +83,8 @@ def march(
     shaking: Shaking,
     sides: Floats,
     rules: Rules,
-    tables: Tables,
-    scratch: Scratch,
+    tables: Floats,
+    scratch: Floats,
     at: Integers,
     x: Floats,
     pieces: int,
@@ -110,14 +115,11 @@ def march(
 
 
 @leaf
-def has_room(rules: Rules, tables: Tables, at: Integers) -> bool:
+def has_room(rules: Rules, tables: Floats, at: Integers) -> bool:
     """Whether every table has room for what one turn of the march can write."""
-    return not rules.record or bool(
-        at[NODES] + 3 <= tables.nodes.shape[0]
-        and at[IMPACTS] < tables.impacts.shape[0]
-        and at[EVENTS] + 2 <= tables.events.shape[0]
-        and at[SEQUENCES] < tables.sequences.shape[0]
-    )
+    rows = tables.shape[1]
+    most = max(max(at[NODES], at[IMPACTS]), max(at[EVENTS], at[SEQUENCES]))
+    return bool(not rules.record or most + 3 <= rows)
 
 
 @leaf
@@ -137,8 +139,8 @@ def wait_for_uplift(
     shaking: Shaking,
     sides: Floats,
     rules: Rules,
-    tables: Tables,
-    scratch: Scratch,
+    tables: Floats,
+    scratch: Floats,
     at: Integers,
     x: Floats,
     pieces: int,
@@ -148,7 +150,7 @@ def wait_for_uplift(
     if pieces < shaking.breakpoints.shape[0]:
         stop = min(stop, shaking.breakpoints[pieces])
     write_node(rules, tables, now(shaking, at, x), at, x)
-    piece, offset, side, jump = next_uplift(shaking, at[PIECE], x[OFFSET], sides, stop, scratch.A, scratch.d)
+    piece, offset, side, jump = next_uplift(shaking, at[PIECE], x[OFFSET], sides, stop, scratch[GROUND], scratch[SPARE])
     if side == AT_REST or shaking.breakpoints[piece] + offset >= stop:
         x[END] = max(now(shaking, at, x), shaking.breakpoints[-1]) if rules.endless else rules.stop
         if pieces > shaking.coefficients.shape[0]:
@@ -170,7 +172,7 @@ def wait_for_uplift(
 
 @routine
 def follow_arc(
-    shaking: Shaking, sides: Floats, rules: Rules, tables: Tables, scratch: Scratch, at: Integers, x: Floats
+    shaking: Shaking, sides: Floats, rules: Rules, tables: Floats, scratch: Floats, at: Integers, x: Floats
 ) -> int:
     """One Taylor step along the arc, or as much of it as its first event leaves."""
     start = now(shaking, at, x)
@@ -188,11 +190,11 @@ def follow_arc(
             return IMPACT
     order, h, degree = expand(shaking, sides, rules, scratch, side, at[PIECE], x[OFFSET], x[U], x[V], left)
     if at[SMOOTH]:  # the acceleration at an uplift is zero, whatever rounding says
-        scratch.c[2] = 0.0
+        scratch[SERIES][2] = 0.0
         at[SMOOTH] = 0
-    if at[PIECE] == shaking.coefficients.shape[0] and x[V] == 0.0 and scratch.c[2] == 0.0 and rules.endless:
+    if at[PIECE] == shaking.coefficients.shape[0] and x[V] == 0.0 and scratch[SERIES][2] == 0.0 and rules.endless:
         return _STUCK
-    outcome, t, u, v, top, height = advance(x[U], x[V], order, h, scratch.c, scratch.d)
+    outcome, t, u, v, top, height = advance(x[U], x[V], order, h, scratch[SERIES], scratch[SPARE])
     if height > x[PEAK]:
         x[PEAK], x[PEAK_TIME] = height, start + top
         x[PEAK_CHANGE], _ = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, top)
@@ -214,7 +216,7 @@ def follow_arc(
 
 
 @routine
-def strike(shaking: Shaking, sides: Floats, rules: Rules, tables: Tables, at: Integers, x: Floats) -> None:
+def strike(shaking: Shaking, sides: Floats, rules: Rules, tables: Floats, at: Integers, x: Floats) -> None:
     """Impact: the angular speed drops, the side changes, and the variation jumps with them (saltation).
 
     Without any speed the impact might come at any time, and the block is at rest.
@@ -234,14 +236,14 @@ def strike(shaking: Shaking, sides: Floats, rules: Rules, tables: Tables, at: In
         x[DV] = e * faster + restoring(sides, entered, acceleration * shaking.inverse_g) * shift
     if rules.record:
         k = at[IMPACTS]
-        tables.impacts[k, 0], tables.impacts[k, 1] = time, sign_of(entered)
-        tables.impacts[k, 2], tables.impacts[k, 3], tables.impacts[k, 4] = speed, x[V], shift
+        tables[IMPACT_TABLE, k, 0], tables[IMPACT_TABLE, k, 1] = time, sign_of(entered)
+        tables[IMPACT_TABLE, k, 2], tables[IMPACT_TABLE, k, 3], tables[IMPACT_TABLE, k, 4] = speed, x[V], shift
     at[IMPACTS] += 1
 
 
 @routine
 def judge(
-    shaking: Shaking, sides: Floats, rules: Rules, scratch: Scratch, at: Integers, x: Floats
+    shaking: Shaking, sides: Floats, rules: Rules, scratch: Floats, at: Integers, x: Floats
 ) -> tuple[bool, float, float, float]:
     """Whether the block comes to rest from this impact on: proven, imposed, or because time hardly advances any more.
 
@@ -269,11 +271,11 @@ def judge(
 
 @leaf
 def bracket(
-    shaking: Shaking, sides: Floats, rules: Rules, scratch: Scratch, at: Integers, x: Floats
+    shaking: Shaking, sides: Floats, rules: Rules, scratch: Floats, at: Integers, x: Floats
 ) -> tuple[float, float]:
     """Proven bounds on the time to rest, with room for the rounding of all times; NaN, NaN: no proof."""
     time = now(shaking, at, x)
-    lower, upper = prove_rest(shaking, sides, rules.nonlinear, scratch.A, x[V], at[SIDE], at[PIECE], x[OFFSET])
+    lower, upper = prove_rest(shaking, sides, rules.nonlinear, scratch[GROUND], x[V], at[SIDE], at[PIECE], x[OFFSET])
     if not upper >= 0.0:
         x[WORTH] = _SLOWER * x[V]
         return np.nan, np.nan
@@ -327,7 +329,7 @@ def imposed(rules: Rules, limit: float, v: float, interval: float, since_uplift:
 def come_to_rest(
     shaking: Shaking,
     rules: Rules,
-    tables: Tables,
+    tables: Floats,
     lower: float,
     upper: float,
     to_rest: float,
@@ -340,8 +342,12 @@ def come_to_rest(
         at[RUN], x[RUN_START] = 1, time
     if rules.record:
         k = at[SEQUENCES]
-        tables.sequences[k, 0], tables.sequences[k, 1] = x[RUN_START], time + to_rest
-        tables.sequences[k, 2], tables.sequences[k, 3], tables.sequences[k, 4] = time + lower, time + upper, at[RUN]
+        tables[SEQUENCE_TABLE, k, 0], tables[SEQUENCE_TABLE, k, 1] = x[RUN_START], time + to_rest
+        tables[SEQUENCE_TABLE, k, 2], tables[SEQUENCE_TABLE, k, 3], tables[SEQUENCE_TABLE, k, 4] = (
+            time + lower,
+            time + upper,
+            at[RUN],
+        )
     at[SEQUENCES] += 1
     at[RUN] = 0
     if time + to_rest >= rules.stop:
@@ -350,7 +356,7 @@ def come_to_rest(
     at[SIDE], x[U], x[V] = AT_REST, 0.0, 0.0
     x[RESTED] = time + to_rest
     if rules.record:
-        write_event(rules, tables, x[RESTED], REST, tables.impacts[at[IMPACTS] - 1, 4], at)
+        write_event(rules, tables, x[RESTED], REST, tables[IMPACT_TABLE, at[IMPACTS] - 1, 4], at)
     x[OFFSET] += to_rest
     settle(shaking, at, x)
     return True
@@ -358,7 +364,7 @@ def come_to_rest(
 
 @leaf
 def vary(
-    sides: Floats, rules: Rules, scratch: Scratch, du: float, dv: float, side: int, order: int, degree: int, t: float
+    sides: Floats, rules: Rules, scratch: Floats, du: float, dv: float, side: int, order: int, degree: int, t: float
 ) -> tuple[float, float]:
     """Variation carried over a part of the step, linear or nonlinear; as it was if nothing is recorded."""
     if not rules.record:
@@ -410,24 +416,24 @@ def settle(shaking: Shaking, at: Integers, x: Floats) -> None:
 
 
 @leaf
-def write_node(rules: Rules, tables: Tables, time: float, at: Integers, x: Floats) -> None:
+def write_node(rules: Rules, tables: Floats, time: float, at: Integers, x: Floats) -> None:
     """Write down the state."""
     if not rules.record:
         return
     k = at[NODES]
-    tables.nodes[k, 0], tables.nodes[k, 1], tables.nodes[k, 2] = time, at[PIECE], x[OFFSET]
-    tables.nodes[k, 3], tables.nodes[k, 4], tables.nodes[k, 5] = sign_of(at[SIDE]), x[U], x[V]
+    tables[NODE_TABLE, k, 0], tables[NODE_TABLE, k, 1], tables[NODE_TABLE, k, 2] = time, at[PIECE], x[OFFSET]
+    tables[NODE_TABLE, k, 3], tables[NODE_TABLE, k, 4], tables[NODE_TABLE, k, 5] = sign_of(at[SIDE]), x[U], x[V]
     at[NODES] += 1
 
 
 @leaf
-def write_event(rules: Rules, tables: Tables, time: float, kind: int, shift: float, at: Integers) -> None:
+def write_event(rules: Rules, tables: Floats, time: float, kind: int, shift: float, at: Integers) -> None:
     """Write down an uplift, a rest or an overturning."""
     if not rules.record:
         return
     k = at[EVENTS]
-    tables.events[k, 0], tables.events[k, 1] = time, kind
-    tables.events[k, 2], tables.events[k, 3] = sign_of(at[SIDE]), shift
+    tables[EVENT_TABLE, k, 0], tables[EVENT_TABLE, k, 1] = time, kind
+    tables[EVENT_TABLE, k, 2], tables[EVENT_TABLE, k, 3] = sign_of(at[SIDE]), shift
     at[EVENTS] += 1
 
 
@@ -436,8 +442,8 @@ def march_each(
     shaking: Shaking,
     sides: Floats,
     rules: Rules,
-    tables: Tables,
-    scratch: Scratch,
+    tables: Floats,
+    scratch: Floats,
     at: Integers,
     x: Floats,
     endings: Integers,

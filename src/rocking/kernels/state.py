@@ -35,21 +35,6 @@ class Rules(NamedTuple):
     record: bool
 
 
-class Tables(NamedTuple):
-    """What a march writes down, one row each.
-
-    nodes (n, 6) : time, piece, offset, side (+1, -1; 0 at rest), u, u'
-    impacts (n, 5) : time, side entered, speed before, speed after, shift of the time per unit of scaling
-    events (n, 4) : time, kind, side, shift
-    sequences (n, 5) : start, end, lower, upper, impacts
-    """
-
-    nodes: Floats
-    impacts: Floats
-    events: Floats
-    sequences: Floats
-
-
 class Trail(NamedTuple):
     """What it takes to follow a response again: the problem and the nodes of its steps."""
 
@@ -59,15 +44,15 @@ class Trail(NamedTuple):
     nodes: Floats
 
 
-class Scratch(NamedTuple):
-    """Room for the series of one step: rotation, motion, sine, cosine, and a spare one."""
+# Kernels pass their arrays by value, so what belongs together is one array: many in a tuple cost more than an arc.
 
-    c: Floats
-    A: Floats
-    S: Floats
-    C: Floats
-    d: Floats
+# A march's tables, shape (4, n, 6), one row each. Nodes: time, piece, offset, side (+1, -1; 0 at rest), u, u'.
+# Impacts: time, side entered, speed before, speed after, shift of the time per unit of scaling. Events: time, kind,
+# side, shift. Sequences: start, end, lower, upper, impacts.
+NODE_TABLE, IMPACT_TABLE, EVENT_TABLE, SEQUENCE_TABLE = range(4)
 
+# Scratch space, shape (5, n): the series of one step (rotation, ground, sine, cosine) and a spare one.
+SERIES, GROUND, SINE, COSINE, SPARE = range(5)
 
 # Columns of a block's side (rows: side +, side -): p^2, alpha, uplift threshold in g, its gain (see `chatter`),
 # restitution, and the limit of a treatment other than the certificate.
@@ -92,17 +77,16 @@ def new_state() -> tuple[Integers, Floats]:
     return at, x
 
 
-def new_scratch(columns: int) -> Scratch:
+def new_scratch(columns: int) -> Floats:
     """Scratch space for motions with that many coefficients in a piece."""
-    size = max(ORDER + 1, columns + 2)
-    return Scratch(*(np.zeros(size) for _ in Scratch._fields))
+    return np.zeros((SPARE + 1, max(ORDER + 1, columns + 2)))
 
 
-def new_tables(nodes: int) -> Tables:
+def new_tables(rows: int) -> Floats:
     """Empty tables for a first try."""
-    return Tables(np.empty((nodes, 6)), np.empty((256, 5)), np.empty((16, 4)), np.empty((8, 5)))
+    return np.empty((SEQUENCE_TABLE + 1, rows, 6))
 
 
-def grown(tables: Tables) -> Tables:
+def grown(tables: Floats) -> Floats:
     """Tables with twice the room and the same rows."""
-    return Tables(*(np.concatenate([table, np.empty_like(table)]) for table in tables))
+    return np.concatenate([tables, np.empty_like(tables)], axis=1)

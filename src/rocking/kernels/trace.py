@@ -5,11 +5,11 @@ import numpy as np
 from rocking.kernels.arc import evaluate
 from rocking.kernels.compiled import kernel
 from rocking.kernels.impact import expand
-from rocking.kernels.state import Floats, Integers, Scratch, Trail
+from rocking.kernels.state import SERIES, Floats, Integers, Trail
 
 
 @kernel
-def trace(trail: Trail, scratch: Scratch, times: Floats, rows: Integers, out: Floats) -> None:
+def trace(trail: Trail, scratch: Floats, times: Floats, rows: Integers, out: Floats) -> None:
     """Write theta, theta', theta'' at times[k], in the step that starts at trail.nodes[rows[k]], into out[k].
 
     Between the last resolved impact and rest, or the end of the response, the unresolved ones are left out: the block
@@ -34,7 +34,7 @@ def trace(trail: Trail, scratch: Scratch, times: Floats, rows: Integers, out: Fl
             )
             expanded = row
         elapsed = max(0.0, times[k] - shaking.breakpoints[piece] - nodes[row, 2])
-        u, v, w = evaluate(scratch.c, order, elapsed)
+        u, v, w = evaluate(scratch[SERIES], order, elapsed)
         if u < 0.0 and (last or nodes[row + 1, 3] == 0.0):
             u = v = w = 0.0
         out[k, 0] = sign * u

@@ -146,12 +146,23 @@ def _duration_statements(critical: float) -> tuple[Statement, ...]:
             "largest error of Eq. 65 up to 90 % of the way to a_cr, %", '"almost perfectly"', asymptotic, digits=3
         ),
         Statement("the same of Eq. 75 with 60 impacts resolved, %", '"remarkable agreement"', semianalytical, digits=2),
+        Statement("Eq. 65 exceeds the exact time up to a =", "not mentioned", _crossing(critical), digits=5),
         Statement("tau_ch/(T/2) at a = 1.03, eta = 0.92", '"solely on a and eta"', by_frequency),
     )
 
 
 def _over_half_period(a: FloatArray, method: str) -> FloatArray:
     return np.asarray(chattering_time(a, OMEGA, ETA, method=method)) * (OMEGA / math.pi)
+
+
+def _crossing(critical: float) -> float:
+    """Amplitude at which Eq. 65 falls below the exact time, by bisection."""
+    low, high = 1.0, critical
+    while high - low > 1e-9:
+        middle = np.array([0.5 * (low + high)])
+        exceeds = _over_half_period(middle, "asymptotic") > _over_half_period(middle, "exact")
+        low, high = (float(middle[0]), high) if exceeds[0] else (low, float(middle[0]))
+    return low
 
 
 def _exponent(values: FloatArray) -> float:

@@ -1,0 +1,173 @@
+"""`rocking chatter`, `critical` and `paper`: the same numbers as the functions, and one line for every mistake."""
+
+import json
+
+import pytest
+
+from rocking.chattering import (
+    asymptotic_table,
+    chattering_time,
+    critical_amplitude,
+    first_impact_speed,
+    first_interval,
+    sequence,
+)
+from rocking.cli import main
+
+
+@pytest.fixture
+def run(capsys):
+    def call(*arguments):
+        code = 0
+        try:
+            main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            code = stop.code or 0
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+def test_chatter_json_is_what_the_functions_give(run):
+    code, out, err = run("chatter", 1.03, 2, 0.92, "--json")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    assert result["complete"] is True
+    for method, value in result["chattering_time"].items():
+        assert value == float(chattering_time(1.03, 2.0, 0.92, method=method))
+    exact = sequence(1.03, 2.0, 0.92)
+    assert (result["bracket"]["lower"], result["bracket"]["upper"]) == (exact.lower, exact.upper)
+    assert result["critical_amplitude"] == critical_amplitude(2.0, 0.92)
+    assert result["first_interval"]["eq32"] == first_interval(1.03, 2.0)
+    assert result["first_interval"]["exact"] == exact.impacts["interval"][0]
+    assert result["first_impact_speed"]["eq34"] == first_impact_speed(1.03, 2.0)
+    assert "asymptotic_table" not in result
+
+
+def test_order_and_resolved_are_passed_on(run):
+    _, out, _ = run("chatter", 1.01, 2, 0.92, "--order", 6, "--resolved", 20, "--json")
+    times = json.loads(out)["chattering_time"]
+    assert times["series"] == chattering_time(1.01, 2.0, 0.92, method="series", order=6)
+    assert times["semianalytical"] == chattering_time(1.01, 2.0, 0.92, method="semianalytical", resolved=20)
+
+
+def test_chatter_shows_the_iterative_procedure(run):
+    table = asymptotic_table(1.01, 2.0, 0.92)
+    _, out, _ = run("chatter", 1.01, 2, 0.92, "--table", "--json")
+    rows = json.loads(out)["asymptotic_table"]
+    assert [row["time"] for row in rows] == table["time"].tolist()
+    code, out, _ = run("chatter", 1.01, 2, 0.92, "--table")
+    assert code == 0
+    assert "T_1;3 = " in out
+    assert len(out.splitlines()) > len(table)
+
+
+def test_chatter_says_complete_or_incomplete(run):
+    assert "complete: proven" in run("chatter", 1.03, 2, 0.92)[1]
+    code, out, _ = run("chatter", 1.05, 2, 0.92)
+    assert code == 0
+    assert "incomplete" in out
+    assert "worthless" in out
+    result = json.loads(run("chatter", 1.05, 2, 0.92, "--json")[1])
+    assert result["complete"] is False
+    assert result["chattering_time"]["exact"] is None
+    assert result["bracket"]["upper"] is None
+
+
+def test_without_loss_at_impacts_nothing_rests(run):
+    code, out, _ = run("chatter", 1.03, 2, 1)
+    assert code == 0
+    assert "incomplete" in out
+    assert json.loads(run("chatter", 1.03, 2, 1, "--json")[1])["series"]["error"] is None
+
+
+def test_at_the_threshold_there_is_nothing_to_wait_for(run):
+    result = json.loads(run("chatter", 1, 2, 0.92, "--json")[1])
+    assert result["complete"] is True
+    assert set(result["chattering_time"].values()) == {0.0}
+
+
+def test_critical_json_has_every_method(run):
+    code, out, err = run("critical", 2, 0.92, "--json")
+    assert (code, err) == (0, "")
+    amplitudes = json.loads(out)["critical_amplitude"]
+    assert set(amplitudes) == {"exact", "eq76", "eq77", "approximation"}
+    for method, value in amplitudes.items():
+        assert value == critical_amplitude(2.0, 0.92, method=method)
+
+
+def test_critical_says_where_an_approximation_does_not_hold(run):
+    code, out, _ = run("critical", 20, 0.92)
+    assert code == 0
+    assert "none here" in out
+    assert json.loads(run("critical", 20, 0.92, "--json")[1])["critical_amplitude"]["approximation"] is None
+
+
+def test_critical_prints_how_far_the_fits_are_off(run):
+    out = run("critical", 2, 0.92)[1]
+    assert "1.03801553873" in out
+    assert "Eq. 76" in out
+    assert "off by -6.92e-04" in out
+
+
+def test_paper_writes_one_figure_and_says_what_the_paper_says(run, tmp_path):
+    code, out, err = run("paper", "--figure", 7, "--out", tmp_path / "new")
+    assert (code, err) == (0, "")
+    names = {path.name for path in (tmp_path / "new").iterdir()}
+    assert names == {"figure-7.pdf", "figure-7.png", "figure-7-critical.csv"}
+    assert all(name in out for name in names)
+    assert "0.5 in the paper, 0.517 here" in out
+
+
+@pytest.mark.slow
+def test_paper_writes_all_figures(run, tmp_path):
+    code, _, _ = run("paper", "--out", tmp_path)
+    assert code == 0
+    drawn = {path.stem for path in tmp_path.glob("*.pdf")}
+    assert drawn == {f"figure-{number}" for number in (2, 3, 4, 5, 6, 7, 9, 10, 11)}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["chatter", 0.9, 2, 0.92], "lift off"),
+        (["chatter", "nan", 2, 0.92], "finite"),
+        (["chatter", 1.03, 0, 0.92], "omega"),
+        (["chatter", 1.03, -2, 0.92], "omega"),
+        (["chatter", 1.03, 2, 0], "eta"),
+        (["chatter", 1.03, 2, 1.2], "eta"),
+        (["chatter", 1.03, 2, "high"], "eta"),
+        (["chatter", 1.03, 2], "eta"),
+        (["chatter", 1.03, 2, 0.92, "--order", 0], "order"),
+        (["chatter", 1.03, 2, 0.92, "--resolved", 0], "resolved"),
+        (["chatter", 1.03, 2, 1, "--table"], "eta"),
+        (["critical", 2, "inf"], "eta"),
+        (["critical", 2], "eta"),
+        (["critical", 2, 0.92, "--method", "exact"], "--method"),
+        (["paper"], "--out"),
+        (["paper", "--figure", "five", "--out", "."], "--figure"),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_2(run, arguments, word):
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert err.startswith("rocking: ")
+    assert word.lower() in err.lower()
+
+
+@pytest.mark.parametrize("number", [1, 8, 99])
+def test_a_figure_that_is_not_computed_is_refused(run, tmp_path, number):
+    code, out, err = run("paper", "--figure", number, "--out", tmp_path)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "9, 10, 11" in err
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused(run, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    code, out, err = run("paper", "--out", blocked / "figures")
+    assert (code, out) == (2, "")
+    assert "--out" in err

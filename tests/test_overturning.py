@@ -1,0 +1,264 @@
+"""Overturning maps: closed forms of pulses, the second region, refined boundaries, and what must be refused."""
+
+import math
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import rocking
+from rocking.analysis import mode_name, overturning_figure, overturning_map
+from rocking.analysis.boundaries import boundaries
+from rocking.analysis.pairs import simulate_pairs
+from rocking.block import Blocks
+from rocking.treatment import Certified
+
+BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+FREQUENCIES = np.array([1.0, 2.0, 3.0, 5.0, 6.5])
+
+# The closed forms know no limit to the rotation. A block falls at pi/2, which the linear model passes during a slow
+# pulse though its end would still bring the block back; the slenderer, the more multiples of alpha pi/2 is.
+THIN = rocking.Block.from_parameters(p=2.0, alpha=1e-5, restitution=0.9)
+
+
+def half_sine_amplitude(ratio: float) -> float:
+    """Amplitude of the half sine, of frequency `ratio` times p, that just overturns a slender block."""
+
+    def excess(a: float) -> float:
+        return math.sqrt(a * a - 1.0) + a * math.exp(-(math.pi - math.asin(1.0 / a)) / ratio) - ratio
+
+    return brentq(excess, 1.0, 50.0, xtol=1e-14, rtol=1e-15)
+
+
+def one_sine_amplitude(ratio: float) -> float:
+    """Amplitude of the one-sine pulse that just overturns a slender block without an impact."""
+
+    def excess(a: float) -> float:
+        return math.sqrt(a * a - 1.0) - a * math.exp(-(2.0 * math.pi - math.asin(1.0 / a)) / ratio) - ratio
+
+    return brentq(excess, 1.0, 50.0, xtol=1e-14, rtol=1e-15)
+
+
+def sequence(dataset, column):
+    """Modes from the lowest amplitude to the highest, and the amplitudes between them."""
+    here = dataset.boundary_frequency.values == dataset.frequency.values[column]
+    modes = [int(dataset.mode[0, column]), *dataset.mode_above.values[here].tolist()]
+    return modes, dataset.boundary_amplitude.values[here]
+
+
+def test_a_half_sine_overturns_a_slender_block_from_the_closed_form_on():
+    grid = np.linspace(0.5, 6.0, 12)
+    dataset = overturning_map("half-sine", THIN, amplitudes=grid, frequencies=FREQUENCIES, model="linear")
+    exact = [half_sine_amplitude(ratio) for ratio in FREQUENCIES]
+    np.testing.assert_allclose(dataset.overturning_amplitude, exact, rtol=0.0, atol=1e-8)
+    # Values known beforehand.
+    np.testing.assert_allclose(exact[:4], [1.3223965979, 1.8007239306, 2.2938723134, 3.2891467775], atol=1e-10)
+
+
+def test_a_one_sine_overturns_a_slender_block_without_impact_from_the_closed_form_on():
+    grid = np.linspace(0.5, 14.0, 46)
+    dataset = overturning_map("one-sine", THIN, amplitudes=grid, frequencies=FREQUENCIES, model="linear")
+    for k, ratio in enumerate(FREQUENCIES):
+        modes, edges = sequence(dataset, k)
+        assert modes[-1] == 0
+        assert edges[-1] == pytest.approx(one_sine_amplitude(ratio), rel=0.0, abs=1e-8)
+
+
+def test_a_second_region_overturns_after_one_impact_with_safety_above_it():
+    grid = np.linspace(0.5, 14.0, 46)
+    dataset = overturning_map("one-sine", BLOCK, amplitudes=grid, frequencies=[4.0, 5.0, 6.0])
+    for k in range(3):
+        modes, _ = sequence(dataset, k)
+        assert modes == [-3, -2, -1, 1, -1, 0] or modes == [-3, -1, 1, -1, 0]
+    assert [mode_name(mode) for mode in modes[-3:]] == ["overturns after 1 impact", "rocks", "overturns without impact"]
+
+
+@pytest.mark.parametrize("pulse", ["half-sine", "one-cosine", "one-sine"])
+def test_the_larger_of_two_similar_blocks_is_safer(pulse):
+    # A larger block has a smaller p, so the same pulse has a larger ratio to it.
+    ratios = np.linspace(1.5, 4.0, 6)
+    dataset = overturning_map(pulse, BLOCK, amplitudes=np.linspace(0.5, 14.0, 28), frequencies=ratios)
+    assert np.all(np.diff(dataset.overturning_amplitude) > 0.0)
+
+
+def test_boundaries_separate_what_simulate_says():
+    dataset = overturning_map("one-sine", BLOCK, amplitudes=[0.5, 2.0, 4.0, 7.0, 10.0], frequencies=[4.5])
+    motion = rocking.pulses.one_sine(1.0, 4.5 * 2.0 / (2.0 * math.pi))
+    threshold = BLOCK.minimum_acceleration
+    for edge, *modes in zip(
+        *(dataset[n].values for n in ("boundary_amplitude", "mode_below", "mode_above")), strict=True
+    ):
+        for factor, mode in zip((1.0 - 1e-8, 1.0 + 1e-8), modes, strict=True):
+            response = rocking.simulate(BLOCK, motion.scaled(edge * factor * threshold))
+            assert response.overturned == (mode >= 0)
+            if mode >= 0:
+                assert len(response.impacts) == mode
+            elif mode == -3:
+                assert len(response.events) == 0
+            else:
+                rests = response.events["time"][response.events["kind"] == "rest"]
+                assert (rests[0] <= motion.duration) == (mode == -2)
+
+
+def test_nothing_moves_below_an_amplitude_of_one():
+    dataset = overturning_map("half-sine", BLOCK, amplitudes=[0.5, 1.5], frequencies=[1.0, 4.0])
+    assert np.all(dataset.mode.values[0] == -3)
+    np.testing.assert_allclose(dataset.boundary_amplitude.values[dataset.mode_below == -3], 1.0, rtol=1e-9)
+    assert np.all(dataset.peak_rotation.values[0] == 0.0)
+
+
+def test_an_overturned_block_counts_the_impacts_since_its_last_uplift():
+    # A weak lobe, after which the block comes to rest in the pause, then a strong one.
+    def pulse(amplitude, frequency):
+        return rocking.pulses.n_lobe([0.35 * amplitude, 0.0, 0.0, amplitude], frequency)
+
+    damped = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.5)
+    dataset = overturning_map(pulse, damped, amplitudes=[3.0], frequencies=[1.0])
+    response = rocking.simulate(damped, pulse(3.0 * damped.minimum_acceleration, 1.0 / math.pi))
+    assert response.overturned
+    assert response.events["kind"].tolist() == ["uplift", "rest", "uplift", "overturn"]
+    assert len(response.impacts) > 0
+    assert dataset.mode.values[0, 0] == 0
+
+
+def test_only_ratios_count():
+    larger = rocking.Block.from_parameters(p=0.7, alpha=0.2, restitution=0.9)
+    maps = [
+        overturning_map("one-cosine", block, amplitudes=np.linspace(0.5, 8.0, 9), frequencies=[1.0, 3.0])
+        for block in (BLOCK, larger)
+    ]
+    np.testing.assert_array_equal(maps[0].mode, maps[1].mode)
+    np.testing.assert_allclose(maps[0].boundary_amplitude, maps[1].boundary_amplitude, rtol=3e-9)
+
+
+def test_a_mirrored_two_sided_block_under_a_mirrored_pulse():
+    sided = rocking.Block.from_parameters(p=(2.0, 2.5), alpha=(0.15, 0.25), restitution=(0.9, 0.85))
+    mirrored = rocking.Block.from_parameters(p=(2.5, 2.0), alpha=(0.25, 0.15), restitution=(0.85, 0.9))
+
+    def reversed_sine(amplitude, frequency):
+        return -rocking.pulses.one_sine(amplitude, frequency)
+
+    grid = {"amplitudes": np.linspace(0.5, 8.0, 9), "frequencies": [2.0, 4.0]}
+    here, there = overturning_map("one-sine", sided, **grid), overturning_map(reversed_sine, mirrored, **grid)
+    np.testing.assert_array_equal(here.mode, there.mode)
+    np.testing.assert_array_equal(here.boundary_amplitude, there.boundary_amplitude)
+
+
+@pytest.mark.parametrize(
+    ("pulse", "parameters"),
+    [
+        ("sine", {"cycles": 2.0}),
+        ("ricker", {}),
+        ("ricker", {"kind": "antisymmetric"}),
+        ("Mavroeidis-Papageorgiou", {"phase": 0.5, "gamma": 2.0}),
+        (partial(rocking.pulses.n_lobe, lobes=3), {}),
+    ],
+)
+def test_the_amplitude_of_a_pulse_is_its_peak(pulse, parameters):
+    dataset = overturning_map(pulse, BLOCK, amplitudes=[0.9, 1.1], frequencies=[2.0], **parameters)
+    assert dataset.mode.values[0, 0] == -3
+    assert dataset.mode.values[1, 0] > -3
+    lifting = dataset.boundary_amplitude.values[dataset.mode_below == -3]
+    np.testing.assert_allclose(lifting, 1.0, rtol=2e-9)
+
+
+def test_bisection_finds_a_region_inside_an_interval_of_the_grid():
+    levels = np.array([1.0, 2.0])
+
+    def outcome_of(column, level):
+        return np.select([level < 1.3, level < 1.6], [0, 1], 2)
+
+    edges = boundaries(levels, np.array([[0], [2]]), outcome_of, tolerance=1e-12)
+    np.testing.assert_allclose(edges.level, [1.3, 1.6], rtol=1e-12)
+    assert edges.below.tolist() == [0, 1]
+    assert edges.above.tolist() == [1, 2]
+    assert np.all(edges.high - edges.low <= 1e-12 * edges.high)
+
+
+def test_bisection_finds_a_thin_region_between_two_others():
+    def outcome_of(column, level):
+        return np.select([level < 1.3, level < 1.3 + 1e-7], [1, -1], 0)
+
+    edges = boundaries(np.array([1.0, 2.0]), np.array([[1], [0]]), outcome_of, tolerance=1e-12)
+    np.testing.assert_allclose(edges.level, [1.3, 1.3 + 1e-7], rtol=1e-12)
+    assert edges.above.tolist() == [-1, 0]
+
+
+def test_bisection_of_endless_regions_ends():
+    rng = np.random.default_rng(0)
+    edges = boundaries(
+        np.array([1.0, 2.0]),
+        np.array([[0], [1]]),
+        lambda column, level: rng.integers(2, 1000, len(level)),
+        tolerance=1e-6,
+    )
+    assert len(edges.level) <= 128
+    assert np.all(np.diff(edges.low) > 0.0)
+
+
+def test_pairs_are_what_simulate_says():
+    rng = np.random.default_rng(1)
+    blocks = Blocks(rng.uniform(1.0, 6.0, 40), rng.uniform(0.08, 0.4, 40), rng.uniform(0.6, 0.95, 40))
+    factors = rng.uniform(0.5, 6.0, 40)
+    motion = rocking.pulses.sine(1.0, 0.9, cycles=2.5)
+    for model in ("linear", "nonlinear"):
+        ends = simulate_pairs(blocks, motion, factors, model=model, chattering=Certified())
+        for k, block in enumerate(blocks):
+            response = rocking.simulate(block, motion.scaled(factors[k]), model=model)
+            assert ends.overturned[k] == response.overturned
+            assert ends.peak[k] == response.peak_rotation
+            assert ends.impacts[k] == len(response.impacts)
+            assert ends.rests[k] == len(response.chattering)
+
+
+def test_a_map_has_units_names_and_provenance():
+    dataset = overturning_map("half-sine", BLOCK, amplitudes=[0.5, 3.0], frequencies=[1.0, 2.0])
+    assert dataset.pulse.startswith("half sine: ")
+    assert "0.2 rad" in dataset.block
+    assert dataset.tolerance == 1e-9
+    assert all(dataset[name].attrs for name in ("mode", "peak_rotation", "overturning_amplitude", "amplitude"))
+
+
+def test_a_map_that_never_overturns_has_no_overturning_amplitude():
+    dataset = overturning_map("half-sine", BLOCK, amplitudes=[0.5, 1.01], frequencies=[5.0])
+    assert np.isnan(dataset.overturning_amplitude.values).all()
+    below = overturning_map("half-sine", BLOCK, amplitudes=[8.0, 9.0], frequencies=[1.0])
+    assert np.isnan(below.overturning_amplitude.values).all()
+    assert below.sizes["boundary"] == 0
+
+
+def test_the_figure_names_every_mode_that_it_shows():
+    dataset = overturning_map(
+        "one-sine", BLOCK, amplitudes=np.linspace(0.5, 10.0, 20), frequencies=np.linspace(2, 6, 5)
+    )
+    figure = overturning_figure(dataset)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {"no uplift", "rocks", "overturns after 1 impact", "overturns without impact"} <= set(texts)
+    filled = [path for collection in figure.axes[0].collections[:-1] for path in collection.get_paths()]
+    areas = [abs(np.sum(np.diff(p.vertices[:, 0]) * (p.vertices[1:, 1] + p.vertices[:-1, 1]) / 2)) for p in filled]
+    # The regions fill the whole of the axes.
+    assert sum(areas) == pytest.approx((6.0 - 2.0) * (10.0 - 0.5), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"pulse": "square"}, "one of sine"),
+        ({"pulse": "sine"}, "cycles"),
+        ({"pulse": "half-sine", "cycles": 2.0}, "cycles"),
+        ({"pulse": rocking.pulses.half_sine, "cycles": 2.0}, "bind"),
+        ({"amplitudes": []}, "amplitudes"),
+        ({"amplitudes": [2.0, 1.0]}, "increase"),
+        ({"amplitudes": [1.0, math.nan]}, "finite"),
+        ({"amplitudes": "high"}, "amplitudes"),
+        ({"frequencies": [-1.0]}, "frequencies"),
+        ({"tolerance": 0.0}, "tolerance"),
+        ({"model": "cubic"}, "model"),
+        ({"block": rocking.Block.from_parameters(1.0, 0.2, 1.0)}, "restitution 1"),
+    ],
+)
+def test_what_makes_no_map_is_refused(changes, word):
+    arguments = {"pulse": "half-sine", "block": BLOCK, "amplitudes": [0.5, 2.0], "frequencies": [1.0]} | changes
+    with pytest.raises(rocking.RockingError, match=word):
+        overturning_map(arguments.pop("pulse"), arguments.pop("block"), **arguments)
