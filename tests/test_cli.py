@@ -37,7 +37,9 @@ def test_simulate_prints_a_verdict(run):
 
 
 def test_simulate_json_is_the_response(run):
-    code, out, _ = run("simulate", RECORD, "--p", "2.5,2.2", "--alpha", "0.12,0.2", "--restitution", "0.9,0.85", "--json")
+    code, out, _ = run(
+        "simulate", RECORD, "--p", "2.5,2.2", "--alpha", "0.12,0.2", "--restitution", "0.9,0.85", "--json"
+    )
     assert code == 0
     result = json.loads(out)
     import rocking

@@ -125,6 +125,15 @@ def test_a_series_that_rises_from_next_to_nothing_still_comes_down(start: float,
     assert first_root(c, 0, 3, 1.0) == pytest.approx(expected, rel=4.0 * ULP)
 
 
+@pytest.mark.parametrize("scale", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("start", [0.0, 1e-6, 1e-2])
+def test_an_arc_much_shorter_than_the_interval_is_found(scale: float, start: float) -> None:
+    """As after an uplift just before a peak of the motion: the series turns down long before the interval ends."""
+    c = np.array([start * scale**3, start * scale**2, scale, -1.0])
+    expected = exact_first_root(c, 1.0)
+    assert first_root(c, 0, 3, 1.0) == pytest.approx(expected, rel=16.0 * ULP, abs=0.0)
+
+
 @quick
 @given(st.integers(-290, -2), st.floats(1.0, 9.0), st.floats(-1.0, 1.0))
 def test_tiny_roots_of_a_divided_series_keep_their_relative_accuracy(
@@ -146,9 +155,9 @@ def test_the_curvature_is_never_below_its_bound(terms: list[float], lead: int, h
     assert np.all(curvature >= -bound * (1.0 + 1e-12) - 1e-12)
 
 
-@pytest.mark.skipif(not numba.config.DISABLE_JIT, reason="counts the calls of an uncompiled kernel")
-@pytest.mark.parametrize("third", [0.0, -1.0, 1.0])
-def test_a_simple_root_takes_few_steps_which_double_its_digits(monkeypatch: pytest.MonkeyPatch, third: float) -> None:
+@pytest.fixture
+def visited(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Times at which the uncompiled search evaluates its series."""
     seen: list[float] = []
     evaluate = root.deflated
 
@@ -157,8 +166,23 @@ def test_a_simple_root_takes_few_steps_which_double_its_digits(monkeypatch: pyte
         return evaluate(c, lead, order, t)
 
     monkeypatch.setattr(root, "deflated", counted)
-    c = np.array([1.0, -1.5, -0.4, third])
-    found = first_root(c, 0, 3, 1.0)
-    errors = [found - t for t in seen if found - t > 1e-15]
-    assert len(seen) <= 7
+    return seen
+
+
+uncompiled = pytest.mark.skipif(not numba.config.DISABLE_JIT, reason="counts the calls of an uncompiled kernel")
+
+
+@uncompiled
+@pytest.mark.parametrize("third", [0.0, -1.0, 1.0])
+def test_a_simple_root_takes_few_steps_which_double_its_digits(visited: list[float], third: float) -> None:
+    found = first_root(np.array([1.0, -1.5, -0.4, third]), 0, 3, 1.0)
+    errors = [found - t for t in visited if found - t > 1e-15]
+    assert len(visited) <= 7
     assert all(after <= 3.0 * before**2 for before, after in itertools.pairwise(errors))
+
+
+@uncompiled
+@pytest.mark.parametrize("scale", [1e-3, 1e-6, 1e-12])
+def test_an_arc_much_shorter_than_the_interval_takes_few_steps(visited: list[float], scale: float) -> None:
+    first_root(np.array([1e-6 * scale**3, 1e-6 * scale**2, scale, -1.0]), 0, 3, 1.0)
+    assert len(visited) <= 80

@@ -56,7 +56,7 @@ def test_no_impact_is_missed_in_the_linear_model_at_length(case: Case) -> None:
 
 
 @pytest.mark.slow
-@settings(thorough, max_examples=300)
+@settings(thorough, max_examples=100)
 @given(cases(model="nonlinear"))
 def test_no_impact_is_missed_in_the_nonlinear_model_at_length(case: Case) -> None:
     assert_no_impact_is_missed(case)

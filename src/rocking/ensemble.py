@@ -29,8 +29,8 @@ Polarity = Literal["+", "-", "both"]
 
 _SIGNS: dict[str, tuple[int, ...]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
 
-#: Blocks that one task takes through one motion: enough to pay for the call, few enough to stop soon.
-_TASK = 8 * lanes.WIDTH
+#: Block-steps of one task: enough to pay for the call, few enough to stop soon when interrupted.
+_TASK = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -211,12 +211,13 @@ def _tasks(
     motions: Sequence[Motion], scales: _Scales, signs: tuple[int, ...], count: int
 ) -> Iterator[tuple[tuple[int, int, int], Motion, slice]]:
     for m, motion in enumerate(motions):
+        blocks_at_once = lanes.WIDTH * max(1, _TASK // (lanes.WIDTH * len(motion.coefficients)))
         for s, value in enumerate(scales.values):
             scaled = scales.applied(motion, float(value))
             for k, sign in enumerate(signs):
                 signed = scaled if sign > 0 else -scaled
-                for start in range(0, count, _TASK):
-                    yield (m, s, k), signed, slice(start, min(start + _TASK, count))
+                for start in range(0, count, blocks_at_once):
+                    yield (m, s, k), signed, slice(start, min(start + blocks_at_once, count))
 
 
 def _parallel(
@@ -248,7 +249,7 @@ def _march(
 ) -> tuple[state.Integers, Floats, state.Integers]:
     """Last state and ending of every block under one motion."""
     shaking = shaking_of(motion, gravity)
-    at, x = (np.tile(array, (len(sides), 1)) for array in state.new_state())
+    at, x = state.new_states(len(sides))
     endings = np.empty(len(sides), dtype=np.int64)
     tables, scratch = state.new_tables(1), state.new_scratch(shaking.coefficients.shape[1])
     if motion.step is None:

@@ -18,7 +18,7 @@ from rocking.kernels.state import Floats, Trail
 from rocking.kernels.trace import trace
 from rocking.motion.motion import Motion
 from rocking.problem import Model
-from rocking.treatment import Certified, Treatment
+from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -178,7 +178,7 @@ class Response:
         return self._traced(time)[..., 2]
 
     def normal_force(self, time: ArrayLike) -> Floats:
-        """Normal force over the weight at any time; impulses at impacts are not part of it."""
+        """Return the normal force over the weight at any time; impulses at impacts are not part of it."""
         return self._forces(time)[1]
 
     def friction_demand(self, time: ArrayLike) -> Floats:
@@ -327,7 +327,7 @@ class Response:
         return max(0.0, first - margin), min(self.duration, float(times.max()) + margin)
 
     def _drawing_times(self, start: float, end: float) -> Floats:
-        """Times dense enough for a smooth line: even ones, and those of every step that is not too short to see."""
+        """Return times dense enough for a smooth line: even ones, and those of steps that are long enough to see."""
         even = np.linspace(start, end, 4001)
         steps = self.trail.nodes[:, 0]
         steps = steps[(steps > start) & (steps < end)]
@@ -403,7 +403,7 @@ class Response:
         return best
 
     def _samples(self) -> tuple[Floats, NDArray[np.int64]]:
-        """Times within every step, both ends included, and at every corner of the motion; with their steps."""
+        """Return times within every step, both ends included, and at every corner of the motion; with their steps."""
         starts = self.trail.nodes[:, 0]
         ends = np.append(starts[1:], self.duration)
         fractions = np.linspace(0.0, 1.0, _INTERIOR + 2)

@@ -127,9 +127,10 @@ class AsymptoticTime:
         amplitude = abs(parameters["amplitude"]) / (blocks.gravity * blocks.alpha)
         frequency = 2.0 * np.pi * parameters["frequency"] / blocks.p
         times = np.full_like(blocks.p, np.inf)
-        for k in np.ndindex(times.shape):
-            if 1.0 <= amplitude[k] < paper.eq76(frequency[k], blocks.restitution[k]):
-                times[k] = paper.eq65_time(amplitude[k], frequency[k], blocks.restitution[k]) / blocks.p[k]
+        for k in range(times.size):
+            a, omega, eta = (float(values.flat[k]) for values in (amplitude, frequency, blocks.restitution))
+            if 1.0 <= a < paper.eq76(omega, eta):
+                times.flat[k] = paper.eq65_time(a, omega, eta) / blocks.p.flat[k]
         return times
 
 

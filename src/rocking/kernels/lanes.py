@@ -58,17 +58,22 @@ AFTER = U1 - U0
 
 
 class Room(NamedTuple):
-    """Room for the work: the lanes' flat table, their marks, and (nonlinear) the series of u, sin and cos(alpha - u)."""
+    """Room for the work of `run_lanes`.
+
+    The lanes' flat table; their marks; the step matrices of both their sides (linear), shape (WIDTH, 2, 4); and the
+    series of u, sin and cos(alpha - u) (nonlinear), shape (3, ORDER + 1, WIDTH).
+    """
 
     lanes: Floats
-    series: Floats
     events: Integers
+    steps: Floats
+    series: Floats
 
 
 def new_room() -> Room:
     """Room for one call of `run_lanes` at a time."""
     series = _on_cache_lines(3 * (ORDER + 1) * WIDTH).reshape(3, ORDER + 1, WIDTH)
-    return Room(_on_cache_lines(ROWS * WIDTH), series, np.zeros(WIDTH, dtype=np.int64))
+    return Room(_on_cache_lines(ROWS * WIDTH), np.zeros(WIDTH, dtype=np.int64), np.zeros((WIDTH, 2, 4)), series)
 
 
 def _on_cache_lines(size: int) -> Floats:
@@ -104,38 +109,55 @@ def run_lanes(
     endings : ndarray of int, shape (n,)
         How each lane ended (`status`), written on return.
     """
-    lanes, series, events = room.lanes, room.series, room.events
-    count = sides.shape[0]
+    lanes = room.lanes
     h = shaking.breakpoints[1] - shaking.breakpoints[0]
-    order = 0 if not rules.nonlinear else series_order(sides, h)
+    order = series_order(sides, h) if rules.nonlinear else 0
+    moving = start_lanes(shaking, sides, rules, room, at, x, endings, h)
     pieces = shaking.coefficients.shape[0]
-    endings[:] = GOING
-    for lane in range(WIDTH):
-        freeze(lanes, lane, 0, np.inf)
-        events[lane] = 0
-    for lane in range(count):
-        load(shaking, sides, rules, lanes, at, x, lane, 0, h)
-    moving = count
     start = shaking.coefficients[0, 0]
     piece = 0
     while piece < pieces and moving > 0 and shaking.breakpoints[piece + 1] <= rules.stop:
         end = shaking.coefficients[piece, 0] + shaking.coefficients[piece, 1] * h
         if rules.nonlinear:
-            busy = quiet_nonlinear(lanes, series, events, start, end, h, order)
+            busy = quiet_nonlinear(lanes, room.series, room.events, start, end, h, order)
         else:
-            busy = quiet_linear(lanes, events, start, end, h)
+            busy = quiet_linear(lanes, room.events, start, end, h)
         if busy > 0:
-            for lane in range(count):
-                if events[lane] != 0:
-                    moving -= play(shaking, sides, rules, tables, scratch, lanes, at, x, endings, lane, piece, h)
-        for k in range(4 * WIDTH):
+            moving -= play(shaking, sides, rules, tables, scratch, room, at, x, endings, piece, h)
+        for k in range(AFTER):
             lanes[U0 + k] = lanes[U1 + k]
         start = end
         piece += 1
-    for lane in range(count):
+    for lane in range(sides.shape[0]):
         if endings[lane] == GOING:
             unload(lanes, at, x, lane, piece)
             endings[lane] = march(shaking, sides[lane], rules, tables, scratch, at[lane], x[lane], pieces + 1)
+
+
+@routine
+def start_lanes(
+    shaking: Shaking,
+    sides: Floats,
+    rules: Rules,
+    room: Room,
+    at: Integers,
+    x: Floats,
+    endings: Integers,
+    h: float,
+) -> int:
+    """Load the lanes that there are and freeze the rest; returns how many there are."""
+    for lane in range(WIDTH):
+        freeze(room.lanes, lane, 0, np.inf)
+        room.events[lane] = 0
+    for lane in range(sides.shape[0]):
+        endings[lane] = GOING
+        for side in range(2):
+            p = math.sqrt(sides[lane, side, STIFFNESS])
+            half, whole = math.sinh(0.5 * p * h), math.sinh(p * h)
+            room.steps[lane, side, 0], room.steps[lane, side, 1] = 2.0 * half * half, whole / p
+            room.steps[lane, side, 2], room.steps[lane, side, 3] = h - whole / p, p * whole
+        load(shaking, sides, rules, room, at, x, lane, 0, h)
+    return sides.shape[0]
 
 
 @routine
@@ -145,22 +167,25 @@ def play(
     rules: Rules,
     tables: Floats,
     scratch: Floats,
-    lanes: Floats,
+    room: Room,
     at: Integers,
     x: Floats,
     endings: Integers,
-    lane: int,
     piece: int,
     h: float,
 ) -> int:
-    """Play one sample for one lane exactly; returns 1 when the lane has ended."""
-    unload(lanes, at, x, lane, piece)
-    endings[lane] = march(shaking, sides[lane], rules, tables, scratch, at[lane], x[lane], piece + 1)
-    load(shaking, sides, rules, lanes, at, x, lane, AFTER, h)
-    if endings[lane] == GOING:
-        return 0
-    freeze(lanes, lane, AFTER, np.inf)
-    return 1
+    """Play one sample exactly for the lanes that are marked; returns how many of them have ended."""
+    ended = 0
+    for lane in range(sides.shape[0]):
+        if room.events[lane] == 0:
+            continue
+        unload(room.lanes, at, x, lane, piece)
+        endings[lane] = march(shaking, sides[lane], rules, tables, scratch, at[lane], x[lane], piece + 1)
+        load(shaking, sides, rules, room, at, x, lane, AFTER, h)
+        if endings[lane] != GOING:
+            freeze(room.lanes, lane, AFTER, np.inf)
+            ended += 1
+    return ended
 
 
 @routine
@@ -179,7 +204,7 @@ def load(
     shaking: Shaking,
     sides: Floats,
     rules: Rules,
-    lanes: Floats,
+    room: Room,
     at: Integers,
     x: Floats,
     lane: int,
@@ -187,7 +212,7 @@ def load(
     h: float,
 ) -> None:
     """Take a lane's state back from the verbs of `march`, into the rows before (half 0) or after (AFTER) the step."""
-    side = at[lane, SIDE]
+    lanes, side = room.lanes, at[lane, SIDE]
     lanes[HIGHEST + lane] = x[lane, PEAK]
     if side == AT_REST:
         freeze(lanes, lane, half, 1.0)
@@ -195,14 +220,9 @@ def load(
         lanes[BELOW + lane] = -sides[lane, 0, THRESHOLD] / shaking.inverse_g
         return
     stiffness, alpha = sides[lane, side, STIFFNESS], sides[lane, side, SLENDERNESS]
-    p = math.sqrt(stiffness)
     sign = (1.0 - 2.0 * side) * shaking.inverse_g
-    half_sinh = math.sinh(0.5 * p * h)
-    sinh = math.sinh(p * h)
-    lanes[COSH + lane] = 2.0 * half_sinh * half_sinh
-    lanes[SINH + lane] = sinh / p
-    lanes[LAG + lane] = h - sinh / p
-    lanes[SINH_P + lane] = p * sinh
+    lanes[COSH + lane], lanes[SINH + lane] = room.steps[lane, side, 0], room.steps[lane, side, 1]
+    lanes[LAG + lane], lanes[SINH_P + lane] = room.steps[lane, side, 2], room.steps[lane, side, 3]
     lanes[ALPHA + lane], lanes[SIGN + lane], lanes[LAMBDA + lane] = alpha, sign, stiffness
     lanes[ABOVE + lane], lanes[BELOW + lane] = np.inf, -np.inf
     u = x[lane, U]

@@ -77,6 +77,13 @@ def new_state() -> tuple[Integers, Floats]:
     return at, x
 
 
+def new_states(count: int) -> tuple[Integers, Floats]:
+    """States of many blocks at rest at time zero, one row each."""
+    at, x = np.zeros((count, UPLIFTS + 1), dtype=np.int64), np.zeros((count, END + 1))
+    at[:, SIDE] = AT_REST
+    return at, x
+
+
 def new_scratch(columns: int) -> Floats:
     """Scratch space for motions with that many coefficients in a piece."""
     return np.zeros((SPARE + 1, max(ORDER + 1, columns + 2)))

@@ -169,41 +169,49 @@ def regions_figure(
 
     polygons: dict[int, list[FloatArray]] = {region: [] for region in names}
     lines: list[FloatArray] = []
-    for start, middle, bounds, middles, inside in _halves(x, edges, regions, y_range):
-        for k, region in enumerate(inside):
-            low, high = [start, bounds[k]], [start, bounds[k + 1]]
-            polygons[region].append(np.array([low, high, [middle, middles[k + 1]], [middle, middles[k]]]))
-        lines += [np.array([[start, bounds[k]], [middle, middles[k]]]) for k in range(1, len(inside))]
+    for abscissae, bounds, inside in _runs(x, edges, regions, y_range):
+        curves = [np.column_stack([abscissae, bound]) for bound in bounds]
+        for region, low, high in zip(inside, curves, curves[1:], strict=False):
+            polygons[region].append(np.concatenate([low, high[::-1]]))
+        lines += curves[1:-1]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.6, 4.6), layout="constrained")
         axes = figure.add_subplot()
         for region, corners in polygons.items():
             colour = _region_colour(region)
-            # Neighbours overlap a little, and hard edges leave no seams between them.
-            strips = PolyCollection(corners, facecolors=colour, edgecolors=colour, linewidths=0.4, antialiaseds=False)
-            axes.add_collection(strips)
+            axes.add_collection(PolyCollection(corners, facecolors=colour, edgecolors=colour, linewidths=0.5))
         axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.5))
         axes.set(xlim=(x[0], x[-1]), ylim=y_range, xlabel=x_label, ylabel=y_label, title=title)
         figure.legend(handles=_region_patches(names, Patch), loc="outside lower center", ncols=3)
     return figure
 
 
-def _halves(
+def _runs(
     x: FloatArray, edges: Sequence[FloatArray], regions: Sequence[Sequence[int]], y_range: tuple[float, float]
-) -> Iterator[tuple[float, float, FloatArray, FloatArray, Sequence[int]]]:
-    """Yield strips from each abscissa half way to the next and half way back, with bounds there and in the middle.
+) -> Iterator[tuple[FloatArray, FloatArray, Sequence[int]]]:
+    """Yield runs of abscissae with the same regions: abscissae, bounds of shape (regions + 1, abscissae), regions.
 
-    A boundary that both abscissae have runs straight from one to the other, any other one level to the middle.
+    Two runs meet half way: a boundary that both have runs straight from one to the other, any other one level.
     """
-    for k in range(len(x) - 1):
-        sides = [np.array([y_range[0], *edges[j], y_range[1]]) for j in (k, k + 1)]
-        shared = _shared(regions[k], regions[k + 1])
-        middle = 0.5 * (x[k] + x[k + 1])
-        for here, j, there in ((0, k, 1), (1, k + 1, 0)):
-            middles = sides[here].copy()
-            for pair in shared:
-                middles[pair[here]] = 0.5 * (sides[here][pair[here]] + sides[there][pair[there]])
-            yield x[j], middle, sides[here], middles, regions[j]
+    columns = [np.array([y_range[0], *edge, y_range[1]]) for edge in edges]
+    starts = [k for k in range(len(x)) if k == 0 or list(regions[k]) != list(regions[k - 1])]
+    for start, end in zip(starts, [*starts[1:], len(x)], strict=True):
+        at, bounds = [*x[start:end]], columns[start:end]
+        if start > 0:
+            at = [0.5 * (x[start - 1] + x[start]), *at]
+            bounds = [_meeting(columns, regions, start, start - 1), *bounds]
+        if end < len(x):
+            at = [*at, 0.5 * (x[end - 1] + x[end])]
+            bounds = [*bounds, _meeting(columns, regions, end - 1, end)]
+        yield np.array(at), np.stack(bounds, axis=1), regions[start]
+
+
+def _meeting(columns: Sequence[FloatArray], regions: Sequence[Sequence[int]], here: int, there: int) -> FloatArray:
+    """Bounds half way from one abscissa to the next."""
+    bounds = columns[here].copy()
+    for mine, other in _shared(regions[here], regions[there]):
+        bounds[mine] = 0.5 * (columns[here][mine] + columns[there][other])
+    return bounds
 
 
 def _shared(left: Sequence[int], right: Sequence[int]) -> list[tuple[int, int]]:

@@ -1,0 +1,136 @@
+"""Rocking spectra: what `simulate` says, fractiles over blocks that overturn, the size-independence of displacements."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+import rocking
+from rocking.analysis import rocking_spectrum, spectrum_figure
+from rocking.analysis.spectrum import fractiles_of
+
+PULSES = [rocking.pulses.one_sine(5.0, frequency) for frequency in (0.5, 0.8, 1.3, 2.0)]
+
+
+@pytest.fixture(scope="module")
+def spectrum():
+    return rocking_spectrum(PULSES, alpha=[0.1, 0.2], p=[1.0, 2.0, 4.0], restitution=[0.8, 0.9], polarity="both")
+
+
+def test_every_peak_is_the_one_of_its_block_and_motion(spectrum):
+    assert spectrum.peak_rotation.dims == ("motion", "polarity", "alpha", "restitution", "p")
+    for m, motion in enumerate(PULSES):
+        for sign, polarity in ((1.0, "+"), (-1.0, "-")):
+            for alpha, e, p in ((0.1, 0.9, 2.0), (0.2, 0.8, 4.0), (0.2, 0.9, 1.0)):
+                block = rocking.Block.from_parameters(p, alpha, e)
+                response = rocking.simulate(block, motion.scaled(sign))
+                cell = spectrum.isel(motion=m).sel(polarity=polarity, alpha=alpha, restitution=e, p=p)
+                assert float(cell.peak_rotation) == pytest.approx(response.peak_rotation, rel=1e-9)
+                assert bool(cell.overturned) == response.overturned
+                over = math.inf if response.overturned else response.peak_rotation / alpha
+                assert float(cell.peak_over_alpha) == pytest.approx(over, rel=1e-9)
+
+
+def test_an_overturned_block_counts_as_infinitely_large(spectrum):
+    cell = spectrum.sel(alpha=0.2, restitution=0.9, p=1.0)
+    peaks = np.sort(cell.peak_over_alpha.values.ravel())
+    assert np.isfinite(peaks).sum() == 6
+    # Fractiles stand between the 2nd and 3rd, the 4th and 5th, and the 6th and 7th of eight peaks.
+    low, middle, high = cell.fractile_over_alpha.values
+    assert low == pytest.approx(peaks[1] + (0.16 * 7 - 1) * (peaks[2] - peaks[1]), rel=1e-12)
+    assert middle == pytest.approx(0.5 * (peaks[3] + peaks[4]), rel=1e-12)
+    assert high == math.inf
+    assert float(cell.overturned_share) == 0.25
+
+
+def test_housners_restitution_goes_with_each_slenderness():
+    result = rocking_spectrum(PULSES[2], alpha=[0.1, 0.3], p=[2.0])
+    assert "restitution" not in result.dims
+    for alpha in (0.1, 0.3):
+        response = rocking.simulate(rocking.Block.from_parameters(2.0, alpha), PULSES[2])
+        assert float(result.peak_rotation.sel(alpha=alpha, p=2.0)[0]) == pytest.approx(response.peak_rotation, rel=1e-9)
+
+
+def test_sizes_are_half_diagonals_of_rectangles():
+    block = rocking.Block(0.2, 1.0)
+    result = rocking_spectrum(PULSES[3], alpha=block.alpha, size=[block.radius])
+    assert float(result.p[0]) == pytest.approx(block.p, rel=1e-14)
+    assert float(result["size"][0]) == pytest.approx(block.radius, rel=1e-14)
+    assert float(result.period[0]) == pytest.approx(2.0 * math.pi / block.p, rel=1e-14)
+    response = rocking.simulate(block, PULSES[3])
+    assert result.peak_rotation.values.item() == pytest.approx(response.peak_rotation, rel=1e-9)
+
+
+def test_large_similar_blocks_have_equal_displacements():
+    # R theta'' = -(3/4) (g sin(alpha - theta) + a cos(alpha - theta)): as R grows theta vanishes beside alpha, and R theta
+    # obeys an equation without R. The difference falls as theta does, in proportion to 1/R.
+    record = rocking.records.load("el-centro-meloland-270")
+    result = rocking_spectrum(record, alpha=[0.1, 0.2], size=[20.0, 40.0, 80.0, 160.0, 320.0], restitution=[0.9])
+    displacement = (result.peak_rotation * result["size"]).isel(motion=0, restitution=0).values
+    steps = np.abs(np.diff(displacement, axis=1))
+    assert np.all(steps[:, -1] < 0.02 * displacement[:, -1])
+    np.testing.assert_allclose(steps[:, 1:] / steps[:, :-1], 0.5, atol=0.1)
+
+
+@given(arrays(float, (7, 3), elements=st.floats(0.0, 1e6)), st.lists(st.floats(0.01, 0.99), min_size=1, max_size=4))
+def test_finite_fractiles_are_interpolated_linearly(values, shares):
+    shares = np.array(shares)
+    expected = np.quantile(values, shares, axis=0)
+    np.testing.assert_allclose(fractiles_of(values, shares), expected, rtol=1e-12, atol=1e-9)
+
+
+@given(st.integers(1, 6), st.integers(0, 6), st.floats(0.0, 1.0))
+def test_a_fractile_is_infinite_where_the_value_at_it_or_next_above_is(finite, infinite, share):
+    values = np.concatenate([np.arange(finite, dtype=float), np.full(infinite, np.inf)])[:, None]
+    place = share * (finite + infinite - 1)
+    (result,) = fractiles_of(values, np.array([share]))[:, 0]
+    assert math.isinf(result) == (math.ceil(place) >= finite)
+    assert not math.isnan(result)
+
+
+def test_the_figure_draws_fractiles_and_leaves_out_what_overturns(spectrum):
+    few = spectrum.sel(restitution=[0.9])
+    figure = spectrum_figure(few, against="size")
+    peaks, shares = figure.axes
+    thick = [line for line in peaks.lines if line.get_label().endswith("median")]
+    assert len(thick) == 2
+    expected = few.fractile_over_alpha.sel(fractile=0.5, alpha=0.2, restitution=0.9).values
+    np.testing.assert_array_equal(thick[1].get_ydata(), np.where(np.isinf(expected), np.nan, expected))
+    np.testing.assert_array_equal(thick[1].get_xdata(), few["size"].values)
+    drawn = shares.lines[0].get_ydata()
+    np.testing.assert_array_equal(drawn, few.overturned_share.sel(alpha=0.1, restitution=0.9).values)
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"p": None}, "either p"),
+        ({"size": [1.0]}, "either p"),
+        ({"p": None, "size": [-1.0]}, "size"),
+        ({"p": [0.0]}, "p must"),
+        ({"p": "fast"}, "p must"),
+        ({"alpha": [math.nan]}, "alpha"),
+        ({"alpha": [2.0]}, "alpha"),
+        ({"restitution": [1.5]}, "restitution"),
+        ({"fractiles": [1.0]}, "fractiles"),
+        ({"fractiles": ["median"]}, "fractiles"),
+        ({"model": "cubic"}, "model"),
+        ({"polarity": "up"}, "polarity"),
+        ({"motions": []}, "at least one motion"),
+    ],
+)
+def test_what_makes_no_spectrum_is_refused(changes, word):
+    arguments = {"motions": PULSES, "alpha": [0.2], "p": [2.0]} | changes
+    with pytest.raises(rocking.RockingError, match=word):
+        rocking_spectrum(arguments.pop("motions"), **arguments)
+
+
+def test_a_figure_of_too_many_curves_is_refused(spectrum):
+    more = rocking_spectrum(PULSES[0], alpha=[0.1, 0.15, 0.2, 0.25, 0.3], p=[2.0])
+    with pytest.raises(rocking.InvalidOption, match="at most 4"):
+        spectrum_figure(more)
+    with pytest.raises(rocking.InvalidOption, match="against"):
+        spectrum_figure(spectrum, against="height")
