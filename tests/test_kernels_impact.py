@@ -10,9 +10,10 @@ from flint import fmpq, fmpq_poly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift
+from rocking.kernels.arc import expand_linear
+from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift, short_step
 from rocking.kernels.state import AT_REST, GROUND, SERIES, SPARE, Rules, Shaking, new_scratch
-from rocking.kernels.status import CERTIFIED, IMPACT, OVERTURN, STEP
+from rocking.kernels.status import CERTIFIED, IMPACT, OVERTURN, STEP, UNDECIDED
 
 ULP = 2.0**-52
 PLUS, MINUS = 0, 1
@@ -258,3 +259,34 @@ def test_a_step_after_an_impact_is_sized_by_the_arc_under_weak_and_violent_motio
     assert (time < h <= 0.5, degree) == (True, 0 if columns == 1 else 1)
     order, h, _ = expand(shaking, sides(), rules, scratch, MINUS, 0, 0.0, 0.0, 1e-3, 9.0)
     assert (h <= 0.5) if strength > 0.2 else (h < 0.01)
+
+
+@settings(quick, max_examples=400)
+@given(
+    st.just(0.0) | st.floats(1e-9, 1e-2),
+    between(-0.2, 0.2),
+    between(-1.5, 1.5),
+    between(-60.0, 60.0),
+    st.floats(1e-4, 0.03),
+    st.integers(0, 1),
+    st.floats(1.0, 1.1),
+)
+def test_a_short_step_at_a_glance_is_the_one_of_the_series(
+    u: float, v: float, a: float, slope: float, left: float, side: int, margin: float
+) -> None:
+    """What it decides is what `advance` finds, and no rotation above the highest so far is passed over."""
+    v = abs(v) if u == 0.0 else v
+    shaking, scratch = in_units_of_g([0.0, 1.0], [[a, slope]]), new_scratch(2)
+    block, c = sides(), scratch[SERIES]
+    sign = 1.0 - 2.0 * side
+    expand_linear(u, v, 4.0, 0.2, np.array([sign * a, sign * slope]), 1, 21, c)
+    status, time, end, speed, _, peak = advance(u, v, 21, left, c, scratch[SPARE])
+    highest = max(u, peak) * margin
+    found, found_time, found_end, found_speed = short_step(shaking, block, side, 0, 0.0, u, v, left, highest)
+    assert found in (status, UNDECIDED)
+    if found == status:
+        assert found_time == pytest.approx(time, rel=1e-11)
+        assert found_end == pytest.approx(end, rel=1e-11, abs=1e-14)
+        assert found_speed == pytest.approx(speed, rel=1e-9, abs=1e-13)
+    if status != OVERTURN and peak > 0.0:
+        assert short_step(shaking, block, side, 0, 0.0, u, v, left, 0.999 * peak)[0] == UNDECIDED

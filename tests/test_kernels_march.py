@@ -212,6 +212,19 @@ def test_a_motion_clipped_at_the_threshold_ends_whatever_rounding_makes_of_it(
     assert len(found.nodes) < 200
 
 
+@pytest.mark.parametrize("nonlinear", [False, True])
+@pytest.mark.parametrize("columns", [1, 5, 21, 40])
+def test_coefficients_that_are_zero_change_nothing(nonlinear: bool, columns: int) -> None:
+    """However many they are: more than the series of an arc has, too."""
+    shaking = motion([0.0, 0.1, 0.5, 0.6], np.full((3, 1), 0.2) * [[1.0], [-0.4], [-1.0]])
+    rows = np.zeros((3, columns))
+    rows[:, :1] = shaking.coefficients
+    one = run(shaking._replace(coefficients=np.hstack([shaking.coefficients, np.zeros((3, 1))])), nonlinear=nonlinear)
+    other = run(shaking._replace(coefficients=rows), nonlinear=nonlinear)
+    assert len(one.impacts) > 10
+    assert one.events[:, :3] == pytest.approx(other.events[:, :3], abs=1e-11)
+
+
 # ---- Ends ----
 
 

@@ -92,8 +92,9 @@ def incremental_dynamic_analysis(
 
     Notes
     -----
-    Ends of bands are found by bisection between neighbouring levels whose verdicts differ; bands that lie between two
-    neighbouring levels with the same verdict are not seen.
+    Ends of bands are found by bisection between neighbouring levels whose verdicts differ; what lies between two levels
+    with the same verdict is not seen. Under records the set of levels that overturn is often a fractal: thinner bands
+    beside every band, at any resolution.
 
     References
     ----------

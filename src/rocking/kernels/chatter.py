@@ -265,6 +265,26 @@ def time_to_rest(
 
 
 @leaf
+def rest_shift(
+    shaking: Shaking, sides: Floats, v: float, dv: float, shift: float, i: int, piece: int, offset: float
+) -> float:
+    """Shift of the time of rest per unit of scaling of the motion, to first order in the speed.
+
+    ``shift`` is that of the impact, ``dv`` the variation of the velocity after it at the time that it has unscaled.
+    The time to rest is A v (`remaining_time`), with A and v at the impact of the scaled motion.
+    """
+    j = 1 - i
+    e_i, e_j = sides[i, RESTITUTION], sides[j, RESTITUTION]
+    here = motion_at(shaking, piece, offset) * shaking.inverse_g
+    g_i, g_j = restoring(sides, i, here), restoring(sides, j, here)
+    faster = dv - g_i * shift
+    change = (1.0 - 2.0 * i) * (here + shift * motion_slope(shaking, piece, offset) * shaking.inverse_g)
+    per_speed = 2.0 * (1.0 / g_i + e_i / g_j)
+    change_of_it = -2.0 * change * (sides[i, GAIN] / g_i**2 - e_i * sides[j, GAIN] / g_j**2)
+    return shift + (per_speed * faster + change_of_it * v) / (1.0 - e_i * e_j)
+
+
+@leaf
 def stiffness_at_rest(sides: Floats, j: int, nonlinear: bool, push: float) -> float:
     """Rate at which side j's restoring acceleration falls with rotation, at zero rotation; push = j a/g."""
     if not nonlinear:

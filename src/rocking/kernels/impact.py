@@ -31,15 +31,15 @@ from rocking.kernels.state import (
     Rules,
     Shaking,
 )
-from rocking.kernels.status import IMPACT, OVERTURN, STEP
+from rocking.kernels.status import IMPACT, OVERTURN, STEP, UNDECIDED
 
 QUARTER_TURN = 0.5 * math.pi
 
 #: First step from an impact, over the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
 
-#: Largest (p t)^2 for which the terms of `short_series` are enough, and the most Newton steps of `short_arc`.
-_SHORT = 2e-3
+#: Largest (p t)^2 for which the terms of `short_series` are enough, and the most Newton steps of a short arc.
+_SHORT = 4e-3
 _NEWTON_STEPS = 6
 
 #: Accelerations closer to a threshold than this fraction of it are at the threshold.
@@ -90,51 +90,98 @@ def expand(
     return order, h, degree
 
 
-@leaf
-def short_arc(
-    shaking: Shaking, sides: Floats, side: int, piece: int, offset: float, v: float, left: float
-) -> tuple[float, float, float]:
-    """Whole arc of the linear model from an impact to the next, where it is short and ends within the piece.
+@routine
+def short_step(
+    shaking: Shaking,
+    sides: Floats,
+    side: int,
+    piece: int,
+    offset: float,
+    u: float,
+    v: float,
+    left: float,
+    highest: float,
+) -> tuple[int, float, float, float]:
+    """Step of the linear model to the next impact or to the end of the piece, where it is short and simple.
 
-    Returns (duration, speed at its end, bound on its height); NaN where it is not that simple. The series is that of
-    `expand_linear`, in registers. With u = c1 t + c2 t^2 + ..., all even coefficients are negative, and the odd ones
-    from c3 on have its sign, so that u/t falls all the way where 2 c2 + 4.04 max(c3, 0) t < 0: Newton's root is the
-    first. Where u'' < 0 throughout, the arc lies below its tangents at both ends, which bounds its height.
+    Returns (status, time, u, u'); UNDECIDED where the step is long, may hold a rotation above ``highest``, or is not
+    simple enough to see its first impact at a glance. The series is that of `expand_linear`, in registers.
     """
     lam = sides[side, STIFFNESS]
+    if not lam * left * left < _SHORT:
+        return UNDECIDED, 0.0, 0.0, 0.0
     g = restoring(sides, side, motion_at(shaking, piece, offset) * shaking.inverse_g)
     rate = sides[side, GAIN] * (1.0 - 2.0 * side) * motion_slope(shaking, piece, offset) * shaking.inverse_g
-    c2 = -0.5 * g
-    c3 = (lam * v - rate) * (1.0 / 6.0)
+    c2, c3 = 0.5 * (lam * u - g), (lam * v - rate) * (1.0 / 6.0)
+    t, status = left, STEP
+    if u == 0.0:
+        # u/t > v + 1.01 (min(c2, 0) t + min(c3, 0) t^2): no impact while that is positive.
+        if not v + 1.01 * left * (min(c2, 0.0) + min(c3, 0.0) * left) > 0.0:
+            t, status = arc_from_impact(v, c2, c3, lam, left), IMPACT
+    else:
+        end, _ = short_series(u, v, c2, c3, lam, left)
+        # u'' has its extrema at the ends: no dip below both by more than left^2/8 of it, and one root if it is concave.
+        bend = max(c2, 0.5 * (lam * end - g - rate * left))
+        if not min(u, end) > 0.25 * left * left * max(bend, 0.0):
+            t, status = arc_to_impact(u, v, c2, c3, lam, left) if end < 0.0 and bend < 0.0 else np.nan, IMPACT
+    if not t <= left:
+        return UNDECIDED, 0.0, 0.0, 0.0
+    end, speed = short_series(u, v, c2, c3, lam, t)
+    bend = min(c2, 0.5 * (lam * end - g - rate * t))
+    if end >= highest or max(u, end) - 0.25 * t * t * min(bend, 0.0) > highest:
+        return UNDECIDED, 0.0, 0.0, 0.0
+    return status, t, end if status == STEP else 0.0, speed
+
+
+@leaf
+def arc_from_impact(v: float, c2: float, c3: float, lam: float, left: float) -> float:
+    """Duration of the arc that an impact starts, where it ends before ``left`` and u/t falls all the way; else NaN.
+
+    All even coefficients have the sign of c2, the odd ones from c3 on that of c3, and they fall so fast that the slope
+    of u/t is below c2 + 2.02 max(c3, 0) t. Where that is negative, the root that Newton finds is the first.
+    """
     root = c2 * c2 - 4.0 * c3 * v
-    if not (g > 0.0 and root > 0.0):
-        return np.nan, np.nan, np.nan
+    if not (c2 < 0.0 and root > 0.0):
+        return np.nan
     t = 2.0 * v / (math.sqrt(root) - c2)
-    simple = t < left and lam * t * t < _SHORT and c2 + 2.02 * max(c3, 0.0) * t < 0.0
-    if not (simple and lam * v * t + max(-rate, 0.0) * t < g):
-        return np.nan, np.nan, np.nan
+    if not (t < left and c2 + 2.02 * max(c3, 0.0) * t < 0.0):
+        return np.nan
     for _ in range(_NEWTON_STEPS):
-        f, slope = short_series(v, c2, c3, lam, t)
-        step = f / slope
+        x = lam * t * t
+        even = c2 * (1.0 + x * (1.0 / 12.0 + x * (1.0 / 360.0 + x * (1.0 / 20160.0))))
+        odd = c3 * (1.0 + x * (1.0 / 20.0 + x * (1.0 / 840.0 + x * (1.0 / 60480.0))))
+        even_slope = c2 * (1.0 + x * (1.0 / 4.0 + x * (1.0 / 72.0 + x * (1.0 / 2880.0))))
+        odd_slope = c3 * (2.0 + x * (1.0 / 5.0 + x * (1.0 / 140.0 + x * (1.0 / 7560.0))))
+        step = (v + t * (even + t * odd)) / (even_slope + t * odd_slope)
         t -= step
         if abs(step) < 1e-8 * t:
             break
-    if not t < left:
-        return np.nan, np.nan, np.nan
-    _, slope = short_series(v, c2, c3, lam, t)
-    speed = -t * slope  # u' = u/t + t (u/t)', and u = 0
-    return t, speed, v * speed * t / (v + speed)
+    return t if t < left else np.nan
 
 
 @leaf
-def short_series(v: float, c2: float, c3: float, lam: float, t: float) -> tuple[float, float]:
-    """u/t and its slope, for c[k + 2] = lam c[k]/((k + 1)(k + 2)) from c2 and c3 on and (p t)^2 <= _SHORT."""
+def arc_to_impact(u: float, v: float, c2: float, c3: float, lam: float, left: float) -> float:
+    """Time to the one root of a concave arc that is above ground now and below it at ``left``; NaN if not found."""
+    t = 2.0 * u / (math.sqrt(v * v - 4.0 * c2 * u) - v)
+    for _ in range(_NEWTON_STEPS):
+        height, speed = short_series(u, v, c2, c3, lam, t)
+        step = height / speed
+        t -= step
+        if abs(step) < 1e-8 * t:
+            return t if 0.0 < t < left else np.nan
+    return np.nan
+
+
+@leaf
+def short_series(u: float, v: float, c2: float, c3: float, lam: float, t: float) -> tuple[float, float]:
+    """Rotation and velocity after t, for c[k + 2] = lam c[k]/((k + 1)(k + 2)) from c2, c3 on and (p t)^2 <= _SHORT."""
     x = lam * t * t
-    even = c2 * (1.0 + x * (1.0 / 12.0 + x * (1.0 / 360.0 + x * (1.0 / 20160.0))))
-    odd = c3 * (1.0 + x * (1.0 / 20.0 + x * (1.0 / 840.0 + x * (1.0 / 60480.0))))
-    even_slope = c2 * (1.0 + x * (1.0 / 4.0 + x * (1.0 / 72.0 + x * (1.0 / 2880.0))))
-    odd_slope = c3 * (2.0 + x * (1.0 / 5.0 + x * (1.0 / 140.0 + x * (1.0 / 7560.0))))
-    return v + t * (even + t * odd), even_slope + t * odd_slope
+    even = 1.0 + x * (1.0 / 12.0 + x * (1.0 / 360.0 + x * (1.0 / 20160.0)))
+    odd = 1.0 + x * (1.0 / 20.0 + x * (1.0 / 840.0 + x * (1.0 / 60480.0)))
+    even_slope = 1.0 + x * (1.0 / 6.0 + x * (1.0 / 120.0 + x * (1.0 / 5040.0)))
+    rotation = u + t * (v + t * (c2 * even + t * c3 * odd))
+    velocity = v + t * (2.0 * c2 * even_slope + 3.0 * t * c3 * even)
+    return rotation, velocity
 
 
 @routine

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rocking.kernels.chatter import piece_range
 from rocking.kernels.compiled import kernel, leaf, routine
 from rocking.kernels.impact import QUARTER_TURN
 from rocking.kernels.march import march
@@ -43,8 +44,8 @@ from rocking.kernels.status import GOING
 #: Lanes that step together. A constant, so that the compiler sees that the rows of the flat tables do not overlap.
 WIDTH = 64
 
-# Where each row of the lanes' flat table starts. State before and after the step: u, u', and (nonlinear) the sine and
-# cosine of alpha - u.
+# Where each row of the lanes' flat table starts. State: u, u', and (nonlinear) the sine and cosine of alpha - u; where
+# a step would take it (nonlinear).
 U0, V0, S0, C0, U1, V1, S1, C1 = range(0, 8 * WIDTH, WIDTH)
 # Constants of the side that the lane is on: with x = p h, cosh x - 1, sinh x / p, h - sinh x / p, p sinh x (linear);
 # alpha, i/g, p^2, and the factor of the bounds.
@@ -52,9 +53,6 @@ COSH, SINH, LAG, SINH_P, ALPHA, SIGN, LAMBDA, CURVE = range(8 * WIDTH, 16 * WIDT
 # Peak so far, and the accelerations beyond which a lane at rest uplifts.
 HIGHEST, ABOVE, BELOW = range(16 * WIDTH, 19 * WIDTH, WIDTH)
 ROWS = 19
-
-#: From a row before the step to the one after it.
-AFTER = U1 - U0
 
 
 class Room(NamedTuple):
@@ -114,8 +112,8 @@ def run_lanes(
     order = series_order(sides, h) if rules.nonlinear else 0
     moving = start_lanes(shaking, sides, rules, room, at, x, endings, h)
     pieces = shaking.coefficients.shape[0]
-    start = shaking.coefficients[0, 0]
-    piece = 0
+    piece = next_loud(shaking, lanes, 0, pieces)
+    start = shaking.coefficients[min(piece, pieces - 1), 0]
     while piece < pieces and moving > 0 and shaking.breakpoints[piece + 1] <= rules.stop:
         end = shaking.coefficients[piece, 0] + shaking.coefficients[piece, 1] * h
         if rules.nonlinear:
@@ -124,10 +122,11 @@ def run_lanes(
             busy = quiet_linear(lanes, room.events, start, end, h)
         if busy > 0:
             moving -= play(shaking, sides, rules, tables, scratch, room, at, x, endings, piece, h)
-        for k in range(AFTER):
-            lanes[U0 + k] = lanes[U1 + k]
         start = end
         piece += 1
+        if busy > 0 and is_idle(lanes):
+            piece = next_loud(shaking, lanes, piece, pieces)
+            start = shaking.coefficients[min(piece, pieces - 1), 0]
     for lane in range(sides.shape[0]):
         if endings[lane] == GOING:
             unload(lanes, at, x, lane, piece)
@@ -147,7 +146,7 @@ def start_lanes(
 ) -> int:
     """Load the lanes that there are and freeze the rest; returns how many there are."""
     for lane in range(WIDTH):
-        freeze(room.lanes, lane, 0, np.inf)
+        freeze(room.lanes, lane, np.inf)
         room.events[lane] = 0
     for lane in range(sides.shape[0]):
         endings[lane] = GOING
@@ -156,7 +155,7 @@ def start_lanes(
             half, whole = math.sinh(0.5 * p * h), math.sinh(p * h)
             room.steps[lane, side, 0], room.steps[lane, side, 1] = 2.0 * half * half, whole / p
             room.steps[lane, side, 2], room.steps[lane, side, 3] = h - whole / p, p * whole
-        load(shaking, sides, rules, room, at, x, lane, 0, h)
+        load(shaking, sides, rules, room, at, x, lane, h)
     return sides.shape[0]
 
 
@@ -181,9 +180,9 @@ def play(
             continue
         unload(room.lanes, at, x, lane, piece)
         endings[lane] = march(shaking, sides[lane], rules, tables, scratch, at[lane], x[lane], piece + 1)
-        load(shaking, sides, rules, room, at, x, lane, AFTER, h)
+        load(shaking, sides, rules, room, at, x, lane, h)
         if endings[lane] != GOING:
-            freeze(room.lanes, lane, AFTER, np.inf)
+            freeze(room.lanes, lane, np.inf)
             ended += 1
     return ended
 
@@ -208,14 +207,13 @@ def load(
     at: Integers,
     x: Floats,
     lane: int,
-    half: int,
     h: float,
 ) -> None:
-    """Take a lane's state back from the verbs of `march`, into the rows before (half 0) or after (AFTER) the step."""
+    """Take a lane's state back from the verbs of `march`."""
     lanes, side = room.lanes, at[lane, SIDE]
     lanes[HIGHEST + lane] = x[lane, PEAK]
     if side == AT_REST:
-        freeze(lanes, lane, half, 1.0)
+        freeze(lanes, lane, 1.0)
         lanes[ABOVE + lane] = sides[lane, 1, THRESHOLD] / shaking.inverse_g
         lanes[BELOW + lane] = -sides[lane, 0, THRESHOLD] / shaking.inverse_g
         return
@@ -226,28 +224,53 @@ def load(
     lanes[ALPHA + lane], lanes[SIGN + lane], lanes[LAMBDA + lane] = alpha, sign, stiffness
     lanes[ABOVE + lane], lanes[BELOW + lane] = np.inf, -np.inf
     u = x[lane, U]
-    lanes[U0 + half + lane], lanes[V0 + half + lane] = u, x[lane, V]
+    lanes[U0 + lane], lanes[V0 + lane] = u, x[lane, V]
     if rules.nonlinear:
         lanes[CURVE + lane] = h * h / 8.0
-        lanes[S0 + half + lane], lanes[C0 + half + lane] = math.sin(alpha - u), math.cos(alpha - u)
+        lanes[S0 + lane], lanes[C0 + lane] = math.sin(alpha - u), math.cos(alpha - u)
         return
     lanes[CURVE + lane] = stiffness * h * h / 8.0
 
 
 @leaf
-def freeze(lanes: Floats, lane: int, half: int, limit: float) -> None:
+def freeze(lanes: Floats, lane: int, limit: float) -> None:
     """Constants with which a lane stays where it is: at rest, or (infinite limit) ended."""
     for row in range(COSH, CURVE + WIDTH, WIDTH):
         lanes[row + lane] = 0.0
-    lanes[U0 + half + lane], lanes[V0 + half + lane] = 1.0, 0.0
-    lanes[S0 + half + lane], lanes[C0 + half + lane] = 0.0, 1.0
+    lanes[U0 + lane], lanes[V0 + lane] = 1.0, 0.0
+    lanes[S0 + lane], lanes[C0 + lane] = 0.0, 1.0
     lanes[ALPHA + lane] = 1.0
     lanes[ABOVE + lane], lanes[BELOW + lane] = limit, -limit
 
 
+@leaf
+def is_idle(lanes: Floats) -> bool:
+    """Whether no lane rocks: all are at rest or have ended."""
+    rocking = 0.0
+    for lane in range(WIDTH):
+        rocking += lanes[LAMBDA + lane]
+    return rocking == 0.0
+
+
+@routine
+def next_loud(shaking: Shaking, lanes: Floats, piece: int, pieces: int) -> int:
+    """First piece from this one on in which the motion passes the threshold of a lane at rest."""
+    above, below = np.inf, -np.inf
+    for lane in range(WIDTH):
+        above, below = min(above, lanes[ABOVE + lane]), max(below, lanes[BELOW + lane])
+    while piece < pieces:
+        low, high, _, _ = piece_range(
+            shaking.coefficients[piece], 0.0, shaking.breakpoints[piece + 1] - shaking.breakpoints[piece], lanes
+        )
+        if high > above or low < below:
+            break
+        piece += 1
+    return piece
+
+
 @routine
 def quiet_linear(lanes: Floats, events: Integers, start: float, end: float, h: float) -> int:
-    """Step all lanes through one sample of the linear model; mark and count those that may have an event in it."""
+    """Step all lanes through one sample of the linear model, but mark, count and leave those with an event."""
     slope = (end - start) / h
     above, below = max(start, end), min(start, end)
     busy = 0
@@ -260,7 +283,6 @@ def quiet_linear(lanes: Floats, events: Integers, start: float, end: float, h: f
         z1 = u1 - (alpha + sign * end)
         dip = lanes[CURVE + lane] * max(max(z, z1), 0.0)
         bulge = lanes[CURVE + lane] * max(max(-z, -z1), 0.0)
-        lanes[U1 + lane], lanes[V1 + lane] = u1, v1
         event = (
             (min(u, u1) <= dip)
             | ((v > 0.0) & (v1 <= 0.0) & (max(u, u1) + bulge > lanes[HIGHEST + lane]))
@@ -268,6 +290,7 @@ def quiet_linear(lanes: Floats, events: Integers, start: float, end: float, h: f
             | (above > lanes[ABOVE + lane])
             | (below < lanes[BELOW + lane])
         )
+        lanes[U0 + lane], lanes[V0 + lane] = u if event else u1, v if event else v1
         events[lane] = event
         busy += event
     return busy
@@ -293,7 +316,7 @@ def series_order(sides: Floats, h: float) -> int:
 def quiet_nonlinear(
     lanes: Floats, series: Floats, events: Integers, start: float, end: float, h: float, order: int
 ) -> int:
-    """Step all lanes through one sample of the nonlinear model; mark and count those that may have an event in it."""
+    """Step all lanes through one sample of the nonlinear model, but mark, count and leave those with an event."""
     slope = (end - start) / h
     rotation, sine, cosine = series[0], series[1], series[2]
     signs, stiffness = lanes[SIGN : SIGN + WIDTH], lanes[LAMBDA : LAMBDA + WIDTH]
@@ -384,7 +407,10 @@ def add_size(to: Floats, values: Floats, factor: float) -> None:
 def mark_nonlinear(
     lanes: Floats, half_curvature: Floats, spread: Floats, events: Integers, above: float, below: float
 ) -> int:
-    """Mark and count the lanes that may have an event: u'' is twice c2, give or take the sizes of the other terms."""
+    """Mark and count the lanes that may have an event, and move on the others.
+
+    u'' is twice c2, give or take the sizes of the other terms.
+    """
     busy = 0
     for lane in range(WIDTH):
         u, v, u1, v1 = lanes[U0 + lane], lanes[V0 + lane], lanes[U1 + lane], lanes[V1 + lane]
@@ -397,6 +423,9 @@ def mark_nonlinear(
             | (above > lanes[ABOVE + lane])
             | (below < lanes[BELOW + lane])
         )
+        if not event:
+            lanes[U0 + lane], lanes[V0 + lane] = u1, v1
+            lanes[S0 + lane], lanes[C0 + lane] = lanes[S1 + lane], lanes[C1 + lane]
         events[lane] = event
         busy += event
     return busy

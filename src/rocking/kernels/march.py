@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from rocking.kernels.arc import vary_linear, vary_nonlinear
-from rocking.kernels.chatter import motion_at, motion_slope, prove_rest, restoring, time_to_rest
+from rocking.kernels.chatter import motion_at, motion_slope, prove_rest, rest_shift, restoring, time_to_rest
 from rocking.kernels.compiled import kernel, leaf, routine
-from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift, short_arc
+from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift, short_step
 from rocking.kernels.state import (
     AT_REST,
     DU,
@@ -64,6 +64,7 @@ from rocking.kernels.status import (
     STEP,
     TIME,
     TOPPLED,
+    UNDECIDED,
     UPLIFT,
     VELOCITY,
 )
@@ -103,7 +104,7 @@ def march(
         if outcome == IMPACT:
             strike(shaking, sides, rules, tables, at, x)
             resting, lower, upper, to_rest = judge(shaking, sides, rules, scratch, at, x)
-            if resting and not come_to_rest(shaking, rules, tables, lower, upper, to_rest, at, x):
+            if resting and not come_to_rest(shaking, sides, rules, tables, lower, upper, to_rest, at, x):
                 return DONE
         elif outcome == OVERTURN:
             return FELL
@@ -182,12 +183,10 @@ def follow_arc(
         x[END] = rules.stop
         return _STOPPED
     side = at[SIDE]
-    if not rules.record and not rules.nonlinear and x[U] == 0.0 and x[V] > 0.0 and shaking.coefficients.shape[1] == 2:
-        t, speed, height = short_arc(shaking, sides, side, at[PIECE], x[OFFSET], x[V], left)
-        if height <= x[PEAK]:
-            pass_time(t, x)
-            x[V] = -speed
-            return IMPACT
+    if not (rules.record or rules.nonlinear or at[SMOOTH]) and shaking.coefficients.shape[1] == 2:
+        outcome, t, u, v = short_step(shaking, sides, side, at[PIECE], x[OFFSET], x[U], x[V], left, x[PEAK])
+        if outcome != UNDECIDED:
+            return arrive(shaking, rules, tables, outcome, t, u, v, left, last, at, x)
     order, h, degree = expand(shaking, sides, rules, scratch, side, at[PIECE], x[OFFSET], x[U], x[V], left)
     if at[SMOOTH]:  # the acceleration at an uplift is zero, whatever rounding says
         scratch[SERIES][2] = 0.0
@@ -199,6 +198,24 @@ def follow_arc(
         x[PEAK], x[PEAK_TIME] = height, start + top
         x[PEAK_CHANGE], _ = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, top)
     x[DU], x[DV] = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, t)
+    return arrive(shaking, rules, tables, outcome, t, u, v, left, last, at, x)
+
+
+@leaf
+def arrive(
+    shaking: Shaking,
+    rules: Rules,
+    tables: Floats,
+    outcome: int,
+    t: float,
+    u: float,
+    v: float,
+    left: float,
+    last: bool,
+    at: Integers,
+    x: Floats,
+) -> int:
+    """Take the state to the end of a step, and say what ended it."""
     pass_time(t, x)
     x[U], x[V] = u, v
     if outcome == OVERTURN:
@@ -328,6 +345,7 @@ def imposed(rules: Rules, limit: float, v: float, interval: float, since_uplift:
 @routine
 def come_to_rest(
     shaking: Shaking,
+    sides: Floats,
     rules: Rules,
     tables: Floats,
     lower: float,
@@ -353,13 +371,26 @@ def come_to_rest(
     if time + to_rest >= rules.stop:
         x[END] = rules.stop
         return False
+    shift = shift_of_rest(shaking, sides, rules, tables, to_rest, at, x)
     at[SIDE], x[U], x[V] = AT_REST, 0.0, 0.0
     x[RESTED] = time + to_rest
-    if rules.record:
-        write_event(rules, tables, x[RESTED], REST, tables[IMPACT_TABLE, at[IMPACTS] - 1, 4], at)
+    write_event(rules, tables, x[RESTED], REST, shift, at)
     x[OFFSET] += to_rest
     settle(shaking, at, x)
     return True
+
+
+@leaf
+def shift_of_rest(
+    shaking: Shaking, sides: Floats, rules: Rules, tables: Floats, to_rest: float, at: Integers, x: Floats
+) -> float:
+    """Shift of the time of rest per unit of scaling, from the last impact; 0 if nothing is recorded."""
+    if not rules.record:
+        return 0.0
+    shift = float(tables[IMPACT_TABLE, at[IMPACTS] - 1, 4])
+    if to_rest == 0.0:
+        return shift
+    return rest_shift(shaking, sides, x[V], x[DV], shift, at[SIDE], at[PIECE], x[OFFSET])
 
 
 @leaf

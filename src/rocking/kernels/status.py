@@ -6,6 +6,7 @@ from typing import Final
 STEP: Final = 0
 IMPACT: Final = 1
 OVERTURN: Final = 2
+UNDECIDED: Final = 5
 
 # Kinds of event in a response.
 UPLIFT: Final = 0

@@ -1,0 +1,398 @@
+"""Which blocks explain what was observed: overturned or not, over many motions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rocking.analysis import calibration_population as population
+from rocking.analysis.calibration_population import Evidence
+from rocking.analysis.calibration_scores import Scores
+from rocking.analysis.calibration_space import PARAMETERS, Candidates, Range, Space
+from rocking.block import Blocks
+from rocking.ensemble import simulate_many
+from rocking.errors import InvalidOption
+from rocking.kernels.state import Floats
+from rocking.motion.motion import Motion
+from rocking.problem import Model
+
+Flags = NDArray[np.bool_]
+
+#: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
+_LAPSE: Final = 0.005
+
+#: Draws from the posterior over populations: for the final fit, and where it only guides the search or judges it.
+_DRAWS: Final = 512
+_ROUGH_DRAWS: Final = 256
+
+#: The second half of the candidates is drawn from the first fit with its scatter wider by this factor.
+_WIDENED: Final = 1.5
+
+#: Central share of the posterior between an estimate's lower and upper end.
+_CENTRAL: Final = 0.9
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter of the population of blocks.
+
+    Attributes
+    ----------
+    median, lower, upper : float
+        Median and central 90 % interval of the population's centre, in the parameter's unit.
+    scatter : float
+        Standard deviation of the parameter's logarithm from test to test.
+    """
+
+    median: float
+    lower: float
+    upper: float
+    scatter: float
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Predictions for tests that were left out of the fit.
+
+    Attributes
+    ----------
+    probabilities : ndarray, shape (repeats, m)
+        Probability of overturning for each test, from the fit to the folds without it.
+    repeats : tuple of Scores
+        Scores of each repeat.
+    """
+
+    probabilities: Floats
+    repeats: tuple[Scores, ...]
+
+    @property
+    def scores(self) -> Scores:
+        """Mean scores of the repeats."""
+        columns = [[getattr(one, name) for one in self.repeats] for name in ("accuracy", "log_loss", "brier")]
+        return Scores(*(float(np.mean(column)) for column in columns))
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Blocks that explain which motions overturned a specimen, and what they predict.
+
+    Made by `calibrate`.
+
+    Attributes
+    ----------
+    blocks : Blocks
+        Ensemble of plausible blocks, n of them.
+    weights : ndarray, shape (n,)
+        Their weights; they sum to 1.
+    estimates : mapping of str to Estimate
+        The population's parameters, "p_plus" (rad/s), "alpha_minus" (rad), "restitution_plus", ...
+    probabilities : ndarray, shape (m,)
+        Fitted probability of overturning under each of the motions of the calibration.
+    observed : ndarray of bool, shape (m,)
+        What happened.
+    model : str
+        Equation of motion.
+    lapse : float
+        Chance that an outcome is not that of a rocking block at all.
+    seed : int
+        What the search started from.
+    """
+
+    blocks: Blocks
+    weights: Floats
+    estimates: Mapping[str, Estimate]
+    probabilities: Floats
+    observed: Flags
+    model: Model
+    lapse: float
+    seed: int
+    _evidence: Evidence = field(repr=False)
+
+    @property
+    def scores(self) -> Scores:
+        """Scores on the motions of the calibration itself: too good by nature, see `cross_validate`."""
+        return Scores.of(self.probabilities, self.observed)
+
+    @property
+    def scatter(self) -> Mapping[str, float]:
+        """Standard deviation of each parameter's logarithm from test to test."""
+        return MappingProxyType({name: estimate.scatter for name, estimate in self.estimates.items()})
+
+    def predict(
+        self, motions: Motion | Sequence[Motion], *, threads: int | None = None, progress: bool | None = None
+    ) -> Floats:
+        """Probability that each motion overturns the specimen.
+
+        Parameters
+        ----------
+        motions : Motion or sequence of Motion
+            m motions.
+        threads, progress
+            As for `simulate_many`.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            Weighted share of the ensemble that overturns, within the lapse of 0 and 1.
+        """
+        outcomes = _outcomes(self.blocks, motions, self.model, threads, progress)
+        return population.blurred(self.weights @ outcomes, self.lapse)
+
+    def cross_validate(
+        self,
+        *,
+        groups: Sequence[object] | None = None,
+        folds: int = 10,
+        repeats: int = 1,
+        seed: int = 0,
+        progress: bool | None = None,
+    ) -> Validation:
+        """Predict every test from fits without it.
+
+        The candidates' simulations are used again, so a fold costs a second; the fit is made anew for each.
+
+        Parameters
+        ----------
+        groups : sequence, optional
+            One label for each motion: tests with the same label are left out together, as they should be where one source
+            motion was scaled several times.
+        folds, repeats : int
+            Number of parts, and of random divisions into parts.
+        seed : int
+            Seeds the divisions.
+        progress : bool, optional
+            As for `simulate_many`.
+
+        Raises
+        ------
+        InvalidOption
+            If there are fewer groups than folds, or labels do not match the motions.
+
+        See Also
+        --------
+        Scores : accuracy, log loss and Brier score.
+        """
+        labels = _labels(groups, len(self.observed), folds)
+        rng = np.random.default_rng(seed)
+        chances = np.empty((repeats, len(self.observed)))
+        for row in chances:
+            parts = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
+            for part in range(folds):
+                left_out = parts == part
+                drawn = population.posterior(self._evidence, ~left_out, _ROUGH_DRAWS, rng, progress)
+                row[left_out] = self._evidence.chances(drawn).mean(axis=0)[left_out]
+        return Validation(chances, tuple(Scores.of(row, self.observed) for row in chances))
+
+    def summary(self) -> str:
+        """Return the estimates and scores as a table for people."""
+        units = {"p": "rad/s", "alpha": "rad", "restitution": ""}
+        scores = self.scores
+        lines = [
+            f"{len(self.observed)} motions, {int(self.observed.sum())} overturned the specimen; {self.model} model",
+            "",
+            f"{'parameter':<20}{'median':>9}{'5 %':>9}{'95 %':>9}  scatter",
+            *(
+                f"{name:<20}{one.median:>9.4g}{one.lower:>9.4g}{one.upper:>9.4g}  {100 * one.scatter:.0f} %"
+                + f"  {units[name.rpartition('_')[0] or name]}".rstrip()
+                for name, one in self.estimates.items()
+            ),
+            "",
+            f"ensemble of {len(self.blocks)} blocks, equivalent to {1 / (self.weights**2).sum():.0f} of equal weight",
+            f"fitted motions: accuracy {100 * scores.accuracy:.1f} %, log loss {scores.log_loss:.3f}, "
+            f"Brier score {scores.brier:.3f}",
+        ]
+        return "\n".join(lines)
+
+
+def calibrate(
+    motions: Sequence[Motion],
+    overturned: ArrayLike,
+    seed: int = 0,
+    *,
+    model: Model = "linear",
+    p: Range = (1.0, 10.0),
+    alpha: Range = (0.02, 0.5),
+    restitution: Range = (0.3, 0.99),
+    two_sided: bool = True,
+    lapse: float = _LAPSE,
+    candidates: int = 8192,
+    ensemble: int = 1000,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Calibration:
+    """Find the blocks that explain which motions overturned a specimen and which did not.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+        m motions, each of which the specimen met at rest.
+    overturned : array_like of bool, shape (m,)
+        Whether it overturned.
+    seed : int
+        The same seed gives the same result.
+    model : {"linear", "nonlinear"}
+        Equation of motion; the linear one is faster and serves slender specimens.
+    p, alpha, restitution : pair of float
+        Lowest and highest value that is thinkable on either side (rad/s; rad; -). The prior is even in the logarithm.
+    two_sided : bool
+        Whether the two sides may differ: p and restitution by a factor of 1.25, the slenderness by 3.
+    lapse : float
+        Chance that an outcome is not that of a rocking block at all.
+    candidates : int
+        Blocks that are simulated under every motion.
+    ensemble : int
+        Most blocks that are kept for predictions.
+    threads, progress
+        As for `simulate_many`.
+
+    Returns
+    -------
+    Calibration
+        Ensemble of blocks with weights, estimates, predictions for other motions.
+
+    Raises
+    ------
+    InvalidOption
+        If an argument is out of its range, the numbers of motions and outcomes differ, or all outcomes are the same (they
+        bound the block from one side only).
+
+    Notes
+    -----
+    A specimen differs a little from test to test, and no rigid plane block is a real rock. So each test is taken to have
+    its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratios between the sides.
+    The probability of an outcome is the share of the population that behaves so (and a small lapse); a common scatter of
+    both slendernesses is, in the linear model, the same as a lognormal scatter of the motion's amplitude. The posterior
+    over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with the prior that is given by
+    the bounds and a lognormal prior on each scatter (median 10 %, ratios of p and restitution 5 %).
+
+    The search is global: half of the candidates fill the bounds evenly, the other half are drawn from a first fit and
+    weighted so that the prior stays what it was (deterministic mixture; Owen and Zhou 2000).
+
+    Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
+    predictions are not.
+
+    Examples
+    --------
+    A block is hidden behind forty outcomes:
+
+    >>> import numpy as np, rocking
+    >>> hidden = rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)
+    >>> pulses = [rocking.pulses.one_sine(amplitude=a, frequency=f) for a in range(1, 9) for f in (0.5, 1.0, 1.5, 2.0, 3.0)]
+    >>> motions = [rocking.Motion.from_samples(one.acceleration(np.arange(0.0, 3.0, 0.02)), 0.02) for one in pulses]
+    >>> overturned = [rocking.simulate(hidden, one, model="linear").overturned for one in motions]
+    >>> found = rocking.calibrate(motions, overturned, candidates=512, two_sided=False)
+    >>> bool(np.mean((found.predict(motions) > 0.5) == overturned) > 0.9)
+    True
+    """
+    tested = list(motions)
+    observed = _observed(overturned, len(tested))
+    space = Space.of(p, alpha, restitution, two_sided=two_sided)
+    _check(seed, lapse, candidates, ensemble)
+    rng = np.random.default_rng(seed)
+
+    def tried(points: Floats) -> NDArray[np.float32]:
+        return _outcomes(space.blocks(points), tested, model, threads, progress)
+
+    everywhere = space.spread_evenly(candidates // 2, rng)
+    first = Evidence(Candidates(space, everywhere, tried(everywhere), np.zeros(len(everywhere))), observed, lapse)
+    guide = population.posterior(first, _all(observed), _ROUGH_DRAWS, rng, progress)
+    count = candidates - len(everywhere)
+    nearby = population.drawn(guide, _WIDENED, count, rng)
+    nearby = nearby[space.contains(nearby)]
+    points = np.concatenate([everywhere, nearby])
+    outcomes = np.concatenate([first.candidates.overturned, tried(nearby)])
+    # Even points have density 1/volume, the others that of the guide: what a candidate stands for is one over their sum.
+    density = np.logaddexp(
+        np.log(len(everywhere) / space.volume()), np.log(count) + population.log_density(guide, _WIDENED, points)
+    )
+    evidence = Evidence(Candidates(space, points, outcomes, -density), observed, lapse)
+
+    final = population.posterior(evidence, _all(observed), _DRAWS, rng, progress)
+    weights = evidence.mean_weights(final)
+    kept, times = np.unique(population.systematic(weights, ensemble, rng), return_counts=True)
+    return Calibration(
+        blocks=space.blocks(points[kept]),
+        weights=times / ensemble,
+        estimates=MappingProxyType(_estimates(space, final)),
+        probabilities=evidence.chances(final).mean(axis=0),
+        observed=observed,
+        model=model,
+        lapse=lapse,
+        seed=seed,
+        _evidence=evidence,
+    )
+
+
+def _outcomes(
+    blocks: Blocks, motions: Motion | Sequence[Motion], model: Model, threads: int | None, progress: bool | None
+) -> NDArray[np.float32]:
+    """1 where a block overturns under a motion, else 0; shape (n, m)."""
+    simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
+    return np.asarray(simulated.overturned.transpose("block", "motion").values, dtype=np.float32)
+
+
+def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
+    centres, scatter = population.unpacked(populations)
+    values = space.sides(centres)
+    # The side's logarithm is that of the mean plus or minus half that of the ratio.
+    ratio = 0.5 * scatter[:, 3:] if len(space.ratios) else 0.0
+    deviations = np.hypot(scatter[:, :3], ratio).mean(axis=0)
+    tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
+    estimates = {}
+    for j, name in enumerate(PARAMETERS):
+        for i, side in enumerate(("_plus", "_minus") if len(space.ratios) else ("",)):
+            median, lower, upper = (float(value) for value in np.quantile(values[:, i, j], tails))
+            estimates[name + side] = Estimate(median, lower, upper, float(deviations[j]))
+    return estimates
+
+
+def _observed(overturned: ArrayLike, count: int) -> Flags:
+    """Outcomes as an array of their own that nobody can change.
+
+    Raises
+    ------
+    InvalidOption
+        If they are not yes or no, not one for each motion, or all the same.
+    """
+    values = np.asarray(overturned)
+    if values.shape != (count,):
+        raise InvalidOption(f"overturned must hold one outcome for each of the {count} motions, not {values.shape}")
+    if not np.all(np.isin(values, (0, 1))):
+        raise InvalidOption("overturned must hold True or False (or 1 or 0) for each motion")
+    observed = values.astype(bool)
+    if observed.all() or not observed.any():
+        raise InvalidOption(
+            "the outcomes are all the same: calibration needs motions that overturn and motions that do not"
+        )
+    observed.flags.writeable = False
+    return observed
+
+
+def _check(seed: int, lapse: float, candidates: int, ensemble: int) -> None:
+    if not (isinstance(seed, (int, np.integer)) and seed >= 0):
+        raise InvalidOption(f"seed must be a whole number, not {seed!r}")
+    if not (isinstance(lapse, (int, float)) and 0.0 < lapse < 0.5):
+        raise InvalidOption(f"lapse must be between 0 and 1/2, not {lapse!r}")
+    for name, value, least in (("candidates", candidates, 128), ("ensemble", ensemble, 1)):
+        if not (isinstance(value, (int, np.integer)) and value >= least):
+            raise InvalidOption(f"{name} must be a whole number of at least {least}, not {value!r}")
+
+
+def _all(observed: Flags) -> Flags:
+    return np.ones(len(observed), dtype=bool)
+
+
+def _labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
+    """Groups numbered from 0; without groups each motion is its own."""
+    names = [str(label) for label in (range(count) if groups is None else groups)]
+    if len(names) != count:
+        raise InvalidOption(f"groups must hold one label for each of the {count} motions, not {len(names)}")
+    labels = np.unique(names, return_inverse=True)[1]
+    if not (isinstance(folds, (int, np.integer)) and 2 <= folds <= labels.max() + 1):
+        raise InvalidOption(f"folds must be a whole number from 2 to the {labels.max() + 1} groups, not {folds!r}")
+    return np.asarray(labels, dtype=np.int64)

@@ -1,0 +1,56 @@
+"""How good predicted probabilities are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking.errors import InvalidOption
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Measures of predicted probabilities against outcomes.
+
+    Attributes
+    ----------
+    accuracy : float
+        Share of outcomes on the side of 1/2 that was predicted.
+    log_loss : float
+        Mean of -log of the probability that was given to the outcome; infinite after a certainty that failed.
+    brier : float
+        Mean squared difference between probability and outcome (Brier 1950).
+    """
+
+    accuracy: float
+    log_loss: float
+    brier: float
+
+    @classmethod
+    def of(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
+        """Measure probabilities against outcomes of the same number.
+
+        Raises
+        ------
+        InvalidOption
+            If the shapes differ, there is nothing to measure, or a probability is not between 0 and 1.
+
+        Examples
+        --------
+        >>> Scores.of([0.9, 0.2, 0.6], [True, False, False])
+        Scores(accuracy=0.6666666666666666, log_loss=0.4149316..., brier=0.1366666...)
+        """
+        chances, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
+        if chances.shape != seen.shape or not chances.size:
+            raise InvalidOption(f"there must be one probability for each outcome, not {chances.shape} and {seen.shape}")
+        if not np.all((chances >= 0.0) & (chances <= 1.0)):
+            raise InvalidOption("probabilities must lie between 0 and 1")
+        with np.errstate(divide="ignore"):
+            losses = -np.log(np.where(seen, chances, 1.0 - chances))
+        return cls(
+            accuracy=float(np.mean((chances > 0.5) == seen)),
+            log_loss=float(losses.mean()),
+            brier=float(np.mean((chances - seen) ** 2)),
+        )

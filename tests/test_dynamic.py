@@ -1,0 +1,161 @@
+"""Incremental dynamic analysis: bands of overturning, their ends, measures, and what must be refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.analysis import dynamic_figure, incremental_dynamic_analysis
+from rocking.block import Blocks
+
+BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+PULSE = rocking.pulses.one_sine(1.0, 5.0 / math.pi)
+
+
+@pytest.fixture(scope="module")
+def record():
+    return rocking.records.load("ridgecrest-clc-360").processed(trim=(225.0, 255.0))
+
+
+@pytest.fixture(scope="module")
+def analysis(record):
+    blocks = [rocking.Block(0.12, 0.55), rocking.Block.from_parameters((2.5, 3.0), (0.15, 0.2), (0.85, 0.9))]
+    return blocks, incremental_dynamic_analysis(blocks, [record, PULSE], measure="pgv")
+
+
+def bands(dataset, motion=0, block=0):
+    mine = (dataset.band_motion.values == motion) & (dataset.band_block.values == block)
+    return np.column_stack([dataset.band_start.values[mine], dataset.band_end.values[mine]])
+
+
+def test_a_pulse_overturns_in_two_bands_that_a_map_finds_as_well():
+    dataset = incremental_dynamic_analysis(BLOCK, PULSE, measure="pga_ratio")
+    grid = {"amplitudes": np.linspace(0.5, 10.0, 30), "frequencies": [5.0]}
+    edges = rocking.analysis.overturning_map("one-sine", BLOCK, **grid).boundary_amplitude.values[-3:]
+    (start, end), (again, never) = bands(dataset)
+    np.testing.assert_allclose([start, end, again], edges, rtol=1e-6)
+    assert math.isnan(never)
+    assert float(dataset.overturning_level[0, 0]) == start
+
+
+def test_the_ends_of_every_band_are_where_the_verdict_changes(analysis, record):
+    blocks, dataset = analysis
+    assert dataset.sizes["band"] > 4
+    for m, motion in enumerate((record, PULSE)):
+        for k, block in enumerate(blocks):
+            for start, end in bands(dataset, m, k):
+                for level in (start, end):
+                    if not math.isnan(level):
+                        # Both verdicts within the tolerance; under a record bands have thinner ones beside them.
+                        factors = 1.0 + np.linspace(-5e-7, 5e-7, 11)
+                        scaled = [motion.scaled(pgv=level * factor) for factor in factors]
+                        assert len({rocking.simulate(block, one).overturned for one in scaled}) == 2
+
+
+def test_the_bands_hold_the_levels_that_overturn_and_no_others(analysis):
+    _, dataset = analysis
+    for m in range(2):
+        for k in range(2):
+            inside = np.zeros(dataset.sizes["level"], dtype=bool)
+            for start, end in bands(dataset, m, k):
+                inside |= (dataset.level.values >= start) & ~(dataset.level.values >= end)
+            fell = dataset.overturned.isel(motion=m, block=k).values
+            np.testing.assert_array_equal(inside, fell)
+
+
+def test_peaks_are_those_of_the_scaled_motion(analysis, record):
+    blocks, dataset = analysis
+    level = float(dataset.level[20])
+    for k, block in enumerate(blocks):
+        response = rocking.simulate(block, record.scaled(pgv=level))
+        cell = dataset.isel(motion=0, level=20, block=k)
+        assert float(cell.peak_rotation) == pytest.approx(response.peak_rotation, rel=1e-9)
+        smaller = min(side.alpha for side in block.sides)
+        expected = math.inf if response.overturned else response.peak_rotation / smaller
+        assert float(cell.peak_over_alpha) == pytest.approx(expected, rel=1e-9)
+
+
+def test_without_levels_they_go_from_the_first_uplift_to_twice_the_first_overturning(analysis, record):
+    blocks, dataset = analysis
+    uplift = min(
+        min(block.uplift_thresholds()) / motion.pga * motion.pgv for block in blocks for motion in (record, PULSE)
+    )
+    assert float(dataset.level[0]) == pytest.approx(uplift, rel=1e-12)
+    assert not dataset.overturned.isel(level=0).any()
+    assert float(dataset.level[-1]) >= 2.0 * float(dataset.overturning_level.max())
+    np.testing.assert_allclose(dataset.level.values[1:] / dataset.level.values[:-1], 1.05, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("measure", "options", "units"),
+    [
+        ("pga", {}, lambda block, motion: motion.pga),
+        ("pgv", {}, lambda block, motion: motion.pgv),
+        ("sa", {"period": 0.5}, lambda block, motion: motion.spectral_acceleration(0.5)),
+        ("pga_ratio", {}, lambda block, motion: motion.pga / block.minimum_acceleration),
+        ("pgv_ratio", {}, lambda block, motion: motion.pgv * block.p / block.minimum_acceleration),
+    ],
+)
+def test_every_measure_finds_the_same_factor(measure, options, units):
+    blocks = [BLOCK, rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)]
+    dataset = incremental_dynamic_analysis(blocks, PULSE, measure=measure, **options)
+    reference = incremental_dynamic_analysis(blocks, PULSE, measure="pga")
+    for k, block in enumerate(blocks):
+        factor = float(dataset.overturning_level[0, k]) / units(block, PULSE)
+        assert factor == pytest.approx(float(reference.overturning_level[0, k]) / PULSE.pga, rel=2e-6)
+
+
+def test_given_levels_that_begin_or_end_in_a_band_leave_it_open():
+    dataset = incremental_dynamic_analysis(BLOCK, PULSE, measure="pga_ratio", levels=[4.0, 5.0, 6.8, 8.0])
+    (first, end), (start, last) = bands(dataset)
+    assert math.isnan(first)
+    assert math.isnan(last)
+    assert end < 6.8 < start
+    assert np.isnan(dataset.overturning_level.values).all()
+    safe = incremental_dynamic_analysis(BLOCK, PULSE, measure="pga_ratio", levels=[1.0, 2.0])
+    assert safe.sizes["band"] == 0
+    assert np.isnan(safe.overturning_level.values).all()
+
+
+def test_the_larger_of_two_similar_blocks_is_safer_under_records():
+    names = ("el-centro-meloland-270", "el-centro-meloland-360", "ridgecrest-tow2-090")
+    motions = [rocking.records.load(name) for name in names]
+    blocks = Blocks(p=[1.5, 3.0], alpha=0.2, restitution=0.9)
+    levels = np.geomspace(1.0, 40.0, 40)
+    dataset = incremental_dynamic_analysis(blocks, motions, measure="pga_ratio", levels=levels, tolerance=1e-3)
+    large, small = dataset.overturning_level.values.T
+    assert np.all(large > small)
+
+
+def test_the_figure_shows_peaks_and_bands(analysis):
+    _, dataset = analysis
+    curves, strip = dynamic_figure(dataset, block=1).axes
+    lines = [line for line in curves.lines if line.get_marker() == "None"]
+    assert [line.get_label() for line in lines] == [str(name) for name in dataset.motion.values]
+    peaks = dataset.peak_over_alpha.isel(motion=0, block=1).values
+    np.testing.assert_array_equal(lines[0].get_xdata(), np.where(np.isinf(peaks), np.nan, peaks))
+    assert len(strip.lines) == len(bands(dataset, 0, 1)) + len(bands(dataset, 1, 1))
+    assert curves.get_ylabel() == "peak ground velocity (m/s)"
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"measure": "pgd"}, "measure"),
+        ({"measure": "sa"}, "period"),
+        ({"period": 1.0}, "period"),
+        ({"levels": [2.0, 1.0]}, "increase"),
+        ({"levels": []}, "levels"),
+        ({"levels": [0.0, 1.0]}, "positive"),
+        ({"tolerance": -1.0}, "tolerance"),
+        ({"motions": []}, "at least one motion"),
+        ({"motions": rocking.Motion([0.0, 1.0], [[0.0]])}, "zero throughout"),
+        ({"blocks": rocking.Block.from_parameters(1.0, 0.2, 1.0)}, "restitution 1"),
+        ({"model": "cubic"}, "model"),
+    ],
+)
+def test_what_cannot_be_scaled_up_is_refused(changes, word):
+    arguments = {"blocks": BLOCK, "motions": PULSE} | changes
+    with pytest.raises(rocking.RockingError, match=word):
+        incremental_dynamic_analysis(arguments.pop("blocks"), arguments.pop("motions"), **arguments)
