@@ -275,7 +275,7 @@ def test_a_short_step_at_a_glance_is_the_one_of_the_series(
     u: float, v: float, a: float, slope: float, left: float, side: int, margin: float
 ) -> None:
     """What it decides is what `advance` finds, and no rotation above the highest so far is passed over."""
-    v = abs(v) if u == 0.0 else v
+    v = max(abs(v), 1e-9) if u == 0.0 else v
     shaking, scratch = in_units_of_g([0.0, 1.0], [[a, slope]]), new_scratch(2)
     block, c = sides(), scratch[SERIES]
     sign = 1.0 - 2.0 * side

@@ -159,8 +159,8 @@ class Calibration:
         Parameters
         ----------
         groups : sequence, optional
-            One label for each motion: tests with the same label are left out together, as they should be where one source
-            motion was scaled several times.
+            One label for each motion: tests with the same label are left out together, as they should be where one
+            source motion was scaled several times.
         folds, repeats : int
             Number of parts, and of random divisions into parts.
         seed : int
@@ -258,17 +258,17 @@ def calibrate(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, the numbers of motions and outcomes differ, or all outcomes are the same (they
-        bound the block from one side only).
+        If an argument is out of its range, the numbers of motions and outcomes differ, or all outcomes are the same
+        (they bound the block from one side only).
 
     Notes
     -----
-    A specimen differs a little from test to test, and no rigid plane block is a real rock. So each test is taken to have
-    its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratios between the sides.
-    The probability of an outcome is the share of the population that behaves so (and a small lapse); a common scatter of
-    both slendernesses is, in the linear model, the same as a lognormal scatter of the motion's amplitude. The posterior
-    over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with the prior that is given by
-    the bounds and a lognormal prior on each scatter (median 10 %, ratios of p and restitution 5 %).
+    A specimen differs a little from test to test, and no rigid plane block is a real rock. So each test is taken to
+    have its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratios between the
+    sides. The probability of an outcome is the share of the population that behaves so (and a small lapse); a common
+    scatter of both slendernesses is, in the linear model, the same as a lognormal scatter of the motion's amplitude.
+    The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with the prior
+    that is given by the bounds and a lognormal prior on each scatter (median 10 %, ratios of p and restitution 5 %).
 
     The search is global: half of the candidates fill the bounds evenly, the other half are drawn from a first fit and
     weighted so that the prior stays what it was (deterministic mixture; Owen and Zhou 2000).
@@ -282,8 +282,9 @@ def calibrate(
 
     >>> import numpy as np, rocking
     >>> hidden = rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)
-    >>> pulses = [rocking.pulses.one_sine(amplitude=a, frequency=f) for a in range(1, 9) for f in (0.5, 1.0, 1.5, 2.0, 3.0)]
-    >>> motions = [rocking.Motion.from_samples(one.acceleration(np.arange(0.0, 3.0, 0.02)), 0.02) for one in pulses]
+    >>> pulses = [rocking.pulses.one_sine(a, f) for a in range(1, 9) for f in (0.5, 1.0, 1.5, 2.0, 3.0)]
+    >>> times = np.arange(0.0, 3.0, 0.02)
+    >>> motions = [rocking.Motion.from_samples(one.acceleration(times), 0.02) for one in pulses]
     >>> overturned = [rocking.simulate(hidden, one, model="linear").overturned for one in motions]
     >>> found = rocking.calibrate(motions, overturned, candidates=512, two_sided=False)
     >>> bool(np.mean((found.predict(motions) > 0.5) == overturned) > 0.9)
@@ -306,7 +307,7 @@ def calibrate(
     nearby = nearby[space.contains(nearby)]
     points = np.concatenate([everywhere, nearby])
     outcomes = np.concatenate([first.candidates.overturned, tried(nearby)])
-    # Even points have density 1/volume, the others that of the guide: what a candidate stands for is one over their sum.
+    # Even points have density 1/volume, the others that of the guide; a candidate stands for one over their sum.
     density = np.logaddexp(
         np.log(len(everywhere) / space.volume()), np.log(count) + population.log_density(guide, _WIDENED, points)
     )
@@ -388,7 +389,7 @@ def _all(observed: Flags) -> Flags:
 
 
 def _labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
-    """Groups numbered from 0; without groups each motion is its own."""
+    """Give each group a number from 0; without groups each motion is its own."""
     names = [str(label) for label in (range(count) if groups is None else groups)]
     if len(names) != count:
         raise InvalidOption(f"groups must hold one label for each of the {count} motions, not {len(names)}")

@@ -1,9 +1,9 @@
 """The population of blocks behind binary outcomes: its likelihood, and its posterior by tempering.
 
-A specimen is never twice the same block: it is set back by hand, its pivots wear, a rock rolls out of its plane. So each
-test has its own block, drawn from a population that is normal in the logarithmic coordinates of `Space`. The chance that
-a test overturns the specimen is the share of the population that overturns under its motion, and that share is a
-weighted mean over candidate blocks that were simulated once, whatever the population.
+A specimen is never twice the same block: it is set back by hand, its pivots wear, a rock rolls out of its plane. So
+each test has its own block, drawn from a population that is normal in the logarithmic coordinates of `Space`. The
+chance that a test overturns the specimen is the share of the population that overturns under its motion, and that share
+is a weighted mean over candidate blocks that were simulated once, whatever the population.
 """
 
 from __future__ import annotations
@@ -62,12 +62,13 @@ class Evidence:
         exponent = (precision * centre) @ points.T - 0.5 * precision @ (points**2).T + self.candidates.log_weights
         exponent -= exponent.max(axis=1, keepdims=True)
         np.exp(exponent, out=exponent)
-        return exponent / exponent.sum(axis=1, keepdims=True)
+        exponent /= exponent.sum(axis=1, keepdims=True)
+        return np.asarray(exponent)
 
     def mean_weights(self, populations: Floats) -> Floats:
         """Weights of the candidates, shape (n,), averaged over populations."""
         parts = [self.weights(part).sum(axis=0) for part in _batches(populations)]
-        return np.sum(parts, axis=0) / len(populations)
+        return np.asarray(np.sum(parts, axis=0) / len(populations))
 
     def chances(self, populations: Floats) -> Floats:
         """Probability of overturning for each population and motion, shape (c, m)."""
@@ -95,11 +96,11 @@ def unpacked(populations: Floats) -> tuple[Floats, Floats]:
 def posterior(
     evidence: Evidence, tests: Flags, count: int, rng: np.random.Generator, progress: bool | None = None
 ) -> Floats:
-    """Populations drawn from the posterior given some of the tests, shape (count, 2 k).
+    """Draw populations from the posterior given some of the tests, shape (count, 2 k).
 
-    Sequential Monte Carlo: particles from the prior (even centres in the space, normal scores of the scatter) follow the
-    likelihood as its exponent grows from 0 to 1. Each step keeps half of them effective, resamples, and moves them by
-    differences of other particles (differential evolution), so that several separate optima are all followed.
+    Sequential Monte Carlo: particles from the prior (even centres in the space, normal scores of the scatter) follow
+    the likelihood as its exponent grows from 0 to 1. Each step keeps half of them effective, resamples, and moves them
+    by differences of other particles (differential evolution), so that several separate optima are all followed.
     """
     particles = _Particles.from_prior(evidence, tests, count, rng)
     with Progress("fitting", 100, show=progress) as bar:
@@ -152,13 +153,13 @@ class _Particles:
 
 
 def systematic(weights: Floats, count: int, rng: np.random.Generator) -> Integers:
-    """Indices drawn in proportion to weights that sum to 1, as evenly as can be."""
+    """Draw indices in proportion to weights that sum to 1, as evenly as can be."""
     steps = np.cumsum(weights)
     return np.searchsorted(steps / steps[-1], (np.arange(count) + rng.random()) / count).astype(np.int64)
 
 
 def drawn(populations: Floats, widened: float, count: int, rng: np.random.Generator) -> Floats:
-    """Points drawn from populations in turn, their scatter times `widened`; shape (count, k)."""
+    """Draw points from populations in turn, their scatter times `widened`; shape (count, k)."""
     centre, scatter = unpacked(populations[np.arange(count) % len(populations)])
     return centre + widened * scatter * rng.standard_normal(centre.shape)
 
@@ -170,7 +171,7 @@ def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
     for middle, deviation in zip(centre, widened * scatter, strict=True):
         exponent = -0.5 * (((points - middle) / deviation) ** 2).sum(axis=1)
         total = np.logaddexp(total, exponent - np.log(deviation * np.sqrt(2.0 * np.pi)).sum())
-    return total - np.log(len(centre))
+    return np.asarray(total - np.log(len(centre)))
 
 
 def _differences(guides: Floats, count: int, rng: np.random.Generator) -> Floats:

@@ -17,6 +17,9 @@ from rocking.kernels.state import Floats
 #: Parameters of a block's side, in the order of the coordinates.
 PARAMETERS: Final = ("p", "alpha", "restitution")
 
+#: What a block allows.
+HIGHEST: Final = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
+
 #: Largest ratios between the sides. A rigid body's two pivot radii are h/cos(alpha_i), so p hardly differs; the
 #: slendernesses may differ as much as the pivots' distances from the centre of mass.
 LARGEST_RATIOS: Final = {"p": 1.25, "alpha": 3.0, "restitution": 1.25}
@@ -52,9 +55,8 @@ class Space:
         InvalidOption
             If a pair is not two increasing numbers in the range that blocks allow.
         """
-        highest = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
         given = zip(PARAMETERS, (p, alpha, restitution), strict=True)
-        bounds = np.array([_range(pair, name, highest[name]) for name, pair in given])
+        bounds = np.array([value_range(pair, name, HIGHEST[name]) for name, pair in given])
         ratios = [LARGEST_RATIOS[name] for name in PARAMETERS] if two_sided else []
         return cls(np.log(bounds[:, 0]), np.log(bounds[:, 1]), np.log(ratios))
 
@@ -83,7 +85,7 @@ class Space:
         low, high = self.box
         logs = self._log_sides(points)
         inside = np.all((logs >= self.lower) & (logs <= self.upper), axis=(1, 2))
-        return inside & np.all((points >= low) & (points <= high), axis=1)
+        return np.asarray(inside & np.all((points >= low) & (points <= high), axis=1))
 
     def sides(self, points: Floats) -> Floats:
         """Values of p, alpha and restitution on each side, shape (n, 2, 3)."""
@@ -97,8 +99,7 @@ class Space:
 
     def _recurrence(self, start: Floats, first: int, count: int) -> Floats:
         low, high = self.box
-        fractions = (start + np.outer(np.arange(first, first + count), _irrational_steps(len(low)))) % 1.0
-        return low + fractions * (high - low)
+        return low + even_fractions(start, first, count) * (high - low)
 
     def _log_sides(self, points: Floats) -> Floats:
         half = 0.5 * points[:, 3:] if len(self.ratios) else np.zeros((len(points), 3))
@@ -127,15 +128,27 @@ class Candidates:
     log_weights: Floats = field(repr=False)
 
 
-def _irrational_steps(dimensions: int) -> Floats:
-    """Powers of the root of x^(d + 1) = x + 1 (the golden ratio for d = 1): steps of an evenly filling sequence."""
+def even_fractions(start: Floats, first: int, count: int) -> Floats:
+    """Members of an additive recurrence that fills the unit cube evenly, shape (count, d).
+
+    Its steps are powers of the root of x^(d + 1) = x + 1, the golden ratio for d = 1 (Roberts 2018).
+    """
+    dimensions = len(start)
     root = 1.5
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (dimensions + 1))
-    return root ** -np.arange(1.0, dimensions + 1)
+    steps = root ** -np.arange(1.0, dimensions + 1)
+    return np.asarray((start + np.outer(np.arange(first, first + count), steps)) % 1.0)
 
 
-def _range(pair: Sequence[float], name: str, highest: float) -> Range:
+def value_range(pair: Sequence[float], name: str, highest: float) -> Range:
+    """Return the two ends of a range.
+
+    Raises
+    ------
+    InvalidOption
+        If they are not two increasing numbers between 0 and `highest`.
+    """
     try:
         low, high = (float(value) for value in pair)
     except (TypeError, ValueError):

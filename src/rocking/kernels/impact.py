@@ -39,7 +39,7 @@ QUARTER_TURN = 0.5 * math.pi
 _FIRST_STEP = 1.3
 
 #: Largest (p t)^2 for which the terms of `short_series` are enough, and the most Newton steps of a short arc.
-_SHORT = 4e-3
+SHORT = 4e-3
 _NEWTON_STEPS = 6
 
 #: Accelerations closer to a threshold than this fraction of it are at the threshold.
@@ -108,7 +108,7 @@ def short_step(
     simple enough to see its first impact at a glance. The series is that of `expand_linear`, in registers.
     """
     lam = sides[side, STIFFNESS]
-    if not lam * left * left < _SHORT:
+    if not lam * left * left < SHORT:
         return UNDECIDED, 0.0, 0.0, 0.0
     g = restoring(sides, side, motion_at(shaking, piece, offset) * shaking.inverse_g)
     rate = sides[side, GAIN] * (1.0 - 2.0 * side) * motion_slope(shaking, piece, offset) * shaking.inverse_g
@@ -174,7 +174,7 @@ def arc_to_impact(u: float, v: float, c2: float, c3: float, lam: float, left: fl
 
 @leaf
 def short_series(u: float, v: float, c2: float, c3: float, lam: float, t: float) -> tuple[float, float]:
-    """Rotation and velocity after t, for c[k + 2] = lam c[k]/((k + 1)(k + 2)) from c2, c3 on and (p t)^2 <= _SHORT."""
+    """Rotation and velocity after t, for c[k + 2] = lam c[k]/((k + 1)(k + 2)) from c2, c3 on and (p t)^2 <= SHORT."""
     x = lam * t * t
     even = 1.0 + x * (1.0 / 12.0 + x * (1.0 / 360.0 + x * (1.0 / 20160.0)))
     odd = 1.0 + x * (1.0 / 20.0 + x * (1.0 / 840.0 + x * (1.0 / 60480.0)))

@@ -7,7 +7,16 @@ import numpy as np
 from rocking.kernels.arc import vary_linear, vary_nonlinear
 from rocking.kernels.chatter import motion_at, motion_slope, prove_rest, rest_shift, restoring, time_to_rest
 from rocking.kernels.compiled import kernel, leaf, routine
-from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift, short_step
+from rocking.kernels.impact import (
+    QUARTER_TURN,
+    SHORT,
+    advance,
+    arc_from_impact,
+    expand,
+    next_uplift,
+    short_series,
+    short_step,
+)
 from rocking.kernels.state import (
     AT_REST,
     DU,
@@ -15,6 +24,7 @@ from rocking.kernels.state import (
     END,
     EVENT_TABLE,
     EVENTS,
+    GAIN,
     GROUND,
     IMPACT_TABLE,
     IMPACTS,
@@ -40,6 +50,7 @@ from rocking.kernels.state import (
     STALLED,
     STIFFNESS,
     STRUCK,
+    THRESHOLD,
     UPLIFTED,
     UPLIFTS,
     WORTH,
@@ -184,6 +195,9 @@ def follow_arc(
         return _STOPPED
     side = at[SIDE]
     if not (rules.record or rules.nonlinear or at[SMOOTH]) and shaking.coefficients.shape[1] == 2:
+        if at[RUN] > 0 and x[U] == 0.0:
+            left = hurry(shaking, sides, left, at, x)
+            side = at[SIDE]
         outcome, t, u, v = short_step(shaking, sides, side, at[PIECE], x[OFFSET], x[U], x[V], left, x[PEAK])
         if outcome != UNDECIDED:
             return arrive(shaking, rules, tables, outcome, t, u, v, left, last, at, x)
@@ -199,6 +213,39 @@ def follow_arc(
         x[PEAK_CHANGE], _ = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, top)
     x[DU], x[DV] = vary(sides, rules, scratch, x[DU], x[DV], side, order, degree, t)
     return arrive(shaking, rules, tables, outcome, t, u, v, left, last, at, x)
+
+
+@routine
+def hurry(shaking: Shaking, sides: Floats, left: float, at: Integers, x: Floats) -> float:
+    """Impacts of a proven sequence of the linear model within a piece, up to the one that is worth another proof.
+
+    Returns the time left in the piece.
+    """
+    piece, side, v = at[PIECE], at[SIDE], x[V]
+    ground = motion_at(shaking, piece, x[OFFSET]) * shaking.inverse_g
+    slope = motion_slope(shaking, piece, x[OFFSET]) * shaking.inverse_g
+    elapsed = 0.0
+    while True:
+        lam, gain = sides[side, STIFFNESS], sides[side, GAIN] * (1.0 - 2.0 * side)
+        c2 = -0.5 * (sides[side, GAIN] * sides[side, THRESHOLD] + gain * (ground + slope * elapsed))
+        c3 = (lam * v - gain * slope) * (1.0 / 6.0)
+        t = arc_from_impact(v, c2, c3, lam, left)
+        if not (t == t and lam * t * t < SHORT):
+            break
+        _, speed = short_series(0.0, v, c2, c3, lam, t)
+        slower = -sides[side, RESTITUTION] * speed
+        # The arc lies below its first tangent.
+        if not (slower > x[WORTH] and v * t <= x[PEAK]):
+            break
+        v, side = slower, 1 - side
+        elapsed += t
+        left -= t
+        at[IMPACTS] += 1
+        at[RUN] += 1
+    at[SIDE], x[V] = side, v
+    x[OFFSET] += elapsed
+    x[STRUCK] = now(shaking, at, x)
+    return left
 
 
 @leaf
