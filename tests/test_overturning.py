@@ -1,7 +1,9 @@
 """Overturning maps: closed forms of pulses, the second region, refined boundaries, and what must be refused."""
 
 import math
+import runpy
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from rocking.analysis.pairs import simulate_pairs
 from rocking.block import Blocks
 from rocking.treatment import Certified
 
+EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "overturning_map.py"
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 FREQUENCIES = np.array([1.0, 2.0, 3.0, 5.0, 6.5])
 
@@ -262,3 +265,9 @@ def test_what_makes_no_map_is_refused(changes, word):
     arguments = {"pulse": "half-sine", "block": BLOCK, "amplitudes": [0.5, 2.0], "frequencies": [1.0]} | changes
     with pytest.raises(rocking.RockingError, match=word):
         overturning_map(arguments.pop("pulse"), arguments.pop("block"), **arguments)
+
+
+def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert runpy.run_path(str(EXAMPLE))["main"]() < 1e-8
+    assert (tmp_path / "out" / "map.png").stat().st_size > 10_000

@@ -9,6 +9,8 @@ __version__ = VERSION
 
 if TYPE_CHECKING:
     from rocking import chattering
+    from rocking.analysis.calibration import Calibration, calibrate
+    from rocking.analysis.calibration_history import HistoryCalibration, calibrate_history
     from rocking.block import Block, Blocks
     from rocking.ensemble import simulate_many
     from rocking.errors import (
@@ -29,7 +31,9 @@ __all__ = [
     "AsymptoticTime",
     "Block",
     "Blocks",
+    "Calibration",
     "Certified",
+    "HistoryCalibration",
     "IntervalThreshold",
     "InvalidBlock",
     "InvalidMotion",
@@ -40,6 +44,8 @@ __all__ = [
     "RockingError",
     "UnreadableRecord",
     "VelocityThreshold",
+    "calibrate",
+    "calibrate_history",
     "chattering",
     "pulses",
     "read",
@@ -53,7 +59,9 @@ _HOMES = {
     "AsymptoticTime": "rocking.treatment",
     "Block": "rocking.block",
     "Blocks": "rocking.block",
+    "Calibration": "rocking.analysis.calibration",
     "Certified": "rocking.treatment",
+    "HistoryCalibration": "rocking.analysis.calibration_history",
     "IntervalThreshold": "rocking.treatment",
     "InvalidBlock": "rocking.errors",
     "InvalidMotion": "rocking.errors",
@@ -64,6 +72,8 @@ _HOMES = {
     "RockingError": "rocking.errors",
     "UnreadableRecord": "rocking.errors",
     "VelocityThreshold": "rocking.treatment",
+    "calibrate": "rocking.analysis.calibration",
+    "calibrate_history": "rocking.analysis.calibration_history",
     "chattering": "rocking.chattering",
     "pulses": "rocking.motion.pulses",
     "read": "rocking.motion.formats",

@@ -36,7 +36,7 @@ class Certified:
     Certified(tolerance=1e-09)
     """
 
-    tolerance: float = 1e-9
+    tolerance: float = 1e-12
 
     def __post_init__(self) -> None:
         _positive(self.tolerance, "tolerance", "s")
@@ -155,7 +155,7 @@ def treatment(chattering: str | Treatment) -> Treatment:
     Examples
     --------
     >>> treatment("certified")
-    Certified(tolerance=1e-09)
+    Certified(tolerance=1e-12)
     """
     if isinstance(chattering, Treatment):
         return chattering

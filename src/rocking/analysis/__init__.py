@@ -1,4 +1,4 @@
-"""What engineers ask of many simulations: spectra, overturning, fragility, calibration.
+"""What engineers ask of many simulations: spectra, overturning maps, scaling, fragility, calibration.
 
 Names are imported when they are first used, so that the command line starts at once.
 """
@@ -7,6 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rocking.analysis.calibration import Calibration, Estimate, Validation, calibrate
+    from rocking.analysis.calibration_history import HistoryCalibration, Measured, calibrate_history
+    from rocking.analysis.calibration_scores import Scores
     from rocking.analysis.dynamic import dynamic_figure, incremental_dynamic_analysis
     from rocking.analysis.fragility_curve import Fragility, FragilityCurve
     from rocking.analysis.fragility_function import fit_fragility, fragility
@@ -14,8 +17,16 @@ if TYPE_CHECKING:
     from rocking.analysis.spectrum import rocking_spectrum, spectrum_figure
 
 __all__ = [
+    "Calibration",
+    "Estimate",
     "Fragility",
     "FragilityCurve",
+    "HistoryCalibration",
+    "Measured",
+    "Scores",
+    "Validation",
+    "calibrate",
+    "calibrate_history",
     "dynamic_figure",
     "fit_fragility",
     "fragility",
@@ -27,9 +38,18 @@ __all__ = [
     "spectrum_figure",
 ]
 
+# No module may have the name of what it exports: once imported, it would stand in its place.
 _HOMES = {
+    "Calibration": "calibration",
+    "Estimate": "calibration",
     "Fragility": "fragility_curve",
     "FragilityCurve": "fragility_curve",
+    "HistoryCalibration": "calibration_history",
+    "Measured": "calibration_history",
+    "Scores": "calibration_scores",
+    "Validation": "calibration",
+    "calibrate": "calibration",
+    "calibrate_history": "calibration_history",
     "dynamic_figure": "dynamic",
     "fit_fragility": "fragility_function",
     "fragility": "fragility_function",

@@ -30,8 +30,10 @@ _LAPSE: Final = 0.005
 _DRAWS: Final = 512
 _ROUGH_DRAWS: Final = 256
 
-#: The second half of the candidates is drawn from the first fit with its scatter wider by this factor.
-_WIDENED: Final = 1.5
+#: After candidates that fill the space, as many are drawn from a first fit, from a second and so on, so many times, with
+#: the scatter of the fit wider by a factor.
+_REFINEMENTS: Final = 3
+_WIDENED: Final = 1.2
 
 #: Central share of the posterior between an estimate's lower and upper end.
 _CENTRAL: Final = 0.9
@@ -73,8 +75,7 @@ class Validation:
     @property
     def scores(self) -> Scores:
         """Mean scores of the repeats."""
-        columns = [[getattr(one, name) for one in self.repeats] for name in ("accuracy", "log_loss", "brier")]
-        return Scores(*(float(np.mean(column)) for column in columns))
+        return Scores.mean(self.repeats)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +141,8 @@ class Calibration:
         ndarray, shape (m,)
             Weighted share of the ensemble that overturns, within the lapse of 0 and 1.
         """
+        if not isinstance(motions, Motion) and not len(motions):
+            return np.empty(0)
         outcomes = _outcomes(self.blocks, motions, self.model, threads, progress)
         return population.blurred(self.weights @ outcomes, self.lapse)
 
@@ -299,18 +302,20 @@ def calibrate(
     def tried(points: Floats) -> NDArray[np.float32]:
         return _outcomes(space.blocks(points), tested, model, threads, progress)
 
-    everywhere = space.spread_evenly(candidates // 2, rng)
-    first = Evidence(Candidates(space, everywhere, tried(everywhere), np.zeros(len(everywhere))), observed, lapse)
-    guide = population.posterior(first, _all(observed), _ROUGH_DRAWS, rng, progress)
-    count = candidates - len(everywhere)
-    nearby = population.drawn(guide, _WIDENED, count, rng)
-    nearby = nearby[space.contains(nearby)]
-    points = np.concatenate([everywhere, nearby])
-    outcomes = np.concatenate([first.candidates.overturned, tried(nearby)])
-    # Even points have density 1/volume, the others that of the guide; a candidate stands for one over their sum.
-    density = np.logaddexp(
-        np.log(len(everywhere) / space.volume()), np.log(count) + population.log_density(guide, _WIDENED, points)
-    )
+    share = candidates // (1 + _REFINEMENTS)
+    points = space.spread_evenly(candidates - _REFINEMENTS * share, rng)
+    outcomes = tried(points)
+    density = np.full(len(points), np.log(len(points) / space.volume()))
+    evenly, guides = density[0], []
+    for _ in range(_REFINEMENTS):
+        rough = Evidence(Candidates(space, points, outcomes, -density), observed, lapse)
+        guides.append(population.posterior(rough, _all(observed), _ROUGH_DRAWS, rng, progress))
+        nearby = population.drawn(guides[-1], _WIDENED, share, rng)
+        nearby = nearby[space.contains(nearby)]
+        points, outcomes = np.concatenate([points, nearby]), np.concatenate([outcomes, tried(nearby)])
+        # Candidates per volume: those that fill the space, and those of each guide.
+        drawn = [np.log(share) + population.log_density(guide, _WIDENED, points) for guide in guides]
+        density = np.logaddexp.reduce([np.full(len(points), evenly), *drawn])
     evidence = Evidence(Candidates(space, points, outcomes, -density), observed, lapse)
 
     final = population.posterior(evidence, _all(observed), _DRAWS, rng, progress)

@@ -27,14 +27,21 @@ _CANDIDATES: Final = 2048
 #: history the misfit has many local minima, since impacts drift out of phase; over the first arcs it has few.
 _STAGES: Final = ((0.15, 16), (0.3, 8), (0.6, 4), (1.0, 2))
 
-#: The history counts from where it first passes this share of its peak.
-_ONSET: Final = 0.05
+#: Then points around the best are tried, this many, so many standard errors wide.
+_AROUND: Final = 64
+_WIDTHS: Final = (6.0, 3.0, 1.5)
+
+#: A release test starts above this share of the peak rotation.
+_RELEASED: Final = 0.05
 
 #: A sensitivity below this share of the largest counts as none.
 _INSENSITIVE: Final = 1e-7
 
-#: Relative step of the numerical derivatives: simulations are good to about 1e-12.
-_STEP: Final = 1e-6
+#: Steps of the numerical derivatives in the logarithms, simulations being good to about 1e-12: while fitting, and the
+#: largest for standard errors, whose step is refined this often.
+_STEP: Final = 1e-5
+_LARGEST_STEP: Final = 0.05
+_REFINED: Final = 4
 
 #: Nearer to a bound than this, in the logarithm, counts as at it.
 _AT_BOUND: Final = 1e-6
@@ -205,9 +212,9 @@ class _History:
         return cls(at, measured, motion, model)
 
     def first(self, share: float) -> int:
-        """Count the samples in the first share of the history, which starts where the block first moves."""
-        start = self.times[np.argmax(np.abs(self.rotation) >= _ONSET * np.abs(self.rotation).max())]
-        return int(np.searchsorted(self.times, start + share * (self.times[-1] - start), side="right"))
+        """Count the samples until this share of all rocking is over, measured by the integral of |rotation|."""
+        past = np.cumsum(np.abs(self.rotation) * np.gradient(self.times))
+        return int(np.searchsorted(past, share * past[-1])) + 1
 
 
 @dataclass(frozen=True)
@@ -257,6 +264,10 @@ class _Problem:
         rotation = response.rotation(np.minimum(times, response.duration))
         return self.history.rotation[:count] - rotation
 
+    def error(self, logs: Floats, count: int) -> float:
+        """Sum of the squared residuals of the first samples."""
+        return float((self.residuals(logs, count) ** 2).sum())
+
 
 def _split(given: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[str, float], list[_Unknown]]:
     """Tell what is known of a block from what is to be found."""
@@ -274,28 +285,44 @@ def _split(given: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[st
 def _released_from(history: _History) -> _Unknown:
     """Rotation at the release, near that of the first sample."""
     first = float(history.rotation[0])
-    if abs(first) < _ONSET * np.abs(history.rotation).max():
+    if abs(first) < _RELEASED * np.abs(history.rotation).max():
         raise InvalidOption("a release test must start at the rotation it is released from; give initial_rotation=")
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
 
 
 def _best(problem: _Problem, rng: np.random.Generator) -> Floats:
     """Logarithms of the unknowns at the least sum of squares over the whole history."""
-    from scipy.optimize import least_squares
-
     low, high = problem.bounds
     survivors = low + even_fractions(rng.random(len(low)), 0, _CANDIDATES) * (high - low)
     for share, kept in _STAGES:
-        count = max(problem.history.first(share), 2 * len(low))
-        errors = [float((problem.residuals(one, count) ** 2).sum()) for one in survivors]
+        count = min(max(problem.history.first(share), 2 * len(low)), len(problem.history.times))
+        errors = [problem.error(one, count) for one in survivors]
         best = survivors[np.argsort(errors, kind="stable")[:kept]]
-        fits = [
-            least_squares(problem.residuals, one, args=(count,), bounds=(low, high), diff_step=[_STEP] * len(low))
-            for one in best
-        ]
-        fits.sort(key=lambda fit: float(fit.cost))
-        survivors = np.array([fit.x for fit in fits])
-    return np.asarray(survivors[0], dtype=np.float64)
+        survivors = np.array([_descended(problem, one, count) for one in best])
+    whole = len(problem.history.times)
+    found = min(survivors, key=lambda one: problem.error(one, whole))
+    for width in _WIDTHS:
+        found = _shaken(problem, found, width, rng)
+    return np.asarray(found, dtype=np.float64)
+
+
+def _descended(problem: _Problem, start: Floats, count: int) -> Floats:
+    from scipy.optimize import least_squares
+
+    low, high = problem.bounds
+    steps = [_STEP] * len(low)
+    fit = least_squares(problem.residuals, start, "3-point", (low, high), args=(count,), diff_step=steps)
+    return np.asarray(fit.x, dtype=np.float64)
+
+
+def _shaken(problem: _Problem, found: Floats, width: float, rng: np.random.Generator) -> Floats:
+    """Look around an optimum, so many standard errors wide: a forced response can be rugged on that scale."""
+    whole = len(problem.history.times)
+    covariance = _covariance(problem, found, problem.residuals(found, whole))
+    around = found + width * rng.multivariate_normal(np.zeros(len(found)), covariance, _AROUND, method="cholesky")
+    around = np.clip(around, *problem.bounds)
+    best = min(around, key=lambda one: problem.error(one, whole))
+    return min(found, _descended(problem, best, whole), key=lambda one: problem.error(one, whole))
 
 
 def _result(problem: _Problem, logs: Floats) -> HistoryCalibration:
@@ -324,14 +351,8 @@ def _covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
     InvalidOption
         If the history says nothing of an unknown, or not enough to tell them all apart.
     """
-    steps = _STEP * np.eye(len(logs))
-    slopes = np.array(
-        [
-            (problem.residuals(logs + step, len(residuals)) - problem.residuals(logs - step, len(residuals)))
-            / (2 * _STEP)
-            for step in steps
-        ]
-    ).T
+    variance = float((residuals**2).sum()) / (len(residuals) - len(logs)) * _integrated_autocorrelation(residuals)
+    slopes = _slopes(problem, logs, math.sqrt(variance))
     sizes = np.linalg.norm(slopes, axis=0)
     silent = [one.name for one, size in zip(problem.unknowns, sizes, strict=True) if size <= _INSENSITIVE * sizes.max()]
     if silent:
@@ -340,9 +361,26 @@ def _covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
     if values[-1] <= _INSENSITIVE * values[0]:
         names = ", ".join(one.name for one in problem.unknowns)
         raise InvalidOption(f"the history does not tell {names} apart: give one of them a value")
-    curvature = (right.T / values**2) @ right / np.outer(sizes, sizes)
-    variance = float((residuals**2).sum()) / (len(residuals) - len(logs))
-    return np.asarray(curvature * variance * _integrated_autocorrelation(residuals))
+    return np.asarray(variance * (right.T / values**2) @ right / np.outer(sizes, sizes))
+
+
+def _slopes(problem: _Problem, logs: Floats, deviation: float) -> Floats:
+    """Differentiate the residuals, shape (n, k), by differences over about one standard error.
+
+    A forced response may jump where a block just lifts off or just does not, and a small step across such a jump would
+    make a slope of it. Over a standard error jumps count for what they change.
+    """
+    count, low, high = len(problem.history.times), *problem.bounds
+    columns = []
+    for k in range(len(logs)):
+        step = _STEP
+        for _ in range(_REFINED):
+            ahead, behind = logs.copy(), logs.copy()
+            ahead[k], behind[k] = min(logs[k] + step, high[k]), max(logs[k] - step, low[k])
+            slope = (problem.residuals(ahead, count) - problem.residuals(behind, count)) / (ahead[k] - behind[k])
+            step = float(np.clip(deviation / max(float(np.linalg.norm(slope)), 1e-300), _STEP, _LARGEST_STEP))
+        columns.append(slope)
+    return np.array(columns).T
 
 
 def _integrated_autocorrelation(residuals: Floats) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,3 +55,9 @@ class Scores:
             log_loss=float(losses.mean()),
             brier=float(np.mean((chances - seen) ** 2)),
         )
+
+    @classmethod
+    def mean(cls, scores: Sequence[Scores]) -> Scores:
+        """Mean of each measure."""
+        table = np.array([astuple(one) for one in scores])
+        return cls(*(float(value) for value in table.mean(axis=0)))

@@ -80,7 +80,9 @@ class FragilityCurve:
         """Confidence interval of the median."""
         if self.replicates is not None:
             with np.errstate(divide="ignore", over="ignore"):
-                return self._percentiles(np.exp(-self.replicates.intercept / self.replicates.slope))
+                medians = np.exp(-self.replicates.intercept / self.replicates.slope)
+            low, high = lognormal.corrected_percentiles(medians[:, None], np.array([self.median]), self.confidence)
+            return float(low[0]), float(high[0])
         intercept, slope = float(self.fitted.intercept[0]), float(self.fitted.slope[0])
         gradient = np.array([-1.0 / slope, intercept / slope**2])
         return self._around(math.log(self.median), gradient)
@@ -89,9 +91,9 @@ class FragilityCurve:
     def dispersion_interval(self) -> tuple[float, float]:
         """Confidence interval of the dispersion; infinite where the data allow a slope that does not rise."""
         if self.replicates is not None:
-            low, high = self._percentiles(self.replicates.slope)
-            least = 0.0 if high >= lognormal.STEEP else 1.0 / high if high > 0.0 else math.inf
-            return least, 1.0 / low if low > 0.0 else math.inf
+            slopes = self.replicates.slope[:, None]
+            flattest, steepest = lognormal.corrected_percentiles(slopes, self.fitted.slope, self.confidence)
+            return _spread(float(steepest[0])), _spread(float(flattest[0]))
         return self._around(math.log(self.dispersion), np.array([0.0, -self.dispersion]))
 
     def probability(self, intensity: ArrayLike) -> Floats:
@@ -110,15 +112,16 @@ class FragilityCurve:
     def band(self, intensity: ArrayLike) -> tuple[Floats, Floats]:
         """Lower and upper end of the pointwise confidence band of the probability.
 
-        From Fisher's information: Phi of the interval of intercept + slope ln x. By the bootstrap: percentiles.
+        From Fisher's information: Phi of the interval of intercept + slope ln x. By the bootstrap: bias-corrected
+        percentiles.
         """
         from scipy.special import ndtr
 
         at = _intensities(intensity)
         z = _logarithm(at).ravel()
         if self.replicates is not None:
-            ends = [0.5 - 0.5 * self.confidence, 0.5 + 0.5 * self.confidence]
-            low, high = np.quantile(self.replicates.probability(z), ends, axis=0)
+            estimate = self.fitted.probability(z)[0]
+            low, high = lognormal.corrected_percentiles(self.replicates.probability(z), estimate, self.confidence)
             return low.reshape(at.shape), high.reshape(at.shape)
         middle = self.fitted.intercept[0] + self.fitted.slope[0] * z
         finite = np.where(np.isfinite(z), z, 0.0)
@@ -155,11 +158,6 @@ class FragilityCurve:
         from scipy.special import ndtri
 
         return float(ndtri(0.5 + 0.5 * self.confidence))
-
-    def _percentiles(self, values: Floats) -> tuple[float, float]:
-        ordered = np.sort(values)
-        reach = (0.5 - 0.5 * self.confidence) * (len(ordered) - 1)
-        return float(ordered[math.floor(reach)]), float(ordered[len(ordered) - 1 - math.floor(reach)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,6 +298,13 @@ def _shares_seen(curve: FragilityCurve) -> tuple[Floats, Floats]:
     group = lognormal.groups(np.log(curve.intensity), curve.trials)
     held = np.bincount(group, curve.trials)
     return np.bincount(group, curve.trials * curve.intensity) / held, np.bincount(group, curve.exceeded) / held
+
+
+def _spread(slope: float) -> float:
+    """Dispersion of a slope: 0 of a step, infinite of a curve that does not rise."""
+    if slope >= lognormal.STEEP:
+        return 0.0
+    return 1.0 / slope if slope > 0.0 else math.inf
 
 
 def _intensities(intensity: ArrayLike) -> Floats:

@@ -67,7 +67,8 @@ def fragility(
         Limit states: peak rotation over slenderness (the smaller one of two sides) that is exceeded; ``math.inf``
         stands for overturning, the default.
     model, chattering, polarity, threads, progress
-        As for `simulate_many`; with both polarities each motion counts twice.
+        As for `simulate_many`. With both polarities each motion counts twice, unless all blocks are symmetric: they do
+        the same under a motion and its mirror image, which is no second outcome.
     confidence, band, samples, seed
         As for `fit_fragility`; the bootstrap draws motions, each with all its outcomes.
 
@@ -98,7 +99,12 @@ def fragility(
     if not limits:
         raise InvalidOption("limits must name at least one limit state")
     shaken, values = several_motions(motions, how)
-    options: dict[str, Any] = {"chattering": chattering, "polarity": polarity, "threads": threads, "progress": progress}
+    options: dict[str, Any] = {
+        "chattering": chattering,
+        "polarity": "+" if polarity == "both" and many.is_symmetric else polarity,
+        "threads": threads,
+        "progress": progress,
+    }
     if levels is None:
         table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
         intensity = (values[:, None] / how.unit_of(many, model)[None, :])[None, :, :, None]

@@ -210,6 +210,32 @@ def resampled(
     return fits, samples - int(overlap.sum())
 
 
+def corrected_percentiles(replicates: Floats, estimate: Floats, confidence: float) -> tuple[Floats, Floats]:
+    """Return the ends of intervals from the bootstrap: percentiles, corrected for the median bias (Efron 1981).
+
+    Parameters
+    ----------
+    replicates : ndarray, shape (fits, n)
+        Resampled values of n quantities.
+    estimate : ndarray, shape (n,)
+        Their estimates.
+    confidence : float
+        Probability that an interval shall hold the true value.
+    """
+    from scipy.special import ndtr, ndtri
+
+    count = len(replicates)
+    below = (np.sum(replicates < estimate, axis=0) + 0.5 * np.sum(replicates == estimate, axis=0)) / count
+    bias = ndtri(np.clip(below, 0.5 / count, 1.0 - 0.5 / count))
+    reach = ndtri(0.5 + 0.5 * confidence)
+    ordered = np.sort(replicates, axis=0)
+    low, high = (
+        np.take_along_axis(ordered, rounded((count - 1) * ndtr(2.0 * bias + end)).astype(np.int64)[None, :], axis=0)[0]
+        for rounded, end in ((np.floor, -reach), (np.ceil, reach))
+    )
+    return low, high
+
+
 def _limits(z: Floats, exceeded: Floats, trials: Floats) -> tuple[Probit, NDArray[np.bool_]]:
     """Limits that likelihoods without a maximum tend to, and which of the fits have a maximum."""
     yes, no = exceeded > 0, exceeded < trials

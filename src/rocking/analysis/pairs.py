@@ -75,8 +75,7 @@ def simulate_pairs(
     rules = rules_of(blocks, model, chattering, None, record=False)
     shaking = shaking_of(motion, blocks.gravity)
     sides = sides_of(blocks, model, chattering.limits(blocks, motion))
-    integers, floats = state.new_state()
-    at, x = np.tile(integers, (len(blocks), 1)), np.tile(floats, (len(blocks), 1))
+    at, x = state.new_states(len(blocks))
     endings = np.empty(len(blocks), dtype=np.int64)
 
     def run(chosen: Integers) -> int:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rocking.analysis.checks import positive_numbers, share
 from rocking.block import Blocks
 from rocking.constants import STANDARD_GRAVITY
-from rocking.ensemble import Polarity, simulate_many
+from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
@@ -36,7 +36,6 @@ def rocking_spectrum(
     fractiles: Sequence[float] = (0.16, 0.5, 0.84),
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",
-    polarity: Polarity = "+",
     gravity: float = STANDARD_GRAVITY,
     threads: int | None = None,
     progress: bool | None = None,
@@ -56,8 +55,8 @@ def rocking_spectrum(
     restitution : array_like, optional
         Restitutions; Housner's from each alpha by default.
     fractiles : sequence of float
-        Shares, in (0, 1), of motions (and polarities) that stay below the fractile curves.
-    model, chattering, polarity, threads, progress
+        Shares, in (0, 1), of motions that stay below the fractile curves.
+    model, chattering, threads, progress
         As for `simulate_many`.
     gravity : float
         Acceleration of gravity, m/s^2.
@@ -65,7 +64,7 @@ def rocking_spectrum(
     Returns
     -------
     xarray.Dataset
-        Over (motion, polarity if both, alpha, restitution if given, p): peak_rotation (rad; pi/2 where the block
+        Over (motion, alpha, restitution if given, p): peak_rotation (rad; pi/2 where the block
         overturns), peak_over_alpha (infinite where it overturns) and overturned. Over (fractile, alpha, ..., p):
         fractile_over_alpha. Over (alpha, ..., p): overturned_share. Coordinates besides: period 2 pi/p (s), and size R
         (m) of the rectangular block.
@@ -81,6 +80,8 @@ def rocking_spectrum(
     -----
     A block that overturns has no largest rotation, so it counts as infinitely large: fractiles are interpolated in the
     ordered peaks, and are infinite where that share of the motions, or the next motion above it, overturns.
+
+    The blocks are symmetric, so a motion and its mirror image give the same peaks.
 
     References
     ----------
@@ -103,9 +104,7 @@ def rocking_spectrum(
     if restitution is not None:
         axes["restitution"] = positive_numbers(restitution, "restitution")
     blocks = Blocks.grid(**axes, gravity=gravity)
-    table = simulate_many(
-        blocks, motions, model=model, chattering=chattering, polarity=polarity, threads=threads, progress=progress
-    )
+    table = simulate_many(blocks, motions, model=model, chattering=chattering, threads=threads, progress=progress)
     return _spectrum(table, axes, blocks, shares)
 
 
@@ -164,7 +163,7 @@ def spectrum_figure(dataset: xr.Dataset, *, against: str = "p", title: str = "")
     for k in range(stacked.sizes["curve"]):
         one = stacked.isel(curve=k)
         text = f"α = {float(one.alpha):g}" + (f", e = {float(one.restitution):g}" if len(combinations) > 1 else "")
-        singles = one.peak_over_alpha.transpose(..., "p").values.reshape(-1, one.sizes["p"])
+        singles = one.peak_over_alpha.transpose("motion", "p").values
         fractile_lines = one.fractile_over_alpha.transpose("fractile", "p").values
         curves.append(SpectrumCurves(text, singles, fractile_lines, one.overturned_share.values))
     return drawn(
@@ -180,45 +179,43 @@ def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares
     """Ensemble over a grid of blocks as a spectrum, p last."""
     import xarray as xr
 
-    leading = [str(name) for name in table.peak_rotation.dims if name != "block"]
     names = [*(name for name in axes if name != "p"), "p"]
 
     def on_grid(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        return np.moveaxis(values.reshape(*values.shape[:-1], *map(len, axes.values())), len(leading), -1)
+        return np.moveaxis(values.reshape(len(values), *map(len, axes.values())), 1, -1)
 
     peak, overturned = on_grid(table.peak_rotation.values), on_grid(table.overturned.values)
     over_alpha = np.where(overturned, np.inf, peak / axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
-    merged = over_alpha.reshape(-1, *over_alpha.shape[len(leading) :])
     radius = 0.75 * blocks.gravity / axes["p"] ** 2
     words = "over the slenderness; infinite where the block overturns"
     return xr.Dataset(
         {
             "peak_rotation": (
-                (*leading, *names),
+                ("motion", *names),
                 peak,
                 {"units": "rad", "long_name": "peak rotation; pi/2: overturns"},
             ),
-            "peak_over_alpha": ((*leading, *names), over_alpha, {"units": "1", "long_name": f"peak rotation {words}"}),
-            "overturned": ((*leading, *names), overturned, table.overturned.attrs),
+            "peak_over_alpha": (("motion", *names), over_alpha, {"units": "1", "long_name": f"peak rotation {words}"}),
+            "overturned": (("motion", *names), overturned, table.overturned.attrs),
             "fractile_over_alpha": (
                 ("fractile", *names),
-                fractiles_of(merged, shares),
+                fractiles_of(over_alpha, shares),
                 {"units": "1", "long_name": f"fractile of the peak rotation {words}"},
             ),
             "overturned_share": (
                 names,
-                overturned.mean(axis=tuple(range(len(leading)))),
+                overturned.mean(axis=0),
                 {"units": "1", "long_name": "share of the motions that overturn the block"},
             ),
         },
         {
-            **{name: table[name] for name in leading},
+            "motion": table.motion,
             **{name: (name, values, {"units": _UNITS[name]}) for name, values in axes.items()},
             "fractile": ("fractile", shares),
             "period": ("p", 2.0 * np.pi / axes["p"], {"units": "s", "long_name": "2 pi/p"}),
             "size": ("p", radius, {"units": "m", "long_name": "half diagonal of the rectangular block"}),
         },
-        {name: table.attrs[name] for name in ("program", "model", "chattering", "polarity", "gravity", "motions")},
+        {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions")},
     )
 
 

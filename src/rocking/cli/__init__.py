@@ -27,6 +27,7 @@ for _command, _help in {
     "map": "Map what a pulse does to a block, over amplitude and frequency.",
     "ida": "Scale motions up until the block overturns and beyond (incremental dynamic analysis).",
     "fragility": "Fit the probability that a block overturns against the intensity of the motions.",
+    "calibrate": "Find the block behind observed outcomes, or behind a measured rotation history.",
 }.items():
     app.command(f"rocking.cli.{_command}:{_command}", name=_command, help=_help)
 

@@ -9,7 +9,6 @@ from cyclopts import Parameter
 
 from rocking.analysis.spectrum import rocking_spectrum, spectrum_figure
 from rocking.cli import batch, options
-from rocking.ensemble import Polarity
 from rocking.problem import Model
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ def spectrum(
     size: str | None = None,
     restitution: str | None = None,
     fractiles: str = "0.16,0.5,0.84",
-    polarity: Polarity = "+",
     model: Model = "nonlinear",
     chattering: str = "certified",
     against: Literal["p", "period", "size"] = "p",
@@ -52,8 +50,6 @@ def spectrum(
         Restitutions; Housner's by default.
     fractiles
         Shares of the motions that stay below the fractile curves.
-    polarity
-        Motions as they are (+), reversed (-), or both.
     model
         Equation of motion.
     chattering
@@ -81,7 +77,6 @@ def spectrum(
         size=None if size is None else batch.values(size, "--size"),
         restitution=None if restitution is None else batch.values(restitution, "--restitution"),
         fractiles=batch.values(fractiles, "--fractiles").tolist(),
-        polarity=polarity,
         model=model,
         chattering=options.treatment_from(chattering),
     )
@@ -99,7 +94,6 @@ def _result(dataset: xr.Dataset) -> dict[str, Any]:
         "motions": dataset.motion.values,
         "model": dataset.model,
         "chattering_treatment": dataset.chattering,
-        "polarity": dataset.attrs["polarity"],
         "p_rad_per_s": dataset.p.values,
         "period_s": dataset.period.values,
         "size_m": dataset["size"].values,

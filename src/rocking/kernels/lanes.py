@@ -116,10 +116,11 @@ def run_lanes(
     start = shaking.coefficients[min(piece, pieces - 1), 0]
     while piece < pieces and moving > 0 and shaking.breakpoints[piece + 1] <= rules.stop:
         end = shaking.coefficients[piece, 0] + shaking.coefficients[piece, 1] * h
+        length = shaking.breakpoints[piece + 1] - shaking.breakpoints[piece]
         if rules.nonlinear:
-            busy = quiet_nonlinear(lanes, room.series, room.events, start, end, h, order)
+            busy = quiet_nonlinear(lanes, room.series, room.events, start, end, length, order)
         else:
-            busy = quiet_linear(lanes, room.events, start, end, h)
+            busy = quiet_linear(lanes, room.events, start, end, h, length - h)
         if busy > 0:
             moving -= play(shaking, sides, rules, tables, scratch, room, at, x, endings, piece, h)
         start = end
@@ -269,8 +270,11 @@ def next_loud(shaking: Shaking, lanes: Floats, piece: int, pieces: int) -> int:
 
 
 @routine
-def quiet_linear(lanes: Floats, events: Integers, start: float, end: float, h: float) -> int:
-    """Step all lanes through one sample of the linear model, but mark, count and leave those with an event."""
+def quiet_linear(lanes: Floats, events: Integers, start: float, end: float, h: float, late: float) -> int:
+    """Step all lanes through one sample of the linear model, but mark, count and leave those with an event.
+
+    Samples whose times are rounded are not all of one length: ``late`` is what this one has more than ``h``.
+    """
     slope = (end - start) / h
     above, below = max(start, end), min(start, end)
     busy = 0
@@ -281,6 +285,8 @@ def quiet_linear(lanes: Floats, events: Integers, start: float, end: float, h: f
         u1 = u + (lanes[COSH + lane] * z + (lanes[SINH + lane] * v + lanes[LAG + lane] * drift))
         v1 = v + (lanes[SINH_P + lane] * z + lanes[COSH + lane] * (v - drift))
         z1 = u1 - (alpha + sign * end)
+        u1 += late * v1
+        v1 += late * (lanes[LAMBDA + lane] * z1)
         dip = lanes[CURVE + lane] * max(max(z, z1), 0.0)
         bulge = lanes[CURVE + lane] * max(max(-z, -z1), 0.0)
         event = (

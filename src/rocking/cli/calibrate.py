@@ -1,0 +1,172 @@
+"""`rocking calibrate`: find the block behind observed outcomes, or behind a measured rotation history."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from rocking.analysis.calibration import Calibration
+from rocking.analysis.calibration import calibrate as run
+from rocking.analysis.calibration_history import HistoryCalibration, calibrate_history
+from rocking.cli import batch, options
+from rocking.cli.calibrate_data import Outcomes, read
+from rocking.errors import InvalidOption, OutputError
+from rocking.problem import Model
+
+
+def calibrate(
+    data: Path,
+    *,
+    model: Model | None = None,
+    p: str | None = None,
+    alpha: str | None = None,
+    restitution: str | None = None,
+    two_sided: bool | None = None,
+    candidates: int = 8192,
+    folds: int = 0,
+    predict: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
+    motion: str | None = None,
+    initial_rotation: float | None = None,
+    channel: str | None = None,
+    dt: float | None = None,
+    units: str | None = None,
+    seed: int = 0,
+    out: Path | None = None,
+    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
+) -> None:
+    """Find the block behind observed outcomes (overturned or not), or behind a measured rotation history.
+
+    DATA is a CSV table with a header. Outcomes: columns motion (a record file, or a shipped record) and overturned (1
+    or 0), and where wanted scale, channel and group. A history: columns time_s and rotation_rad (or rotation_deg).
+
+    Parameters
+    ----------
+    data
+        CSV table of outcomes or of a history.
+    model
+        Equation of motion; by default linear for outcomes, nonlinear for a history.
+    p
+        Lowest and highest thinkable frequency parameter, rad/s, with a comma between; for a history also a known value.
+    alpha
+        Likewise the slenderness, rad.
+    restitution
+        Likewise the factor on the angular speed at an impact.
+    two_sided
+        Whether the two sides of the block may differ; by default yes for outcomes, no for a history.
+    candidates
+        Outcomes: blocks to try.
+    folds
+        Outcomes: parts for cross-validation; 0: none. Tests of one group stay together.
+    predict
+        Outcomes: records to predict, files or names of shipped records.
+    motion
+        History: record of the base's motion; without it, the block was released and rocked freely.
+    initial_rotation
+        History: rotation at time 0, rad; by default fitted in a release test, 0 under a motion.
+    channel
+        Channel of the records, by number or name, where there are several.
+    dt
+        Sampling step, s, of text files that do not give times.
+    units
+        Units of text files: g, m/s2, cm/s2, mm/s2.
+    seed
+        The same seed gives the same result.
+    out
+        Folder for result.json and, of outcomes, ensemble.csv.
+    as_json
+        Print the result as JSON.
+    """
+    folder = None if out is None else options.output_folder(out)
+    table = read(data, channel=channel, dt=dt, units=units)
+    ranges = {"p": p, "alpha": alpha, "restitution": restitution}
+    choices: dict[str, Any] = {name: _range(text, f"--{name}") for name, text in ranges.items() if text is not None}
+    choices |= {name: value for name, value in (("model", model), ("two_sided", two_sided)) if value is not None}
+    if isinstance(table, Outcomes):
+        _refuse("a history", motion=motion, initial_rotation=initial_rotation)
+        others = [options.motion_from(name, channel=channel, dt=dt, units=units) for name in predict]
+        found = run(table.motions, table.overturned, seed, candidates=candidates, **choices)
+        results = _outcomes_results(found, table, folds, dict(zip(predict, found.predict(others), strict=True)))
+    else:
+        _refuse("outcomes", predict=predict or None, folds=folds or None)
+        shaking = None if motion is None else options.motion_from(motion, channel=channel, dt=dt, units=units)
+        choices |= {"initial_rotation": initial_rotation, "seed": seed}
+        results = _history_results(calibrate_history(table.times, table.rotation, shaking, **choices))
+    if folder is not None:
+        _write(folder, results)
+    batch.show(results.numbers, results.text, as_json=as_json, folder=folder)
+
+
+@dataclass(frozen=True)
+class _Results:
+    numbers: dict[str, Any]
+    text: str
+    ensemble: str | None = None
+
+
+def _refuse(belong_to: str, **given: object) -> None:
+    for name, value in given.items():
+        if value is not None:
+            raise InvalidOption(f"--{name.replace('_', '-')} is for {belong_to}; the columns of this table are not")
+
+
+def _range(text: str, option: str) -> float | tuple[float, ...]:
+    values = options.numbers(text, option)
+    return values if isinstance(values, float) else tuple(values)
+
+
+def _outcomes_results(found: Calibration, table: Outcomes, folds: int, predicted: dict[str, np.float64]) -> _Results:
+    numbers = {
+        "model": found.model,
+        "motions": len(found.observed),
+        "overturned": int(found.observed.sum()),
+        "estimates": {name: asdict(one) for name, one in found.estimates.items()},
+        "fitted": asdict(found.scores),
+        "probabilities": found.probabilities,
+        "predicted": predicted,
+    }
+    parts = [found.summary()]
+    if folds:
+        scores = found.cross_validate(groups=table.groups, folds=folds).scores
+        numbers["cross_validated"] = asdict(scores)
+        parts.append(
+            f"left-out motions: accuracy {100 * scores.accuracy:.1f} %, log loss {scores.log_loss:.3f}, "
+            f"Brier score {scores.brier:.3f} ({folds} folds)"
+        )
+    if predicted:
+        rows = [(name, float(chance)) for name, chance in predicted.items()]
+        parts.append("\n" + batch.table(["motion", "probability"], rows))
+    return _Results(numbers, "\n".join(parts), _ensemble(found))
+
+
+def _history_results(found: HistoryCalibration) -> _Results:
+    numbers = {
+        "model": found.response.model,
+        "samples": len(found.residuals),
+        "estimates": {name: asdict(one) for name, one in found.estimates.items()},
+        "covariance_of_logarithms": found.covariance,
+        "misfit_rad": found.misfit,
+    }
+    return _Results(numbers, found.summary())
+
+
+def _ensemble(found: Calibration) -> str:
+    """Return the blocks and their weights as CSV."""
+    blocks = found.blocks
+    header = [f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus")]
+    table = np.hstack([blocks.p, blocks.alpha, blocks.restitution, found.weights[:, None]])
+    lines = [",".join([*header, "weight"]), *(",".join(f"{value:.10g}" for value in row) for row in table)]
+    return "\n".join(lines) + "\n"
+
+
+def _write(folder: Path, results: _Results) -> None:
+    try:
+        (folder / "result.json").write_text(json.dumps(options.plain(results.numbers), indent=2) + "\n", "utf-8")
+        if results.ensemble is not None:
+            (folder / "ensemble.csv").write_text(results.ensemble, "utf-8")
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error

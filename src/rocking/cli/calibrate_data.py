@@ -1,0 +1,115 @@
+"""What `rocking calibrate` reads: a CSV table of outcomes, or of a measured rotation history."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from rocking.cli import options
+from rocking.errors import RockingError, UnreadableRecord
+from rocking.kernels.state import Floats
+from rocking.motion.motion import Motion
+
+_ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """Tests of one specimen: motions, whether each overturned it, and what to leave out together."""
+
+    motions: tuple[Motion, ...]
+    overturned: tuple[bool, ...]
+    groups: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Measured rotation: times (s) and rotations (rad)."""
+
+    times: Floats
+    rotation: Floats
+
+
+@dataclass(frozen=True)
+class _Table:
+    path: Path
+    columns: tuple[str, ...]
+    #: Line number and cells of each row.
+    rows: tuple[tuple[int, dict[str, str]], ...]
+
+    def numbers(self, column: str) -> Floats:
+        return np.array([self.convert(line, row[column], float, "a number") for line, row in self.rows])
+
+    def convert(self, line: int, text: str, how: Callable[[str], Any], what: str) -> Any:
+        try:
+            return how(text)
+        except (ValueError, KeyError):
+            raise UnreadableRecord(f"{self.path}, line {line}: {text!r} is not {what}; correct it") from None
+
+
+def read(path: Path, *, channel: str | None, dt: float | None, units: str | None) -> Outcomes | History:
+    """Read a table; its columns say which of the two it is.
+
+    Outcomes: `motion` (a record file, relative to the table's folder, or a shipped record) and `overturned` (1 or 0,
+    yes or no); also, if there are such columns, `scale`, `channel` and `group`. A history: `time_s`, and `rotation_rad`
+    or `rotation_deg`.
+
+    Raises
+    ------
+    UnreadableRecord
+        If it is no such table, or a cell or a record cannot be read; the message has the line.
+    """
+    table = _table(path)
+    if {"motion", "overturned"} <= set(table.columns):
+        return _outcomes(table, channel=channel, dt=dt, units=units)
+    for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
+        if {"time_s", column} <= set(table.columns):
+            return History(table.numbers("time_s"), unit * table.numbers(column))
+    raise UnreadableRecord(
+        f"{path}, line 1: the columns must be motion,overturned (outcomes) or time_s,rotation_rad (a history), "
+        f"not {','.join(table.columns)}"
+    )
+
+
+def _table(path: Path) -> _Table:
+    try:
+        text = path.read_text("utf-8-sig")
+    except OSError as error:
+        raise UnreadableRecord(f"{path} cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise UnreadableRecord(f"{path} is no text table; save it as CSV") from None
+    reader = csv.reader(text.splitlines())
+    cells = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(cell.strip() for cell in row)]
+    if len(cells) < 2:
+        raise UnreadableRecord(f"{path} holds no rows below its header")
+    (_, columns), *rows = cells
+    for line, row in rows:
+        if len(row) != len(columns):
+            raise UnreadableRecord(f"{path}, line {line}: {len(row)} cells under {len(columns)} columns; correct it")
+    named = tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows)
+    return _Table(path, tuple(columns), named)
+
+
+def _outcomes(table: _Table, *, channel: str | None, dt: float | None, units: str | None) -> Outcomes:
+    motions, overturned = [], []
+    for line, row in table.rows:
+        overturned.append(table.convert(line, row["overturned"].lower(), _ANSWERS.__getitem__, "0 or 1"))
+        scale = table.convert(line, row.get("scale") or "1", float, "a number")
+        name = _file_or_name(row["motion"], table.path.parent)
+        wanted = row.get("channel") or channel
+        try:
+            motions.append(options.motion_from(name, channel=wanted, dt=dt, units=units, scale=scale))
+        except RockingError as error:
+            raise UnreadableRecord(f"{table.path}, line {line}: {error}") from error
+    groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None
+    return Outcomes(tuple(motions), tuple(overturned), groups)
+
+
+def _file_or_name(name: str, folder: Path) -> str:
+    beside = folder / name
+    return str(beside) if beside.exists() else name

@@ -1,0 +1,437 @@
+"""Calibration: hidden blocks are found again from outcomes and from histories, and what they will do is predicted."""
+
+import math
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.analysis import calibration_population as population
+from rocking.analysis.calibration_history import HistoryCalibration
+from rocking.analysis.calibration_population import Evidence
+from rocking.analysis.calibration_scores import Scores
+from rocking.analysis.calibration_space import Candidates, Space
+
+HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
+STEP = 0.02
+
+
+def bursts(count: int, seed: int) -> list[rocking.Motion]:
+    """Windowed noise of random length, colour and strength: 6 s each."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(0.0, 6.0, STEP)
+    frequencies = np.fft.rfftfreq(len(times), STEP)
+    motions = []
+    for number in range(count):
+        centre, length, peak = rng.uniform(0.5, 3.0), rng.uniform(0.5, 2.0), 9.81 * rng.uniform(0.05, 0.9)
+        noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(len(times))) / (1.0 + (frequencies / centre) ** 4))
+        samples = noise * np.exp(-(((times - 2.5) / length) ** 2))
+        samples *= peak / np.abs(samples).max()
+        motions.append(rocking.Motion.from_samples(samples, STEP, name=f"burst {number}"))
+    return motions
+
+
+def outcomes(motions: list[rocking.Motion], block: rocking.Block = HIDDEN) -> np.ndarray:
+    return np.array([rocking.simulate(block, motion, model="linear").overturned for motion in motions])
+
+
+@pytest.fixture(scope="module")
+def shaken():
+    motions = bursts(120, seed=1)
+    return motions, outcomes(motions)
+
+
+@pytest.fixture(scope="module")
+def found(shaken):
+    return rocking.calibrate(*shaken, candidates=2048)
+
+
+@pytest.fixture(scope="module")
+def unseen():
+    motions = bursts(150, seed=2)
+    return motions, outcomes(motions)
+
+
+# Outcomes: overturned or not.
+
+
+def test_what_a_hidden_block_will_do_is_predicted(found, unseen):
+    motions, overturned = unseen
+    scores = Scores.of(found.predict(motions), overturned)
+    guess = Scores.of(np.full(len(motions), overturned.mean()), overturned)
+    assert scores.accuracy > 0.93
+    assert scores.log_loss < 0.35 * guess.log_loss
+
+
+def test_the_hidden_block_lies_within_the_estimates(found):
+    sides = zip(("_plus", "_minus"), HIDDEN.sides, strict=True)
+    for side, truth in sides:
+        for name in ("p", "alpha"):
+            estimate = found.estimates[name + side]
+            assert estimate.lower < getattr(truth, name) < estimate.upper, name + side
+    assert found.estimates["alpha_plus"].upper < found.estimates["alpha_minus"].upper
+
+
+def test_the_ensemble_predicts_what_its_blocks_do(found, unseen):
+    motions = unseen[0][:20]
+    fallen = np.array([outcomes(motions, block) for block in found.blocks])
+    expected = found.lapse + (1.0 - 2.0 * found.lapse) * found.weights @ fallen
+    np.testing.assert_allclose(found.predict(motions), expected, rtol=1e-12)
+    assert found.weights.sum() == pytest.approx(1.0, abs=1e-12)
+
+
+def test_fitted_probabilities_are_those_of_the_ensemble(found, shaken):
+    # The ensemble is a draw of 1000 from the candidates' weights, which are those of the fit.
+    assert np.abs(found.predict(shaken[0]) - found.probabilities).max() < 3.0 / math.sqrt(1000)
+
+
+def test_the_same_seed_gives_the_same_calibration(shaken):
+    motions, overturned = shaken[0][:40], shaken[1][:40]
+    first, second, other = (rocking.calibrate(motions, overturned, seed, candidates=256) for seed in (5, 5, 6))
+    assert np.array_equal(first.blocks.alpha, second.blocks.alpha)
+    assert np.array_equal(first.weights, second.weights)
+    assert not np.array_equal(first.blocks.alpha, other.blocks.alpha)
+
+
+def test_cross_validation_says_how_good_predictions_are(found, shaken, unseen):
+    validation = found.cross_validate(folds=4, repeats=2)
+    assert validation.probabilities.shape == (2, len(shaken[0]))
+    for row, scores in zip(validation.probabilities, validation.repeats, strict=True):
+        assert scores == Scores.of(row, shaken[1])
+    honest = Scores.of(found.predict(unseen[0]), unseen[1])
+    assert found.scores.log_loss < validation.scores.log_loss
+    # Both are means over more than a hundred outcomes, with standard errors of about 0.02.
+    assert abs(validation.scores.accuracy - honest.accuracy) < 0.06
+
+
+def test_a_group_is_left_out_as_a_whole():
+    # Each motion comes twice, with opposite outcomes: whoever saw the twin would predict the wrong outcome.
+    motions = bursts(12, seed=4)
+    overturned = np.arange(24) < 12
+    found = rocking.calibrate(motions * 2, overturned, candidates=128)
+    validation = found.cross_validate(groups=[*range(12)] * 2, folds=12)
+    first, second = validation.probabilities[0, :12], validation.probabilities[0, 12:]
+    # Twins differ by the order of single-precision sums.
+    np.testing.assert_allclose(first, second, rtol=1e-6)
+
+
+def test_random_outcomes_are_not_predicted_with_confidence():
+    motions = bursts(60, seed=7)
+    overturned = np.random.default_rng(0).random(60) < 0.5
+    found = rocking.calibrate(motions, overturned, candidates=1024)
+    assert found.cross_validate(folds=6).scores.log_loss < 1.5 * math.log(2.0)
+
+
+def test_scatter_from_test_to_test_is_measured():
+    motions = bursts(150, seed=3)
+    rng = np.random.default_rng(8)
+    scatters = []
+    for deviation in (0.0, 0.4):
+        factors = np.exp(deviation * rng.standard_normal(len(motions)))
+        fallen = outcomes([motion.scaled(factor) for motion, factor in zip(motions, factors, strict=True)])
+        found = rocking.calibrate(motions, fallen, candidates=2048, two_sided=False)
+        scatters.append(found.scatter["alpha"])
+    assert scatters[0] < 0.12
+    assert scatters[1] > 1.5 * scatters[0]
+
+
+def test_symmetric_blocks_can_be_asked_for(shaken):
+    found = rocking.calibrate(shaken[0][:30], shaken[1][:30], candidates=256, two_sided=False)
+    assert found.blocks.is_symmetric
+    assert set(found.estimates) == {"p", "alpha", "restitution"}
+
+
+def test_blocks_keep_to_the_bounds(shaken):
+    found = rocking.calibrate(
+        shaken[0][:30], shaken[1][:30], candidates=512, p=(2.0, 3.0), alpha=(0.1, 0.2), restitution=(0.7, 1.0)
+    )
+    assert np.all((found.blocks.p >= 2.0 - 1e-12) & (found.blocks.p <= 3.0 + 1e-12))
+    assert np.all((found.blocks.alpha >= 0.1 - 1e-12) & (found.blocks.alpha <= 0.2 + 1e-12))
+    assert np.all(found.blocks.restitution >= 0.7 - 1e-12)
+
+
+def test_the_nonlinear_model_calibrates_too():
+    motions = bursts(40, seed=9)
+    block = rocking.Block.from_parameters(p=3.0, alpha=0.25, restitution=0.85)
+    overturned = [rocking.simulate(block, motion).overturned for motion in motions]
+    found = rocking.calibrate(motions, overturned, model="nonlinear", candidates=256, two_sided=False)
+    assert found.scores.accuracy > 0.9
+
+
+def test_the_summary_has_every_parameter_and_the_scores(found):
+    text = found.summary()
+    for name, estimate in found.estimates.items():
+        assert name in text
+        assert f"{estimate.median:.4g}" in text
+    assert f"{100 * found.scores.accuracy:.1f} %" in text
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"overturned": [True, False]}, "each of the 3 motions"),
+        ({"overturned": [1, 1, 1]}, "all the same"),
+        ({"overturned": [0, 0, 0]}, "all the same"),
+        ({"overturned": [0, 2, 1]}, "True or False"),
+        ({"overturned": [0, math.nan, 1]}, "True or False"),
+        ({"overturned": ["no", "yes", "no"]}, "True or False"),
+        ({"seed": -1}, "seed"),
+        ({"seed": 1.5}, "seed"),
+        ({"lapse": 0.0}, "lapse"),
+        ({"lapse": 0.5}, "lapse"),
+        ({"candidates": 10}, "candidates"),
+        ({"ensemble": 0}, "ensemble"),
+        ({"p": (2.0, 1.0)}, "p must be"),
+        ({"p": (0.0, 1.0)}, "p must be"),
+        ({"p": 2.0}, "pair"),
+        ({"p": (1.0, math.inf)}, "p must be"),
+        ({"alpha": (0.1, 1.6)}, "alpha must be"),
+        ({"restitution": (0.5, 1.1)}, "restitution must be"),
+        ({"model": "cubic"}, "model"),
+    ],
+)
+def test_a_mistaken_argument_is_refused(change, word):
+    arguments = {"motions": bursts(3, seed=0), "overturned": [True, False, True], "candidates": 128} | change
+    with pytest.raises(rocking.InvalidOption, match=word):
+        rocking.calibrate(**arguments)
+
+
+@pytest.mark.parametrize(("change", "word"), [({"folds": 1}, "folds"), ({"groups": ["a"]}, "groups")])
+def test_a_mistaken_division_is_refused(found, change, word):
+    with pytest.raises(rocking.InvalidOption, match=word):
+        found.cross_validate(**change)
+
+
+# The parts: space, population, posterior.
+
+
+def test_even_points_fill_the_space_evenly():
+    space = Space.of((1.0, 4.0), (0.1, 0.2), (0.5, 1.0), two_sided=True)
+    rng = np.random.default_rng(0)
+    points = space.spread_evenly(4096, rng)
+    low, high = space.box
+    independent = low + rng.random((200_000, 6)) * (high - low)
+    inside = independent[space.contains(independent)]
+    assert space.volume() == pytest.approx(len(inside) / 200_000 * np.prod(high - low), rel=0.02)
+    # Means are those of the uniform density, closer than independent points would be (0.3/sqrt(4096) of the width).
+    np.testing.assert_allclose(points.mean(axis=0) / (high - low), inside.mean(axis=0) / (high - low), atol=5e-3)
+
+
+def test_sides_are_mean_times_and_over_the_root_of_the_ratio():
+    space = Space.of((1.0, 9.0), (0.01, 1.0), (0.1, 1.0), two_sided=True)
+    point = np.log([[3.0, 0.1, 0.5, 1.21, 4.0, 1.0]])
+    np.testing.assert_allclose(space.sides(point)[0], [[3.3, 0.2, 0.5], [3.0 / 1.1, 0.05, 0.5]], rtol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def threshold_evidence():
+    """Symmetric blocks that overturn where alpha is below a threshold, one threshold for each of 40 tests."""
+    space = Space.of((1.0, 2.0), (0.05, 0.5), (0.5, 0.9), two_sided=False)
+    rng = np.random.default_rng(3)
+    points = space.spread_evenly(4096, rng)
+    thresholds = np.log(np.geomspace(0.08, 0.35, 40))
+    fallen = (points[:, 1:2] < thresholds).astype(np.float32)
+    observed = np.log(0.17) + 0.1 * rng.standard_normal(40) < thresholds
+    return Evidence(Candidates(space, points, fallen, np.zeros(len(points))), observed, 0.01), thresholds
+
+
+def test_the_chance_of_overturning_is_the_share_of_the_population(threshold_evidence):
+    evidence, thresholds = threshold_evidence
+    centre, score = math.log(0.17), 0.5
+    scatter = 0.1 * math.exp(0.6 * score)
+    populations = np.array([[math.log(1.4), centre, math.log(0.7), 1.0, score, 1.0]])
+    share = [0.5 * (1.0 + math.erf((threshold - centre) / scatter / math.sqrt(2.0))) for threshold in thresholds]
+    # 4096 candidates, of which some 150 stand within the population's reach.
+    np.testing.assert_allclose(evidence.chances(populations)[0], 0.01 + 0.98 * np.array(share), atol=0.03)
+
+
+def test_the_posterior_is_that_of_brute_force(threshold_evidence):
+    evidence, _ = threshold_evidence
+    tests = np.ones(40, dtype=bool)
+    drawn = population.posterior(evidence, tests, 512, np.random.default_rng(0))
+    rng = np.random.default_rng(1)
+    prior = np.hstack([evidence.candidates.space.spread_evenly(20_000, rng), rng.standard_normal((20_000, 3))])
+    likelihood = np.exp(evidence.log_likelihoods(evidence.chances(prior), tests))
+    weights = likelihood / likelihood.sum()
+    mean = weights @ prior
+    deviation = np.sqrt(weights @ (prior - mean) ** 2)
+    effective = min(1.0 / (weights**2).sum(), 512)
+    assert effective > 100
+    assert np.all(np.abs(drawn.mean(axis=0) - mean) < 4.0 * deviation * math.sqrt(2.0 / effective))
+    np.testing.assert_allclose(drawn.std(axis=0), deviation, rtol=0.3)
+
+
+def test_tests_that_are_left_out_do_not_count(threshold_evidence):
+    evidence, _ = threshold_evidence
+    some = np.arange(40) < 30
+    flipped = Evidence(evidence.candidates, np.where(some, evidence.observed, ~evidence.observed), evidence.lapse)
+    first, second = (population.posterior(one, some, 64, np.random.default_rng(2)) for one in (evidence, flipped))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_candidates_weigh_what_their_density_lacks(threshold_evidence):
+    """Twice as many candidates in one half of the space, at half the weight each: nothing changes."""
+    evidence, _ = threshold_evidence
+    candidates = evidence.candidates
+    doubled = candidates.points[:, 1] > math.log(0.15)
+    twice = Candidates(
+        candidates.space,
+        np.concatenate([candidates.points, candidates.points[doubled]]),
+        np.concatenate([candidates.overturned, candidates.overturned[doubled]]),
+        np.concatenate([np.where(doubled, -math.log(2.0), 0.0), np.full(doubled.sum(), -math.log(2.0))]),
+    )
+    populations = np.array([[math.log(1.4), math.log(0.16), math.log(0.7), 0.0, 0.0, 0.0]])
+    expected = evidence.chances(populations)
+    found = Evidence(twice, evidence.observed, evidence.lapse).chances(populations)
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+def test_the_density_is_that_of_what_is_drawn():
+    rng = np.random.default_rng(5)
+    populations = np.array([[0.0, 1.0, 2.0, 0.0, 1.0, -1.0], [0.2, 1.1, 2.1, 0.0, 0.0, 0.0]])
+    points = population.drawn(populations, 1.5, 40_000, rng)
+    density = np.exp(population.log_density(populations, 1.5, points))
+    box = (points > [0.0, 0.9, 1.95]) & (points < [0.2, 1.1, 2.05])
+    inside = box.all(axis=1)
+    # The mean of 1/density over points in a box is its volume over its share.
+    assert (1.0 / density[inside]).sum() / len(points) == pytest.approx(0.2 * 0.2 * 0.1, rel=0.05)
+
+
+def test_scores_of_known_predictions():
+    scores = Scores.of([0.8, 0.4, 0.5], [1, 1, 0])
+    assert scores.accuracy == pytest.approx(2 / 3)
+    assert scores.log_loss == pytest.approx(-(math.log(0.8) + math.log(0.4) + math.log(0.5)) / 3)
+    assert scores.brier == pytest.approx((0.04 + 0.36 + 0.25) / 3)
+    assert Scores.of([1.0], [0]).log_loss == math.inf
+
+
+@pytest.mark.parametrize("chances", [[0.5], [1.2, 0.1], [math.nan, 0.1], []])
+def test_scores_refuse_what_is_no_probability(chances):
+    with pytest.raises(rocking.InvalidOption):
+        Scores.of(chances, [True, False])
+
+
+# Histories: release tests and forced rocking.
+
+TIMES = np.arange(0.0, 6.0, 0.01)
+NOISE = 1e-3
+
+
+def released(model: str = "nonlinear", seed: int = 0, block: rocking.Block | None = None) -> np.ndarray:
+    rocks = block or rocking.Block.from_parameters(p=2.5, alpha=0.2, restitution=0.88)
+    response = rocking.simulate(rocks, None, model=model, initial_rotation=0.1, duration=float(TIMES[-1]))
+    return response.rotation(TIMES) + np.random.default_rng(seed).normal(0.0, NOISE, len(TIMES))
+
+
+def errors(found: HistoryCalibration, truth: dict[str, float]) -> dict[str, float]:
+    """Errors in standard errors."""
+    return {
+        name: (estimate.value - truth[name]) / estimate.deviation
+        for name, estimate in found.estimates.items()
+        if name in truth
+    }
+
+
+TRUTH = {"p": 2.5, "alpha": 0.2, "restitution": 0.88, "initial_rotation": 0.1}
+
+
+@pytest.mark.parametrize("model", ["nonlinear", "linear"])
+def test_a_release_test_gives_the_block_within_its_errors(model):
+    found = rocking.calibrate_history(TIMES, released(model), model=model)
+    assert all(abs(error) < 3.5 for error in errors(found, TRUTH).values())
+    assert found.estimates["restitution"].deviation < 1e-3
+    assert found.misfit == pytest.approx(NOISE, rel=0.1)
+
+
+def test_standard_errors_are_those_of_repeated_tests():
+    fits = [rocking.calibrate_history(TIMES, released(seed=seed)) for seed in range(24)]
+    for name, truth in TRUTH.items():
+        scaled = [errors(found, {name: truth})[name] for found in fits]
+        # The root mean square of 24 standard normals is within 0.6 and 1.45 with 99.9 %.
+        assert 0.6 < math.sqrt(np.mean(np.square(scaled))) < 1.45, name
+
+
+def test_two_sides_are_told_apart():
+    block = rocking.Block.from_parameters(p=(2.5, 2.3), alpha=(0.18, 0.24), restitution=(0.9, 0.84))
+    found = rocking.calibrate_history(TIMES, released(block=block), two_sided=True)
+    truth = {
+        f"{name}_{side}": getattr(block.sides[k], name)
+        for k, side in enumerate(("plus", "minus"))
+        for name in ("p", "alpha", "restitution")
+    }
+    assert all(abs(error) < 4.0 for error in errors(found, truth).values())
+
+
+def test_forced_rocking_gives_the_block():
+    block = rocking.Block.from_parameters(p=2.5, alpha=0.2, restitution=0.88)
+    motion = rocking.records.load("el-centro-meloland-270").scaled(0.9)
+    times = np.arange(0.0, 30.0, 0.02)
+    measured = rocking.simulate(block, motion, duration=30.0).rotation(times)
+    measured += np.random.default_rng(2).normal(0.0, NOISE, len(times))
+    found = rocking.calibrate_history(times, measured, motion)
+    assert set(found.estimates) == {"p", "alpha", "restitution"}
+    assert all(abs(error) < 3.5 for error in errors(found, TRUTH).values())
+
+
+def test_without_noise_the_block_is_found_exactly():
+    clean = rocking.simulate(
+        rocking.Block.from_parameters(p=2.5, alpha=0.2, restitution=0.88), None, initial_rotation=0.1, duration=5.99
+    ).rotation(TIMES)
+    found = rocking.calibrate_history(TIMES, clean)
+    for name, truth in TRUTH.items():
+        assert found.estimates[name].value == pytest.approx(truth, rel=1e-6)
+
+
+def test_what_is_known_is_kept():
+    found = rocking.calibrate_history(TIMES, released(), p=2.5, alpha=0.2, initial_rotation=0.1)
+    assert (found.block.p, found.block.alpha) == (2.5, 0.2)
+    assert set(found.estimates) == {"restitution"}
+    free = rocking.calibrate_history(TIMES, released())
+    assert found.estimates["restitution"].deviation < free.estimates["restitution"].deviation
+
+
+def test_a_fit_at_a_bound_says_so():
+    found = rocking.calibrate_history(TIMES, released(), restitution=(0.3, 0.8))
+    assert found.estimates["restitution"].at_bound
+    assert "at its bound" in found.summary()
+    assert not found.estimates["p"].at_bound
+
+
+def test_a_release_to_the_other_side_is_found_too():
+    found = rocking.calibrate_history(TIMES, -released())
+    assert found.estimates["initial_rotation"].value == pytest.approx(-0.1, abs=1e-3)
+    assert found.estimates["restitution"].value == pytest.approx(0.88, abs=2e-3)
+
+
+def test_correlated_noise_widens_the_errors():
+    white = np.random.default_rng(0).normal(0.0, 1.0, len(TIMES))
+    correlated = np.convolve(white, np.ones(20) / math.sqrt(20), mode="same")
+    clean = released() - np.random.default_rng(0).normal(0.0, NOISE, len(TIMES))
+    sharp, wide = (rocking.calibrate_history(TIMES, clean + NOISE * noise) for noise in (white, correlated))
+    assert wide.misfit == pytest.approx(sharp.misfit, rel=0.15)
+    assert wide.estimates["restitution"].deviation > 2.0 * sharp.estimates["restitution"].deviation
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"times": TIMES[:-1]}, "one rotation for each time"),
+        ({"times": TIMES - 1.0}, "start at 0"),
+        ({"times": TIMES[::-1]}, "increase"),
+        ({"rotation": np.full(len(TIMES), math.nan)}, "finite"),
+        ({"rotation": np.zeros(len(TIMES))}, "zero throughout"),
+        ({"rotation": np.full(len(TIMES), 10.0)}, "rad"),
+        ({"rotation": np.roll(released(), 1) * (TIMES > 0.0)}, "initial_rotation="),
+        ({"rotation": ["a"] * len(TIMES)}, "numbers"),
+        ({"times": TIMES[:6], "rotation": released()[:6]}, "6 samples"),
+        ({"times": TIMES[:30], "rotation": released()[:30]}, "does not determine restitution"),
+        ({"p": 2.5, "alpha": 0.2, "restitution": 0.9, "initial_rotation": 0.1}, "everything is known"),
+        ({"alpha": (0.3, 0.2)}, "alpha must be"),
+        ({"restitution": (0.5, 2.0)}, "restitution must be"),
+        ({"model": "cubic"}, "model"),
+    ],
+)
+def test_a_mistaken_history_is_refused(change, word):
+    arguments = {"times": TIMES, "rotation": released()} | change
+    with pytest.raises(rocking.InvalidOption, match=word):
+        rocking.calibrate_history(**arguments)

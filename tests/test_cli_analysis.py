@@ -1,0 +1,186 @@
+"""The commands with many simulations: their results, their files, one line for every mistake."""
+
+import json
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.analysis import fragility, incremental_dynamic_analysis, overturning_map, rocking_spectrum
+from rocking.cli import main
+
+RECORD = "el-centro-meloland-270"
+OTHER = "el-centro-meloland-360"
+SIZES = ["--half-width", "0.12", "--half-height", "0.55"]
+
+
+@pytest.fixture
+def run(capsys):
+    def call(*arguments):
+        code = 0
+        try:
+            main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            code = stop.code or 0
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+def test_spectrum_json_is_the_spectrum(run):
+    code, out, err = run("spectrum", RECORD, OTHER, "--alpha", "0.1,0.2", "--p", "1:4:5:log", "--json")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    motions = [rocking.records.load(name) for name in (RECORD, OTHER)]
+    dataset = rocking_spectrum(motions, alpha=[0.1, 0.2], p=np.geomspace(1.0, 4.0, 5))
+    assert result["motions"] == [RECORD, OTHER]
+    assert result["axes"] == ["alpha", "p"]
+    assert result["overturned_share"] == dataset.overturned_share.values.tolist()
+    shown = dataset.fractile_over_alpha.values
+    assert result["fractile_over_alpha"] == np.where(np.isinf(shown), None, shown).tolist()
+
+
+def test_spectrum_prints_fractiles_and_writes_what_it_says(run, tmp_path):
+    arguments = ["--alpha", "0.2", "--size", "0.5,1,2", "--restitution", "0.9", "--against", "size", "--out", tmp_path]
+    code, out, _ = run("spectrum", RECORD, *arguments)
+    assert code == 0
+    assert "restitution = 0.9" in out
+    assert {path.name for path in tmp_path.iterdir()} == {"result.json", "spectrum.nc", "spectrum.pdf", "spectrum.png"}
+    assert all(path.name in out for path in tmp_path.iterdir())
+
+
+def test_map_json_is_the_map(run):
+    arguments = ["--alpha", "0.2", "--restitution", "0.9", "--amplitudes", "0.5:8:16", "--frequencies", "2,5", "--json"]
+    code, out, err = run("map", "sine", "--cycles", "1", *arguments, "--model", "linear")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    block = rocking.Block.from_parameters(1.0, 0.2, 0.9)
+    grid = {"amplitudes": np.linspace(0.5, 8.0, 16), "frequencies": [2.0, 5.0]}
+    dataset = overturning_map("one-sine", block, model="linear", **grid)
+    assert result["mode"] == dataset.mode.values.tolist()
+    assert [row["boundary_amplitude"] for row in result["boundaries"]] == dataset.boundary_amplitude.values.tolist()
+    assert result["modes"]["0"] == "overturns without impact"
+
+
+def test_map_prints_shares_and_writes_what_it_says(run, tmp_path):
+    arguments = ["--amplitudes", "0.5:8:9", "--frequencies", "2:5:4", "--out", tmp_path]
+    code, out, _ = run("map", "ricker", "--kind", "antisymmetric", *SIZES, *arguments)
+    assert code == 0
+    for words in ("no uplift", "rocks", "lowest amplitude that overturns"):
+        assert words in out
+    assert {path.name for path in tmp_path.iterdir()} == {"map.nc", "map.pdf", "map.png", "result.json"}
+
+
+def test_ida_json_is_the_analysis(run):
+    code, out, err = run("ida", RECORD, *SIZES, "--measure", "pgv", "--levels", "0.2:1.5:12", "--json")
+    assert (code, err) == (0, "")
+    (result,) = json.loads(out)["motions"]
+    dataset = incremental_dynamic_analysis(
+        rocking.Block(0.12, 0.55), rocking.records.load(RECORD), measure="pgv", levels=np.linspace(0.2, 1.5, 12)
+    )
+    assert result["overturning_level"] == float(dataset.overturning_level[0, 0])
+    assert [band["from"] for band in result["overturns"]] == dataset.band_start.values.tolist()
+    assert result["overturns"][-1]["to"] is None
+
+
+def test_ida_prints_bands_and_writes_what_it_says(run, tmp_path):
+    code, out, _ = run("ida", RECORD, *SIZES, "--out", tmp_path)
+    assert code == 0
+    assert "and more" in out
+    assert {path.name for path in tmp_path.iterdir()} == {"ida.nc", "ida.pdf", "ida.png", "result.json"}
+    code, out, _ = run("ida", RECORD, *SIZES, "--levels", "0.1,0.2")
+    assert "never" in out
+    code, out, _ = run("ida", RECORD, *SIZES, "--levels", "20,21")
+    assert "at every level" in out
+
+
+STRIPES = ["--measure", "pgv", "--levels", "0.4:1.2:9", "--polarity", "both"]
+
+
+def test_fragility_json_is_the_fit(run):
+    code, out, err = run(
+        "fragility", RECORD, OTHER, "ridgecrest-clc-090", *SIZES, *STRIPES, "--bootstrap", "50", "--json"
+    )
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    motions = [rocking.records.load(name) for name in (RECORD, OTHER, "ridgecrest-clc-090")]
+    options = {"measure": "pgv", "levels": np.linspace(0.4, 1.2, 9), "polarity": "both"}
+    fitted = fragility(rocking.Block(0.12, 0.55), motions, band="bootstrap", samples=50, **options)
+    assert result["curves"][0]["median"] == fitted.curves[0].median
+    assert result["curves"][0]["median_interval"] == list(fitted.curves[0].median_interval)
+    assert result["measure"] == {"name": "pgv", "units": "m/s"}
+
+
+def test_fragility_prints_a_table_and_writes_what_it_says(run, tmp_path):
+    arguments = ["--limits", "half=0.5,overturning", "--taxonomy", "statue", "--out", tmp_path]
+    code, out, _ = run("fragility", RECORD, OTHER, "ridgecrest-clc-090", *SIZES, *STRIPES, *arguments)
+    assert code == 0
+    assert "overturning" in out
+    assert "half" in out
+    names = {"fragility-continuous.xml", "fragility-discrete.xml", "fragility.csv", "fragility.pdf", "fragility.png"}
+    assert {path.name for path in tmp_path.iterdir()} == names | {"result.json"}
+    assert 'id="statue"' in (tmp_path / "fragility-continuous.xml").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["spectrum", RECORD, "--alpha", "0.2"], "either p"),
+        (["spectrum", "--alpha", "0.2", "--p", "2"], "record"),
+        (["spectrum", RECORD, "--alpha", "high", "--p", "2"], "--alpha"),
+        (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2"], "--p"),
+        (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2:3:4"], "--p"),
+        (["spectrum", RECORD, "--alpha", "0.2", "--p", "0:2:3:log"], "positive"),
+        (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2:1"], "COUNT"),
+        (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2:9999999"], "COUNT"),
+        (["spectrum", RECORD, "--alpha", "0.2", "--p", "nan"], "finite"),
+        (["spectrum", "nowhere.AT2", "--alpha", "0.2", "--p", "2"], "nowhere.AT2"),
+        (["spectrum", RECORD, "--p", "2"], "alpha"),
+        (["spectrum", RECORD, "--alpha", "0.2", "--p", "2", "--chattering", "hope"], "hope"),
+        (["map", "square", "--alpha", "0.2"], "square"),
+        (["map", "sine", "--alpha", "0.2"], "cycles"),
+        (["map", "half-sine"], "--alpha"),
+        (["map", "half-sine", "--alpha", "0.2", "--amplitudes", "2,1"], "increase"),
+        (["map", "half-sine", "--alpha", "0.2", "--restitution", "1"], "restitution"),
+        (["map", "half-sine", "--alpha", "0.2", "--tolerance", "2"], "tolerance"),
+        (["ida", RECORD, "--p", "2"], "--alpha"),
+        (["ida", RECORD, *SIZES, "--measure", "pgd"], "pgd"),
+        (["ida", RECORD, *SIZES, "--measure", "sa"], "period"),
+        (["ida", RECORD, *SIZES, "--levels", "2,1"], "increase"),
+        (["ida", *SIZES], "record"),
+        (["fragility", RECORD, *SIZES], "overturning"),
+        (["fragility", RECORD, *SIZES, "--limits", "half"], "--limits"),
+        (["fragility", RECORD, *SIZES, "--limits", "half=much"], "--limits half"),
+        (["fragility", RECORD, *SIZES, "--bootstrap", "-4"], "samples"),
+        (["fragility", RECORD, *SIZES, "--confidence", "90"], "confidence"),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_2(run, arguments, word):
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert word.lower() in err.lower()
+
+
+@pytest.mark.parametrize("command", ["spectrum", "map", "ida", "fragility"])
+def test_a_folder_that_cannot_be_written_to_is_refused_before_work(run, tmp_path, command):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    what = "half-sine" if command == "map" else RECORD
+    block = ["--alpha", "0.2", "--p", "2"] if command == "spectrum" else SIZES
+    code, out, err = run(command, what, *block, "--out", blocked / "results")
+    assert (code, out) == (2, "")
+    assert "--out" in err
+
+
+def test_the_help_of_every_command_names_its_options(run):
+    for command, option in (
+        ("spectrum", "--alpha"),
+        ("map", "--cycles"),
+        ("ida", "--levels"),
+        ("fragility", "--limits"),
+    ):
+        code, out, _ = run(command, "--help")
+        assert code == 0
+        assert option in out

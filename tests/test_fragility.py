@@ -1,0 +1,334 @@
+"""Fragility: maximum likelihood against an independent one, intervals, tests of fit, limit states, what is refused."""
+
+import csv
+import math
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+from scipy.optimize import minimize
+
+import rocking
+from rocking.analysis import fit_fragility, fragility
+from rocking.block import Blocks
+
+EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "fragility.py"
+BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+PULSES = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.5, 13)]
+
+
+def outcomes(seed, count, median=3.0, dispersion=0.4):
+    """Random intensities, and whether each exceeded."""
+    rng = np.random.default_rng(seed)
+    intensity = rng.lognormal(math.log(median), 0.6, count)
+    chance = stats.norm.cdf(np.log(intensity / median) / dispersion)
+    return intensity, rng.random(count) < chance
+
+
+def log_likelihood(parameters, intensity, exceeded, trials):
+    z = (np.log(intensity) - parameters[0]) / math.exp(parameters[1])
+    return np.sum(exceeded * stats.norm.logcdf(z) + (trials - exceeded) * stats.norm.logsf(z))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_fit_has_the_largest_likelihood(seed):
+    intensity, exceeded = outcomes(seed, 80)
+    curve = fit_fragility(intensity, exceeded).curves[0]
+    here = [math.log(curve.median), math.log(curve.dispersion)]
+    assert curve.likelihood.logarithm == pytest.approx(log_likelihood(here, intensity, exceeded, 1), rel=1e-12)
+    options = {"xatol": 1e-10, "fatol": 1e-12, "maxiter": 4000}
+    found = minimize(
+        lambda x: -log_likelihood(x, intensity, exceeded, 1), [1.0, -1.0], method="Nelder-Mead", options=options
+    )
+    assert curve.likelihood.logarithm >= -found.fun - 1e-10
+    np.testing.assert_allclose(here, found.x, atol=1e-5)
+
+
+def test_two_stripes_are_fitted_exactly():
+    curve = fit_fragility([2.0, 5.0], [2, 7], trials=10).curves[0]
+    np.testing.assert_allclose(curve.probability([2.0, 5.0]), [0.2, 0.7], rtol=1e-12)
+    dispersion = math.log(2.5) / (stats.norm.ppf(0.7) - stats.norm.ppf(0.2))
+    assert curve.dispersion == pytest.approx(dispersion, rel=1e-12)
+    assert curve.median == pytest.approx(2.0 * math.exp(-dispersion * stats.norm.ppf(0.2)), rel=1e-12)
+
+
+def test_counts_and_single_outcomes_are_the_same_data():
+    counted = fit_fragility([2.0, 3.0, 4.0], [1, 2, 4], trials=5).curves[0]
+    outcome = (np.arange(5) < np.array([[1], [2], [4]])).ravel()
+    single = fit_fragility(np.repeat([2.0, 3.0, 4.0], 5), outcome).curves[0]
+    assert single.median == pytest.approx(counted.median, rel=1e-10)
+    np.testing.assert_allclose(single.covariance, counted.covariance, rtol=1e-8)
+    assert single.goodness.statistic == pytest.approx(counted.goodness.statistic, rel=1e-8)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 1000), st.floats(1e-3, 1e3))
+def test_other_units_scale_the_median_and_nothing_else(seed, factor):
+    intensity, exceeded = outcomes(seed, 40)
+    here, there = (fit_fragility(intensity * scale, exceeded).curves[0] for scale in (1.0, factor))
+    assert there.median == pytest.approx(factor * here.median, rel=1e-8)
+    assert there.dispersion == pytest.approx(here.dispersion, rel=1e-8)
+    np.testing.assert_allclose(there.median_interval, factor * np.array(here.median_interval), rtol=1e-7)
+
+
+def test_fishers_covariance_is_the_inverse_of_the_expected_curvature():
+    # Where the data are their own expectation, expected and observed information agree.
+    intensity = np.array([1.0, 2.0, 3.0, 4.0])
+    trials = np.full(4, 1_000_000)
+    exceeded = np.rint(trials * stats.norm.cdf(np.log(intensity / 2.5) / 0.5))
+    curve = fit_fragility(intensity, exceeded, trials=trials).curves[0]
+    best = np.array([curve.fitted.intercept[0], curve.fitted.slope[0]])
+
+    def negative(x):
+        z = x[0] + x[1] * np.log(intensity)
+        return -np.sum(exceeded * stats.norm.logcdf(z) + (trials - exceeded) * stats.norm.logsf(z))
+
+    h = 1e-4
+    steps = h * np.eye(2)
+    hessian = np.array(
+        [
+            [
+                negative(best + i + j) - negative(best + i - j) - negative(best - i + j) + negative(best - i - j)
+                for j in steps
+            ]
+            for i in steps
+        ]
+    ) / (4.0 * h * h)
+    np.testing.assert_allclose(np.linalg.inv(hessian), curve.covariance, rtol=1e-4)
+
+
+# Shares that a thousand data sets gave: the bootstrap, which knows only these 120 outcomes, is a little bold.
+@pytest.mark.parametrize(("band", "share", "repeats"), [("fisher", 0.885, 400), ("bootstrap", 0.86, 100)])
+def test_ninety_per_cent_intervals_hold_the_truth_nine_times_in_ten(band, share, repeats):
+    held = np.zeros(2)
+    for seed in range(repeats):
+        curve = fit_fragility(*outcomes(seed, 120), band=band, samples=200).curves[0]
+        for k, (truth, (low, high)) in enumerate(((3.0, curve.median_interval), (0.4, curve.dispersion_interval))):
+            held[k] += low <= truth <= high
+    # Three standard deviations of a binomial share.
+    assert np.all(np.abs(held / repeats - share) < 3.0 * math.sqrt(share * (1.0 - share) / repeats))
+
+
+def test_bands_hold_the_curve_and_agree_with_each_other():
+    intensity, exceeded = outcomes(3, 400)
+    at = np.linspace(0.0, 10.0, 41)
+    results = [fit_fragility(intensity, exceeded, band=band).curves[0] for band in ("fisher", "bootstrap")]
+    bands = [curve.band(at) for curve in results]
+    for curve, (low, high) in zip(results, bands, strict=True):
+        assert np.all(low <= curve.probability(at))
+        assert np.all(curve.probability(at) <= high)
+    np.testing.assert_allclose(bands[0], bands[1], atol=0.03)
+
+
+def test_the_bootstrap_is_reproducible():
+    data = outcomes(1, 60)
+    first, again, other = (
+        fit_fragility(*data, band="bootstrap", samples=100, seed=seed).curves[0] for seed in (7, 7, 8)
+    )
+    assert first.median_interval == again.median_interval
+    assert first.median_interval != other.median_interval
+
+
+def test_the_bootstrap_draws_whole_clusters():
+    # Ten copies of every outcome are no more data than one.
+    intensity, exceeded = outcomes(2, 60)
+    single = fit_fragility(intensity, exceeded, band="bootstrap").curves[0]
+    copies = np.repeat(intensity, 10), np.repeat(exceeded, 10)
+    clusters = np.repeat(np.arange(60), 10)
+    kept = fit_fragility(*copies, clusters=clusters, band="bootstrap").curves[0]
+    np.testing.assert_allclose(kept.median_interval, single.median_interval, rtol=1e-6)
+    apart = fit_fragility(*copies, band="bootstrap").curves[0]
+    assert np.diff(apart.median_interval) < 0.5 * np.diff(kept.median_interval)
+
+
+def test_resampled_outcomes_that_are_separated_count_as_steps():
+    curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 0, 1], band="bootstrap", samples=500).curves[0]
+    assert 0.5 < curve.degenerate < 1.0
+    low, high = curve.band([0.5, 2.5, 9.0])
+    assert np.all((low >= 0.0) & (high <= 1.0))
+    assert curve.dispersion_interval[0] == 0.0
+
+
+def test_the_likelihood_ratio_says_whether_the_intensity_matters():
+    intensity, exceeded = outcomes(5, 200)
+    share = exceeded.mean()
+    without = 200 * (share * math.log(share) + (1.0 - share) * math.log(1.0 - share))
+    likelihood = fit_fragility(intensity, exceeded).curves[0].likelihood
+    assert likelihood.ratio == pytest.approx(2.0 * (likelihood.logarithm - without), rel=1e-12)
+    assert likelihood.p_value == pytest.approx(stats.chi2.sf(likelihood.ratio, 1), rel=1e-9)
+    shuffled = np.random.default_rng(0).permutation(exceeded)
+    assert fit_fragility(intensity, shuffled).curves[0].likelihood.p_value > 0.01
+
+
+def test_the_test_of_fit_is_pearsons_over_stripes():
+    intensity, exceeded = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([1, 4, 11, 13, 19])
+    curve = fit_fragility(intensity, exceeded, trials=20).curves[0]
+    chance = curve.probability(intensity)
+    statistic = np.sum((exceeded - 20 * chance) ** 2 / (20 * chance * (1 - chance)))
+    assert curve.goodness.statistic == pytest.approx(statistic, rel=1e-12)
+    assert curve.goodness.freedom == 3
+    assert curve.goodness.p_value == pytest.approx(stats.chi2.sf(statistic, 3), rel=1e-9)
+
+
+def test_the_test_of_fit_accepts_lognormals_and_rejects_what_is_none():
+    accepted = [fit_fragility(*outcomes(seed, 200)).curves[0].goodness.p_value > 0.05 for seed in range(60)]
+    assert sum(accepted) > 50
+    rng = np.random.default_rng(0)
+    intensity = rng.uniform(1.0, 10.0, 400)
+    # Safe again between 4 and 7, as a rocking block may be.
+    exceeded = (intensity > 2.0) & ~((intensity > 4.0) & (intensity < 7.0))
+    assert fit_fragility(intensity, exceeded).curves[0].goodness.p_value < 1e-6
+
+
+def test_a_cloud_has_every_motion_at_its_own_intensity():
+    motions = [pulse.scaled(factor) for factor in (2.1, 2.4, 3.0, 4.0, 6.0) for pulse in PULSES]
+    result = fragility(BLOCK, motions, measure="pga", limits={"half": 0.5, "overturning": math.inf})
+    verdicts = [rocking.simulate(BLOCK, motion) for motion in motions]
+    for curve, limit in zip(result.curves, (0.5, math.inf), strict=True):
+        np.testing.assert_allclose(curve.intensity, [motion.pga for motion in motions], rtol=1e-12)
+        passed = [verdict.overturned or verdict.peak_over_slenderness > limit for verdict in verdicts]
+        np.testing.assert_array_equal(curve.exceeded, passed)
+    assert result.curve("half").median < result.curve("overturning").median
+
+
+def test_stripes_scale_every_motion_to_every_level():
+    levels = np.array([2.5, 3.5, 5.0])
+    sided = rocking.Block.from_parameters((2.0, 2.5), (0.25, 0.15), (0.9, 0.85))
+    # A symmetric block under a motion and its mirror image does the same, which is one outcome.
+    for block, signs in ((BLOCK, (1.0,)), (sided, (1.0, -1.0))):
+        curve = fragility(block, PULSES, levels=levels, polarity="both").curves[0]
+        assert curve.trials.sum() == 3 * 13 * len(signs)
+        for level in levels:
+            scaled = [pulse.scaled(pga=level).scaled(sign) for pulse in PULSES for sign in signs]
+            fell = [rocking.simulate(block, motion).overturned for motion in scaled]
+            assert curve.exceeded[curve.intensity == level].sum() == sum(fell)
+
+
+def test_a_blocks_own_measures_are_multiples_of_those_of_the_motion():
+    lifting = BLOCK.minimum_acceleration
+    levels = np.array([1.5, 2.0, 3.0, 4.0])
+    own = fragility(BLOCK, PULSES, measure="pga_ratio", levels=levels).curves[0]
+    plain = fragility(BLOCK, PULSES, measure="pga", levels=levels * lifting).curves[0]
+    assert own.median * lifting == pytest.approx(plain.median, rel=1e-9)
+    own = fragility(BLOCK, PULSES, measure="pgv_ratio", levels=levels).curves[0]
+    plain = fragility(BLOCK, PULSES, measure="pgv", levels=levels * lifting / BLOCK.p).curves[0]
+    assert own.median * lifting / BLOCK.p == pytest.approx(plain.median, rel=1e-9)
+
+
+def test_similar_blocks_pool_in_their_own_units():
+    # Two blocks of the same shape, each under the pulses of the same frequencies relative to its p.
+    blocks = [BLOCK, rocking.Block.from_parameters(p=4.0, alpha=0.2, restitution=0.9)]
+    fast = [rocking.pulses.one_sine(1.0, 2.0 * frequency) for frequency in np.linspace(0.3, 1.5, 13)]
+    levels = np.linspace(1.1, 4.0, 9)
+    alone = [
+        fragility(block, motions, measure="pga_ratio", levels=levels).curves[0]
+        for block, motions in zip(blocks, (PULSES, fast), strict=True)
+    ]
+    assert alone[0].median == pytest.approx(alone[1].median, rel=1e-9)
+    pooled = fragility(Blocks.of(blocks), PULSES, measure="pga_ratio", levels=levels).curves[0]
+    assert pooled.trials.sum() == 2 * 13 * 9
+
+
+def test_two_sided_blocks_count_in_the_units_of_the_side_that_lifts_first():
+    sided = rocking.Block.from_parameters((2.0, 2.5), (0.25, 0.15), (0.9, 0.85))
+    result = fragility(sided, PULSES, measure="pgv_ratio", levels=np.linspace(0.5, 6.0, 12))
+    unit = sided.uplift_thresholds()[1] / 2.0
+    plain = fragility(sided, PULSES, measure="pgv", levels=unit * np.linspace(0.5, 6.0, 12))
+    assert result.curves[0].median * unit == pytest.approx(plain.curves[0].median, rel=1e-9)
+
+
+def test_the_table_has_the_curve_and_its_band(tmp_path):
+    result = fragility(BLOCK, PULSES, levels=[2.5, 3.5, 5.0])
+    result.to_csv(tmp_path / "curve.csv")
+    with (tmp_path / "curve.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["limit_state", "pga_m_per_s2", "probability", "lower", "upper"]
+    at = np.array([float(row["pga_m_per_s2"]) for row in rows])
+    np.testing.assert_allclose([float(row["probability"]) for row in rows], result.curves[0].probability(at), atol=1e-9)
+    with pytest.raises(rocking.OutputError, match="cannot be written"):
+        result.to_csv(tmp_path / "nowhere" / "curve.csv")
+
+
+def test_the_figure_shows_curves_bands_and_shares():
+    result = fragility(BLOCK, PULSES, levels=[2.5, 3.5, 5.0], limits={"half": 0.5, "overturning": math.inf})
+    axes = result.plot().axes[0]
+    labels = [line.get_label() for line in axes.lines]
+    assert sum(label.startswith(("half", "overturning")) for label in labels) == 2
+    shares = [line for line in axes.lines if line.get_marker() == "o" and line.get_xdata().size]
+    np.testing.assert_allclose(shares[0].get_xdata(), [2.5, 3.5, 5.0])
+    assert axes.get_xlabel() == "peak ground acceleration (m/s²)"
+
+
+@pytest.mark.parametrize(
+    ("intensity", "exceeded", "sentence"),
+    [
+        ([1.0, 2.0, 3.0], [0, 0, 0], "none of the 3 outcomes exceeds .* stronger motions"),
+        ([1.0, 2.0, 3.0], [1, 1, 1], "all of the 3 outcomes exceed .* weaker motions"),
+        ([1.0, 2.0, 3.0, 4.0], [0, 0, 1, 1], "separated, none exceeds the limit up to 2 and all do from 3 on"),
+        ([1.0, 2.0, 2.0, 4.0], [0, 0, 1, 1], "separated, none exceeds the limit up to 2 and all do from 2 on"),
+        ([1.0, 2.0, 3.0, 4.0], [1, 1, 0, 0], "wrong way round"),
+    ],
+)
+def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity, exceeded, sentence):
+    with pytest.raises(rocking.InvalidOption, match=f"'overturning': .*{sentence}"):
+        fit_fragility(intensity, exceeded)
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"intensity": [1.0, -2.0, 3.0]}, "intensity"),
+        ({"intensity": []}, "intensity"),
+        ({"exceeded": [0, 1]}, "exceeded"),
+        ({"exceeded": [0, 2, 1]}, "trials"),
+        ({"exceeded": [0.5, 1, 1]}, "whole"),
+        ({"trials": 0}, "trials"),
+        ({"clusters": [1, 2]}, "clusters"),
+        ({"confidence": 1.0}, "confidence"),
+        ({"band": "exact"}, "band"),
+        ({"samples": 0, "band": "bootstrap"}, "samples"),
+        ({"seed": -1}, "seed"),
+        ({"measure": "pgd"}, "measure"),
+        ({"measure": "sa"}, "period"),
+    ],
+)
+def test_data_that_cannot_be_fitted_are_refused(changes, word):
+    arguments = {"intensity": [1.0, 2.0, 3.0], "exceeded": [1, 0, 1]} | changes
+    with pytest.raises(rocking.InvalidOption, match=word):
+        fit_fragility(arguments.pop("intensity"), arguments.pop("exceeded"), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"limits": {}}, "limit state"),
+        ({"limits": {"half": -0.5}}, "'half'"),
+        ({"limits": {"half": math.nan}}, "'half'"),
+        ({"levels": [3.0, 2.0]}, "levels"),
+        ({"motions": []}, "at least one motion"),
+        ({"model": "cubic"}, "model"),
+    ],
+)
+def test_studies_that_make_no_fragility_are_refused(changes, word):
+    arguments = {"motions": PULSES, "levels": [4.0, 6.0]} | changes
+    with pytest.raises(rocking.RockingError, match=word):
+        fragility(BLOCK, arguments.pop("motions"), **arguments)
+
+
+def test_an_unknown_limit_state_names_those_there_are():
+    result = fit_fragility([1.0, 2.0, 3.0], [0, 1, 3], trials=4)
+    assert result.curve("overturning") is result.curves[0]
+    with pytest.raises(rocking.InvalidOption, match="there are overturning"):
+        result.curve("uplift")
+    with pytest.raises(rocking.InvalidOption, match="intensities"):
+        result.curves[0].probability([-1.0])
+
+
+def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert runpy.run_path(str(EXAMPLE))["main"]() == pytest.approx(0.6424, abs=1e-4)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"fragility.png", "fragility.xml", "ida.png"}
