@@ -159,7 +159,7 @@ def quiet_steps(table: np.ndarray, events: np.ndarray, calls: int) -> int:
     """Many quiet steps of the same lanes."""
     busy = 0
     for _ in range(calls):
-        busy += lanes.quiet_linear(table, events, 0.1, 0.2, 0.01, 1e-17)
+        busy += lanes.quiet_linear(table, events, 0.1, 10.0, 0.01, 1e-17)
     return busy
 
 

@@ -188,7 +188,7 @@ class Calibration:
             for part in range(folds):
                 left_out = parts == part
                 drawn = population.posterior(self._evidence, ~left_out, _ROUGH_DRAWS, rng, progress)
-                row[left_out] = self._evidence.chances(drawn).mean(axis=0)[left_out]
+                row[left_out] = self._evidence.predicted(drawn)[left_out]
         return Validation(chances, tuple(Scores.of(row, self.observed) for row in chances))
 
     def summary(self) -> str:
@@ -325,7 +325,7 @@ def calibrate(
         blocks=space.blocks(points[kept]),
         weights=times / ensemble,
         estimates=MappingProxyType(_estimates(space, final)),
-        probabilities=evidence.chances(final).mean(axis=0),
+        probabilities=evidence.predicted(final),
         observed=observed,
         model=model,
         lapse=lapse,

@@ -50,7 +50,8 @@ class FragilityCurve:
         At its maximum, and against one probability for all intensities.
     goodness : Goodness
         Pearson's test between groups of outcomes and the fit: one group for each intensity where each has five outcomes
-        or more (stripes), else up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow).
+        or more (stripes), else up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow). It takes all
+        outcomes for independent, which stripes of the same motions are not: there the p-value flatters the fit.
     """
 
     limit_state: str

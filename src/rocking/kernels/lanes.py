@@ -113,21 +113,18 @@ def run_lanes(
     moving = start_lanes(shaking, sides, rules, room, at, x, endings, h)
     pieces = shaking.coefficients.shape[0]
     piece = next_loud(shaking, lanes, 0, pieces)
-    start = shaking.coefficients[min(piece, pieces - 1), 0]
     while piece < pieces and moving > 0 and shaking.breakpoints[piece + 1] <= rules.stop:
-        end = shaking.coefficients[piece, 0] + shaking.coefficients[piece, 1] * h
+        start, slope = shaking.coefficients[piece, 0], shaking.coefficients[piece, 1]
         length = shaking.breakpoints[piece + 1] - shaking.breakpoints[piece]
         if rules.nonlinear:
-            busy = quiet_nonlinear(lanes, room.series, room.events, start, end, length, order)
+            busy = quiet_nonlinear(lanes, room.series, room.events, start, slope, length, order)
         else:
-            busy = quiet_linear(lanes, room.events, start, end, h, length - h)
+            busy = quiet_linear(lanes, room.events, start, slope, h, length - h)
         if busy > 0:
             moving -= play(shaking, sides, rules, tables, scratch, room, at, x, endings, piece, h)
-        start = end
         piece += 1
         if busy > 0 and is_idle(lanes):
             piece = next_loud(shaking, lanes, piece, pieces)
-            start = shaking.coefficients[min(piece, pieces - 1), 0]
     for lane in range(sides.shape[0]):
         if endings[lane] == GOING:
             unload(lanes, at, x, lane, piece)
@@ -270,12 +267,12 @@ def next_loud(shaking: Shaking, lanes: Floats, piece: int, pieces: int) -> int:
 
 
 @routine
-def quiet_linear(lanes: Floats, events: Integers, start: float, end: float, h: float, late: float) -> int:
+def quiet_linear(lanes: Floats, events: Integers, start: float, slope: float, h: float, late: float) -> int:
     """Step all lanes through one sample of the linear model, but mark, count and leave those with an event.
 
     Samples whose times are rounded are not all of one length: ``late`` is what this one has more than ``h``.
     """
-    slope = (end - start) / h
+    end = start + slope * h
     above, below = max(start, end), min(start, end)
     busy = 0
     for lane in range(WIDTH):
@@ -313,17 +310,17 @@ def series_order(sides: Floats, h: float) -> int:
     term = 1.0
     for k in range(1, ORDER):
         term *= x / k
-        if term < 2.0**-51:
-            return max(4, k)
+        if term < 2.0**-53:
+            return max(4, k + 1)  # the velocity, the sine and the cosine are an order behind
     return ORDER
 
 
 @routine
 def quiet_nonlinear(
-    lanes: Floats, series: Floats, events: Integers, start: float, end: float, h: float, order: int
+    lanes: Floats, series: Floats, events: Integers, start: float, slope: float, h: float, order: int
 ) -> int:
     """Step all lanes through one sample of the nonlinear model, but mark, count and leave those with an event."""
-    slope = (end - start) / h
+    end = start + slope * h
     rotation, sine, cosine = series[0], series[1], series[2]
     signs, stiffness = lanes[SIGN : SIGN + WIDTH], lanes[LAMBDA : LAMBDA + WIDTH]
     copy(rotation[0], lanes[U0 : U0 + WIDTH])

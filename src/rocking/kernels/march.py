@@ -83,7 +83,7 @@ from rocking.kernels.status import (
 _ULP = 2.0**-52
 
 #: A proof that failed, or whose bracket is too wide, is tried again once the speed has fallen by this factor.
-_SLOWER = 0.8
+_SLOWER = 0.6
 
 # Further outcomes of an arc, besides STEP, IMPACT and OVERTURN.
 _STOPPED = 3

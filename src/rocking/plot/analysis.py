@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -215,12 +216,13 @@ def _meeting(columns: Sequence[FloatArray], regions: Sequence[Sequence[int]], he
 
 
 def _shared(left: Sequence[int], right: Sequence[int]) -> list[tuple[int, int]]:
-    """Match boundaries, by their numbers from 1 on: those between the regions that both abscissae begin or end with."""
-    shortest = min(len(left), len(right))
-    begin = next((k for k in range(shortest) if left[k] != right[k]), shortest)
-    end = next((k for k in range(shortest - begin) if left[-1 - k] != right[-1 - k]), shortest - begin)
-    first = [(k, k) for k in range(1, begin)]
-    return first + [(len(left) - k, len(right) - k) for k in range(1, end)]
+    """Match boundaries, by their numbers from 1 on: from the lowest and from the highest as long as they are alike."""
+    one, other = ([*pairwise(regions)] for regions in (left, right))
+    shortest = min(len(one), len(other))
+    begin = next((k for k in range(shortest) if one[k] != other[k]), shortest)
+    end = next((k for k in range(shortest - begin) if one[-1 - k] != other[-1 - k]), shortest - begin)
+    highest = [(len(one) - k, len(other) - k) for k in range(end)]
+    return [(k, k) for k in range(1, begin + 1)] + highest
 
 
 def _region_colour(region: int) -> str:
