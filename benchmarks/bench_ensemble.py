@@ -41,9 +41,8 @@ def main() -> None:
     for model in ("linear", "nonlinear"):
         report(model, motion, acceleration, blocks, steps)
     smooth, limit = arithmetic()
-    print(
-        f"\nquiet linear step {smooth:.2f} ns per block; its {OPERATIONS} operations at the measured peak take {limit:.2f} ns"
-    )
+    print(f"\nquiet linear step: {smooth:.2f} ns per block")
+    print(f"its {OPERATIONS} operations at the measured peak: {limit:.2f} ns")
 
 
 def report(model: str, motion: rocking.Motion, acceleration: np.ndarray, blocks: rocking.Blocks, steps: int) -> None:

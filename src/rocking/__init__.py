@@ -9,6 +9,14 @@ __version__ = VERSION
 
 if TYPE_CHECKING:
     from rocking import chattering
+    from rocking.analysis import (
+        Fragility,
+        fit_fragility,
+        fragility,
+        incremental_dynamic_analysis,
+        overturning_map,
+        rocking_spectrum,
+    )
     from rocking.analysis.calibration import Calibration, calibrate
     from rocking.analysis.calibration_history import HistoryCalibration, calibrate_history
     from rocking.block import Block, Blocks
@@ -33,6 +41,7 @@ __all__ = [
     "Blocks",
     "Calibration",
     "Certified",
+    "Fragility",
     "HistoryCalibration",
     "IntervalThreshold",
     "InvalidBlock",
@@ -47,9 +56,14 @@ __all__ = [
     "calibrate",
     "calibrate_history",
     "chattering",
+    "fit_fragility",
+    "fragility",
+    "incremental_dynamic_analysis",
+    "overturning_map",
     "pulses",
     "read",
     "records",
+    "rocking_spectrum",
     "simulate",
     "simulate_many",
 ]
@@ -61,6 +75,7 @@ _HOMES = {
     "Blocks": "rocking.block",
     "Calibration": "rocking.analysis.calibration",
     "Certified": "rocking.treatment",
+    "Fragility": "rocking.analysis",
     "HistoryCalibration": "rocking.analysis.calibration_history",
     "IntervalThreshold": "rocking.treatment",
     "InvalidBlock": "rocking.errors",
@@ -75,9 +90,14 @@ _HOMES = {
     "calibrate": "rocking.analysis.calibration",
     "calibrate_history": "rocking.analysis.calibration_history",
     "chattering": "rocking.chattering",
+    "fit_fragility": "rocking.analysis",
+    "fragility": "rocking.analysis",
+    "incremental_dynamic_analysis": "rocking.analysis",
+    "overturning_map": "rocking.analysis",
     "pulses": "rocking.motion.pulses",
     "read": "rocking.motion.formats",
     "records": "rocking.motion.records",
+    "rocking_spectrum": "rocking.analysis",
     "simulate": "rocking.simulation",
     "simulate_many": "rocking.ensemble",
 }
