@@ -34,7 +34,8 @@ def assert_brackets_hold(case: Case) -> None:
         rest = multiprecision.rest_time(case.problem, *state)
         assert mpf(lower) <= rest <= mpf(upper), (state, float(rest))
         assert lower <= end <= upper
-        assert upper - lower <= 1e-10
+        # The allowance for rounding grows with the number of impacts since the first proof, up to some thousand here.
+        assert upper - lower <= 1e-9
 
 
 @quick

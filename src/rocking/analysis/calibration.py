@@ -178,7 +178,7 @@ class Calibration:
 
         See Also
         --------
-        Scores : accuracy, log loss and Brier score.
+        rocking.analysis.Scores : accuracy, log loss and Brier score.
         """
         labels = _labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(seed)
