@@ -30,7 +30,7 @@ _LAPSE: Final = 0.005
 _DRAWS: Final = 512
 _ROUGH_DRAWS: Final = 256
 
-#: After candidates that fill the space, as many are drawn from a first fit, from a second and so on, so many times, with
+#: After candidates that fill the space, as many are drawn from a first fit, from a second and so on, so often, with
 #: the scatter of the fit wider by a factor.
 _REFINEMENTS: Final = 3
 _WIDENED: Final = 1.2
@@ -188,7 +188,7 @@ class Calibration:
             for part in range(folds):
                 left_out = parts == part
                 drawn = population.posterior(self._evidence, ~left_out, _ROUGH_DRAWS, rng, progress)
-                row[left_out] = self._evidence.predicted(drawn)[left_out]
+                row[left_out] = self._evidence.chances(drawn).mean(axis=0)[left_out]
         return Validation(chances, tuple(Scores.of(row, self.observed) for row in chances))
 
     def summary(self) -> str:
@@ -325,7 +325,7 @@ def calibrate(
         blocks=space.blocks(points[kept]),
         weights=times / ensemble,
         estimates=MappingProxyType(_estimates(space, final)),
-        probabilities=evidence.predicted(final),
+        probabilities=evidence.chances(final).mean(axis=0),
         observed=observed,
         model=model,
         lapse=lapse,

@@ -70,23 +70,10 @@ class Evidence:
         parts = [self.weights(part).sum(axis=0) for part in _batches(populations)]
         return np.asarray(np.sum(parts, axis=0) / len(populations))
 
-    def predicted(self, populations: Floats) -> Floats:
-        """Probability of overturning for each motion, shape (m,), averaged over populations."""
-        return blurred(self.mean_weights(populations) @ self.candidates.overturned, self.lapse)
-
     def chances(self, populations: Floats) -> Floats:
-        """Probability of overturning for each population and motion, shape (c, m), as far as the candidates tell.
-
-        A share among k blocks that overturn or not is known to some 1/sqrt(k); so k blocks count as k + 1 of which half
-        a block overturned and half did not. Without that, the best population would be one that stands on a single
-        lucky candidate.
-        """
+        """Probability of overturning for each population and motion, shape (c, m)."""
         overturned = self.candidates.overturned
-        parts = []
-        for part in _batches(populations):
-            weights = self.weights(part).astype(np.float32)
-            effective = 1.0 / (weights**2).sum(axis=1, keepdims=True)
-            parts.append((effective * (weights @ overturned) + 0.5) / (effective + 1.0))
+        parts = [self.weights(part).astype(np.float32) @ overturned for part in _batches(populations)]
         return blurred(np.concatenate(parts).astype(np.float64), self.lapse)
 
     def log_likelihoods(self, chances: Floats, tests: Flags) -> Floats:
