@@ -122,8 +122,8 @@ def simulate_many(
     >>> result = rocking.simulate_many(blocks, motion, factor=[0.4, 1.0])
     >>> dict(result.sizes)
     {'motion': 1, 'scale': 2, 'block': 4}
-    >>> result.overturned.sel(scale=1.0).values.tolist()
-    [[False, False, True, False]]
+    >>> result.overturned.sel(scale=0.4).values.tolist()
+    [[True, False, True, False]]
     """
     many = _blocks(blocks)
     shaken = [motions] if isinstance(motions, Motion) else list(motions)
