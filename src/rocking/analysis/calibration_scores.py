@@ -41,7 +41,7 @@ class Scores:
         Examples
         --------
         >>> Scores.of([0.9, 0.2, 0.6], [True, False, False])
-        Scores(accuracy=0.6666666666666666, log_loss=0.4149316..., brier=0.1366666...)
+        Scores(accuracy=0.6666666666666666, log_loss=0.41493..., brier=0.13666...)
         """
         chances, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
         if chances.shape != seen.shape or not chances.size:
