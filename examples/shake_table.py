@@ -42,14 +42,16 @@ def main() -> None:
     intensities = np.log([(motion.pga, motion.pgv) for motion in motions])
     for specimen in ("1", "2"):
         overturned = np.array([test[f"overturned_specimen_{specimen}"] == "1" for test in tests])
-        elements = np.array([float(test[f"dem_best_specimen_{specimen}"]) for test in tests])
+        elements = np.array([test[f"dem_best_specimen_{specimen}"] == "1" for test in tests])
         print(f"\nSpecimen {specimen}")
         start, worked = time.perf_counter(), time.process_time()
         calibration = rocking.calibrate(motions, overturned, seed=0)
         print(calibration.summary())
         print(f"calibrated in {time.perf_counter() - start:.0f} s ({time.process_time() - worked:.0f} s of CPU time)")
         print(f"\n{'':<44}accuracy  log loss  Brier")
-        report("distinct elements (tuned by its authors)", Scores.of(elements, overturned))
+        report(
+            "distinct elements, tuned by their authors", Scores.of(as_sure_as_right(elements, overturned), overturned)
+        )
         report("logistic regression, fitted", Scores.of(logistic(intensities, overturned)(intensities), overturned))
         report("rocking blocks, fitted", calibration.scores)
         for name, labels in (("random folds", None), ("folds of source motions", groups)):
@@ -86,6 +88,12 @@ def logistic(covariates: Floats, observed: Flags) -> Callable[[Floats], Floats]:
     return lambda values: 1.0 / (1.0 + np.exp(-linear(values, weights)))
 
 
+def as_sure_as_right(predicted: Flags, observed: Flags) -> Floats:
+    """Give predictions of yes or no the probability that is best for them: how often they are right."""
+    right = float(np.mean(predicted == observed))
+    return np.where(predicted, right, 1.0 - right)
+
+
 def left_out(covariates: Floats, observed: Flags, groups: list[str] | None, repeats: int) -> Floats:
     """Probabilities for each test from the regression on the folds without it, shape (repeats, m)."""
     labels = np.unique(np.arange(len(observed)) if groups is None else groups, return_inverse=True)[1]
@@ -100,7 +108,7 @@ def left_out(covariates: Floats, observed: Flags, groups: list[str] | None, repe
 
 
 def report(name: str, scores: Scores) -> None:
-    """Print one line of the table; an infinite log loss is that of certainties that failed."""
+    """Print one line of the table."""
     print(f"{name:<44}{100 * scores.accuracy:>6.1f} %{scores.log_loss:>10.3f}{scores.brier:>7.3f}")
 
 

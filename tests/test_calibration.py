@@ -23,7 +23,7 @@ def bursts(count: int, seed: int) -> list[rocking.Motion]:
     frequencies = np.fft.rfftfreq(len(times), STEP)
     motions = []
     for number in range(count):
-        centre, length, peak = rng.uniform(0.5, 3.0), rng.uniform(0.5, 2.0), 9.81 * rng.uniform(0.05, 0.9)
+        centre, length, peak = rng.uniform(0.5, 3.0), rng.uniform(0.5, 2.0), 9.81 * 0.6 ** rng.uniform(1.0, 5.0)
         noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(len(times))) / (1.0 + (frequencies / centre) ** 4))
         samples = noise * np.exp(-(((times - 2.5) / length) ** 2))
         samples *= peak / np.abs(samples).max()
@@ -344,11 +344,11 @@ def test_a_release_test_gives_the_block_within_its_errors(model):
 
 
 def test_standard_errors_are_those_of_repeated_tests():
-    fits = [rocking.calibrate_history(TIMES, released(seed=seed)) for seed in range(24)]
+    fits = [rocking.calibrate_history(TIMES, released(seed=seed)) for seed in range(16)]
     for name, truth in TRUTH.items():
         scaled = [errors(found, {name: truth})[name] for found in fits]
-        # The root mean square of 24 standard normals is within 0.6 and 1.45 with 99.9 %.
-        assert 0.6 < math.sqrt(np.mean(np.square(scaled))) < 1.45, name
+        # The root mean square of 16 standard normals is within these with 99.9 %.
+        assert 0.48 < math.sqrt(np.mean(np.square(scaled))) < 1.59, name
 
 
 def test_two_sides_are_told_apart():
