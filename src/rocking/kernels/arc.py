@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from rocking.kernels.compiled import leaf, routine
+from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.state import COSINE, GROUND, ORDER, SINE, SPARE, Floats
 
 #: Terms below this fraction of the largest one no longer count.
@@ -23,7 +23,7 @@ _WEIGHT = 1.0 / ((np.arange(ORDER + 1) + 1.0) * (np.arange(ORDER + 1) + 2.0))
 _INVERSE = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
 
 
-@leaf
+@inlined
 def local_motion(coefficients: Floats, offset: float, factor: float, h: float, A: Floats) -> int:
     """Motion's polynomial about ``offset``, times ``factor``, into A; returns the degree that counts within h."""
     degree = coefficients.shape[0] - 1
@@ -36,7 +36,7 @@ def local_motion(coefficients: Floats, offset: float, factor: float, h: float, A
     return degree
 
 
-@leaf
+@inlined
 def move(c: Floats, degree: int, t: float) -> None:
     """Centre of a polynomial moved by t, in place."""
     for k in range(degree):
@@ -44,7 +44,7 @@ def move(c: Floats, degree: int, t: float) -> None:
             c[j] += t * c[j + 1]
 
 
-@leaf
+@inlined
 def linear_order(lam: float, h: float) -> int:
     """Order at which a linear arc's series has converged over h <= 1/p, for a motion of degree 0 or 1.
 
@@ -60,7 +60,7 @@ def linear_order(lam: float, h: float) -> int:
     return ORDER
 
 
-@leaf
+@inlined
 def converged(c: Floats, degree: int, h: float) -> tuple[int, float]:
     """Order at which a full series has converged over h, or else a step over which it has; returns (order, h')."""
     largest = max(abs(c[0]), abs(c[1]) * h)
@@ -76,7 +76,7 @@ def converged(c: Floats, degree: int, h: float) -> tuple[int, float]:
     return ORDER, shortened(c, h)
 
 
-@routine
+@shared
 def expand_linear(u: float, v: float, lam: float, alpha: float, A: Floats, degree: int, order: int, c: Floats) -> None:
     """Series of a linear arc into c, up to ``order``."""
     c[0] = u
@@ -88,7 +88,7 @@ def expand_linear(u: float, v: float, lam: float, alpha: float, A: Floats, degre
         c[k + 2] = lam * c[k] * _WEIGHT[k]
 
 
-@routine
+@shared
 def expand_nonlinear(
     u: float, v: float, lam: float, alpha: float, A: Floats, degree: int, h: float, c: Floats, S: Floats, C: Floats
 ) -> tuple[int, float]:
@@ -124,7 +124,7 @@ def expand_nonlinear(
     return ORDER, shortened(c, h)
 
 
-@routine
+@shared
 def shortened(c: Floats, h: float) -> float:
     """Step, not longer than h, at which the last two terms of a full series no longer count."""
     excess = np.inf
@@ -142,7 +142,7 @@ def shortened(c: Floats, h: float) -> float:
     return h
 
 
-@leaf
+@inlined
 def evaluate(c: Floats, order: int, t: float) -> tuple[float, float, float]:
     """Rotation, velocity and acceleration (u, u', u'') of a series at time t after its centre."""
     u = c[order]
@@ -155,7 +155,7 @@ def evaluate(c: Floats, order: int, t: float) -> tuple[float, float, float]:
     return u, v, 2.0 * w
 
 
-@routine
+@shared
 def vary_linear(
     du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Floats
 ) -> tuple[float, float]:
@@ -168,7 +168,7 @@ def vary_linear(
     return total, rate
 
 
-@routine
+@shared
 def vary_nonlinear(
     du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Floats
 ) -> tuple[float, float]:

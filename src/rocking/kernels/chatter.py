@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from rocking.kernels.arc import local_motion
-from rocking.kernels.compiled import leaf, routine
+from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.state import GAIN, RESTITUTION, SLENDERNESS, STIFFNESS, THRESHOLD, Floats, Shaking
 
 #: What is known of one side over a window, see `arc_bounds`.
@@ -30,7 +30,7 @@ _LONGEST_WINDOW = 256
 _ROUNDING = 2.0**-48
 
 
-@leaf
+@inlined
 def geometric_bracket(v: float, first: Bounds, second: Bounds, e_i: float, e_j: float) -> tuple[float, float]:
     """Lower and upper bound on the time to rest, for bounds that hold as long as needed; NaN, NaN: no proof.
 
@@ -50,7 +50,7 @@ def geometric_bracket(v: float, first: Bounds, second: Bounds, e_i: float, e_j: 
     return lower * (1.0 - _ROUNDING), upper * (1.0 + _ROUNDING)
 
 
-@leaf
+@inlined
 def arc_bounds(v: float, bounds: Bounds) -> tuple[float, float, float]:
     """Bounds on one arc of initial speed v: (|w^2/v^2 - 1| for its impact speed w, duration from, to); NaN: none.
 
@@ -70,7 +70,7 @@ def arc_bounds(v: float, bounds: Bounds) -> tuple[float, float, float]:
     return change, shortest, longest
 
 
-@leaf
+@inlined
 def remaining_time(
     v: float,
     g_i: float,
@@ -100,7 +100,7 @@ def remaining_time(
     return v * (A_i + v * (B_i + v * C_i))
 
 
-@routine
+@shared
 def motion_range(
     shaking: Shaking, piece: int, offset: float, window: float, A: Floats
 ) -> tuple[float, float, float, float]:
@@ -126,7 +126,7 @@ def motion_range(
     return np.nan, np.nan, np.nan, np.nan
 
 
-@leaf
+@inlined
 def piece_range(coefficients: Floats, offset: float, window: float, A: Floats) -> tuple[float, float, float, float]:
     """Bounds on one piece over [offset, offset + window]: least, greatest, steepest, and their allowance for rounding.
 
@@ -153,7 +153,7 @@ def piece_range(coefficients: Floats, offset: float, window: float, A: Floats) -
     return low - rounding, high + rounding, steepest + _ROUNDING * columns * slope, rounding
 
 
-@leaf
+@inlined
 def sizes(coefficients: Floats, t: float) -> tuple[float, float]:
     """Sizes of the terms of a polynomial and of its slope at t, added up: what their rounding is a fraction of."""
     size = slope = 0.0
@@ -163,7 +163,7 @@ def sizes(coefficients: Floats, t: float) -> tuple[float, float]:
     return size, slope
 
 
-@routine
+@shared
 def prove_rest(
     shaking: Shaking, sides: Floats, nonlinear: bool, A: Floats, v: float, i: int, piece: int, offset: float
 ) -> tuple[float, float]:
@@ -194,7 +194,7 @@ def prove_rest(
     return lower, upper
 
 
-@leaf
+@inlined
 def side_bounds(
     sides: Floats, j: int, nonlinear: bool, low: float, high: float, steepest: float, leap: float
 ) -> Bounds:
@@ -212,13 +212,13 @@ def side_bounds(
     return stiff * (1.0 + _ROUNDING), m, M, grown * (high - low), grown * steepest, grown * leap
 
 
-@leaf
+@inlined
 def restoring(sides: Floats, j: int, acceleration: float) -> float:
     """Side j's restoring acceleration at zero rotation, for a ground acceleration in units of g."""
     return sides[j, GAIN] * (sides[j, THRESHOLD] + (1.0 - 2.0 * j) * acceleration)
 
 
-@leaf
+@inlined
 def motion_at(shaking: Shaking, piece: int, offset: float) -> float:
     """Ground acceleration within a piece; zero after the last one."""
     coefficients = shaking.coefficients
@@ -230,7 +230,7 @@ def motion_at(shaking: Shaking, piece: int, offset: float) -> float:
     return value
 
 
-@leaf
+@inlined
 def motion_slope(shaking: Shaking, piece: int, offset: float) -> float:
     """Rate of the ground acceleration within a piece; zero after the last one."""
     coefficients = shaking.coefficients
@@ -242,7 +242,7 @@ def motion_slope(shaking: Shaking, piece: int, offset: float) -> float:
     return value
 
 
-@leaf
+@inlined
 def time_to_rest(
     shaking: Shaking, sides: Floats, nonlinear: bool, v: float, i: int, piece: int, offset: float
 ) -> float:
@@ -264,7 +264,7 @@ def time_to_rest(
     )
 
 
-@leaf
+@inlined
 def rest_shift(
     shaking: Shaking, sides: Floats, v: float, dv: float, shift: float, i: int, piece: int, offset: float
 ) -> float:
@@ -284,7 +284,7 @@ def rest_shift(
     return shift + (per_speed * faster + change_of_it * v) / (1.0 - e_i * e_j)
 
 
-@leaf
+@inlined
 def stiffness_at_rest(sides: Floats, j: int, nonlinear: bool, push: float) -> float:
     """Rate at which side j's restoring acceleration falls with rotation, at zero rotation; push = j a/g."""
     if not nonlinear:

@@ -19,13 +19,13 @@ def kernel(function: F) -> F:
     return compiled
 
 
-def leaf(function: F) -> F:
+def inlined(function: F) -> F:
     """Compile a small part of a kernel, always inlined."""
     compiled: F = numba.njit(error_model="numpy", _nrt=False, forceinline=True)(function)
     return compiled
 
 
-def routine(function: F) -> F:
+def shared(function: F) -> F:
     """Compile a part that kernels call from several places, where inlining would only multiply code."""
     compiled: F = numba.njit(error_model="numpy", _nrt=False)(function)
     return compiled

@@ -14,7 +14,7 @@ from rocking.kernels.arc import (
     move,
 )
 from rocking.kernels.chatter import motion_at, motion_slope, piece_range, restoring
-from rocking.kernels.compiled import leaf, routine
+from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.root import curvature_bound, first_root
 from rocking.kernels.state import (
     AT_REST,
@@ -46,7 +46,7 @@ _NEWTON_STEPS = 6
 _ROUNDING = 2.0**-48
 
 
-@leaf
+@inlined
 def step_length(sides: Floats, side: int, u: float, v: float, left: float, acceleration: float) -> float:
     """Length of the next Taylor step; ``acceleration`` is the motion's, now, in units of g."""
     h = min(left, 1.0 / math.sqrt(sides[side, STIFFNESS]))
@@ -57,7 +57,7 @@ def step_length(sides: Floats, side: int, u: float, v: float, left: float, accel
     return h
 
 
-@routine
+@shared
 def expand(
     shaking: Shaking,
     sides: Floats,
@@ -90,7 +90,7 @@ def expand(
     return order, h, degree
 
 
-@routine
+@shared
 def short_step(
     shaking: Shaking,
     sides: Floats,
@@ -133,7 +133,7 @@ def short_step(
     return status, t, end if status == STEP else 0.0, speed
 
 
-@leaf
+@inlined
 def arc_from_impact(v: float, c2: float, c3: float, lam: float, left: float) -> float:
     """Duration of the arc that an impact starts, where it ends before ``left`` and u/t falls all the way; else NaN.
 
@@ -159,7 +159,7 @@ def arc_from_impact(v: float, c2: float, c3: float, lam: float, left: float) -> 
     return t if t < left else np.nan
 
 
-@leaf
+@inlined
 def arc_to_impact(u: float, v: float, c2: float, c3: float, lam: float, left: float) -> float:
     """Time to the one root of a concave arc that is above ground now and below it at ``left``; NaN if not found."""
     t = 2.0 * u / (math.sqrt(v * v - 4.0 * c2 * u) - v)
@@ -172,7 +172,7 @@ def arc_to_impact(u: float, v: float, c2: float, c3: float, lam: float, left: fl
     return np.nan
 
 
-@leaf
+@inlined
 def short_series(u: float, v: float, c2: float, c3: float, lam: float, t: float) -> tuple[float, float]:
     """Rotation and velocity after t, for c[k + 2] = lam c[k]/((k + 1)(k + 2)) from c2, c3 on and (p t)^2 <= SHORT."""
     x = lam * t * t
@@ -184,7 +184,7 @@ def short_series(u: float, v: float, c2: float, c3: float, lam: float, t: float)
     return rotation, velocity
 
 
-@routine
+@shared
 def advance(
     u: float, v: float, order: int, h: float, c: Floats, d: Floats
 ) -> tuple[int, float, float, float, float, float]:
@@ -214,7 +214,7 @@ def advance(
     return status, time, end, speed, peak_time, peak
 
 
-@leaf
+@inlined
 def turns(v: float, order: int, h: float, c: Floats) -> bool:
     """Whether a series may be higher within (0, h) than at both ends."""
     if v > 0.0:
@@ -227,7 +227,7 @@ def turns(v: float, order: int, h: float, c: Floats) -> bool:
     return rise > 0.0
 
 
-@routine
+@shared
 def highest(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
     """Time and value of a series' maximum on (0, h], from one turning point to the next. ``d`` is scratch space."""
     best_time = h
@@ -256,7 +256,7 @@ def highest(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
     return best_time, best
 
 
-@leaf
+@inlined
 def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> float:
     """First time in (0, h] at which a series that starts below ``level``, and is not below it at h, reaches it.
 
@@ -269,7 +269,7 @@ def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> f
     return time if time == time else h
 
 
-@routine
+@shared
 def next_uplift(
     shaking: Shaking, piece: int, offset: float, sides: Floats, stop: float, A: Floats, d: Floats
 ) -> tuple[int, float, int, bool]:
@@ -298,7 +298,7 @@ def next_uplift(
     return piece, offset, AT_REST, False
 
 
-@routine
+@shared
 def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float, d: Floats) -> tuple[float, bool]:
     """First time in [0, h) from which sign * A(t) > threshold, and whether it is so by a jump; inf when never.
 
@@ -318,7 +318,7 @@ def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float
     return first_passing(d, degree, h), False
 
 
-@routine
+@shared
 def first_passing(d: Floats, degree: int, h: float) -> float:
     """First time in [0, h) from which a polynomial, not negative before, is negative beyond rounding; inf when never.
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.kernels.chatter import piece_range
-from rocking.kernels.compiled import kernel, leaf, routine
+from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.impact import QUARTER_TURN
 from rocking.kernels.march import march
 from rocking.kernels.state import (
@@ -131,7 +131,7 @@ def run_lanes(
             endings[lane] = march(shaking, sides[lane], rules, tables, scratch, at[lane], x[lane], pieces + 1)
 
 
-@routine
+@shared
 def start_lanes(
     shaking: Shaking,
     sides: Floats,
@@ -157,7 +157,7 @@ def start_lanes(
     return sides.shape[0]
 
 
-@routine
+@shared
 def play(
     shaking: Shaking,
     sides: Floats,
@@ -185,7 +185,7 @@ def play(
     return ended
 
 
-@routine
+@shared
 def unload(lanes: Floats, at: Integers, x: Floats, lane: int, piece: int) -> None:
     """Hand a lane's state before the step to the verbs of `march`."""
     if at[lane, SIDE] == AT_REST:
@@ -196,7 +196,7 @@ def unload(lanes: Floats, at: Integers, x: Floats, lane: int, piece: int) -> Non
     x[lane, U], x[lane, V] = lanes[U0 + lane], lanes[V0 + lane]
 
 
-@routine
+@shared
 def load(
     shaking: Shaking,
     sides: Floats,
@@ -230,7 +230,7 @@ def load(
     lanes[CURVE + lane] = stiffness * h * h / 8.0
 
 
-@leaf
+@inlined
 def freeze(lanes: Floats, lane: int, limit: float) -> None:
     """Constants with which a lane stays where it is: at rest, or (infinite limit) ended."""
     for row in range(COSH, CURVE + WIDTH, WIDTH):
@@ -241,7 +241,7 @@ def freeze(lanes: Floats, lane: int, limit: float) -> None:
     lanes[ABOVE + lane], lanes[BELOW + lane] = limit, -limit
 
 
-@leaf
+@inlined
 def is_idle(lanes: Floats) -> bool:
     """Whether no lane rocks: all are at rest or have ended."""
     rocking = 0.0
@@ -250,7 +250,7 @@ def is_idle(lanes: Floats) -> bool:
     return rocking == 0.0
 
 
-@routine
+@shared
 def next_loud(shaking: Shaking, lanes: Floats, piece: int, pieces: int) -> int:
     """First piece from this one on in which the motion passes the threshold of a lane at rest."""
     above, below = np.inf, -np.inf
@@ -266,7 +266,7 @@ def next_loud(shaking: Shaking, lanes: Floats, piece: int, pieces: int) -> int:
     return piece
 
 
-@routine
+@shared
 def quiet_linear(lanes: Floats, events: Integers, start: float, slope: float, h: float, late: float) -> int:
     """Step all lanes through one sample of the linear model, but mark, count and leave those with an event.
 
@@ -299,7 +299,7 @@ def quiet_linear(lanes: Floats, events: Integers, start: float, slope: float, h:
     return busy
 
 
-@routine
+@shared
 def series_order(sides: Floats, h: float) -> int:
     """Order of the nonlinear lanes' series: enough for the fastest block to double precision."""
     fastest = 0.0
@@ -315,7 +315,7 @@ def series_order(sides: Floats, h: float) -> int:
     return ORDER
 
 
-@routine
+@shared
 def quiet_nonlinear(
     lanes: Floats, series: Floats, events: Integers, start: float, slope: float, h: float, order: int
 ) -> int:
@@ -347,21 +347,21 @@ def quiet_nonlinear(
     return mark_nonlinear(lanes, rotation[2], spread, events, max(start, end), min(start, end))
 
 
-@leaf
+@inlined
 def copy(to: Floats, values: Floats) -> None:
     """Copy a row."""
     for lane in range(WIDTH):
         to[lane] = values[lane]
 
 
-@leaf
+@inlined
 def clear(to: Floats) -> None:
     """Set a row to zero."""
     for lane in range(WIDTH):
         to[lane] = 0.0
 
 
-@leaf
+@inlined
 def accelerate(
     to: Floats,
     sine: Floats,
@@ -379,7 +379,7 @@ def accelerate(
         to[lane] = -weight * stiffness[lane] * (sine[lane] + signs[lane] * push)
 
 
-@leaf
+@inlined
 def turn(to_sine: Floats, to_cosine: Floats, rotation: Floats, sine: Floats, cosine: Floats, weight: float) -> None:
     """One term of the recurrence of sin and cos(alpha - u)."""
     for lane in range(WIDTH):
@@ -388,7 +388,7 @@ def turn(to_sine: Floats, to_cosine: Floats, rotation: Floats, sine: Floats, cos
         to_cosine[lane] += rate * sine[lane]
 
 
-@leaf
+@inlined
 def sum_series(to: Floats, table: Floats, order: int, h: float, weighted: bool) -> None:
     """Value of every lane's series at h, or (weighted) of its derivative."""
     clear(to)
@@ -399,14 +399,14 @@ def sum_series(to: Floats, table: Floats, order: int, h: float, weighted: bool) 
             to[lane] = to[lane] * h + factor * term[lane]
 
 
-@leaf
+@inlined
 def add_size(to: Floats, values: Floats, factor: float) -> None:
     """Add the sizes of a row, times a factor."""
     for lane in range(WIDTH):
         to[lane] += factor * abs(values[lane])
 
 
-@leaf
+@inlined
 def mark_nonlinear(
     lanes: Floats, half_curvature: Floats, spread: Floats, events: Integers, above: float, below: float
 ) -> int:

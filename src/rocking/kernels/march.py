@@ -6,7 +6,7 @@ import numpy as np
 
 from rocking.kernels.arc import vary_linear, vary_nonlinear
 from rocking.kernels.chatter import motion_at, motion_slope, prove_rest, rest_shift, restoring, time_to_rest
-from rocking.kernels.compiled import kernel, leaf, routine
+from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.impact import (
     QUARTER_TURN,
     SHORT,
@@ -126,7 +126,7 @@ def march(
     return FULL
 
 
-@leaf
+@inlined
 def has_room(rules: Rules, tables: Floats, at: Integers) -> bool:
     """Whether every table has room for what one turn of the march can write."""
     rows = tables.shape[1]
@@ -134,19 +134,19 @@ def has_room(rules: Rules, tables: Floats, at: Integers) -> bool:
     return bool(not rules.record or most + 3 <= rows)
 
 
-@leaf
+@inlined
 def now(shaking: Shaking, at: Integers, x: Floats) -> float:
     """Time of the state."""
     return shaking.breakpoints[at[PIECE]] + x[OFFSET]
 
 
-@leaf
+@inlined
 def sign_of(side: int) -> float:
     """Sign of the rotation on a side: +1, -1, and 0 at rest."""
     return 0.0 if side == AT_REST else 1.0 - 2.0 * side
 
 
-@routine
+@shared
 def wait_for_uplift(
     shaking: Shaking,
     sides: Floats,
@@ -182,7 +182,7 @@ def wait_for_uplift(
     return True
 
 
-@routine
+@shared
 def follow_arc(
     shaking: Shaking, sides: Floats, rules: Rules, tables: Floats, scratch: Floats, at: Integers, x: Floats
 ) -> int:
@@ -215,7 +215,7 @@ def follow_arc(
     return arrive(shaking, rules, tables, outcome, t, u, v, left, last, at, x)
 
 
-@routine
+@shared
 def hurry(shaking: Shaking, sides: Floats, left: float, at: Integers, x: Floats) -> float:
     """Impacts of a proven sequence of the linear model within a piece, up to the one that is worth another proof.
 
@@ -248,7 +248,7 @@ def hurry(shaking: Shaking, sides: Floats, left: float, at: Integers, x: Floats)
     return left
 
 
-@leaf
+@inlined
 def arrive(
     shaking: Shaking,
     rules: Rules,
@@ -279,7 +279,7 @@ def arrive(
     return outcome
 
 
-@routine
+@shared
 def strike(shaking: Shaking, sides: Floats, rules: Rules, tables: Floats, at: Integers, x: Floats) -> None:
     """Impact: the angular speed drops, the side changes, and the variation jumps with them (saltation).
 
@@ -305,7 +305,7 @@ def strike(shaking: Shaking, sides: Floats, rules: Rules, tables: Floats, at: In
     at[IMPACTS] += 1
 
 
-@routine
+@shared
 def judge(
     shaking: Shaking, sides: Floats, rules: Rules, scratch: Floats, at: Integers, x: Floats
 ) -> tuple[bool, float, float, float]:
@@ -333,7 +333,7 @@ def judge(
     return False, lower, upper, 0.0
 
 
-@leaf
+@inlined
 def bracket(
     shaking: Shaking, sides: Floats, rules: Rules, scratch: Floats, at: Integers, x: Floats
 ) -> tuple[float, float]:
@@ -352,7 +352,7 @@ def bracket(
     return lower, upper
 
 
-@leaf
+@inlined
 def worth_proving(at: Integers, x: Floats) -> bool:
     """Whether the block has become so much slower since the last proof was tried that another may bring more."""
     if at[RUN] > 0:
@@ -364,13 +364,13 @@ def worth_proving(at: Integers, x: Floats) -> bool:
     return False
 
 
-@leaf
+@inlined
 def allowance(time: float, upper: float, at: Integers, x: Floats) -> float:
     """Room for the rounding of the times, and of the arcs resolved since the first proof."""
     return float(4.0 * _ULP * time + 8.0 * _ULP * (at[RUN] + 4) * (time + upper - x[RUN_START]))
 
 
-@leaf
+@inlined
 def stalled(shaking: Shaking, sides: Floats, interval: float, at: Integers, x: Floats) -> bool:
     """Whether time hardly advanced since the last impact, and will not until the next."""
     fastest = max(sides[0, STIFFNESS], sides[1, STIFFNESS])
@@ -379,7 +379,7 @@ def stalled(shaking: Shaking, sides: Floats, interval: float, at: Integers, x: F
     return bool(interval <= least and 2.0 * x[V] <= least * pressed)
 
 
-@leaf
+@inlined
 def imposed(rules: Rules, limit: float, v: float, interval: float, since_uplift: float) -> bool:
     """Whether a treatment other than the certificate brings the block to rest at this impact."""
     if rules.treatment == VELOCITY:
@@ -389,7 +389,7 @@ def imposed(rules: Rules, limit: float, v: float, interval: float, since_uplift:
     return rules.treatment == TIME and since_uplift >= limit
 
 
-@routine
+@shared
 def come_to_rest(
     shaking: Shaking,
     sides: Floats,
@@ -427,7 +427,7 @@ def come_to_rest(
     return True
 
 
-@leaf
+@inlined
 def shift_of_rest(
     shaking: Shaking, sides: Floats, rules: Rules, tables: Floats, to_rest: float, at: Integers, x: Floats
 ) -> float:
@@ -440,7 +440,7 @@ def shift_of_rest(
     return rest_shift(shaking, sides, x[V], x[DV], shift, at[SIDE], at[PIECE], x[OFFSET])
 
 
-@leaf
+@inlined
 def vary(
     sides: Floats, rules: Rules, scratch: Floats, du: float, dv: float, side: int, order: int, degree: int, t: float
 ) -> tuple[float, float]:
@@ -453,7 +453,7 @@ def vary(
     return vary_linear(du, dv, stiffness, degree, order, t, scratch)
 
 
-@leaf
+@inlined
 def time_left(shaking: Shaking, piece: int, offset: float, stop: float) -> tuple[float, bool]:
     """Time to the end of the piece, or to ``stop`` where that comes first, and whether it does."""
     until_stop = stop - shaking.breakpoints[piece] - offset
@@ -463,7 +463,7 @@ def time_left(shaking: Shaking, piece: int, offset: float, stop: float) -> tuple
     return min(left, until_stop), until_stop <= left
 
 
-@leaf
+@inlined
 def pass_time(t: float, x: Floats) -> None:
     """Move on by t, and never by nothing, so that every march ends."""
     start = x[OFFSET]
@@ -472,7 +472,7 @@ def pass_time(t: float, x: Floats) -> None:
         x[OFFSET] += _ULP * start
 
 
-@leaf
+@inlined
 def enter_piece(shaking: Shaking, over: bool, at: Integers, x: Floats) -> None:
     """After a step: the start of the next piece if this one is over, by the step's length or by rounding."""
     if over:
@@ -482,7 +482,7 @@ def enter_piece(shaking: Shaking, over: bool, at: Integers, x: Floats) -> None:
         settle(shaking, at, x)
 
 
-@leaf
+@inlined
 def settle(shaking: Shaking, at: Integers, x: Floats) -> None:
     """Bring the offset inside its own piece."""
     while at[PIECE] < shaking.coefficients.shape[0]:
@@ -493,7 +493,7 @@ def settle(shaking: Shaking, at: Integers, x: Floats) -> None:
         at[PIECE] += 1
 
 
-@leaf
+@inlined
 def write_node(rules: Rules, tables: Floats, time: float, at: Integers, x: Floats) -> None:
     """Write down the state."""
     if not rules.record:
@@ -504,7 +504,7 @@ def write_node(rules: Rules, tables: Floats, time: float, at: Integers, x: Float
     at[NODES] += 1
 
 
-@leaf
+@inlined
 def write_event(rules: Rules, tables: Floats, time: float, kind: int, shift: float, at: Integers) -> None:
     """Write down an uplift, a rest or an overturning."""
     if not rules.record:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.kernels.compiled import kernel, leaf, routine
+from rocking.kernels.compiled import inlined, kernel, shared
 
 #: Length of the work array beyond the columns of the motion: 0.25**16 / 16! = 1e-23.
 TERMS = 18
@@ -32,7 +32,7 @@ def peak_displacements(
         peaks[i] = _peak(breakpoints, coefficients, frequencies[i], damping, work[:columns], work[columns:])
 
 
-@routine
+@shared
 def _peak(
     breakpoints: NDArray[np.float64],
     coefficients: NDArray[np.float64],
@@ -58,7 +58,7 @@ def _peak(
     return peak
 
 
-@routine
+@shared
 def _advance(
     series: NDArray[np.float64], force: NDArray[np.float64], h: float, frequency: float, damping: float
 ) -> float:
@@ -77,7 +77,7 @@ def _advance(
     return peak
 
 
-@routine
+@shared
 def _extremum(series: NDArray[np.float64], h: float) -> float:
     """Root of the velocity between 0 and h, where it has opposite signs, by bisection.
 
@@ -93,7 +93,7 @@ def _extremum(series: NDArray[np.float64], h: float) -> float:
     return 0.5 * (low + high)
 
 
-@leaf
+@inlined
 def _value(series: NDArray[np.float64], x: float) -> float:
     result = 0.0
     for k in range(len(series) - 1, -1, -1):
@@ -101,7 +101,7 @@ def _value(series: NDArray[np.float64], x: float) -> float:
     return result
 
 
-@leaf
+@inlined
 def _slope(series: NDArray[np.float64], x: float) -> float:
     result = 0.0
     for k in range(len(series) - 1, 0, -1):
@@ -109,7 +109,7 @@ def _slope(series: NDArray[np.float64], x: float) -> float:
     return result
 
 
-@routine
+@shared
 def _move(force: NDArray[np.float64], shift: float) -> None:
     """Re-expand a polynomial about `shift`, in place (repeated synthetic division)."""
     last = len(force) - 1

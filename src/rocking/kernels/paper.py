@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.kernels.compiled import kernel, leaf
+from rocking.kernels.compiled import inlined, kernel
 
 _ROOT2: Final = math.sqrt(2.0)
 
@@ -60,13 +60,13 @@ def eq65_terms(eta: float, terms: NDArray[np.float64]) -> int:
     return terms.shape[0]
 
 
-@leaf
+@inlined
 def vanishes(z: float, y: float, eta: float) -> bool:
     """Whether all terms after z, nearly a geometric series, are nothing beside their sum y."""
     return z <= _VANISHED * (1.0 - eta * eta) * y
 
 
-@leaf
+@inlined
 def eq65_pair(y: float, v: float, eta: float) -> tuple[float, float, float]:
     """Take steps 2 and 3 of the iterative procedure: omega T_{n;1}, omega T_{n+1;3} and v of the next pair.
 
@@ -81,7 +81,7 @@ def eq65_pair(y: float, v: float, eta: float) -> tuple[float, float, float]:
     return z, odd, eta * odd
 
 
-@leaf
+@inlined
 def positive_root(c2: float, c1: float, v: float) -> float:
     """Root of z^3/24 + c2 z^2 + c1 z - v, all positive: Newton's steps from above, where the cubic is convex."""
     z = min(v / c1, math.sqrt(v / c2))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from rocking.kernels.compiled import leaf, routine
+from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.state import Floats
 
 _EPSILON = 2.0**-53
@@ -18,7 +18,7 @@ _WINDOW = 4.0
 _MAXIMUM_STEPS = 100_000
 
 
-@routine
+@shared
 def first_root(c: Floats, lead: int, order: int, h: float) -> float:
     """First root in (0, h] of sum_k c[lead + k] t^k; NaN when there is none.
 
@@ -61,7 +61,7 @@ def first_root(c: Floats, lead: int, order: int, h: float) -> float:
     return t
 
 
-@leaf
+@inlined
 def curvature_bound(c: Floats, lead: int, order: int, h: float) -> float:
     """Bound B >= 0 with f'' >= -B on [0, h] for the deflated series f: terms that help are left out."""
     lowest = 0.0
@@ -74,7 +74,7 @@ def curvature_bound(c: Floats, lead: int, order: int, h: float) -> float:
     return max(0.0, -lowest)
 
 
-@leaf
+@inlined
 def deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float, float]:
     """Value and slope of sum_k c[lead + k] t^k."""
     f = c[order]

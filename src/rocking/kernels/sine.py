@@ -23,7 +23,7 @@ import math
 from typing import Final
 
 from rocking.kernels.chatter import geometric_bracket
-from rocking.kernels.compiled import kernel, leaf, routine
+from rocking.kernels.compiled import inlined, kernel, shared
 
 #: No first arc ends before x = pi beyond this a - 1: even without growth, U(pi) = pi kappa - pi^2/2 + 2.
 LARGEST_EXCESS: Final = math.hypot(1.0, math.pi / 2 - 2 / math.pi) - 1.0
@@ -65,7 +65,7 @@ _MAXIMUM_HALVINGS: Final = 200
 _INVERSE_FACTORIAL: Final = tuple(1.0 / math.factorial(k) for k in range(2 * LONGEST + 5))
 
 
-@leaf
+@inlined
 def basis(q: float, delta: float, order: int) -> tuple[float, float, float, float]:
     """Return sin(t)/t, (1 - cos t)/t^2, E and W at q = t^2.
 
@@ -91,7 +91,7 @@ def basis(q: float, delta: float, order: int) -> tuple[float, float, float, floa
     return sine, versine, E, W
 
 
-@routine
+@shared
 def basis_anywhere(t: float, delta: float) -> tuple[float, float, float, float]:
     """Return the same at any t > 0: by the shortest sum of full precision, in closed form where there is none."""
     q = t * t
@@ -107,7 +107,7 @@ def basis_anywhere(t: float, delta: float) -> tuple[float, float, float, float]:
     return closed_basis(t, delta)
 
 
-@leaf
+@inlined
 def closed_basis(t: float, delta: float) -> tuple[float, float, float, float]:
     """Return the same from the definitions, for long arcs."""
     q = t * t
@@ -122,13 +122,13 @@ def closed_basis(t: float, delta: float) -> tuple[float, float, float, float]:
     return sine, versine, (S - sine) / ((1.0 + delta) * q), (C - versine) / ((1.0 + delta) * q)
 
 
-@leaf
+@inlined
 def pull(P: float, s: float) -> float:
     """Restoring acceleration of the first (s > 0) or second side."""
     return P if s > 0.0 else 2.0 - P
 
 
-@leaf
+@inlined
 def guess_landing(V: float, P: float, D: float, s: float, delta: float) -> float:
     """Estimate the duration of a short arc: root of the series to t^2, then one Newton step on it to t^3.
 
@@ -144,7 +144,7 @@ def guess_landing(V: float, P: float, D: float, s: float, delta: float) -> float
     return t - value / slope
 
 
-@leaf
+@inlined
 def land(
     t: float, V: float, P: float, D: float, s: float, delta: float, shape: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float, float]:
@@ -178,7 +178,7 @@ def land(
     return t + dt, impact_speed, P_impact, D_impact, abs(dt) * (1.0 + abs(t * c2))
 
 
-@routine
+@shared
 def scaled_height(t: float, V: float, P: float, D: float, s: float, delta: float) -> float:
     """Height at any time of an arc, times exp(-sqrt(delta) t): its sign, without overflow."""
     rate = math.sqrt(delta)
@@ -194,7 +194,7 @@ def scaled_height(t: float, V: float, P: float, D: float, s: float, delta: float
     return V * S - pull(P, s) * C - s * forced
 
 
-@routine
+@shared
 def arc(
     t: float, V: float, P: float, D: float, s: float, delta: float, left: float
 ) -> tuple[float, float, float, float]:
@@ -212,7 +212,7 @@ def arc(
     return bracketed_arc(V, P, D, s, delta, left)
 
 
-@routine
+@shared
 def bracketed_arc(
     V: float, P: float, D: float, s: float, delta: float, left: float
 ) -> tuple[float, float, float, float]:
@@ -234,13 +234,13 @@ def bracketed_arc(
     return math.nan, 0.0, 0.0, 0.0
 
 
-@leaf
+@inlined
 def guess_first_impact(kappa: float, delta: float) -> float:
     """Phase of the first impact to two orders in kappa (Eq. 32, mended)."""
     return 4.0 * kappa / (1.0 + (4.0 / 15.0) * (1.0 - delta) * kappa * kappa)
 
 
-@routine
+@shared
 def first_arc(excess: float, delta: float) -> tuple[float, float, float, float]:
     """Phase and speed of the first impact, P and D there, for a = 1 + excess; NaN: none before x = pi."""
     if not excess <= LARGEST_EXCESS:
@@ -249,7 +249,7 @@ def first_arc(excess: float, delta: float) -> tuple[float, float, float, float]:
     return arc(guess_first_impact(kappa, delta), 0.0, 0.0, -kappa, 1.0, delta, math.pi)
 
 
-@leaf
+@inlined
 def extrapolate(
     T: float, gone: float, Q: float, table: tuple[float, float, float, float, float, float]
 ) -> tuple[float, float, float, float, float, float]:
@@ -272,7 +272,7 @@ def extrapolate(
     return T, r1, r2, r3, r4, r5
 
 
-@leaf
+@inlined
 def agree(remaining: float, less_extrapolated: float, expected: float, x: float) -> bool:
     """Whether the remaining phase is settled: the last extrapolation changed little, and so did the last pair.
 
@@ -281,7 +281,7 @@ def agree(remaining: float, less_extrapolated: float, expected: float, x: float)
     return (abs(remaining - less_extrapolated) <= CLOSED * x) & (abs(remaining - expected) <= CLOSED * x)
 
 
-@leaf
+@inlined
 def closure(V: float, P: float, D: float, eta: float) -> float:
     """Remaining phase to second order in the speed V with which the second side is entered.
 
@@ -301,7 +301,7 @@ def closure(V: float, P: float, D: float, eta: float) -> float:
     return V * (first_up + V * second)
 
 
-@leaf
+@inlined
 def bracket(V: float, P: float, D: float, window: float, delta: float, eta: float) -> tuple[float, float]:
     """Bounds on the remaining phase on entering the second side at speed V; NaN: no proof.
 
@@ -316,7 +316,7 @@ def bracket(V: float, P: float, D: float, window: float, delta: float, eta: floa
     return geometric_bracket(V, entered, other, eta, eta)
 
 
-@leaf
+@inlined
 def proven(x: float, V: float, P: float, D: float, delta: float, eta: float, remaining: float) -> bool:
     """Whether complete chattering is proven on entering the second side, with this remaining phase in the bracket."""
     window = WINDOW * remaining
@@ -324,7 +324,7 @@ def proven(x: float, V: float, P: float, D: float, delta: float, eta: float, rem
     return upper <= window and lower <= remaining <= upper and x + window < math.pi
 
 
-@routine
+@shared
 def settle(x: float, V: float, P: float, D: float, delta: float, eta: float) -> float:
     """Phase at which a block that enters the second side at x comes to rest.
 

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.kernels.compiled import kernel, leaf, routine
+from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.sine import LARGEST_EXCESS, rest_phase
 
 #: Width of the final bracket on a - 1: a few ulp of a.
@@ -28,7 +28,7 @@ def critical_amplitudes(omega: NDArray[np.float64], eta: NDArray[np.float64], am
         amplitudes[i] = 1.0 + critical_excess(1.0 / (omega[i] * omega[i]), eta[i])
 
 
-@routine
+@shared
 def critical_excess(delta: float, eta: float) -> float:
     """Largest a - 1 with complete chattering, by a bracket that closes around an extrapolated value.
 
@@ -62,7 +62,7 @@ def critical_excess(delta: float, eta: float) -> float:
     return low
 
 
-@leaf
+@inlined
 def distance_exponent(eta: float) -> float:
     """Exponent nu of pi - x_rest ~ (critical - excess)^nu.
 

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.kernels.compiled import leaf, routine
+from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.sine import (
     LARGEST_CORRECTION,
     LARGEST_EXCESS,
@@ -106,7 +106,7 @@ def rest_times(
             times[i] = finish(block, lane, a[i] - 1.0) / omega[i]
 
 
-@leaf
+@inlined
 def load(block: NDArray[np.float64], lane: int, excess: float, omega: float, eta: float) -> None:
     """Write one sequence into a lane; one that has nothing to compute gets harmless numbers."""
     rocks = 0.0 < excess <= LARGEST_EXCESS
@@ -117,7 +117,7 @@ def load(block: NDArray[np.float64], lane: int, excess: float, omega: float, eta
     block[_STATUS * LANES + lane] = _RUNNING if rocks else _NEVER_UP
 
 
-@routine
+@shared
 def advance(block: NDArray[np.float64]) -> None:
     """Take every lane to where its remaining phase is known, or as far as the lanes can."""
     first_impacts(block)
@@ -136,7 +136,7 @@ def advance(block: NDArray[np.float64]) -> None:
             late_pairs(block)
 
 
-@routine
+@shared
 def first_closure(block: NDArray[np.float64]) -> int:
     """Pair from which closing is tried: earlier, even the fastest lane of the block is too far from rest."""
     smallest = 1.0
@@ -145,7 +145,7 @@ def first_closure(block: NDArray[np.float64]) -> int:
     return max(0, int(-_FAR_FROM_REST / (2.0 * math.log(smallest))) - LEVELS)
 
 
-@leaf
+@inlined
 def survey(block: NDArray[np.float64]) -> tuple[int, float]:
     """Count the lanes that still run, and find the reach of their longest arc."""
     running = 0
@@ -157,7 +157,7 @@ def survey(block: NDArray[np.float64]) -> tuple[int, float]:
     return running, reach
 
 
-@routine
+@shared
 def first_impacts(block: NDArray[np.float64]) -> None:
     """First arc of every lane."""
     for lane in range(LANES):
@@ -182,25 +182,25 @@ def first_impacts(block: NDArray[np.float64]) -> None:
         block[k] = 0.0
 
 
-@routine
+@shared
 def early_pairs(block: NDArray[np.float64]) -> None:
     """One pair of impacts of every lane, for the long arcs at the start."""
     pass_pair(block, LONG, REACH_LONG, 2)
 
 
-@routine
+@shared
 def pairs(block: NDArray[np.float64]) -> None:
     """One pair of impacts of every lane, for medium arcs."""
     pass_pair(block, MEDIUM, REACH_MEDIUM, 1)
 
 
-@routine
+@shared
 def late_pairs(block: NDArray[np.float64]) -> None:
     """One pair of impacts of every lane, for short arcs."""
     pass_pair(block, SHORT, REACH_SHORT, 1)
 
 
-@leaf
+@inlined
 def pass_pair(block: NDArray[np.float64], order: int, reach: float, corrections: int) -> None:
     """One arc on the second side and one on the first, of every running lane; a lane where it fails stays behind.
 
@@ -240,7 +240,7 @@ def pass_pair(block: NDArray[np.float64], order: int, reach: float, corrections:
         block[_STATUS * LANES + lane] = status if sound else max(status, _LEFT_OVER)
 
 
-@leaf
+@inlined
 def short_arc(
     V: float, P: float, D: float, s: float, delta: float, order: int, reach: float, corrections: int
 ) -> tuple[float, float, float, float, bool]:
@@ -253,7 +253,7 @@ def short_arc(
     return landed, w, P_impact, D_impact, sound
 
 
-@routine
+@shared
 def close(block: NDArray[np.float64], ready: bool) -> None:
     """Extrapolate every running lane, and stop those whose remaining phase is settled."""
     for lane in range(LANES):
@@ -278,7 +278,7 @@ def close(block: NDArray[np.float64], ready: bool) -> None:
         block[_STATUS * LANES + lane] = _CLOSING if closed else status
 
 
-@routine
+@shared
 def finish(block: NDArray[np.float64], lane: int, excess: float) -> float:
     """Phase of rest of one lane: as found there if complete chattering is proven, else by the scalar path."""
     status = block[_STATUS * LANES + lane]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.kernels.compiled import kernel, leaf, routine
+from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.sine import STILL, WINDOW, arc, bracket, closure, first_arc, guess_landing
 
 
@@ -44,7 +44,7 @@ def resolve(
     return intervals.size, math.nan, math.nan, math.nan
 
 
-@leaf
+@inlined
 def settled_bracket(x: float, V: float, P: float, D: float, delta: float, eta: float) -> tuple[float, float]:
     """Bracket on the remaining phase on entering the second side; NaN where the certificate does not hold."""
     window = WINDOW * closure(V, P, D, eta)
@@ -53,7 +53,7 @@ def settled_bracket(x: float, V: float, P: float, D: float, delta: float, eta: f
     return lower if holds else math.nan, upper if holds else math.nan
 
 
-@leaf
+@inlined
 def next_arc(x: float, V: float, P: float, D: float, s: float, delta: float) -> tuple[float, float, float, float]:
     """Duration, impact speed, P and D of the arc that starts at phase x; a block at rest stays so."""
     if V < STILL:
@@ -74,7 +74,7 @@ def semianalytical_times(
         times[i] = semianalytical_phase(a[i] - 1.0, 1.0 / (omega[i] * omega[i]), eta[i], resolved) / omega[i]
 
 
-@routine
+@shared
 def semianalytical_phase(excess: float, delta: float, eta: float, resolved: int) -> float:
     """Eq. 75 in phase: the resolved intervals, then two more as the first terms of two geometric sums."""
     if excess == 0.0:
