@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test doctest lint types docs bench clean distclean
+.PHONY: help demo test slow doctest lint types docs bench clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -13,8 +13,11 @@ help: ## list the targets
 demo: .venv/.base ## simulate a block under a shipped record; writes out/demo.png
 	@$(BIN)/python examples/demo.py
 
-test: .venv/.all ## run the full test suite
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable
+test: .venv/.all ## run the test suite (about five minutes on two cores)
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m "not slow"
+
+slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m slow
 
 doctest: .venv/.all ## run the examples in the docstrings
 	$(BIN)/python -m pytest --doctest-modules src/rocking

@@ -5,6 +5,7 @@ Usage: python benchmarks/bench_ensemble.py
 A block-step is one block through one sample of the record, whether it rocks, rests or has fallen. Times are processor
 times of one core in one run. The Runge-Kutta loop is what one writes with numba in an afternoon: one step per sample,
 an impact where the rotation has changed sign at the end of a step, rest below a velocity threshold.
+The share of lanes is that of block-steps in which a block sits in a lane; in the others it rests, waits or has fallen.
 """
 
 import math
@@ -12,12 +13,19 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import get_args
 
 import numba
 import numpy as np
 
 import rocking
-from rocking.kernels import lanes
+from rocking.kernels import state
+from rocking.kernels.ground import Ground, last_piece
+from rocking.kernels.lanes import crew, scheduler
+from rocking.kernels.lanes.linear import step_linear
+from rocking.kernels.state import Record
+from rocking.problem import Model, ground_of, records_of, rules_of
+from rocking.treatment import Certified
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -25,7 +33,8 @@ sys.path.insert(0, str(ROOT / "tests"))
 from oracles.problem import Problem  # noqa: E402
 from oracles.scipy_events import integrate_as_practised  # noqa: E402
 
-EL_CENTRO = ROOT.parent / "shared" / "records" / "test_only" / "RSN6_IMPVALL.I_I-ELC180-hor1.AT2"
+RECORDS = ROOT.parent / "shared" / "records" / "test_only"
+NAMES = ("RSN6_IMPVALL.I_I-ELC180-hor1.AT2", "RSN753_LOMAP_CLS000-hor1.AT2")
 SHIPPED = "el-centro-meloland-270"
 G = 9.80665
 REPETITIONS = 3
@@ -33,19 +42,21 @@ SCIPY_SAMPLE = 12
 
 
 def main() -> None:
-    motion = rocking.read(EL_CENTRO) if EL_CENTRO.exists() else rocking.records.load(SHIPPED)
-    acceleration = np.asarray(motion.acceleration(motion.breakpoints))
     blocks = rocking.Blocks.grid(p=np.linspace(1.5, 6.0, 100), alpha=np.linspace(0.08, 0.4, 100), restitution=0.9)
-    steps = len(blocks) * (len(acceleration) - 1)
-    print(f"{motion.name}: {len(acceleration)} samples, {len(blocks)} blocks, {steps:.3g} block-steps")
-    for model in ("linear", "nonlinear"):
-        report(model, motion, acceleration, blocks, steps)
+    motions = [rocking.read(RECORDS / name) for name in NAMES if (RECORDS / name).exists()]
+    for motion in motions or [rocking.records.load(SHIPPED)]:
+        acceleration = np.asarray(motion.acceleration(motion.breakpoints))
+        steps = len(blocks) * (len(acceleration) - 1)
+        print(f"{motion.name}: {len(acceleration)} samples, {len(blocks)} blocks, {steps:.3g} block-steps")
+        for model in get_args(Model):
+            report(model, motion, acceleration, blocks, steps)
+        print()
     smooth, limit = arithmetic()
-    print(f"\nquiet linear step: {smooth:.2f} ns per block")
+    print(f"quiet linear step: {smooth:.2f} ns per block")
     print(f"its {OPERATIONS} operations at the measured peak: {limit:.2f} ns")
 
 
-def report(model: str, motion: rocking.Motion, acceleration: np.ndarray, blocks: rocking.Blocks, steps: int) -> None:
+def report(model: Model, motion: rocking.Motion, acceleration: np.ndarray, blocks: rocking.Blocks, steps: int) -> None:
     """Print the rates of one model."""
     own = shortest(lambda: rocking.simulate_many(blocks, motion, model=model, threads=1)) / steps
     result = rocking.simulate_many(blocks, motion, model=model).isel(motion=0)
@@ -53,8 +64,10 @@ def report(model: str, motion: rocking.Motion, acceleration: np.ndarray, blocks:
     arguments = (acceleration, motion.step, blocks.p[:, 0].copy(), blocks.alpha[:, 0].copy(), 0.9, nonlinear)
     plain = shortest(lambda: runge_kutta(*arguments)) / steps
     baseline = scipy_time(model, acceleration, motion, blocks) / (len(acceleration) - 1)
+    share = lane_steps(model, motion, blocks) / steps
     print(
-        f"\n{model}: {float(result.impacts.mean()):.0f} impacts per block, {float(result.overturned.mean()):.0%} fall"
+        f"\n{model}: {float(result.impacts.mean()):.0f} impacts per block, {float(result.overturned.mean()):.0%} fall, "
+        f"{share:.1%} of the steps in lanes"
     )
     print(f"  lanes         {1e9 * own:10.2f} ns per block-step  {1.0 / own:9.3g} per second and core")
     print(f"  Runge-Kutta   {1e9 * plain:10.2f} ns                {plain / own:9.2f} times the lanes' time")
@@ -137,28 +150,54 @@ def runge_kutta(
     return peaks
 
 
-#: Multiplications, additions, comparisons and selections of one lane in `quiet_linear`.
-OPERATIONS = 39
+def lane_steps(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> int:
+    """Block-steps in which a block sits in a lane."""
+    how = Certified()
+    ground = ground_of(motion, blocks.gravity)
+    bodies = records_of(blocks, model, how.limits(blocks, motion))
+    states = state.new_states(len(blocks), state.TO_THE_END)
+    width = motion.step * float(blocks.p.max())
+    substeps = math.ceil(width / crew.LONGEST_SUBSTEP) if model == "nonlinear" else 0
+    whole = crew.crew_of(bodies, states, len(motion.coefficients), motion.step, substeps)
+    return count_lane_steps(
+        ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole, substeps
+    )
+
+
+@numba.njit(error_model="numpy")
+def count_lane_steps(ground: Ground, rules: Record, scratch: Record, whole: crew.Crew, substeps: int) -> int:
+    """Lanes taken over all samples: the loop of `scheduler.run_lanes`, counting."""
+    count = 0
+    for piece in range(last_piece(ground)):
+        count += whole.tally.active
+        scheduler.step_groups(ground, rules, scratch, whole, piece, substeps)
+        scheduler.close_ranks(whole)
+        scheduler.join(ground, rules, scratch, whole, piece)
+    return count
+
+
+#: Multiplications, additions, comparisons and selections of one lane in `step_linear`.
+OPERATIONS = 47
 
 
 def arithmetic() -> tuple[float, float]:
     """Time of a quiet linear step per lane, and the time its operations take at this core's measured rate, ns."""
-    room = lanes.new_room()
-    room.lanes[:] = 0.5
-    room.lanes[lanes.ABOVE : lanes.ABOVE + lanes.WIDTH] = np.inf
+    bodies, states = state.records(crew.WIDTH, state.BLOCK), state.new_states(crew.WIDTH, 0)
+    groups = crew.crew_of(bodies, states, 1, 0.01, 0).groups
+    groups["u"] = 0.5
     calls = 20_000
-    smooth = shortest(lambda: quiet_steps(room.lanes, room.events, calls)) / (calls * lanes.WIDTH)
+    smooth = shortest(lambda: quiet_steps(groups, calls)) / (calls * crew.WIDTH)
     work = np.full(64, 1.0)
     rate = shortest(lambda: multiply_add(work, 200_000)) / (200_000 * 64 * 2)
     return 1e9 * smooth, 1e9 * rate * OPERATIONS
 
 
-@numba.njit
-def quiet_steps(table: np.ndarray, events: np.ndarray, calls: int) -> int:
+@numba.njit(error_model="numpy")
+def quiet_steps(groups: state.Records, calls: int) -> int:
     """Many quiet steps of the same lanes."""
     busy = 0
     for _ in range(calls):
-        busy += lanes.quiet_linear(table, events, 0.1, 10.0, 0.01, 1e-17)
+        busy += step_linear(groups[0], 0.1, 10.0, 0.01, 0.0, 1.5)
     return busy
 
 

@@ -35,7 +35,6 @@ def main() -> float:
         measure="pgv",
         levels=np.linspace(0.1, 2.0, 39),
         limits={"half": 0.5, "overturning": math.inf},
-        band="bootstrap",
     )
     result.plot(title="Statue, 0.24 m x 1.10 m").savefig(OUT / "fragility.png", dpi=160)
     result.to_nrml(OUT / "fragility.xml", taxonomy="statue")

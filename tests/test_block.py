@@ -60,6 +60,30 @@ def test_frame_is_the_lagrangian_of_columns_and_beam(gamma):
     assert frame.alpha == Block(b, h).alpha
 
 
+@given(st.floats(0.0, 50.0))
+def test_a_frames_restitution_conserves_angular_momentum_at_the_impact(gamma):
+    # Every column turns from one lower corner to the other while the beam moves with their tops, without turning.
+    b, h = 0.5, 3.0
+    left, right = np.array([b, h]), np.array([-b, h])  # from the old and the new lower corner to a column's centre
+    square = b * b + h * h
+
+    def velocity(arm):
+        return np.array([arm[1], -arm[0]])
+
+    def moment(arm, momentum):
+        return arm[1] * momentum[0] - arm[0] * momentum[1]
+
+    # Momentum of a column about its new corner, and the beam's share through the new contact at the top (Makris and
+    # Vassiliou 2013): the top's contact jumps to the opposite corner, 2 (b, h) from the lower one that is left.
+    def about_the_new_corner(arm):
+        spin = square / 3.0
+        beam = gamma * moment(2.0 * right, velocity(2.0 * arm))
+        return spin + moment(right, velocity(arm)) + beam
+
+    expected = about_the_new_corner(left) / about_the_new_corner(right)
+    assert Block.from_frame(b, h, gamma).restitution == pytest.approx(expected, rel=1e-12)
+
+
 def test_thresholds_of_both_models():
     block = Block.from_parameters(p=(2.0, 2.5), alpha=(0.1, 0.3), restitution=0.9)
     g = block.gravity
@@ -97,6 +121,20 @@ def test_parameters_give_the_rectangles_radius():
         (lambda: Block.from_pivots((0.2, 0.0), 1.0, 0.3), "distances"),
         (lambda: Block.from_pivots((2.0, 2.0), 0.1, 0.3), "restitution="),
         (lambda: Block.from_frame(0.2, 1.0, -0.1), "mass_ratio"),
+        (lambda: Block.from_frame(0.2, 1.0, 1e300), "mass_ratio"),
+        (lambda: Block(math.inf, 1.0), "half_width"),
+        (lambda: Block(1e-300, 1.0), "half_width"),
+        (lambda: Block(1e-12, 1.0), "alpha"),
+        (lambda: Block(0.2e14, 1e14), "p (from"),
+        (lambda: Block(0.2, 1.0, gravity=1e200), "gravity"),
+        (lambda: Block(0.2, 1.0, mass=1e300), "mass"),
+        (lambda: Block.from_parameters(1e200, 0.2), "p must"),
+        (lambda: Block.from_parameters(1e-200, 0.2), "p must"),
+        (lambda: Block.from_parameters(1.0, 1e-200), "alpha"),
+        (lambda: Block.from_parameters(1.0, 0.2, 1e-300), "restitution"),
+        (lambda: Block.from_pivots((0.2, 0.2), 1.0, 1e200), "radius_of_gyration"),
+        (lambda: Block("0.2", 1.0), "half_width must be a positive number, in m, not '0.2'"),
+        (lambda: Block.from_parameters(True, 0.2), "p must be a positive number, in rad/s, not True"),
     ],
 )
 def test_what_cannot_stand_is_refused_in_one_sentence(make, word):
@@ -127,8 +165,27 @@ def test_blocks_broadcast_and_index():
         (lambda: Blocks.grid(p=[], alpha=[0.1]), "grid"),
         (lambda: Blocks.of([]), "at least one"),
         (lambda: Blocks(p="fast", alpha=0.1), "numbers"),
+        (lambda: Blocks(p=1.0, alpha="wide"), "alpha must be a number"),
+        (lambda: Blocks(p=["1.0"], alpha=[0.1]), "p must be a number"),
+        (lambda: Blocks(p=[True], alpha=[0.1]), "p must be a number"),
+        (lambda: Blocks([np.inf], [0.1]), "p must be positive"),
+        (lambda: Blocks([1.0, 1e200], [0.1]), "block 1"),
+        (lambda: Blocks([1.0], [1e-200]), "alpha"),
+        (lambda: Blocks([1.0], [0.1], gravity=np.inf), "gravity"),
+        (lambda: Blocks([1.0], [0.1], gravity="1"), "gravity"),
+        (lambda: Blocks.grid(p=["2"], alpha=[0.1]), "p must be a number"),
     ],
 )
 def test_bad_arrays_of_blocks_are_refused(make, word):
     with pytest.raises(InvalidBlock, match=word):
         make()
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, np.array, int])
+def test_numbers_of_any_real_type_are_numbers(kind):
+    block = Block.from_parameters(p=kind(2), alpha=(kind(1), kind(1)), restitution=kind(1), gravity=kind(10))
+    assert block == Block.from_parameters(p=2.0, alpha=1.0, restitution=1.0, gravity=10.0)
+    assert type(block.p) is float
+    blocks = Blocks(p=kind(2), alpha=[kind(1)], restitution=kind(1), gravity=kind(10))
+    assert blocks.gravity == 10.0
+    assert blocks[0] == block

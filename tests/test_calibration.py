@@ -122,17 +122,17 @@ def test_random_outcomes_are_not_predicted_with_confidence():
     assert found.cross_validate(folds=6).scores.log_loss < 1.5 * math.log(2.0)
 
 
-def test_scatter_from_test_to_test_is_measured():
+def test_dispersion_from_test_to_test_is_measured():
     motions = bursts(150, seed=3)
     rng = np.random.default_rng(8)
-    scatters = []
+    dispersions = []
     for deviation in (0.0, 0.4):
         factors = np.exp(deviation * rng.standard_normal(len(motions)))
         fallen = outcomes([motion.scaled(factor) for motion, factor in zip(motions, factors, strict=True)])
         found = rocking.calibrate(motions, fallen, candidates=2048, two_sided=False)
-        scatters.append(found.scatter["alpha"])
-    # No scatter at all cannot be told from one as wide as the candidates are apart.
-    assert scatters[1] > 1.5 * scatters[0]
+        dispersions.append(found.dispersion["alpha"])
+    # No dispersion at all cannot be told from one as wide as the candidates are apart.
+    assert dispersions[1] > 1.5 * dispersions[0]
 
 
 def test_symmetric_blocks_can_be_asked_for(shaken):
@@ -238,9 +238,9 @@ def threshold_evidence():
 def test_the_chance_of_overturning_is_the_share_of_the_population(threshold_evidence):
     evidence, thresholds = threshold_evidence
     centre, score = math.log(0.17), 0.5
-    scatter = 0.1 * math.exp(0.6 * score)
+    dispersion = 0.1 * math.exp(0.6 * score)
     populations = np.array([[math.log(1.4), centre, math.log(0.7), 1.0, score, 1.0]])
-    share = [0.5 * (1.0 + math.erf((threshold - centre) / scatter / math.sqrt(2.0))) for threshold in thresholds]
+    share = [0.5 * (1.0 + math.erf((threshold - centre) / dispersion / math.sqrt(2.0))) for threshold in thresholds]
     # 4096 candidates, of which some 150 stand within the population's reach.
     np.testing.assert_allclose(evidence.chances(populations)[0], 0.01 + 0.98 * np.array(share), atol=0.03)
 

@@ -1,24 +1,23 @@
 """The Taylor series of arcs: against closed forms, high precision, and each other."""
 
-from fractions import Fraction
-
 import mpmath
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kernel_records import in_units_of_g, one_sided, rocking_block, rules_for, state_of
 
 from rocking.kernels.arc import (
     NEGLIGIBLE,
     converged,
     evaluate,
+    expand,
     expand_linear,
     expand_nonlinear,
     linear_order,
-    local_motion,
-    vary_linear,
-    vary_nonlinear,
+    step_length,
 )
-from rocking.kernels.state import COSINE, GROUND, ORDER, SERIES, SINE, Floats, new_scratch
+from rocking.kernels.state import ORDER, Record, new_scratch
 
 ULP = 2.0**-52
 
@@ -57,11 +56,20 @@ def value(c: list[mpmath.mpf], t: mpmath.mpf) -> mpmath.mpf:
     return total
 
 
-def linear_arc(u: float, v: float, lam: float, alpha: float, A: np.ndarray, t: float) -> tuple[mpmath.mpf, mpmath.mpf]:
-    """u = (polynomial) + a cosh p t + b sinh p t, where the polynomial is the sum of (D^2/lam)^m (alpha + A)."""
+def linear_arc(
+    u: float, v: float, lam: float, gain: float, threshold: float, A: np.ndarray, t: float
+) -> tuple[mpmath.mpf, mpmath.mpf]:
+    """u = (polynomial) + a cosh p t + b sinh p t, p = sqrt(lam), with the sum of gain/lam (D^2/lam)^m (threshold + A).
+
+    The functions are trigonometric for a negative lam; for lam = 0 the motion is integrated twice.
+    """
     lam, t = mp.mpf(lam), mp.mpf(t)
-    derivative = [mp.mpf(float(x)) for x in A]
-    derivative[0] += mp.mpf(alpha)
+    derivative = [mp.mpf(gain) * mp.mpf(float(x)) for x in A]
+    derivative[0] += mp.mpf(gain) * mp.mpf(threshold)
+    if lam == 0:
+        series = [mp.mpf(u), mp.mpf(v), *[-x / ((k + 1) * (k + 2)) for k, x in enumerate(derivative)]]
+        return value(series, t), value([k * x for k, x in enumerate(series)][1:], t)
+    derivative = [x / lam for x in derivative]
     polynomial = [mp.mpf(0)] * len(derivative)
     while derivative:
         polynomial = [p + (derivative[k] if k < len(derivative) else 0) for k, p in enumerate(polynomial)]
@@ -71,8 +79,8 @@ def linear_arc(u: float, v: float, lam: float, alpha: float, A: np.ndarray, t: f
     a = mp.mpf(u) - polynomial[0]
     b = (mp.mpf(v) - (slope[0] if slope else 0)) / p
     return (
-        value(polynomial, t) + a * mp.cosh(p * t) + b * mp.sinh(p * t),
-        value(slope, t) + p * (a * mp.sinh(p * t) + b * mp.cosh(p * t)),
+        mp.re(value(polynomial, t) + a * mp.cosh(p * t) + b * mp.sinh(p * t)),
+        mp.re(value(slope, t) + p * (a * mp.sinh(p * t) + b * mp.cosh(p * t))),
     )
 
 
@@ -92,28 +100,28 @@ def assert_solves_the_nonlinear_equation(
 
 
 def linear_series(
-    u: float, v: float, lam: float, alpha: float, A: np.ndarray, h: float
+    u: float, v: float, lam: float, gain: float, threshold: float, A: np.ndarray, h: float
 ) -> tuple[np.ndarray, int, float]:
     """Series, its order and the step, as for an arc of a response."""
-    scratch = new_scratch(len(A))
-    scratch[GROUND][: len(A)] = A
+    scratch, start = new_scratch(), state_of(0, u, v)
+    scratch["ground"][: len(A)] = A
     degree = len(A) - 1
     order = linear_order(lam, h) if degree <= 1 else ORDER
-    expand_linear(u, v, lam, alpha, scratch[GROUND], degree, order, scratch[SERIES])
+    expand_linear(one_sided(lam, gain, threshold, 0.5), start, scratch, degree, order)
     if degree > 1:
-        order, h = converged(scratch[SERIES], degree, h)
-    return scratch[SERIES], order, h
+        order, h = converged(scratch["rotation"], degree, h)
+    return scratch["rotation"], order, h
 
 
 def nonlinear_series(
     u: float, v: float, lam: float, alpha: float, A: np.ndarray, h: float
-) -> tuple[Floats, int, float]:
-    scratch = new_scratch(len(A))
-    scratch[GROUND][: len(A)] = A
-    order, h = expand_nonlinear(
-        u, v, lam, alpha, scratch[GROUND], len(A) - 1, h, scratch[SERIES], scratch[SINE], scratch[COSINE]
-    )
-    return scratch, order, h
+) -> tuple[Record, int, float]:
+    scratch, p = new_scratch(), lam**0.5
+    scratch["ground"][: len(A)] = A
+    block = rocking_block((p, p), (alpha, alpha), nonlinear=True)
+    block["stiffness"] = lam
+    order, h = expand_nonlinear(block, state_of(0, u, v), scratch, len(A) - 1, h)
+    return scratch["rotation"], order, h
 
 
 def assert_series_is(c: np.ndarray, order: int, t: float, expected: tuple[mpmath.mpf, mpmath.mpf]) -> None:
@@ -123,27 +131,33 @@ def assert_series_is(c: np.ndarray, order: int, t: float, expected: tuple[mpmath
     assert abs(speed - expected[1]) * t <= order * rounding
 
 
+#: lambda h^2 over the longest step, of a block, an oscillator with a stop and a ball, and the gain over p^2.
+stiffnesses = st.sampled_from([1.0, -1.0, 0.0])
+gains = st.floats(0.1, 3.0)
+
+
 @quick
-@given(rotations, speeds, frequencies, slendernesses, motions, st.floats(0.01, 1.0))
+@given(rotations, speeds, frequencies, stiffnesses, gains, slendernesses, motions, st.floats(0.01, 1.0))
 def test_a_linear_series_gives_the_closed_form(
-    u: float, v: float, p: float, alpha: float, A: list[float], share: float
+    u: float, v: float, p: float, sign: float, gain: float, threshold: float, A: list[float], share: float
 ) -> None:
     motion = motion_over(A, share / p)
-    c, order, h = linear_series(u, v, p * p, alpha, motion, share / p)
+    system = sign * p * p, gain * p * p, threshold
+    c, order, h = linear_series(u, v, *system, motion, share / p)
     assert 0.0 < h <= share / p
-    assert_series_is(c, order, h, linear_arc(u, v, p * p, alpha, motion, h))
+    assert_series_is(c, order, h, linear_arc(u, v, *system, motion, h))
 
 
 @quick
-@given(rotations, speeds, frequencies, slendernesses, motions, st.floats(1e-6, 1.0))
+@given(rotations, speeds, frequencies, stiffnesses, slendernesses, motions, st.floats(1e-6, 1.0))
 def test_what_a_linear_series_leaves_out_is_negligible(
-    u: float, v: float, p: float, alpha: float, A: list[float], share: float
+    u: float, v: float, p: float, sign: float, alpha: float, A: list[float], share: float
 ) -> None:
     motion = motion_over(A, share / p)
-    c, order, h = linear_series(u, v, p * p, alpha, motion, share / p)
+    c, order, h = linear_series(u, v, sign * p * p, p * p, alpha, motion, share / p)
     full = [mp.mpf(float(x)) for x in c[:2]]
     for k in range(80):
-        force = full[k] - (mp.mpf(float(motion[k])) if k < len(motion) else 0) - (mp.mpf(alpha) if k == 0 else 0)
+        force = sign * full[k] - (mp.mpf(float(motion[k])) if k < len(motion) else 0) - (mp.mpf(alpha) if k == 0 else 0)
         full.append(mp.mpf(p * p) * force / ((k + 1) * (k + 2)))
     sizes = [abs(x) * mp.mpf(h) ** k for k, x in enumerate(full)]
     assert sum(sizes[order + 1 :]) <= 4.0 * NEGLIGIBLE * max(sizes)
@@ -155,21 +169,21 @@ def test_a_nonlinear_series_solves_the_equation_of_motion(
     u: float, v: float, p: float, alpha: float, A: list[float]
 ) -> None:
     motion = motion_over(A, 1.0 / p)
-    scratch, order, h = nonlinear_series(u, v, p * p, alpha, motion, 1.0 / p)
+    c, order, h = nonlinear_series(u, v, p * p, alpha, motion, 1.0 / p)
     assert 0.0 < h <= 1.0 / p
-    assert_solves_the_nonlinear_equation(scratch[SERIES], order, h, p * p, alpha, motion)
+    assert_solves_the_nonlinear_equation(c, order, h, p * p, alpha, motion)
 
 
 @quick
 @given(speeds, st.floats(10.0, 100.0), st.sampled_from([0.01, 1.0, 30.0]))
 def test_a_violent_motion_shortens_the_step_until_the_series_converges(v: float, strength: float, p: float) -> None:
     motion = np.array([strength, -3.0 * p * strength])
-    scratch, order, h = nonlinear_series(0.3, v * p, p * p, 0.4, motion, 1.0 / p)
+    c, order, h = nonlinear_series(0.3, v * p, p * p, 0.4, motion, 1.0 / p)
     assert order == ORDER
     assert 0.02 / p < h < 1.0 / p
-    last = max(abs(scratch[SERIES][k]) * h**k for k in (order - 1, order))
-    assert last <= NEGLIGIBLE * max(abs(scratch[SERIES][k]) * h**k for k in range(order + 1))
-    assert_solves_the_nonlinear_equation(scratch[SERIES], order, h, p * p, 0.4, motion)
+    last = max(abs(c[k]) * h**k for k in (order - 1, order))
+    assert last <= NEGLIGIBLE * max(abs(c[k]) * h**k for k in range(order + 1))
+    assert_solves_the_nonlinear_equation(c, order, h, p * p, 0.4, motion)
 
 
 @quick
@@ -179,62 +193,41 @@ def test_the_nonlinear_arc_of_a_slender_block_is_the_linear_one(u: float, v: flo
 
     def difference(alpha: float) -> float:
         motion = alpha * np.array([a, slope])
-        one, order, _ = linear_series(alpha * u, alpha * v, 1.0, alpha, motion, 0.5)
+        one, order, _ = linear_series(alpha * u, alpha * v, 1.0, 1.0, alpha, motion, 0.5)
         other, other_order, _ = nonlinear_series(alpha * u, alpha * v, 1.0, alpha, motion, 0.5)
-        return abs(evaluate(one, order, 0.5)[0] - evaluate(other[SERIES], other_order, 0.5)[0]) / alpha
+        return abs(evaluate(one, order, 0.5)[0] - evaluate(other, other_order, 0.5)[0]) / alpha
 
     assert difference(1e-3) <= 1e-5
     assert difference(1e-5) <= 1e-9
 
 
-@quick
-@given(motions, numbers(0.0, 3.0), numbers(-2.0, 2.0))
-def test_the_local_motion_is_the_same_polynomial_about_a_later_time(
-    A: list[float], offset: float, factor: float
+@pytest.mark.parametrize("nonlinear", [False, True])
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("columns", [1, 2, 3, 9])
+def test_an_arc_takes_the_motion_about_its_start_and_in_the_frame_of_its_side(
+    nonlinear: bool, side: int, columns: int
 ) -> None:
-    local = np.full(len(A) + 2, np.nan)
-    local_motion(np.array(A), offset, factor, 1.0, local)
-    exact, sizes = ([f(Fraction(x) * Fraction(factor)) for x in A] for f in (lambda x: x, abs))
-    for row in (exact, sizes):
-        for k in range(len(row) - 1):
-            for j in range(len(row) - 2, k - 1, -1):
-                row[j] += Fraction(offset) * row[j + 1]
-    for k, (value, size) in enumerate(zip(exact, sizes, strict=True)):
-        assert abs(Fraction(local[k]) - value) <= len(A) * Fraction(ULP) * size
-    assert np.all(np.isnan(local[len(A) :]))
+    row, offset, h = 0.1 * (-0.5) ** np.arange(columns), 0.3, 0.02
+    alpha, sign = 0.2 + 0.1 * side, 1.0 - 2.0 * side
+    block = rocking_block((2.0, 3.0), (0.2, 0.3), nonlinear=nonlinear)
+    scratch, start = new_scratch(), state_of(side, 0.05, 0.1, piece=1, offset=offset)
+    ground = in_units_of_g([0.0, 1.0, 2.0], [9.0 + 0.0 * row, row])
+    order, step, _ = expand(ground, block, rules_for(nonlinear=nonlinear), scratch, start, h)
+    assert step == h
+    u, _, w = evaluate(scratch["rotation"], order, h)
+    a = sign * np.polynomial.Polynomial(row)(offset + h)
+    lam = (4.0, 9.0)[side]
+    expected = -lam * (np.sin(alpha - u) + a * np.cos(alpha - u)) if nonlinear else lam * (u - alpha - a)
+    assert w == pytest.approx(expected, rel=1e-13)
+    assert scratch["rotation"][:2].tolist() == [0.05, 0.1]
 
 
-def test_the_local_motion_drops_what_does_not_count_within_the_step() -> None:
-    coefficients = np.array([1.0, 0.0, 1.0, 1e-3, 1e-30])
-    assert local_motion(coefficients, 0.0, 1.0, 1.0, np.zeros(5)) == 3
-    assert local_motion(coefficients, 0.0, 1.0, 1e-6, np.zeros(5)) == 2
-    assert local_motion(coefficients, 0.0, 1.0, 1e-12, np.zeros(5)) == 1
-    assert local_motion(coefficients[:1], 0.5, 1.0, 1.0, np.zeros(5)) == 0
-
-
-@quick
-@given(rotations, speeds, st.floats(-0.3, 0.3), st.floats(-1.0, 1.0), motions, st.booleans(), st.floats(0.3, 3.0))
-def test_the_variation_is_the_derivative_by_the_strength_of_the_motion(
-    u: float, v: float, du: float, dv: float, A: list[float], nonlinear: bool, p: float
-) -> None:
-    step = 0.5 / p
-    motion = motion_over(A[:6], step)
-
-    def end(strength: float) -> np.ndarray:
-        start = u + strength * du, v + strength * dv
-        if nonlinear:
-            scratch, order, _ = nonlinear_series(*start, p * p, 0.3, (1.0 + strength) * motion, step)
-            return np.array(evaluate(scratch[SERIES], order, h)[:2])
-        c, order, _ = linear_series(*start, p * p, 0.3, (1.0 + strength) * motion, step)
-        return np.array(evaluate(c, order, h)[:2])
-
-    scratch, order, h = nonlinear_series(u, v, p * p, 0.3, motion, step)
-    if nonlinear:
-        found = vary_nonlinear(du, dv, p * p, len(motion) - 1, order, h, scratch)
-    else:
-        _, order, h = linear_series(u, v, p * p, 0.3, motion, step)
-        found = vary_linear(du, dv, p * p, len(motion) - 1, order, h, scratch)
-    strength = 1e-4
-    difference = (8.0 * (end(strength) - end(-strength)) - end(2 * strength) + end(-2 * strength)) / (12.0 * strength)
-    size = 1.0 + abs(np.array(found))
-    assert np.all(np.abs(np.array(found) - difference) <= 1e-9 * size * np.array([1.0, p]))
+def test_a_step_from_an_impact_is_no_longer_than_its_arc_and_some_margin() -> None:
+    ground = in_units_of_g([0.0, 9.0], [[0.1, 0.0]])
+    block = rocking_block((2.0, 2.0), (0.2, 0.2))
+    assert step_length(ground, block, state_of(0, 0.0, 1e-3), 9.0) == pytest.approx(1.3 * 2e-3 / (4.0 * 0.3))
+    assert step_length(ground, block, state_of(0, 0.0, 1e-3), 1e-4) == 1e-4
+    assert step_length(ground, block, state_of(0, 0.0, 9.0), 9.0) == 0.5
+    assert step_length(ground, block, state_of(0, 1e-9, 1e-3), 9.0) == 0.5
+    pushed = in_units_of_g([0.0, 9.0], [[-0.3, 0.0]])
+    assert step_length(pushed, block, state_of(0, 0.0, 1e-3), 9.0) == 0.5

@@ -1,22 +1,20 @@
-"""One step of an arc to its first event, and the first uplift of a block at rest, against exact arithmetic."""
+"""One step of an arc to its first event, and the impact itself, against exact arithmetic."""
 
-import itertools
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from flint import fmpq, fmpq_poly
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kernel_records import MINUS, PLUS, ULP, in_units_of_g, rocking_block, rules_for, state_of
+from oracles.exact import exact, first_above, polynomial, turning_points
 
-from rocking.kernels.arc import expand_linear
-from rocking.kernels.impact import QUARTER_TURN, advance, expand, next_uplift, short_step
-from rocking.kernels.state import AT_REST, GROUND, SERIES, SPARE, Rules, Shaking, new_scratch
-from rocking.kernels.status import CERTIFIED, IMPACT, OVERTURN, STEP, UNDECIDED
+from rocking.kernels.arc import expand
+from rocking.kernels.impact import advance, strike
+from rocking.kernels.state import new_scratch
+from rocking.kernels.status import IMPACT, OVERTURN, STEP
 
-ULP = 2.0**-52
-PLUS, MINUS = 0, 1
+QUARTER_TURN = 0.5 * math.pi
 
 quick = settings(deadline=None, max_examples=100)
 
@@ -24,144 +22,6 @@ quick = settings(deadline=None, max_examples=100)
 def between(low: float, high: float) -> st.SearchStrategy[float]:
     """Numbers far from underflow."""
     return st.floats(low, high).map(lambda x: x if abs(x) > 1e-30 else 0.0)
-
-
-def exact(x: float) -> fmpq:
-    return fmpq(*float(x).as_integer_ratio())
-
-
-def polynomial(c: Sequence[float]) -> fmpq_poly:
-    return fmpq_poly([exact(x) for x in c])
-
-
-def turning_points(f: fmpq_poly, start: float, end: float) -> list[fmpq]:
-    """Both ends, and rational numbers next to every root in between."""
-    inside = []
-    if f.degree() > 0:
-        real = [r.real for r, _ in f.complex_roots() if r.imag == 0]
-        inside = [exact(float(r.mid())) for r in real if exact(start) < r < exact(end)]
-    return [exact(start), *sorted(inside), exact(end)]
-
-
-def first_above(f: fmpq_poly, start: float, end: float) -> float:
-    """First time in [start, end) from which f > 0; inf when never."""
-    if f(exact(start)) > 0:
-        return start
-    points = turning_points(f, start, end)
-    for left, right in itertools.pairwise(points):
-        if f((left + right) / 2) > 0:
-            return float(int(left.p) / int(left.q))
-    return math.inf
-
-
-def exact_uplift(shaking: Shaking, piece: int, offset: float, thresholds: tuple[float, float]) -> tuple[float, int]:
-    """Time and side of the first uplift from an instant on; inf when there is none."""
-    for k in range(piece, len(shaking.coefficients)):
-        length = shaking.breakpoints[k + 1] - shaking.breakpoints[k]
-        start = offset if k == piece else 0.0
-        motion = polynomial(shaking.coefficients[k] * shaking.inverse_g)
-        found = [
-            (first_above((-motion if side == PLUS else motion) - exact(thresholds[side]), start, length), side)
-            for side in (PLUS, MINUS)
-        ]
-        if min(found)[0] < math.inf:
-            return shaking.breakpoints[k] + min(found)[0], min(found)[1]
-    return math.inf, AT_REST
-
-
-def sides(thresholds: tuple[float, float] = (0.2, 0.2)) -> np.ndarray:
-    return np.array([[4.0, t, t, 4.0, 0.9, 0.0] for t in thresholds])
-
-
-def uplift(
-    shaking: Shaking, thresholds: tuple[float, float], *, piece: int = 0, offset: float = 0.0, stop: float = math.inf
-) -> tuple[float, int, bool]:
-    """Time, side, and whether by a jump."""
-    scratch = new_scratch(shaking.coefficients.shape[1])
-    piece, offset, side, jump = next_uplift(
-        shaking, piece, offset, sides(thresholds), stop, scratch[GROUND], scratch[SPARE]
-    )
-    return shaking.breakpoints[piece] + offset if side != AT_REST else math.inf, side, jump
-
-
-def in_units_of_g(breakpoints: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Shaking:
-    return Shaking(np.array(breakpoints, dtype=float), np.array(coefficients, dtype=float), 1.0, 0.0)
-
-
-@st.composite
-def shakings(draw: st.DrawFn) -> Shaking:
-    """One to four pieces of one degree, with jumps between them."""
-    columns = draw(st.integers(1, 8))
-    rows = draw(st.lists(st.lists(between(-1.0, 1.0), min_size=columns, max_size=columns), min_size=1, max_size=4))
-    widths = [draw(st.floats(0.01, 2.0)) for _ in rows]
-    return in_units_of_g(np.cumsum([0.0, *widths]), rows)
-
-
-@quick
-@given(shakings(), st.tuples(st.floats(0.05, 1.5), st.floats(0.05, 1.5)), st.floats(0.0, 0.9))
-def test_the_first_uplift_is_where_the_motion_first_passes_a_threshold(
-    shaking: Shaking, thresholds: tuple[float, float], share: float
-) -> None:
-    offset = share * float(shaking.breakpoints[1])
-    time, side, _ = uplift(shaking, thresholds, offset=offset)
-    size = np.max(np.sum(np.abs(shaking.coefficients) * 2.0 ** np.arange(shaking.coefficients.shape[1]), axis=1))
-    rounding = 2.0**-46 * (size + max(thresholds))
-    earliest = exact_uplift(shaking, 0, offset, tuple(t - rounding for t in thresholds))
-    latest = exact_uplift(shaking, 0, offset, tuple(t + rounding for t in thresholds))
-    assert earliest[0] <= time * (1.0 + 4.0 * ULP)
-    assert time <= latest[0] * (1.0 + 4.0 * ULP) + 1e-300
-    assert side in (earliest[1], latest[1])
-
-
-@pytest.mark.parametrize("sign, side", [(1.0, MINUS), (-1.0, PLUS)])
-def test_after_a_touch_from_below_the_search_goes_on_to_the_true_crossing(sign: float, side: int) -> None:
-    """0.2 - (t - 0.3)^2 (0.9 - t) touches the threshold 0.2 at 0.3 and passes it at 0.9."""
-    gap = np.convolve([0.09, -0.6, 1.0], [0.9, -1.0])
-    motion = sign * (np.array([0.2, 0.0, 0.0, 0.0]) - gap)
-    time, found, jump = uplift(in_units_of_g([0.0, 1.0], [motion]), (0.2, 0.2))
-    assert (found, jump) == (side, False)
-    assert time == pytest.approx(0.9, rel=1e-14)
-
-
-@pytest.mark.parametrize("touch", [[0.3], [0.1, 0.5], [0.2, 0.200001]])
-def test_touches_alone_do_not_uplift(touch: list[float]) -> None:
-    gap = np.array([0.1])
-    for r in touch:
-        gap = np.convolve(gap, [r * r, -2.0 * r, 1.0])
-    motion = -gap
-    motion[0] += 0.2
-    assert uplift(in_units_of_g([0.0, 1.0], [motion]), (0.2, 0.2))[1] == AT_REST
-
-
-def test_a_motion_that_starts_at_the_threshold_uplifts_only_where_it_rises() -> None:
-    assert uplift(in_units_of_g([0.0, 1.0], [[0.2, 0.1]]), (0.2, 0.2)) == (0.0, MINUS, False)
-    assert uplift(in_units_of_g([0.0, 1.0], [[0.2, 0.0, 0.1]]), (0.2, 0.2)) == (0.0, MINUS, False)
-    assert uplift(in_units_of_g([0.0, 1.0], [[0.2]]), (0.2, 0.2))[1] == AT_REST
-    assert uplift(in_units_of_g([0.0, 1.0], [[0.2, -0.1]]), (0.2, 0.2))[1] == AT_REST
-    falls_then_rises = uplift(in_units_of_g([0.0, 1.0], [[0.2, -0.1, 0.2]]), (0.2, 0.2))
-    assert falls_then_rises == (pytest.approx(0.5), MINUS, False)
-
-
-@pytest.mark.parametrize("row", [[0.3], [0.3, -0.1], [0.3, -0.1, 0.05]])
-def test_a_motion_beyond_the_threshold_uplifts_at_once(row: list[float]) -> None:
-    assert uplift(in_units_of_g([0.0, 1.0], [row]), (0.2, 0.2)) == (0.0, MINUS, True)
-    assert uplift(in_units_of_g([0.0, 1.0], [[-a for a in row]]), (0.2, 0.2)) == (0.0, PLUS, True)
-
-
-def test_a_corner_that_only_touches_the_threshold_does_not_uplift() -> None:
-    """Up to the threshold and down again, where the passing at the end of the piece is but rounding."""
-    for width in np.linspace(0.1, 0.2, 101):
-        rate = 0.2 / width
-        corner = in_units_of_g([0.0, width, 2.0 * width], [[0.0, rate * (1.0 + ULP)], [0.2, -rate]])
-        assert uplift(corner, (0.2, 0.2))[1] == AT_REST
-        assert uplift(corner, (0.2, 0.2), offset=0.3 * width)[1] == AT_REST
-
-
-def test_nothing_uplifts_at_or_after_the_stop() -> None:
-    shaking = in_units_of_g([0.0, 1.0, 2.0], [[0.0, 0.3], [0.3, 0.0]])
-    assert uplift(shaking, (0.2, 0.2))[0] == pytest.approx(2.0 / 3.0)
-    assert uplift(shaking, (0.35, 0.35))[1] == AT_REST
-    assert uplift(shaking, (0.3, 0.3), stop=1.0)[1] == AT_REST
 
 
 @st.composite
@@ -176,7 +36,10 @@ def series(draw: st.DrawFn) -> np.ndarray:
 
 
 def follow(c: np.ndarray, h: float) -> tuple[int, float, float, float, float, float]:
-    return advance(float(c[0]), float(c[1]), len(c) - 1, h, c, np.zeros(max(23, len(c))))
+    scratch = new_scratch()
+    scratch["rotation"][: len(c)] = c
+    outcome, time, u, v, top, height = advance(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, QUARTER_TURN)
+    return outcome, time, u, v, top, height
 
 
 @quick
@@ -241,6 +104,28 @@ def test_an_arc_that_a_step_caught_just_off_the_ground_comes_down_all_the_same(s
     assert (speed, peak_time, peak) == (pytest.approx(-0.4), pytest.approx(0.2), pytest.approx(0.04))
 
 
+@quick
+@given(series(), st.floats(0.1, 1.5), st.floats(0.2, 3.0))
+def test_a_fall_is_where_the_rotation_first_reaches_the_limit(c: np.ndarray, h: float, share: float) -> None:
+    """Whatever the limit is: a quarter turn of a block, none of a ball."""
+    scratch, fallen = new_scratch(), max(share, 1.01 * float(c[0]))
+    scratch["rotation"][: len(c)] = c
+    arrival = advance(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, fallen)
+    free = advance(state_of(0, c[0], c[1]), scratch, len(c) - 1, h, math.inf)
+    assert free.outcome != OVERTURN
+    rounding = 1e-13 * float(np.sum(np.abs(c) * h ** np.arange(len(c))))
+    earliest = first_above(polynomial(c) - exact(fallen - rounding), 0.0, h)
+    latest = first_above(polynomial(c) - exact(fallen + rounding), 0.0, h)
+    if arrival.outcome == OVERTURN:
+        assert (arrival.u, arrival.height, arrival.top) == (fallen, fallen, arrival.time)
+        assert earliest <= arrival.time * (1.0 + 1e-14)
+        assert arrival.time <= latest * (1.0 + 1e-14)
+        assert earliest <= free.time * (1.0 + 1e-14)
+    else:
+        assert arrival == free
+        assert latest >= free.time * (1.0 - 1e-14)
+
+
 @pytest.mark.parametrize("nonlinear", [False, True])
 @pytest.mark.parametrize("strength", [0.01, 1.0, 100.0])
 @pytest.mark.parametrize("columns", [1, 2, 3])
@@ -250,43 +135,26 @@ def test_a_step_after_an_impact_is_sized_by_the_arc_under_weak_and_violent_motio
     """The step reaches beyond the impact where the motion presses the block down, else to 1/p."""
     row = np.zeros(columns)
     row[0] = strength
-    shaking, scratch = in_units_of_g([0.0, 9.0], [row]), new_scratch(columns)
-    rules = Rules(nonlinear, CERTIFIED, 1e-12, math.inf, True, True)
-    order, h, degree = expand(shaking, sides(), rules, scratch, PLUS, 0, 0.0, 0.0, 1e-3, 9.0)
-    status, time, *_ = advance(0.0, 1e-3, order, h, scratch[SERIES], scratch[SPARE])
-    assert status == IMPACT
+    ground, scratch = in_units_of_g([0.0, 9.0], [row]), new_scratch()
+    block, rules = rocking_block(alpha=(0.2, 0.2), nonlinear=nonlinear), rules_for(nonlinear=nonlinear)
+    start = state_of(PLUS, 0.0, 1e-3)
+    order, h, degree = expand(ground, block, rules, scratch, start, 9.0)
+    outcome, time, *_ = advance(start, scratch, order, h, QUARTER_TURN)
+    assert outcome == IMPACT
     assert time == pytest.approx(2e-3 / (4.0 * (0.2 + strength)), rel=0.03)
-    assert (time < h <= 0.5, degree) == (True, 0 if columns == 1 else 1)
-    order, h, _ = expand(shaking, sides(), rules, scratch, MINUS, 0, 0.0, 0.0, 1e-3, 9.0)
+    assert (time < h <= 0.5, degree) == (True, 0)
+    order, h, _ = expand(ground, block, rules, scratch, state_of(MINUS, 0.0, 1e-3), 9.0)
     assert (h <= 0.5) if strength > 0.2 else (h < 0.01)
 
 
-@settings(quick, max_examples=400)
-@given(
-    st.just(0.0) | st.floats(1e-9, 1e-2),
-    between(-0.2, 0.2),
-    between(-1.5, 1.5),
-    between(-60.0, 60.0),
-    st.floats(1e-4, 0.03),
-    st.integers(0, 1),
-    st.floats(1.0, 1.1),
-)
-def test_a_short_step_at_a_glance_is_the_one_of_the_series(
-    u: float, v: float, a: float, slope: float, left: float, side: int, margin: float
-) -> None:
-    """What it decides is what `advance` finds, and no rotation above the highest so far is passed over."""
-    v = max(abs(v), 1e-9) if u == 0.0 else v
-    shaking, scratch = in_units_of_g([0.0, 1.0], [[a, slope]]), new_scratch(2)
-    block, c = sides(), scratch[SERIES]
-    sign = 1.0 - 2.0 * side
-    expand_linear(u, v, 4.0, 0.2, np.array([sign * a, sign * slope]), 1, 21, c)
-    status, time, end, speed, _, peak = advance(u, v, 21, left, c, scratch[SPARE])
-    highest = max(u, peak) * margin
-    found, found_time, found_end, found_speed = short_step(shaking, block, side, 0, 0.0, u, v, left, highest)
-    assert found in (status, UNDECIDED)
-    if found == status:
-        assert found_time == pytest.approx(time, rel=1e-11)
-        assert found_end == pytest.approx(end, rel=1e-11, abs=1e-14)
-        assert found_speed == pytest.approx(speed, rel=1e-9, abs=1e-13)
-    if status != OVERTURN and peak > 0.0:
-        assert short_step(shaking, block, side, 0, 0.0, u, v, left, 0.999 * peak)[0] == UNDECIDED
+@pytest.mark.parametrize("entered", [(1, 0), (0, 0)], ids=["rocks", "bounces"])
+@pytest.mark.parametrize("v", [-0.7, -0.0, 0.3])
+def test_an_impact_slows_down_and_enters_the_next_side(entered: tuple[int, int], v: float) -> None:
+    block = rocking_block(e=(0.5, 0.8))
+    block["entered"] = entered
+    for side in (PLUS, MINUS):
+        hit = state_of(side, 1e-18, v)
+        speed = strike(block, hit)
+        assert speed == max(0.0, -v)
+        assert (hit["side"], hit["u"], hit["v"]) == (entered[side], 0.0, (0.5, 0.8)[side] * speed)
+        assert hit["impacts"] == 1

@@ -7,29 +7,21 @@ from collections.abc import Sequence
 import numba
 import numpy as np
 import pytest
-from flint import fmpq, fmpq_poly
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kernel_records import ULP
+from oracles.exact import exact, polynomial, real_roots
 
 from rocking.kernels import root
 from rocking.kernels.root import curvature_bound, first_root
 
-ULP = 2.0**-52
-
 quick = settings(deadline=None, max_examples=150)
-
-
-def exact(x: float) -> fmpq:
-    return fmpq(*float(x).as_integer_ratio())
 
 
 def exact_first_root(c: Sequence[float], h: float, raised: float = 0.0) -> float:
     """First root in (0, h] of the polynomial plus `raised`, its doubles taken as exact numbers; inf: none."""
-    polynomial = fmpq_poly([exact(x) for x in c]) + exact(raised)
-    if polynomial.degree() < 1:
-        return math.inf
-    real = [r.real for r, _ in polynomial.complex_roots() if r.imag == 0 and r.real > 0]
-    inside = [float(r.mid()) for r in real if not r > exact(h)]
+    real = real_roots(polynomial(c) + exact(raised))
+    inside = [float(r.mid()) for r in real if r > 0 and not r > exact(h)]
     return min(inside, default=math.inf)
 
 

@@ -62,7 +62,8 @@ def test_significant_duration_of_a_constant_is_its_fraction():
 @given(samples, st.floats(0.05, 0.4), st.floats(0.5, 0.95))
 def test_significant_duration_holds_its_share_of_the_energy(values, start, end):
     even = Motion.from_samples(values, 0.1)
-    motion = Motion(even.breakpoints, even.coefficients)  # without a step, trim cuts between samples
+    # Rest of an uneven length: without a step, trim cuts between samples.
+    motion = Motion(np.append(even.breakpoints, even.duration + 0.05), np.vstack([even.coefficients, np.zeros(2)]))
     whole = motion.arias_intensity
     assume(whole > 1e-9)
     first, last = motion.significant_duration(0.0, start), motion.significant_duration(0.0, end)

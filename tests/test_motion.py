@@ -227,12 +227,44 @@ def test_a_sum_adds_accelerations(one, other):
 def test_a_sum_of_records_on_one_grid_stays_sampled_and_others_do_not():
     record = Motion.from_samples([1.0, 2.0, 3.0], 0.5, name="a")
     assert (record + record).step == 0.5
-    assert (record + Motion.from_samples([1.0, 1.0], 0.5)).step is None
+    # The shorter one ends in a jump, on the grid.
+    assert (record + Motion.from_samples([1.0, 1.0], 0.5)).step == 0.5
     total = record + pulses.half_sine(1.0, 1.0)
     assert total.name == "a + half sine"
     assert total.description.family == "sum"
     assert "amplitude 1, frequency 1" in total.description.text
     assert total.error == 1e-15
+
+
+def test_the_step_follows_from_the_pieces():
+    even = np.arange(6) * 0.1
+    lines = np.arange(10.0).reshape(5, 2)
+    assert Motion(even, lines).step == 0.1
+    assert Motion(even, np.hstack([lines, np.zeros((5, 3))])).step == 0.1
+    assert Motion.from_points([0.0, 0.1, 0.2, 0.3], [0.0, 1.0, -1.0, 0.0]).step == 0.1
+    assert Motion(even, np.hstack([lines, lines])).step is None
+    assert Motion(even, lines[:, :1]).step is None
+    assert Motion(np.append(even[:-1], 0.51), lines).step is None
+    with pytest.raises(TypeError):
+        Motion(even, lines, step=0.1)
+
+
+def test_a_record_that_is_no_longer_linear_between_even_samples_has_no_step():
+    record = Motion.from_samples(np.zeros(25), 0.125)
+    assert record.step == 0.125
+    # The pulse has its breakpoints on the record's grid.
+    assert (record + pulses.sine(4.0, 1.0, cycles=3)).step is None
+    assert record.delayed(0.1).step is None
+    assert record.delayed(0.125).step == 0.125
+    assert pickle.loads(pickle.dumps(record.scaled(2.0))).step == 0.125
+
+
+def test_pieces_jump_where_their_ends_do_not_meet():
+    record = Motion.from_samples([1.0, 2.0, -3.0, 0.5], 0.01).scaled(1.0 / 3.0)
+    assert not record.jumps
+    assert not pulses.sine(1.0, 1.0, cycles=3).jumps
+    assert (record + Motion.from_samples([1.0, 1.0], 0.01)).jumps
+    assert Motion([0.0, 1.0, 2.0], [[1.0], [5.0]]).jumps
 
 
 @settings(deadline=None)
@@ -277,6 +309,13 @@ def test_unusable_delays_are_refused(delay):
         ([0.0, 1.0], 1e308),
         ([0.0, 1.0, 2.0], 1e308),
         ([0.0, 1.0], 5e-324),
+        ([0.0, 1.0], 1e-300),
+        ([0.0, 0.0], 1e-12),
+        ([0.0, 1.0], 1e10),
+        ([0.0, 1.0], "0.1"),
+        ([0.0, 1.0], True),
+        (["0.0", "1.0"], 0.1),
+        ([False, True], 0.1),
     ],
 )
 def test_unusable_samples_are_refused(samples, dt):
@@ -327,6 +366,30 @@ def test_unusable_points_are_refused(times, samples):
 def test_arrays_that_are_no_motion_are_refused(breakpoints, coefficients, error):
     with pytest.raises(InvalidMotion):
         Motion(breakpoints, coefficients, error=error)
+
+
+def test_pieces_of_too_high_a_degree_are_refused_and_the_message_says_to_split_them():
+    assert Motion([0.0, 1.0], np.ones((1, 21))).pga == 21.0
+    with pytest.raises(InvalidMotion, match="degree 20 or less, not 21: split"):
+        Motion([0.0, 1.0], np.ones((1, 22)))
+
+
+def test_pieces_may_be_short_but_not_steep_beyond_all_sense():
+    assert Motion([0.0, 1e-16, 1.0], [[1.0, 0.0], [2.0, 0.0]]).pga == 2.0
+    with pytest.raises(InvalidMotion, match="shorter than"):
+        Motion.from_points([0.0, 1e-300, 1.0], [0.0, 1.0, 0.0])
+    with pytest.raises(InvalidMotion, match="must last"):
+        Motion([0.0, 1e-300], [[1.0]])
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int64, np.array])
+def test_numbers_of_any_real_type_describe_a_motion(kind):
+    motion = Motion.from_samples([kind(0), kind(2), kind(1)], kind(2), name="ramp")
+    assert (motion.step, motion.pga, type(motion.step)) == (2.0, 2.0, float)
+    assert motion.scaled(pga=kind(4)).pga == 4.0
+    assert pulses.sine(kind(3), kind(1), cycles=kind(2)).duration == 2.0
+    assert pulses.n_lobe(2.0, 1.0, lobes=np.int64(3)).duration == 1.5
+    assert motion.processed(baseline=np.int64(0)).step == 2.0
 
 
 def test_descriptions_compare_by_value():

@@ -183,6 +183,13 @@ def test_a_curve_too_flat_for_a_mean_is_refused_as_continuous_and_written_as_dis
     check_shape(written(flat, tmp_path / "model.xml", format="discrete"))
 
 
+def test_data_below_the_blocks_uplift_have_no_range_of_validity(tmp_path):
+    below = fit_fragility([0.5, 1.0, 1.5], [1, 2, 3], trials=4, block=BLOCK)
+    for form in ("continuous", "discrete"):
+        with pytest.raises(rocking.InvalidOption, match="below the one that lifts the block"):
+            below.to_nrml(tmp_path / "model.xml", format=form)
+
+
 def test_a_place_that_cannot_be_written_to_is_refused(result, tmp_path):
     with pytest.raises(rocking.OutputError, match="cannot be written"):
         result.to_nrml(tmp_path / "nowhere" / "model.xml")

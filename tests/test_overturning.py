@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 import rocking
 from rocking.analysis import mode_name, overturning_figure, overturning_map
 from rocking.analysis.boundaries import boundaries
-from rocking.analysis.pairs import simulate_pairs
 from rocking.block import Blocks
+from rocking.engine import Setup, simulate_each
 from rocking.treatment import Certified
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "overturning_map.py"
@@ -200,19 +200,21 @@ def test_bisection_of_endless_regions_ends():
     assert np.all(np.diff(edges.low) > 0.0)
 
 
-def test_pairs_are_what_simulate_says():
+def test_blocks_that_each_have_their_own_scaling_do_what_simulate_says():
     rng = np.random.default_rng(1)
     blocks = Blocks(rng.uniform(1.0, 6.0, 40), rng.uniform(0.08, 0.4, 40), rng.uniform(0.6, 0.95, 40))
     factors = rng.uniform(0.5, 6.0, 40)
     motion = rocking.pulses.sine(1.0, 0.9, cycles=2.5)
     for model in ("linear", "nonlinear"):
-        ends = simulate_pairs(blocks, motion, factors, model=model, chattering=Certified())
-        for k, block in enumerate(blocks):
-            response = rocking.simulate(block, motion.scaled(factors[k]), model=model)
-            assert ends.overturned[k] == response.overturned
-            assert ends.peak[k] == response.peak_rotation
-            assert ends.impacts[k] == len(response.impacts)
-            assert ends.rests[k] == len(response.chattering)
+        played = list(simulate_each(Setup(blocks, model, Certified()), motion, factors))
+        assert sorted(np.concatenate([task.blocks for task, _ in played])) == list(range(40))
+        for task, outcomes in played:
+            for k, outcome in zip(task.blocks, outcomes, strict=True):
+                response = rocking.simulate(blocks[k], motion.scaled(factors[k]), model=model)
+                assert outcome["overturned"] == response.overturned
+                assert outcome["peak_rotation"] == response.peak_rotation
+                assert outcome["impacts"] == len(response.impacts)
+                assert outcome["rests"] == len(response.chattering)
 
 
 def test_a_map_has_units_names_and_provenance():

@@ -158,10 +158,10 @@ def assert_same_course(
 
     Nothing is asserted where an ulp in the motion moves an event by more than 1e-12 s.
     """
-    assume(np.all(ULP * np.abs(one.events["sensitivity"]) <= 1e-12))
+    assume(np.all(ULP * np.abs(one.sensitivity.events["motion"]) <= 1e-12))
     assert [e[1:] for e in events_of(one)] == [e[1:] for e in events_of(other)]
     assert_allclose(other.events["time"], time * one.events["time"] + shift, rtol=0.0, atol=1e-10 * time)
-    atol = 100.0 * ULP * abs(size * one.peak_sensitivity)
+    atol = 100.0 * ULP * abs(size * one.sensitivity.peak["motion"][0])
     assert_allclose(other.peak_rotation, size * one.peak_rotation, rtol=1e-9, atol=atol)
 
 
@@ -220,22 +220,24 @@ def test_sensitivities_are_derivatives_by_the_scale_of_the_motion(case: Case) ->
     for rows in ("events", "impacts"):
         found, after, before = (getattr(r, rows) for r in (response, more, less))
         slopes = (after["time"] - before["time"]) / (2.0 * STEP)
-        chosen = np.abs(found["sensitivity"]) < 100.0
+        sensitivity = getattr(response.sensitivity, rows)["motion"]
+        chosen = np.abs(sensitivity) < 100.0
         if rows == "events":
             chosen &= found["kind"] != "rest"
-        assert_allclose(slopes[chosen], found["sensitivity"][chosen], rtol=1e-3, atol=1e-5)
-    if abs(response.peak_sensitivity) < 100.0 * response.peak_rotation:
+        assert_allclose(slopes[chosen], sensitivity[chosen], rtol=1e-3, atol=1e-5)
+    if abs(response.sensitivity.peak["motion"][0]) < 100.0 * response.peak_rotation:
         slope = (more.peak_rotation - less.peak_rotation) / (2.0 * STEP)
-        assert_allclose(slope, response.peak_sensitivity, rtol=1e-3, atol=1e-5 * response.peak_rotation)
+        assert_allclose(slope, response.sensitivity.peak["motion"][0], rtol=1e-3, atol=1e-5 * response.peak_rotation)
 
 
 @quick
 @given(cases(motion="record"))
 def test_sensitivities_of_rests_take_in_the_impacts_that_a_proof_has_summed(case: Case) -> None:
-    found, after, before = (r.events for r in scaled_responses(case))
-    slopes = (after["time"] - before["time"]) / (2.0 * STEP)
-    rests = (np.abs(found["sensitivity"]) < 100.0) & (found["kind"] == "rest")
-    assert_allclose(slopes[rests], found["sensitivity"][rests], rtol=1e-2, atol=1e-3)
+    response, more, less = scaled_responses(case)
+    slopes = (more.events["time"] - less.events["time"]) / (2.0 * STEP)
+    sensitivity = response.sensitivity.events["motion"]
+    rests = (np.abs(sensitivity) < 100.0) & (response.events["kind"] == "rest")
+    assert_allclose(slopes[rests], sensitivity[rests], rtol=1e-2, atol=1e-3)
 
 
 @pytest.mark.parametrize(

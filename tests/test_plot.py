@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pytest
 
-from rocking.plot import ChatteringSequence, response_figure
+from rocking.plot import DrawnSequence, response_figure
 
 NO_TIMES = np.array([])
 NO_INTERVALS = np.empty((0, 2))
@@ -79,7 +79,7 @@ def test_an_overturned_block_does_not_flatten_the_rocking_before():
 
 def test_the_zoom_shows_every_interval_against_the_time_to_rest():
     times = bouncing_times(9.8, 0.5, 0.8, 60)
-    zoom = figure_of(chattering=ChatteringSequence(times, 9.8 - 1e-9, 9.8 + 1e-9)).axes[2]
+    zoom = figure_of(chattering=DrawnSequence(times, 9.8 - 1e-9, 9.8 + 1e-9)).axes[2]
     (points,) = zoom.lines
     to_rest, intervals = points.get_data()
     assert to_rest.size == 59
@@ -90,7 +90,7 @@ def test_the_zoom_shows_every_interval_against_the_time_to_rest():
 
 def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
     times = bouncing_times(9.8, 0.5, 0.5, 80)
-    zoom = figure_of(chattering=ChatteringSequence(times, 9.8, 9.8)).axes[2]
+    zoom = figure_of(chattering=DrawnSequence(times, 9.8, 9.8)).axes[2]
     assert np.all(zoom.lines[0].get_ydata() > 0.0)
     assert zoom.lines[0].get_xdata().size < 60
 
@@ -103,7 +103,7 @@ def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
         {"impact_times": NO_TIMES, "uplift_times": NO_TIMES, "rest_intervals": NO_INTERVALS},
         {"motion_time": NO_TIMES, "motion_acceleration_g": NO_TIMES},
         {"rotation_over_slenderness": np.zeros(1001)},
-        {"chattering": ChatteringSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)},
+        {"chattering": DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)},
     ],
     ids=["full", "no events", "free rocking", "never moved", "chattering"],
 )
@@ -115,7 +115,7 @@ def test_every_response_is_drawn_to_every_format_without_a_warning(changes, exte
 
 @pytest.mark.parametrize(
     "sequence",
-    [ChatteringSequence(np.array([9.0]), 9.1, 9.2), ChatteringSequence(np.array([9.0, 9.5]), np.nan, np.nan)],
+    [DrawnSequence(np.array([9.0]), 9.1, 9.2), DrawnSequence(np.array([9.0, 9.5]), np.nan, np.nan)],
     ids=["one impact", "rest not bracketed"],
 )
 def test_without_a_bracketed_sequence_the_panels_fill_the_figure(sequence):
@@ -123,7 +123,7 @@ def test_without_a_bracketed_sequence_the_panels_fill_the_figure(sequence):
 
 
 def test_no_text_covers_another_text():
-    sequence = ChatteringSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
+    sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
     figure = figure_of(chattering=sequence, overturn_time=9.9)
     figure.savefig(io.BytesIO(), format="png")
     boxes = [figure._suptitle.get_window_extent()]

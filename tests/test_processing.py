@@ -47,6 +47,16 @@ def test_trim_to_the_whole_changes_nothing():
         assert_allclose(same.coefficients, motion.coefficients, rtol=1e-9, atol=1e-13)
 
 
+def test_jumps_survive_a_trim_and_are_not_dropped_by_what_works_on_samples():
+    ended = Motion.from_samples(np.ones(5), 0.5) + Motion.from_samples(np.zeros(11), 0.5)  # from 1 to 0 at 2 s
+    part = ended.processed(trim=(1.0, 4.0))
+    assert_array_equal(part.acceleration([0.5, 0.999, 1.0, 2.0]), [1.0, 1.0, 0.0, 0.0])
+    for options in ({"baseline": 0}, {"band_pass": (0.1, 0.5)}):
+        with pytest.raises(InvalidMotion, match="jumps: call processed\\(resample"):
+            ended.processed(**options)
+    assert not ended.processed(resample=0.25).jumps
+
+
 @settings(deadline=None)
 @given(st.lists(st.floats(-5.0, 5.0), min_size=1, max_size=4))
 def test_a_baseline_polynomial_is_removed_exactly(polynomial):

@@ -66,8 +66,8 @@ def test_responses_to_el_centro_err_less_than_an_ulp_of_the_record_matters(
     errors = np.array(
         [float(e["time"] - exact) for e, (exact, _, _) in zip(response.events, course.events, strict=True)]
     )
-    assert np.all(np.abs(errors) <= np.maximum(1e-12, ULP * np.abs(response.events["sensitivity"])))
-    of_an_ulp = ULP * abs(response.peak_sensitivity)
+    assert np.all(np.abs(errors) <= np.maximum(1e-12, ULP * np.abs(response.sensitivity.events["motion"])))
+    of_an_ulp = ULP * abs(response.sensitivity.peak["motion"][0])
     assert_allclose(response.peak_rotation, float(course.peak), rtol=1e-12, atol=of_an_ulp)
 
 

@@ -118,10 +118,10 @@ def test_sensitivities_are_derivatives(record):
         low, base, high = (simulate(block, record.scaled(1 + k * step), model=model) for k in (-1, 0, 1))
         first = 12
         change = (high.impacts["time"][:first] - low.impacts["time"][:first]) / (2 * step)
-        assert np.allclose(base.impacts["sensitivity"][:first], change, rtol=2e-4, atol=1e-5)
+        assert np.allclose(base.sensitivity.impacts["motion"][:first], change, rtol=2e-4, atol=1e-5)
         change = (high.peak_rotation - low.peak_rotation) / (2 * step)
-        assert base.peak_sensitivity == pytest.approx(change, rel=1e-4)
-        assert base.events["sensitivity"][0] == pytest.approx(
+        assert base.sensitivity.peak["motion"][0] == pytest.approx(change, rel=1e-4)
+        assert base.sensitivity.events["motion"][0] == pytest.approx(
             (high.events["time"][0] - low.events["time"][0]) / (2 * step), rel=1e-4
         )
 

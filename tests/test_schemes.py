@@ -153,3 +153,28 @@ def test_free_rocking_is_compared_too():
     assert outcome.is_right
     assert -1e-4 < outcome.largest_error < 0.0
     assert outcome.peak_error == 0.0
+
+
+def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
+    scheme = rocking.AsymptoticTime()
+    sine = rocking.pulses.sine(4.0, 1.0, cycles=2)
+    symmetric = rocking.Blocks([2.0], [0.2], [0.9])
+    assert scheme.limits(symmetric, sine).shape == (1, 2)
+    for different in (
+        rocking.Blocks([[2.0, 2.5]], [0.2], [0.9]),
+        rocking.Blocks([2.0], [[0.2, 0.25]], [0.9]),
+        rocking.Blocks([2.0], [0.2], [[0.9, 0.8]]),
+        rocking.Blocks([[2.0, 2.0], [2.0, 2.5]], [0.2], [0.9]),
+    ):
+        with pytest.raises(rocking.InvalidOption, match="symmetric blocks"):
+            scheme.limits(different, sine)
+    with pytest.raises(rocking.InvalidOption, match="sinusoidal"):
+        scheme.limits(symmetric, sine.delayed(1.0))
+
+
+@pytest.mark.parametrize("value", ["1e-9", True, np.nan, np.inf, 0.0, -1.0, None])
+@pytest.mark.parametrize("scheme", [rocking.Certified, rocking.VelocityThreshold, rocking.IntervalThreshold])
+def test_the_parameter_of_a_scheme_is_a_positive_number(scheme, value):
+    assert scheme(np.float32(1.0)) == scheme(1)
+    with pytest.raises(rocking.InvalidOption, match="must be"):
+        scheme(value)

@@ -139,5 +139,5 @@ def test_a_figure_of_too_many_curves_is_refused(spectrum):
 
 def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert runpy.run_path(str(EXAMPLE))["main"]() == pytest.approx(-0.93674, abs=1e-5)
+    assert runpy.run_path(str(EXAMPLE))["main"]() == pytest.approx(-0.93668, abs=1e-5)
     assert (tmp_path / "out" / "spectrum.png").stat().st_size > 10_000

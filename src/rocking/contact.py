@@ -8,10 +8,9 @@ from rocking.kernels.state import Floats
 
 
 def contact_forces(
-    rotation: Floats,
-    velocity: Floats,
-    acceleration: Floats,
+    motion: tuple[Floats, Floats, Floats],
     ground_over_g: Floats,
+    side: Floats,
     slenderness: Floats,
     radius_over_g: Floats,
 ) -> tuple[Floats, Floats]:
@@ -19,23 +18,26 @@ def contact_forces(
 
     Parameters
     ----------
-    rotation, velocity, acceleration : ndarray
-        theta (rad) and its rates.
+    motion : tuple of ndarray
+        theta (rad), and its first and second rate.
     ground_over_g : ndarray
         Ground acceleration in units of g.
+    side : ndarray
+        +1 or -1, the side that the block leans to; 0 at rest.
     slenderness, radius_over_g : ndarray
-        alpha (rad) and R/g (s^2) of the side that the block leans to.
+        alpha (rad) and R/g (s^2) of that side.
 
     Notes
     -----
     On side i = +-1, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
-    pivot; forces are m (a + x'') and m (g + y''). Rotations of exactly 0 with no motion give (a/g, 1).
+    pivot; forces are m (a + x'') and m (g + y''). At rest they are (a/g, 1).
     """
-    side = np.where(rotation != 0.0, np.sign(rotation), np.sign(velocity))
+    rotation, velocity, acceleration = motion
     psi = slenderness - np.abs(rotation)
     towards_pivot = side * acceleration
-    horizontal = side * radius_over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * velocity**2)
-    vertical = radius_over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * velocity**2)
+    speed = np.abs(side) * velocity**2
+    horizontal = side * radius_over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
+    vertical = radius_over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)
     return ground_over_g + horizontal, 1.0 + vertical
 
 

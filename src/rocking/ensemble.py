@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking import checks
 from rocking.block import Block, Blocks
 from rocking.constants import VERSION
-from rocking.errors import InvalidOption
-from rocking.kernels import lanes, march, state, status
+from rocking.engine import OUTCOME, Setup, Task, cores, parts_of, simulate_tasks
+from rocking.errors import InvalidMotion, InvalidOption
 from rocking.kernels.state import Floats
+from rocking.motion import measures
 from rocking.motion.motion import Motion
-from rocking.problem import Model, rules_of, shaking_of, sides_of
+from rocking.problem import Model, rules_of
 from rocking.progress import Progress
 from rocking.treatment import Treatment, treatment
 
@@ -29,31 +29,17 @@ Polarity = Literal["+", "-", "both"]
 
 _SIGNS: dict[str, tuple[int, ...]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
 
-#: Block-steps of one task: enough to pay for the call, few enough to stop soon when interrupted.
-_TASK = 2_000_000
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """One variable of the result."""
-
-    name: str
-    dtype: str
-    units: str
-    meaning: str
-    of: Callable[[state.Integers, Floats, state.Integers], NDArray[Any]]
-
-
-#: What is kept of each simulation, from the last state (at, x) and the ending of its march.
-OUTCOMES = (
-    Outcome("overturned", "?", "1", "whether the rotation reached pi/2", lambda at, x, end: end == status.FELL),
-    Outcome("peak_rotation", "f8", "rad", "largest rotation in size", lambda at, x, end: x[:, state.PEAK]),
-    Outcome("peak_time", "f8", "s", "time of the peak rotation", lambda at, x, end: x[:, state.PEAK_TIME]),
-    Outcome("impacts", "i8", "1", "impacts that were resolved", lambda at, x, end: at[:, state.IMPACTS]),
-    Outcome("uplifts", "i8", "1", "uplifts from rest", lambda at, x, end: at[:, state.UPLIFTS]),
-    Outcome("rests", "i8", "1", "times the block came to rest", lambda at, x, end: at[:, state.SEQUENCES]),
-    Outcome("time_at_rest", "f8", "s", "time spent at rest", lambda at, x, end: x[:, state.RESTING]),
-)
+#: Variables of the result, from the fields of the engine's outcome: units, and what each one means.
+VARIABLES: dict[str, tuple[str, str]] = {
+    "overturned": ("1", "whether the rotation reached pi/2"),
+    "peak_rotation": ("rad", "largest rotation in size"),
+    "peak_time": ("s", "time of the peak rotation"),
+    "impacts": ("1", "impacts that were resolved"),
+    "uplifts": ("1", "uplifts from rest"),
+    "rests": ("1", "times the block came to rest"),
+    "time_at_rest": ("s", "time spent at rest"),
+    "unfinished": ("1", "whether the simulation was given up after too many steps; the rest is as far as it came"),
+}
 
 
 def simulate_many(
@@ -101,8 +87,8 @@ def simulate_many(
     -------
     xarray.Dataset
         Dimensions (motion, scale, polarity, block), those that apply. Variables: overturned, peak_rotation (rad),
-        peak_time (s), impacts, uplifts, rests, time_at_rest (s). Coordinates name the motions and hold the blocks'
-        parameters.
+        peak_time (s), impacts, uplifts, rests, time_at_rest (s), unfinished. Coordinates name the motions and hold the
+        blocks' parameters.
 
     Raises
     ------
@@ -111,8 +97,9 @@ def simulate_many(
 
     Notes
     -----
-    The same engine as `simulate`: every impact is located and chattering is proven. Under evenly sampled records 64
-    blocks step together through each sample, and only those with an event in it leave for the scalar loop.
+    The same engine as `simulate`: every impact is located and chattering is proven. Under evenly sampled records the
+    blocks that rock step together through each sample, and only those with an event in it are played one by one. What
+    becomes of a block depends on the block and the motion alone, bit for bit, whatever is simulated beside it.
 
     Examples
     --------
@@ -130,26 +117,19 @@ def simulate_many(
     if not shaken:
         raise InvalidOption("motions must hold at least one motion")
     how = treatment(chattering)
-    rules = rules_of(many, model, how, duration, record=False)
+    rules_of(many, model, how, duration, record=False)  # checked before anything is computed
     scales = _scales(factor=factor, pga=pga, pgv=pgv, sa=sa, period=period, damping=damping)
     if polarity not in _SIGNS:
         raise InvalidOption(f"polarity must be one of {', '.join(_SIGNS)}, not {polarity!r}")
     count = _threads(threads)
     shape = (len(shaken), scales.count, len(_SIGNS[polarity]), len(many))
-    results = {outcome.name: np.empty(shape, dtype=outcome.dtype) for outcome in OUTCOMES}
-
-    def run(cell: tuple[int, int, int], motion: Motion, part: slice) -> int:
-        chosen = many.select(part)
-        sides = sides_of(chosen, model, how.limits(chosen, motion))
-        ended = _march(motion, many.gravity, sides, rules)
-        for outcome in OUTCOMES:
-            results[outcome.name][(*cell, part)] = outcome.of(*ended)
-        return len(chosen)
-
-    tasks = _tasks(shaken, scales, _SIGNS[polarity], len(many))
+    results = {name: np.empty(shape, dtype=OUTCOME[name]) for name in VARIABLES}
+    setup = Setup(many, model, how, duration)
     with Progress("simulating", math.prod(shape), show=progress) as bar:
-        for finished in _parallel(run, tasks, count):
-            bar.advance(finished)
+        for task, outcomes in simulate_tasks(setup, _tasks(shaken, scales, _SIGNS[polarity], len(many)), threads=count):
+            for name, values in results.items():
+                values[(*task.key, task.blocks)] = outcomes[name]
+            bar.advance(len(outcomes))
     return _dataset(results, many, shaken, scales, polarity, model, how)
 
 
@@ -165,10 +145,14 @@ class _Scales:
     def count(self) -> int:
         return len(self.values)
 
-    def applied(self, motion: Motion, value: float) -> Motion:
-        if self.measure is None:
-            return motion
-        return motion.scaled(**{self.measure: value}, **self.options)
+    def factors(self, motion: Motion) -> Floats:
+        """Factors that bring a motion to the values of the measure."""
+        if self.measure is None or self.measure == "factor":
+            return self.values
+        now = measures.target(motion, self.measure, self.options.get("period"), self.options.get("damping", 0.0))
+        if now == 0.0:
+            raise InvalidMotion(f"{motion.name} is zero throughout and cannot be scaled to a {self.measure}")
+        return self.values / now
 
 
 def _scales(*, period: float | None, damping: float, **measures: ArrayLike | None) -> _Scales:
@@ -180,12 +164,7 @@ def _scales(*, period: float | None, damping: float, **measures: ArrayLike | Non
     if not given:
         return _Scales(None, np.ones(1), {})
     ((name, target),) = given.items()
-    try:
-        values = np.atleast_1d(np.asarray(target, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise InvalidOption(f"{name} must be a number or a sequence of numbers, not {target!r}") from None
-    if values.ndim != 1 or values.size == 0 or not np.all(np.isfinite(values) & (values > 0.0)):
-        raise InvalidOption(f"{name} must be a positive number or a sequence of positive numbers")
+    values = checks.positive_numbers(target, name, InvalidOption)
     if name != "sa":
         return _Scales(name, values, {})
     if period is None:
@@ -200,66 +179,15 @@ def _blocks(blocks: Blocks | Block | Sequence[Block]) -> Blocks:
 
 
 def _threads(threads: int | None) -> int:
-    if threads is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not (isinstance(threads, int) and threads >= 1):
-        raise InvalidOption(f"threads must be a whole number of at least 1, not {threads!r}")
-    return threads
+    return cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
 
 
-def _tasks(
-    motions: Sequence[Motion], scales: _Scales, signs: tuple[int, ...], count: int
-) -> Iterator[tuple[tuple[int, int, int], Motion, slice]]:
+def _tasks(motions: Sequence[Motion], scales: _Scales, signs: tuple[int, ...], count: int) -> Iterator[Task]:
     for m, motion in enumerate(motions):
-        blocks_at_once = lanes.WIDTH * max(1, _TASK // (lanes.WIDTH * len(motion.coefficients)))
-        for s, value in enumerate(scales.values):
-            scaled = scales.applied(motion, float(value))
+        for s, factor in enumerate(scales.factors(motion).tolist()):
             for k, sign in enumerate(signs):
-                signed = scaled if sign > 0 else -scaled
-                for start in range(0, count, blocks_at_once):
-                    yield (m, s, k), signed, slice(start, min(start + blocks_at_once, count))
-
-
-def _parallel(
-    run: Callable[[tuple[int, int, int], Motion, slice], int],
-    tasks: Iterator[tuple[tuple[int, int, int], Motion, slice]],
-    threads: int,
-) -> Iterator[int]:
-    """Run tasks on threads, a few ahead of the results; an interrupt leaves the rest undone.
-
-    Kernels release Python's lock, so plain threads use every core, whoever calls and however often.
-    """
-    with ThreadPoolExecutor(threads) as pool:
-        pending: set[Future[int]] = set()
-        try:
-            for task in tasks:
-                pending.add(pool.submit(run, *task))
-                if len(pending) >= 2 * threads:
-                    done, pending = wait(pending, return_when=FIRST_COMPLETED)
-                    yield from (future.result() for future in done)
-            for future in pending:
-                yield future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _march(
-    motion: Motion, gravity: float, sides: Floats, rules: state.Rules
-) -> tuple[state.Integers, Floats, state.Integers]:
-    """Last state and ending of every block under one motion."""
-    shaking = shaking_of(motion, gravity)
-    at, x = state.new_states(len(sides))
-    endings = np.empty(len(sides), dtype=np.int64)
-    tables, scratch = state.new_tables(1), state.new_scratch(shaking.coefficients.shape[1])
-    if motion.step is None:
-        march.march_each(shaking, sides, rules, tables, scratch, at, x, endings)
-        return at, x, endings
-    room = lanes.new_room()
-    for start in range(0, len(sides), lanes.WIDTH):
-        part = slice(start, start + lanes.WIDTH)
-        lanes.run_lanes(shaking, sides[part], rules, tables, scratch, room, at[part], x[part], endings[part])
-    return at, x, endings
+                for part in parts_of(count, motion):
+                    yield Task(part, motion, sign * factor, (m, s, k))
 
 
 def _dataset(
@@ -277,12 +205,8 @@ def _dataset(
     dropped = [k for k, gone in ((1, scales.measure is None), (2, polarity != "both")) if gone]
     kept = tuple(name for k, name in enumerate(dimensions) if k not in dropped)
     variables = {
-        outcome.name: (
-            kept,
-            results[outcome.name].squeeze(axis=tuple(dropped)),
-            {"units": outcome.units, "long_name": outcome.meaning},
-        )
-        for outcome in OUTCOMES
+        name: (kept, results[name].squeeze(axis=tuple(dropped)), {"units": units, "long_name": meaning})
+        for name, (units, meaning) in VARIABLES.items()
     }
     coordinates: dict[str, Any] = {"motion": ("motion", [motion.name for motion in motions])}
     if scales.measure is not None:

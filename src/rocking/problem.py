@@ -1,38 +1,55 @@
-"""Blocks, a motion and the rules of a simulation as the plain arrays that kernels take."""
+"""Blocks, a motion and the rules of a simulation as the records and arrays that kernels take."""
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Literal, get_args
 
 import numpy as np
 
+from rocking import checks
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
-from rocking.kernels import state
+from rocking.kernels import ground, state
+from rocking.kernels.ground import Ground
 from rocking.motion.motion import Motion
 from rocking.treatment import Certified, Treatment
 
 Model = Literal["nonlinear", "linear"]
 
 
-def shaking_of(motion: Motion | None, gravity: float) -> state.Shaking:
-    """Arrays of a motion; without one, no piece at all."""
+@functools.lru_cache(maxsize=8)
+def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Ground:
+    """Ground of a motion times a factor; without a motion, no piece at all.
+
+    The last few are kept: laying out a record takes as long as a block's march through it.
+    """
     if motion is None:
-        return state.Shaking(_readonly(np.zeros(1)), _readonly(np.zeros((0, 2))), 1.0 / gravity, 0.0)
-    return state.Shaking(motion.breakpoints, motion.coefficients, 1.0 / gravity, motion.error / gravity)
+        return ground.ground_of(_NO_BREAKPOINTS, _NO_COEFFICIENTS, 1.0, 0.0)
+    coefficients = motion.coefficients if factor == 1.0 else _frozen(motion.coefficients * factor)
+    return ground.ground_of(motion.breakpoints, coefficients, 1.0 / gravity, motion.error * abs(factor))
 
 
-def sides_of(blocks: Blocks, model: Model, limits: state.Floats) -> state.Floats:
-    """Sides of every block as the kernels take them (`state`), shape (n, 2, 6)."""
+def records_of(blocks: Blocks, model: Model, limits: state.Floats) -> state.Records:
+    """Every block as the kernels take it (`state.BLOCK`), shape (n,)."""
     p, alpha = blocks.p, blocks.alpha
-    threshold, gain = (alpha, p * p) if model == "linear" else (np.tan(alpha), p * p * np.cos(alpha))
-    return np.stack([p * p, alpha, threshold, gain, blocks.restitution, limits], axis=2)
+    made = state.records(len(blocks), state.BLOCK)
+    made["stiffness"] = p * p
+    made["slenderness"] = alpha
+    made["sine"], made["cosine"] = np.sin(alpha), np.cos(alpha)
+    made["threshold"] = alpha if model == "linear" else np.tan(alpha)
+    made["gain"] = p * p if model == "linear" else p * p * np.cos(alpha)
+    made["restitution"] = blocks.restitution
+    made["limit"] = limits
+    made["entered"] = (1, 0)
+    made["fallen"] = 0.5 * math.pi
+    return made
 
 
 def rules_of(
     blocks: Blocks, model: Model, treatment: Treatment, duration: float | None, *, record: bool
-) -> state.Rules:
+) -> state.Record:
     """Rules of a simulation, checked.
 
     Raises
@@ -45,18 +62,22 @@ def rules_of(
     if duration is None:
         if np.any(np.prod(blocks.restitution, axis=1) == 1.0):
             raise InvalidOption("a block with restitution 1 never comes to rest; give duration= to say when to stop")
-    elif not (isinstance(duration, (int, float)) and math.isfinite(duration) and duration > 0.0):
-        raise InvalidOption(f"duration must be a positive number of seconds, not {duration!r}")
-    return state.Rules(
+    else:
+        duration = checks.positive(duration, "duration", InvalidOption, "s")
+    return state.record(
+        state.RULES,
         nonlinear=model == "nonlinear",
         treatment=treatment.code,
         tolerance=treatment.tolerance if isinstance(treatment, Certified) else 0.0,
-        stop=math.inf if duration is None else float(duration),
+        stop=math.inf if duration is None else duration,
         endless=duration is None,
         record=record,
     )
 
 
-def _readonly(array: state.Floats) -> state.Floats:
+def _frozen(array: state.Floats) -> state.Floats:
     array.flags.writeable = False
     return array
+
+
+_NO_BREAKPOINTS, _NO_COEFFICIENTS = _frozen(np.zeros(1)), _frozen(np.zeros((0, 2)))

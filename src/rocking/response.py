@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking import checks
 from rocking.block import Block
 from rocking.contact import contact_forces, friction_demand
 from rocking.errors import InvalidOption, OutputError
-from rocking.kernels import state, status
-from rocking.kernels.state import Floats, Trail
-from rocking.kernels.trace import trace
+from rocking.kernels import state, status, variation
+from rocking.kernels.state import Floats
+from rocking.kernels.trace import Trail, trace
+from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.problem import Model
 from rocking.treatment import Treatment
@@ -24,24 +27,53 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1"), ("sensitivity", "f8")])
-IMPACT = np.dtype(
-    [("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8"), ("sensitivity", "f8")]
-)
+EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
+IMPACT = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
 CHATTERING = np.dtype([("start", "f8"), ("end", "f8"), ("lower", "f8"), ("upper", "f8"), ("impacts", "i8")])
 
 _KINDS = np.array(["uplift", "rest", "overturn"])
 
-#: A response is ambiguous when a change of the motion by one unit in the last place moves its peak by more than this
-#: fraction, or one of its events by more than this many seconds.
+#: A response is ambiguous when changes of the motion, the initial state and the block by one unit in the last place
+#: move its peak by more than this fraction, or one of its events by more than this many seconds.
 AMBIGUITY = 1e-6
 
 _ULP = 2.0**-52
 
-#: Interior points per step, rounds, and points per further round, when the contact forces' extremes are searched.
-_INTERIOR = 4
-_REFINEMENTS = 3
-_REFINED = 33
+#: Samples per step, rounds, and steps that are looked at again, when the contact forces' extremes are searched.
+_SAMPLES = 9
+_REFINEMENTS = 10
+_MOST_REFINED = 64
+
+
+#: What a sensitivity is to.
+QUANTITIES = ("motion", "initial_rotation", "initial_velocity", "p", "alpha", "restitution")
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Changes of a response per unit of relative change of what it was computed from.
+
+    Structured arrays with the fields motion, initial_rotation, initial_velocity, p, alpha and restitution (of both
+    sides together): a field times 1e-3 is what 0.1 % more of that quantity changes, to first order.
+
+    Attributes
+    ----------
+    peak : structured array, shape (1,)
+        Of the peak rotation, rad; 0 when overturned.
+    impacts, events : structured array
+        Of the times of the response's impacts and events, s.
+    """
+
+    peak: NDArray[np.void]
+    impacts: NDArray[np.void]
+    events: NDArray[np.void]
+
+
+def _by_quantity(values: Floats) -> NDArray[np.void]:
+    table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
+    for name, row in zip(QUANTITIES, values, strict=True):
+        table[name] = row
+    return table
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,20 +86,19 @@ class Response:
         What was simulated, and how.
     overturned : bool
         Whether the rotation reached pi/2.
+    unfinished : bool
+        Whether the simulation was given up after too many steps; all else is then as far as it came.
     overturn_time : float
         When it first did, s; NaN otherwise.
     peak_rotation, peak_time : float
         Largest |theta|, rad, and when, s; pi/2 when overturned.
-    peak_sensitivity : float
-        Change of the peak rotation per unit of relative change of the motion, rad.
     duration : float
         End of the response, s.
     events : structured array
-        time (s), kind ("uplift", "rest", "overturn"), side (+1, -1; 0 at rest), and sensitivity: shift of the time
-        per unit of relative change of the motion, s.
+        time (s), kind ("uplift", "rest", "overturn"), side (+1, -1; 0 at rest).
     impacts : structured array
-        time (s), side entered, speed_before and speed_after (rad/s), sensitivity (s), in order of time; of a
-        chattering sequence those that were resolved before its rest was closed.
+        time (s), side entered, speed_before and speed_after (rad/s), in order of time; of a chattering sequence those
+        that were resolved before its rest was closed.
     chattering : structured array
         One row for each sequence of impacts that ended at rest: start (time of the impact from which it was proven to
         be complete), end (time of rest), lower and upper bound on the end (NaN if not proven), number of impacts
@@ -81,10 +112,10 @@ class Response:
     model: Model
     treatment: Treatment
     overturned: bool
+    unfinished: bool
     overturn_time: float
     peak_rotation: float
     peak_time: float
-    peak_sensitivity: float
     duration: float
     events: NDArray[np.void]
     impacts: NDArray[np.void]
@@ -100,29 +131,28 @@ class Response:
         model: Model,
         treatment: Treatment,
         trail: Trail,
-        tables: Floats,
-        at: state.Integers,
-        x: Floats,
+        table: state.Records,
+        end: state.Record,
     ) -> Response:
-        """Response from the tables and the last state of a march."""
-        events = tables[state.EVENT_TABLE, : at[state.EVENTS]]
-        overturned = bool(len(events)) and events[-1, 1] == status.TOPPLED
+        """Response from the table and the last state of a march."""
+        events = table["event"][: end["events"]]
+        overturned = bool(len(events)) and events["kind"][-1] == status.TOPPLED
         return cls(
             block=block,
             motion=motion,
             model=model,
             treatment=treatment,
             overturned=bool(overturned),
-            overturn_time=float(events[-1, 0]) if overturned else math.nan,
-            peak_rotation=float(x[state.PEAK]),
-            peak_time=float(x[state.PEAK_TIME]),
-            peak_sensitivity=float(x[state.PEAK_CHANGE]),
-            duration=float(x[state.END]),
+            unfinished=bool(end["ending"] == status.UNFINISHED),
+            overturn_time=float(events["time"][-1]) if overturned else math.nan,
+            peak_rotation=float(end["peak"]),
+            peak_time=float(end["peak_time"]),
+            duration=float(end["end"]),
             events=_events(events),
-            impacts=_structured(tables[state.IMPACT_TABLE, : at[state.IMPACTS]], IMPACT),
-            chattering=_structured(tables[state.SEQUENCE_TABLE, : at[state.SEQUENCES]], CHATTERING),
-            stalled=int(at[state.STALLED]),
-            trail=trail._replace(nodes=tables[state.NODE_TABLE, : at[state.NODES]].copy()),
+            impacts=_public(table["impact"][: end["impacts"]], IMPACT),
+            chattering=_public(table["sequence"][: end["sequences"]], CHATTERING),
+            stalled=int(end["stalled"]),
+            trail=trail._replace(nodes=state.attributed(np.array(table["node"][: end["nodes"]]))),
         )
 
     @property
@@ -134,11 +164,25 @@ class Response:
         return self.peak_rotation / self.block.sides[0 if leaning > 0.0 else 1].alpha
 
     @property
+    def sensitivity(self) -> Sensitivity:
+        """How the peak and the times of events and impacts change with the motion, the initial state and the block."""
+        trail, count = self.trail, len(QUANTITIES)
+        peak = np.zeros(count)
+        impacts, events = np.zeros((count, len(self.impacts))), np.zeros((count, len(self.events)))
+        scratch, work = state.new_scratch(), np.zeros(variation.WORK)
+        for k in range(count):
+            peak[k] = variation.vary(trail, scratch, work, k, self.peak_time, impacts[k], events[k])
+        if self.overturned:
+            peak[:] = 0.0
+        return Sensitivity(*(_by_quantity(values) for values in (peak[:, None], impacts, events)))
+
+    @property
     def ambiguous(self) -> bool:
-        """Whether no double-precision program can know this response: one ulp of the motion changes it visibly."""
-        if not abs(self.peak_sensitivity) * _ULP <= AMBIGUITY * max(self.peak_rotation, 1e-300):
-            return True
-        return not bool(np.all(np.abs(self.events["sensitivity"]) * _ULP <= AMBIGUITY))
+        """Whether no double-precision program can know this response: one ulp of what was given changes it visibly."""
+        changes = self.sensitivity
+        total = [np.sum([np.abs(values[name]) for name in QUANTITIES], axis=0) for values in vars(changes).values()]
+        peak, _, events = (values * _ULP for values in total)
+        return not bool(np.all(peak <= AMBIGUITY * max(self.peak_rotation, 1e-300)) and np.all(events <= AMBIGUITY))
 
     @property
     def time_at_rest(self) -> float:
@@ -150,9 +194,9 @@ class Response:
     def rest_intervals(self) -> Floats:
         """Start and end of each interval at rest, shape (n, 2), s."""
         nodes = self.trail.nodes
-        rows = np.flatnonzero(nodes[:, 3] == 0.0)
-        after = np.append(nodes[1:, 0], self.duration)
-        return np.column_stack([nodes[rows, 0], after[rows]])
+        rows = np.flatnonzero(nodes["side"] == state.AT_REST)
+        after = np.append(nodes["time"][1:], self.duration)
+        return np.column_stack([nodes["time"][rows], after[rows]])
 
     def rotation(self, time: ArrayLike) -> Floats:
         """Rotation theta, rad, at any time, from the series of the arc in which it lies.
@@ -270,7 +314,7 @@ class Response:
 
         Drawn from a little before the first event to a little after the last.
         """
-        from rocking.plot import ChatteringSequence, response_figure
+        from rocking.plot import DrawnSequence, response_figure
 
         start, end = self._active_span()
         times = self._drawing_times(start, end)
@@ -283,7 +327,7 @@ class Response:
         if longest is not None:
             struck = self.impacts["time"]
             within = struck[(struck >= longest["start"]) & (struck <= longest["end"])]
-            sequence = ChatteringSequence(within, float(longest["lower"]), float(longest["upper"]))
+            sequence = DrawnSequence(within, float(longest["lower"]), float(longest["upper"]))
         return response_figure(
             time=times,
             rotation_over_slenderness=theta / np.where(theta >= 0.0, alpha[0], alpha[1]),
@@ -329,7 +373,7 @@ class Response:
     def _drawing_times(self, start: float, end: float) -> Floats:
         """Return times dense enough for a smooth line: even ones, and those of steps that are long enough to see."""
         even = np.linspace(start, end, 4001)
-        steps = self.trail.nodes[:, 0]
+        steps = self.trail.nodes["time"]
         steps = steps[(steps > start) & (steps < end)]
         visible = np.diff(np.floor(steps / max(even[1] - even[0], 1e-12)), prepend=-1.0) > 0.0
         return np.union1d(even, steps[visible])
@@ -346,9 +390,9 @@ class Response:
     def _axis(self, dt: float | None) -> Floats:
         if dt is None:
             step = None if self.motion is None else self.motion.step
-            dt = step or max(self.duration, 1e-3) / 2000.0
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise InvalidOption(f"dt must be a positive number of seconds, not {dt!r}")
+            # A pulse of a few straight lines has a step, too, that shows nothing.
+            dt = step if step and step <= 0.01 * self.duration else max(self.duration, 1e-3) / 2000.0
+        dt = checks.positive(dt, "dt", InvalidOption, "s")
         return dt * np.arange(math.floor(self.duration / dt * (1.0 + 1e-12)) + 1, dtype=np.float64)
 
     def _ground(self, times: Floats) -> Floats:
@@ -357,7 +401,7 @@ class Response:
         return self.motion.acceleration(times)
 
     def _rows(self, times: Floats) -> NDArray[np.int64]:
-        rows = np.searchsorted(self.trail.nodes[:, 0], times, side="right") - 1
+        rows = np.searchsorted(self.trail.nodes["time"], times, side="right") - 1
         return np.maximum(rows, 0).astype(np.int64)
 
     def _traced(self, time: ArrayLike) -> Floats:
@@ -369,8 +413,7 @@ class Response:
 
     def _traced_in(self, times: Floats, rows: NDArray[np.int64]) -> Floats:
         out = np.empty((len(times), 3))
-        scratch = state.new_scratch(self.trail.shaking.coefficients.shape[1])
-        trace(self.trail, scratch, times, rows, out)
+        trace(self.trail, state.new_scratch(), times, rows, out)
         return out
 
     def _forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
@@ -381,51 +424,71 @@ class Response:
         return horizontal.reshape(times.shape), vertical.reshape(times.shape)
 
     def _forces_in(self, times: Floats, rows: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """Contact forces in the steps that start at these rows: on the side and under the piece of each."""
+        nodes = self.trail.nodes[rows]
         theta, rate, acceleration = self._traced_in(times, rows).T
-        side = np.where(self.trail.nodes[rows, 3] < 0.0, 1, 0)
+        rests = nodes["side"] == state.AT_REST
+        side = np.maximum(nodes["side"], 0)
         alpha = np.array([s.alpha for s in self.block.sides])[side]
         radius = np.array([s.radius for s in self.block.sides])[side]
-        ground = self._ground(times) / self.block.gravity
-        leaning = np.where(theta == 0.0, self.trail.nodes[rows, 3] * 1e-300, theta)
-        return contact_forces(leaning, rate, acceleration, ground, alpha, radius / self.block.gravity)
+        ground = self._ground_in(times, nodes)
+        sign = np.where(rests, 0.0, 1.0 - 2.0 * side)
+        return contact_forces((theta, rate, acceleration), ground, sign, alpha, radius / self.block.gravity)
 
-    def _extreme(self, measure: Any) -> float:
-        """Largest value of a measure of the two forces over the response, refined within its step."""
+    def _ground_in(self, times: Floats, nodes: state.Records) -> Floats:
+        """Ground acceleration in g: in the piece where a step starts; at rest, which may span many, wherever it is."""
+        pieces = self.trail.ground.pieces
+        inside = np.maximum(times - pieces[nodes["piece"], 0], 0.0)
+        stepping = piecewise.value(pieces[nodes["piece"], 2:], inside)
+        return np.where(nodes["side"] == state.AT_REST, self._ground(times) / self.block.gravity, stepping)
+
+    def _extreme(self, measure: Callable[[Floats, Floats], Floats]) -> float:
+        """Largest value of a measure of the two forces, both limits at every impact and jump included.
+
+        Within a step the forces are smooth. Those steps whose samples come near the largest are sampled again, around
+        their best.
+        """
         times, rows = self._samples()
-        best = -math.inf
+        largest = -math.inf
         for _ in range(_REFINEMENTS):
-            values = measure(*self._forces_in(times, rows))
-            place = int(np.argmax(values))
-            best = max(best, float(values[place]))
-            row = rows[place]
-            low, high = (times[k] if rows[k] == row else times[place] for k in (place - 1, (place + 1) % len(rows)))
-            times, rows = np.linspace(low, high, _REFINED), np.full(_REFINED, row)
-        return best
+            values = measure(*self._forces_in(times.ravel(), rows.ravel())).reshape(times.shape)
+            largest = max(largest, float(values.max()))
+            kept = np.argsort(values.max(axis=1))[-_MOST_REFINED:]
+            times, rows, place = times[kept], rows[kept], values[kept].argmax(axis=1)
+            low = np.take_along_axis(times, np.maximum(place - 1, 0)[:, None], axis=1)
+            high = np.take_along_axis(times, np.minimum(place + 1, times.shape[1] - 1)[:, None], axis=1)
+            times = low + (high - low) * np.linspace(0.0, 1.0, times.shape[1])
+        return largest
 
     def _samples(self) -> tuple[Floats, NDArray[np.int64]]:
-        """Return times within every step, both ends included, and at every corner of the motion; with their steps."""
-        starts = self.trail.nodes[:, 0]
-        ends = np.append(starts[1:], self.duration)
-        fractions = np.linspace(0.0, 1.0, _INTERIOR + 2)
-        times = (starts[:, None] + fractions * (ends - starts)[:, None]).ravel()
-        rows = np.repeat(np.arange(len(starts)), len(fractions))
-        corners = self.trail.shaking.breakpoints
-        pieces = (corners[:-1, None] + fractions * np.diff(corners)[:, None]).ravel()
-        pieces = pieces[pieces <= self.duration]
-        times, rows = np.append(times, pieces), np.append(rows, self._rows(pieces))
-        order = np.lexsort((times, rows))
-        return times[order], rows[order]
+        """Sample every step, and every piece of the motion during rest, ends included; with their steps."""
+        nodes = self.trail.nodes
+        starts, ends = nodes["time"], np.append(nodes["time"][1:], self.duration)
+        corners = self.trail.ground.pieces[:, 0]
+        corners = corners[(corners > 0.0) & (corners < self.duration)]
+        at_rest = self._rows(corners)
+        corners = corners[nodes["side"][at_rest] == state.AT_REST]
+        rests = self._rows(corners)
+        until = np.minimum(ends[rests], np.append(corners[1:], self.duration))
+        starts, ends = np.append(starts, corners), np.append(ends, until)
+        rows = np.append(np.arange(len(nodes)), rests)
+        lasting = ends > starts
+        starts, ends, rows = starts[lasting], ends[lasting], rows[lasting]
+        fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES))
+        times = starts[:, None] + fractions * (ends - starts)[:, None]
+        resting = nodes["side"][rows] == state.AT_REST  # what the motion is before a jump
+        times[resting, -1] = np.maximum(np.nextafter(times[resting, -1], 0.0), times[resting, 0])
+        return times, np.repeat(rows[:, None], _SAMPLES, axis=1)
 
 
-def _structured(table: Floats, dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    rows = np.empty(len(table), dtype=dtype)
-    for column, name in enumerate(dtype.names or ()):
-        rows[name] = table[:, column]
-    return rows
+def _public(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    public = np.empty(len(rows), dtype=dtype)
+    for name in dtype.names or ():
+        public[name] = rows[name]
+    return public
 
 
-def _events(table: Floats) -> NDArray[np.void]:
-    rows = np.empty(len(table), dtype=EVENT)
-    rows["time"], rows["side"], rows["sensitivity"] = table[:, 0], table[:, 2], table[:, 3]
-    rows["kind"] = _KINDS[table[:, 1].astype(np.intp)]
-    return rows
+def _events(rows: state.Records) -> NDArray[np.void]:
+    events = np.empty(len(rows), dtype=EVENT)
+    events["time"], events["side"], events["kind"] = rows["time"], rows["side"], _KINDS[rows["kind"]]
+    return events

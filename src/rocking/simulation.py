@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 
+from rocking import checks
 from rocking.block import Block, Blocks
+from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state, status
 from rocking.kernels.march import march
+from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.problem import Model, rules_of, shaking_of, sides_of
+from rocking.problem import Model, ground_of, records_of, rules_of
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
 
-#: Rows of the first tables per piece of the motion, and the most that tables may grow to.
+#: Rows of the first table per piece of the motion.
 _FIRST_ROWS = 1.25
-_MOST_ROWS = 30_000_000
+
+#: Fastest initial velocity, rad/s: beyond all sense, and squares and fourth powers of it are far from overflow.
+_FASTEST = 1e6
 
 
 def simulate(
@@ -75,35 +80,46 @@ def simulate(
     """
     how, blocks = treatment(chattering), Blocks.of([block])
     rules = rules_of(blocks, model, how, duration, record=True)
-    shaking = shaking_of(motion, block.gravity)
-    sides = sides_of(blocks, model, how.limits(blocks, motion))[0]
-    at, x = state.new_state()
-    at[state.SIDE], x[state.U], x[state.V] = _initial_state(initial_rotation, initial_velocity)
-    x[state.PEAK] = x[state.U]
-    tables = state.new_tables(64 + int(_FIRST_ROWS * len(shaking.coefficients)))
-    scratch = state.new_scratch(shaking.coefficients.shape[1])
-    pieces = len(shaking.coefficients) + 1
-    ending = march(shaking, sides, rules, tables, scratch, at, x, pieces)
-    while ending == status.FULL:
-        if tables.shape[1] > _MOST_ROWS:
-            raise InvalidOption(f"the response takes more than {_MOST_ROWS} steps; give a shorter duration=")
-        tables = state.grown(tables)
-        ending = march(shaking, sides, rules, tables, scratch, at, x, pieces)
+    trail = Trail(
+        ground_of(motion, block.gravity), records_of(blocks, model, how.limits(blocks, motion))[0], rules, NO_NODES
+    )
+    start = state.new_states(1, 0)[0]
+    start["side"], start["u"], start["v"] = _initial_state(initial_rotation, initial_velocity)
+    start["peak"] = start["u"]
+    ending, table = _marched(trail, start)
     if ending == status.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give duration= or another initial state")
-    return Response.from_march(
-        block, motion, model, how, state.Trail(shaking, sides, rules, tables[state.NODE_TABLE]), tables, at, x
-    )
+    return Response.from_march(block, motion, model, how, trail, table, start)
+
+
+def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
+    """How a march ends, in slices so that an interrupt is seen; and its table, which grows as it is filled."""
+    ground, block, rules, _ = trail
+    table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))
+    scratch = state.new_scratch()
+    ending = status.PAUSED
+    for _ in range(slices(ground)):
+        start["budget"] = SLICE
+        ending = march(ground, block, rules, table, scratch, start)
+        while ending == status.FULL:
+            table = state.grown(table)
+            ending = march(ground, block, rules, table, scratch, start)
+        if ending != status.PAUSED:
+            return ending, table
+    start["end"] = table["node"]["time"][start["nodes"] - 1]
+    start["ending"] = status.UNFINISHED
+    return status.UNFINISHED, table
 
 
 def _initial_state(rotation: float, velocity: float) -> tuple[int, float, float]:
     """Side index, rotation and velocity in that side's frame; at rest where both are zero."""
-    for value, name in ((rotation, "initial_rotation"), (velocity, "initial_velocity")):
-        if not (isinstance(value, (int, float)) and math.isfinite(value)):
-            raise InvalidOption(f"{name} must be a finite number, not {value!r}")
-    if abs(rotation) >= 0.5 * math.pi:
-        raise InvalidOption(f"initial_rotation must be below pi/2 rad in size, not {rotation:g}")
-    if rotation == 0.0 and velocity == 0.0:
+    theta = checks.finite(rotation, "initial_rotation", InvalidOption)
+    rate = checks.finite(velocity, "initial_velocity", InvalidOption)
+    if abs(rate) > _FASTEST:
+        raise InvalidOption(f"initial_velocity must be at most {_FASTEST:g} rad/s in size, not {rate:g}")
+    if abs(theta) >= 0.5 * math.pi:
+        raise InvalidOption(f"initial_rotation must be below pi/2 rad in size, not {theta:g}")
+    if theta == 0.0 and rate == 0.0:
         return state.AT_REST, 0.0, 0.0
-    sign = math.copysign(1.0, rotation if rotation != 0.0 else velocity)
-    return (0 if sign > 0.0 else 1), abs(rotation), sign * velocity
+    sign = math.copysign(1.0, theta if theta != 0.0 else rate)
+    return (0 if sign > 0.0 else 1), abs(theta), sign * rate

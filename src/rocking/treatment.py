@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
+from rocking import checks
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.kernels import status
@@ -39,7 +39,7 @@ class Certified:
     tolerance: float = 1e-12
 
     def __post_init__(self) -> None:
-        _positive(self.tolerance, "tolerance", "s")
+        checks.positive(self.tolerance, "tolerance", InvalidOption, "s")
 
     code: ClassVar[int] = status.CERTIFIED
 
@@ -66,7 +66,7 @@ class VelocityThreshold:
     threshold: float = 5e-10
 
     def __post_init__(self) -> None:
-        _positive(self.threshold, "threshold", "as a fraction of p alpha")
+        checks.positive(self.threshold, "threshold", InvalidOption, "fractions of p alpha")
 
     code: ClassVar[int] = status.VELOCITY
 
@@ -93,7 +93,7 @@ class IntervalThreshold:
     threshold: float = 1e-9
 
     def __post_init__(self) -> None:
-        _positive(self.threshold, "threshold", "s")
+        checks.positive(self.threshold, "threshold", InvalidOption, "s")
 
     code: ClassVar[int] = status.INTERVAL
 
@@ -162,8 +162,3 @@ def treatment(chattering: str | Treatment) -> Treatment:
     if chattering not in _BY_NAME:
         raise InvalidOption(f"chattering must be one of {', '.join(_BY_NAME)} or a treatment, not {chattering!r}")
     return _BY_NAME[chattering]()
-
-
-def _positive(value: float, name: str, unit: str) -> None:
-    if not (isinstance(value, (int, float)) and math.isfinite(value) and value > 0.0):
-        raise InvalidOption(f"{name} must be a positive number, {unit}, not {value!r}")

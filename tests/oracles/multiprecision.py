@@ -17,6 +17,7 @@ mp = MPContext()
 mp.dps = 60
 SETTLED = mp.mpf("1e-32")
 NEGLIGIBLE = mp.mpf("1e-56")
+ROUNDED = mp.mpf("1e-14")
 HIGHEST_ORDER = 90
 GRID = np.unique(np.concatenate([[0.0], 2.0 ** -np.arange(1.0, 60.0), np.linspace(0.0, 1.0, 257)]))
 """Where series are first looked at, in shares of a span: an arc can end long before its series loses reach."""
@@ -219,8 +220,17 @@ def _slope(series: list[Number], s: Number) -> Number:
 def _first_root(series: list[Number], span: Number) -> Number | None:
     """First sign change from positive of a series on (0, span], found in double and then polished."""
     for low, high in _fallings(series, span):
-        if _value(series, high) <= 0:
-            return _polished(series, low, high)
+        beyond = _beyond(series, high)
+        if beyond is not None:
+            return _polished(series, low, beyond)
+    return None
+
+
+def _beyond(series: list[Number], high: Number) -> Number | None:
+    """The end of an interval, or a point hardly after it where the root is so close that double sees it before."""
+    for end in (high, high * (1 + ROUNDED)):
+        if _value(series, end) <= 0:
+            return end
     return None
 
 
@@ -253,8 +263,9 @@ def _note_peak(course: Course, series: list[Number], span: Number) -> None:
     course.peak = max(course.peak, series[0], _value(series, span))
     rate = [n * c for n, c in enumerate(series)][1:]
     for low, high in _fallings(rate, span):
-        if _value(rate, high) <= 0:
-            course.peak = max(course.peak, _value(series, _polished(rate, low, high)))
+        beyond = _beyond(rate, high)
+        if beyond is not None:
+            course.peak = max(course.peak, _value(series, _polished(rate, low, beyond)))
 
 
 def _next_uplift(problem: Problem, time: Number) -> tuple[Number, int]:

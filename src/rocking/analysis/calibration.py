@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking import checks
 from rocking.analysis import calibration_population as population
 from rocking.analysis.calibration_population import Evidence
 from rocking.analysis.calibration_scores import Scores
@@ -31,7 +32,7 @@ _DRAWS: Final = 512
 _ROUGH_DRAWS: Final = 256
 
 #: After candidates that fill the space, as many are drawn from a first fit, from a second and so on, so often, with
-#: the scatter of the fit wider by a factor.
+#: the dispersion of the fit wider by a factor.
 _REFINEMENTS: Final = 3
 _WIDENED: Final = 1.2
 
@@ -47,14 +48,14 @@ class Estimate:
     ----------
     median, lower, upper : float
         Median and central 90 % interval of the population's centre, in the parameter's unit.
-    scatter : float
+    dispersion : float
         Standard deviation of the parameter's logarithm from test to test.
     """
 
     median: float
     lower: float
     upper: float
-    scatter: float
+    dispersion: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +121,9 @@ class Calibration:
         return Scores.of(self.probabilities, self.observed)
 
     @property
-    def scatter(self) -> Mapping[str, float]:
+    def dispersion(self) -> Mapping[str, float]:
         """Standard deviation of each parameter's logarithm from test to test."""
-        return MappingProxyType({name: estimate.scatter for name, estimate in self.estimates.items()})
+        return MappingProxyType({name: estimate.dispersion for name, estimate in self.estimates.items()})
 
     def predict(
         self, motions: Motion | Sequence[Motion], *, threads: int | None = None, progress: bool | None = None
@@ -181,7 +182,7 @@ class Calibration:
         rocking.analysis.Scores : accuracy, log loss and Brier score.
         """
         labels = _labels(groups, len(self.observed), folds)
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
         chances = np.empty((repeats, len(self.observed)))
         for row in chances:
             parts = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
@@ -198,9 +199,9 @@ class Calibration:
         lines = [
             f"{len(self.observed)} motions, {int(self.observed.sum())} overturned the specimen; {self.model} model",
             "",
-            f"{'parameter':<20}{'median':>9}{'5 %':>9}{'95 %':>9}  scatter",
+            f"{'parameter':<20}{'median':>9}{'5 %':>9}{'95 %':>9}  dispersion",
             *(
-                f"{name:<20}{one.median:>9.4g}{one.lower:>9.4g}{one.upper:>9.4g}  {100 * one.scatter:.0f} %"
+                f"{name:<20}{one.median:>9.4g}{one.lower:>9.4g}{one.upper:>9.4g}  {100 * one.dispersion:.0f} %"
                 + f"  {units[name.rpartition('_')[0] or name]}".rstrip()
                 for name, one in self.estimates.items()
             ),
@@ -269,9 +270,9 @@ def calibrate(
     A specimen differs a little from test to test, and no rigid plane block is a real rock. So each test is taken to
     have its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratios between the
     sides. The probability of an outcome is the share of the population that behaves so (and a small lapse); a common
-    scatter of both slendernesses is, in the linear model, the same as a lognormal scatter of the motion's amplitude.
-    The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with the prior
-    that is given by the bounds and a lognormal prior on each scatter (median 10 %, ratios of p and restitution 5 %).
+    dispersion of both slendernesses is, in the linear model, the same as one of the motion's amplitude. The posterior
+    over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with the prior that is given
+    by the bounds and a lognormal prior on each dispersion (median 10 %, ratios of p and restitution 5 %).
 
     The search is global: half of the candidates fill the bounds evenly, the other half are drawn from a first fit and
     weighted so that the prior stays what it was (deterministic mixture; Owen and Zhou 2000).
@@ -343,11 +344,11 @@ def _outcomes(
 
 
 def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
-    centres, scatter = population.unpacked(populations)
+    centres, dispersion = population.unpacked(populations)
     values = space.sides(centres)
     # The side's logarithm is that of the mean plus or minus half that of the ratio.
-    ratio = 0.5 * scatter[:, 3:] if len(space.ratios) else 0.0
-    deviations = np.hypot(scatter[:, :3], ratio).mean(axis=0)
+    ratio = 0.5 * dispersion[:, 3:] if len(space.ratios) else 0.0
+    deviations = np.hypot(dispersion[:, :3], ratio).mean(axis=0)
     tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
     estimates = {}
     for j, name in enumerate(PARAMETERS):
@@ -380,13 +381,10 @@ def _observed(overturned: ArrayLike, count: int) -> Flags:
 
 
 def _check(seed: int, lapse: float, candidates: int, ensemble: int) -> None:
-    if not (isinstance(seed, (int, np.integer)) and seed >= 0):
-        raise InvalidOption(f"seed must be a whole number, not {seed!r}")
-    if not (isinstance(lapse, (int, float)) and 0.0 < lapse < 0.5):
-        raise InvalidOption(f"lapse must be between 0 and 1/2, not {lapse!r}")
-    for name, value, least in (("candidates", candidates, 128), ("ensemble", ensemble, 1)):
-        if not (isinstance(value, (int, np.integer)) and value >= least):
-            raise InvalidOption(f"{name} must be a whole number of at least {least}, not {value!r}")
+    checks.whole(seed, "seed", InvalidOption, 0)
+    checks.share(lapse, "lapse", InvalidOption, below=0.5)
+    checks.whole(candidates, "candidates", InvalidOption, 128)
+    checks.whole(ensemble, "ensemble", InvalidOption, 1)
 
 
 def _all(observed: Flags) -> Flags:
@@ -399,6 +397,5 @@ def _labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[
     if len(names) != count:
         raise InvalidOption(f"groups must hold one label for each of the {count} motions, not {len(names)}")
     labels = np.unique(names, return_inverse=True)[1]
-    if not (isinstance(folds, (int, np.integer)) and 2 <= folds <= labels.max() + 1):
-        raise InvalidOption(f"folds must be a whole number from 2 to the {labels.max() + 1} groups, not {folds!r}")
+    checks.whole(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return np.asarray(labels, dtype=np.int64)

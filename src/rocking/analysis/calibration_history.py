@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking import checks
 from rocking.analysis.calibration_space import HIGHEST, PARAMETERS, Range, even_fractions, value_range
 from rocking.block import Block
 from rocking.errors import InvalidOption
@@ -175,7 +176,7 @@ def calibrate_history(
     history = _History.of(times, rotation, motion, model)
     settled, unknowns = _split({"p": p, "alpha": alpha, "restitution": restitution}, two_sided)
     if initial_rotation is not None:
-        settled["initial_rotation"] = float(initial_rotation)
+        settled["initial_rotation"] = checks.finite(initial_rotation, "initial_rotation", InvalidOption)
     elif motion is not None:
         settled["initial_rotation"] = 0.0
     else:
@@ -184,8 +185,8 @@ def calibrate_history(
         raise InvalidOption("everything is known: give a pair (lowest, highest) for what is to be found")
     if len(history.times) < 2 * len(unknowns):
         raise InvalidOption(f"{len(history.times)} samples cannot determine {len(unknowns)} parameters: give more")
-    problem = _Problem(history, settled, tuple(unknowns))
-    return _result(problem, _best(problem, np.random.default_rng(seed)))
+    problem = _HistoryProblem(history, settled, tuple(unknowns))
+    return _result(problem, _best(problem, np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,10 +198,10 @@ class _History:
 
     @classmethod
     def of(cls, times: ArrayLike, rotation: ArrayLike, motion: Motion | None, model: Model) -> _History:
-        try:
-            at, measured = (np.array(values, dtype=np.float64) for values in (times, rotation))
-        except (TypeError, ValueError):
-            raise InvalidOption("times and rotation must be numbers") from None
+        at, measured = (
+            np.array(checks.numbers(values, name, InvalidOption))
+            for values, name in ((times, "times"), (rotation, "rotation"))
+        )
         if at.ndim != 1 or at.shape != measured.shape:
             raise InvalidOption(f"there must be one rotation for each time, not {at.shape} and {measured.shape}")
         if not (np.all(np.isfinite(at)) and np.all(np.isfinite(measured))):
@@ -228,7 +229,7 @@ class _Unknown:
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class _HistoryProblem:
     history: _History
     settled: Mapping[str, float]
     unknowns: tuple[_Unknown, ...]
@@ -273,8 +274,8 @@ def _split(given: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[st
     """Tell what is known of a block from what is to be found."""
     settled, unknowns = {}, []
     for name, value in given.items():
-        if isinstance(value, (int, float)):
-            settled[name] = float(value)
+        if not isinstance(value, (tuple, list, np.ndarray)) or np.ndim(value) == 0:
+            settled[name] = checks.positive(value, name, InvalidOption)
             continue
         low, high = value_range(value, name, HIGHEST[name])
         sides = ("_plus", "_minus") if two_sided else ("",)
@@ -290,7 +291,7 @@ def _released_from(history: _History) -> _Unknown:
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
 
 
-def _best(problem: _Problem, rng: np.random.Generator) -> Floats:
+def _best(problem: _HistoryProblem, rng: np.random.Generator) -> Floats:
     """Logarithms of the unknowns at the least sum of squares over the whole history."""
     low, high = problem.bounds
     survivors = low + even_fractions(rng.random(len(low)), 0, _CANDIDATES) * (high - low)
@@ -306,7 +307,7 @@ def _best(problem: _Problem, rng: np.random.Generator) -> Floats:
     return np.asarray(found, dtype=np.float64)
 
 
-def _descended(problem: _Problem, start: Floats, count: int) -> Floats:
+def _descended(problem: _HistoryProblem, start: Floats, count: int) -> Floats:
     from scipy.optimize import least_squares
 
     low, high = problem.bounds
@@ -315,7 +316,7 @@ def _descended(problem: _Problem, start: Floats, count: int) -> Floats:
     return np.asarray(fit.x, dtype=np.float64)
 
 
-def _shaken(problem: _Problem, found: Floats, width: float, rng: np.random.Generator) -> Floats:
+def _shaken(problem: _HistoryProblem, found: Floats, width: float, rng: np.random.Generator) -> Floats:
     """Look around an optimum, so many standard errors wide: a forced response can be rugged on that scale."""
     whole = len(problem.history.times)
     covariance = _covariance(problem, found, problem.residuals(found, whole))
@@ -325,7 +326,7 @@ def _shaken(problem: _Problem, found: Floats, width: float, rng: np.random.Gener
     return min(found, _descended(problem, best, whole), key=lambda one: problem.error(one, whole))
 
 
-def _result(problem: _Problem, logs: Floats) -> HistoryCalibration:
+def _result(problem: _HistoryProblem, logs: Floats) -> HistoryCalibration:
     count = len(problem.history.times)
     residuals = problem.residuals(logs, count)
     covariance = _covariance(problem, logs, residuals)
@@ -343,7 +344,7 @@ def _result(problem: _Problem, logs: Floats) -> HistoryCalibration:
     )
 
 
-def _covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
+def _covariance(problem: _HistoryProblem, logs: Floats, residuals: Floats) -> Floats:
     """Covariance of the logarithms: inverse curvature times the residuals' variance, allowing for their correlation.
 
     Raises
@@ -364,7 +365,7 @@ def _covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
     return np.asarray(variance * (right.T / values**2) @ right / np.outer(sizes, sizes))
 
 
-def _slopes(problem: _Problem, logs: Floats, deviation: float) -> Floats:
+def _slopes(problem: _HistoryProblem, logs: Floats, deviation: float) -> Floats:
     """Differentiate the residuals, shape (n, k), by differences over about one standard error.
 
     A forced response may jump where a block just lifts off or just does not, and a small step across such a jump would

@@ -21,9 +21,9 @@ from rocking.progress import Progress
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-#: Prior of the scatter from test to test: lognormal, medians for p, alpha, restitution and for the three ratios.
-_SCATTER_MEDIANS: Final = np.array([0.10, 0.10, 0.10, 0.05, 0.10, 0.05])
-_SCATTER_LOG_DEVIATION: Final = 0.6
+#: Prior of the dispersion from test to test: lognormal, medians for p, alpha, restitution and for the three ratios.
+_DISPERSION_MEDIANS: Final = np.array([0.10, 0.10, 0.10, 0.05, 0.10, 0.05])
+_DISPERSION_LOG_DEVIATION: Final = 0.6
 
 #: Populations that are weighed at once: bounds the memory.
 _BATCH: Final = 64
@@ -57,8 +57,8 @@ class Evidence:
     def weights(self, populations: Floats) -> Floats:
         """Share of each population that each candidate stands for, shape (c, n); rows sum to 1."""
         points = self.candidates.points
-        centre, scatter = unpacked(populations)
-        precision = scatter**-2
+        centre, dispersion = unpacked(populations)
+        precision = dispersion**-2
         exponent = (precision * centre) @ points.T - 0.5 * precision @ (points**2).T + self.candidates.log_weights
         exponent -= exponent.max(axis=1, keepdims=True)
         np.exp(exponent, out=exponent)
@@ -88,9 +88,9 @@ def blurred(chances: Floats, lapse: float) -> Floats:
 
 
 def unpacked(populations: Floats) -> tuple[Floats, Floats]:
-    """Centres and scatters, shape (c, k) each, of populations (c, 2 k): centres and standard scores of the scatter."""
+    """Centres and dispersions, shape (c, k) each, of populations (c, 2 k): centres and scores of the dispersion."""
     k = populations.shape[1] // 2
-    return populations[:, :k], _SCATTER_MEDIANS[:k] * np.exp(_SCATTER_LOG_DEVIATION * populations[:, k:])
+    return populations[:, :k], _DISPERSION_MEDIANS[:k] * np.exp(_DISPERSION_LOG_DEVIATION * populations[:, k:])
 
 
 def posterior(
@@ -98,7 +98,7 @@ def posterior(
 ) -> Floats:
     """Draw populations from the posterior given some of the tests, shape (count, 2 k).
 
-    Sequential Monte Carlo: particles from the prior (even centres in the space, normal scores of the scatter) follow
+    Sequential Monte Carlo: particles from the prior (even centres in the space, normal scores of the dispersion) follow
     the likelihood as its exponent grows from 0 to 1. Each step keeps half of them effective, resamples, and moves them
     by differences of other particles (differential evolution), so that several separate optima are all followed.
     """
@@ -159,16 +159,16 @@ def systematic(weights: Floats, count: int, rng: np.random.Generator) -> Integer
 
 
 def drawn(populations: Floats, widened: float, count: int, rng: np.random.Generator) -> Floats:
-    """Draw points from populations in turn, their scatter times `widened`; shape (count, k)."""
-    centre, scatter = unpacked(populations[np.arange(count) % len(populations)])
-    return centre + widened * scatter * rng.standard_normal(centre.shape)
+    """Draw points from populations in turn, their dispersion times `widened`; shape (count, k)."""
+    centre, dispersion = unpacked(populations[np.arange(count) % len(populations)])
+    return centre + widened * dispersion * rng.standard_normal(centre.shape)
 
 
 def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
     """Logarithm of the density at points of what `drawn` draws, shape (n,)."""
-    centre, scatter = unpacked(populations)
+    centre, dispersion = unpacked(populations)
     total = np.full(len(points), -np.inf)
-    for middle, deviation in zip(centre, widened * scatter, strict=True):
+    for middle, deviation in zip(centre, widened * dispersion, strict=True):
         exponent = -0.5 * (((points - middle) / deviation) ** 2).sum(axis=1)
         total = np.logaddexp(total, exponent - np.log(deviation * np.sqrt(2.0 * np.pi)).sum())
     return np.asarray(total - np.log(len(centre)))
@@ -183,7 +183,7 @@ def _differences(guides: Floats, count: int, rng: np.random.Generator) -> Floats
 
 
 def _log_prior(space: Space, populations: Floats) -> Floats:
-    """Even centres inside the space, standard normal scores of the scatter."""
+    """Even centres inside the space, standard normal scores of the dispersion."""
     k = populations.shape[1] // 2
     inside = space.contains(populations[:, :k])
     return np.where(inside, -0.5 * (populations[:, k:] ** 2).sum(axis=1), -np.inf)

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking import checks
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.kernels.state import Floats
@@ -150,7 +151,7 @@ def value_range(pair: Sequence[float], name: str, highest: float) -> Range:
         If they are not two increasing numbers between 0 and `highest`.
     """
     try:
-        low, high = (float(value) for value in pair)
+        low, high = (checks.number(value, f"each of {name}", InvalidOption) for value in pair)
     except (TypeError, ValueError):
         raise InvalidOption(f"{name} must be a pair (lowest, highest), not {pair!r}") from None
     if not 0.0 < low < high <= highest or math.isinf(high):

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking import checks
 from rocking.analysis.boundaries import Boundaries, boundaries
-from rocking.analysis.checks import increasing_numbers, share
 from rocking.analysis.measures import Measure, MeasureName
-from rocking.analysis.pairs import simulate_pairs
 from rocking.analysis.scaled import several_blocks, several_motions, simulate_levels
 from rocking.block import Block, Blocks
+from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.kernels.state import Floats, Integers
 from rocking.motion.motion import Motion
@@ -119,13 +119,15 @@ def incremental_dynamic_analysis(
     shaken, values = several_motions(motions, how)
     if np.any(np.prod(many.restitution, axis=1) == 1.0):
         raise InvalidOption("a block with restitution 1 never comes to rest; scaling up needs one below 1")
-    width = share(tolerance, "tolerance")
+    width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model, "threads": threads, "progress": progress}
     if levels is None:
         first = _lowest_uplift(many, shaken, values, how, model)
         table = _until_overturned(many, shaken, how, first, options)
     else:
-        table = simulate_levels(many, shaken, how, increasing_numbers(levels, "levels"), **options)
+        table = simulate_levels(
+            many, shaken, how, checks.increasing_numbers(levels, "levels", InvalidOption), **options
+        )
 
     factors = how.unit_of(many, model)[None, :] / values[:, None]
 
@@ -135,8 +137,9 @@ def incremental_dynamic_analysis(
         for m in np.unique(motion):
             here = motion == m
             factor = level[here] * factors[m, block[here]]
-            ends = simulate_pairs(many.select(block[here]), shaken[m], factor, model=model, chattering=_VERDICT)
-            verdicts[here] = ends.overturned
+            setup = Setup(many.select(block[here]), model, _VERDICT)
+            for task, outcomes in simulate_each(setup, shaken[m], factor, threads=threads):
+                verdicts[np.flatnonzero(here)[task.blocks]] = outcomes["overturned"]
         return verdicts
 
     grid = table.overturned.transpose("level", "motion", "block").values

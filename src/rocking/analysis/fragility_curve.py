@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis import lognormal, nrml
+from rocking.analysis.confidence import Confidence, Resamples
+from rocking.analysis.lognormal import Probit
 from rocking.analysis.measures import Measure
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
@@ -40,10 +42,8 @@ class FragilityCurve:
         Intercept and slope of P = Phi(intercept + slope ln x).
     covariance : ndarray, shape (2, 2)
         Inverse of Fisher's expected information of intercept and slope.
-    replicates : Probit or None
-        Fits to resampled data, for bands by the bootstrap; None: bands come from the covariance.
-    degenerate : float
-        Share of the resampled data sets whose outcomes were separated or all alike; they count as steps.
+    uncertainty : LikelyRegion or Resamples
+        Where intervals and bands come from: the likelihood, or the bootstrap.
     confidence : float
         Probability of the intervals and bands.
     likelihood : Likelihood
@@ -58,10 +58,9 @@ class FragilityCurve:
     intensity: Floats
     exceeded: Floats
     trials: Floats
-    fitted: lognormal.Probit
+    fitted: Probit
     covariance: Floats
-    replicates: lognormal.Probit | None
-    degenerate: float
+    uncertainty: Confidence
     confidence: float
     likelihood: lognormal.Likelihood
     goodness: lognormal.Goodness
@@ -77,25 +76,28 @@ class FragilityCurve:
         return 1.0 / float(self.fitted.slope[0])
 
     @property
+    def degenerate(self) -> float:
+        """Share of resampled data sets whose outcomes were separated, all alike or fell; they count as limits.
+
+        Separated outcomes make a step, the others a level curve; NaN without a bootstrap.
+        """
+        return self.uncertainty.degenerate if isinstance(self.uncertainty, Resamples) else math.nan
+
+    @property
     def median_interval(self) -> tuple[float, float]:
-        """Confidence interval of the median."""
-        if self.replicates is not None:
-            with np.errstate(divide="ignore", over="ignore"):
-                medians = np.exp(-self.replicates.intercept / self.replicates.slope)
-            low, high = lognormal.corrected_percentiles(medians[:, None], np.array([self.median]), self.confidence)
-            return float(low[0]), float(high[0])
-        intercept, slope = float(self.fitted.intercept[0]), float(self.fitted.slope[0])
-        gradient = np.array([-1.0 / slope, intercept / slope**2])
-        return self._around(math.log(self.median), gradient)
+        """Confidence interval of the median; 0 or infinite where the data allow a curve that does not rise."""
+        slope, logarithm = float(self.fitted.slope[0]), math.log(self.median)
+        gradient = np.array([[-1.0 / slope], [-logarithm / slope]])
+        low, high = self.uncertainty.interval(_log_medians, np.array([logarithm]), gradient, self.confidence)
+        with np.errstate(over="ignore"):
+            return float(np.exp(low[0])), float(np.exp(high[0]))
 
     @property
     def dispersion_interval(self) -> tuple[float, float]:
-        """Confidence interval of the dispersion; infinite where the data allow a slope that does not rise."""
-        if self.replicates is not None:
-            slopes = self.replicates.slope[:, None]
-            flattest, steepest = lognormal.corrected_percentiles(slopes, self.fitted.slope, self.confidence)
-            return _spread(float(steepest[0])), _spread(float(flattest[0]))
-        return self._around(math.log(self.dispersion), np.array([0.0, -self.dispersion]))
+        """Confidence interval of the dispersion; infinite where the data allow a curve that does not rise."""
+        gradient = np.array([[0.0], [1.0]])
+        flattest, steepest = self.uncertainty.interval(_slopes, self.fitted.slope, gradient, self.confidence)
+        return _dispersion(float(steepest[0])), _dispersion(float(flattest[0]))
 
     def probability(self, intensity: ArrayLike) -> Floats:
         """Fitted probability at intensities, shaped like them.
@@ -111,25 +113,20 @@ class FragilityCurve:
         return np.asarray(self.fitted.probability(_logarithm(at).ravel())[0].reshape(at.shape))
 
     def band(self, intensity: ArrayLike) -> tuple[Floats, Floats]:
-        """Lower and upper end of the pointwise confidence band of the probability.
-
-        From Fisher's information: Phi of the interval of intercept + slope ln x. By the bootstrap: bias-corrected
-        percentiles.
-        """
+        """Lower and upper end of the pointwise confidence band of the probability."""
         from scipy.special import ndtr
 
         at = _intensities(intensity)
         z = _logarithm(at).ravel()
-        if self.replicates is not None:
-            estimate = self.fitted.probability(z)[0]
-            low, high = lognormal.corrected_percentiles(self.replicates.probability(z), estimate, self.confidence)
-            return low.reshape(at.shape), high.reshape(at.shape)
-        middle = self.fitted.intercept[0] + self.fitted.slope[0] * z
         finite = np.where(np.isfinite(z), z, 0.0)
-        powers = np.stack([np.ones_like(finite), finite])
-        reach = self._normal_quantile() * np.sqrt(np.einsum("jn,jk,kn->n", powers, self.covariance, powers))
-        low, high = np.asarray(ndtr(middle - reach)), np.asarray(ndtr(middle + reach))
-        return low.reshape(at.shape), high.reshape(at.shape)
+        ends = self.uncertainty.interval(
+            lambda fits: fits.score(z),
+            self.fitted.score(z)[0],
+            np.stack([np.ones_like(finite), finite]),
+            self.confidence,
+        )
+        low, high = (np.asarray(ndtr(end)).reshape(at.shape) for end in ends)
+        return low, high
 
     def summary(self) -> dict[str, Any]:
         """Parameters, intervals and tests by name."""
@@ -150,15 +147,6 @@ class FragilityCurve:
             "goodness_p_value": self.goodness.p_value,
             "degenerate_resamples": self.degenerate,
         }
-
-    def _around(self, logarithm: float, gradient: Floats) -> tuple[float, float]:
-        reach = self._normal_quantile() * math.sqrt(float(gradient @ self.covariance @ gradient))
-        return math.exp(logarithm - reach), math.exp(logarithm + reach)
-
-    def _normal_quantile(self) -> float:
-        from scipy.special import ndtri
-
-        return float(ndtri(0.5 + 0.5 * self.confidence))
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,7 +273,7 @@ class Fragility:
             text = f"{curve.limit_state}: median {curve.median:.4g}, dispersion {curve.dispersion:.3g}"
             lines.append(FragilityLine(text, intensity, curve.probability(intensity), *curve.band(intensity), at, seen))
         first = self.curves[0]
-        how = "bootstrap" if first.replicates is not None else "Fisher information"
+        how = "bootstrap" if isinstance(first.uncertainty, Resamples) else "likelihood"
         return fragility_figure(
             lines=lines,
             intensity_label=self.measure.label,
@@ -301,8 +289,19 @@ def _shares_seen(curve: FragilityCurve) -> tuple[Floats, Floats]:
     return np.bincount(group, curve.trials * curve.intensity) / held, np.bincount(group, curve.exceeded) / held
 
 
-def _spread(slope: float) -> float:
-    """Dispersion of a slope: 0 of a step, infinite of a curve that does not rise."""
+def _log_medians(fits: Probit) -> Floats:
+    """Logarithms of medians, shape (fits, 1): infinite of a level curve, above one half or below."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sloping = -fits.intercept / fits.slope
+    return np.where(fits.slope > 0.0, sloping, np.where(fits.intercept > 0.0, -np.inf, np.inf))[:, None]
+
+
+def _slopes(fits: Probit) -> Floats:
+    return fits.slope[:, None]
+
+
+def _dispersion(slope: float) -> float:
+    """Dispersion of a slope: 0 of a step, infinite of a level curve."""
     if slope >= lognormal.STEEP:
         return 0.0
     return 1.0 / slope if slope > 0.0 else math.inf

@@ -10,8 +10,9 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking import checks
 from rocking.analysis import lognormal
-from rocking.analysis.checks import increasing_numbers, positive_numbers, share
+from rocking.analysis.confidence import Confidence, LikelyRegion, Resamples
 from rocking.analysis.fragility_curve import Fragility, FragilityCurve
 from rocking.analysis.measures import Measure, MeasureName
 from rocking.analysis.scaled import several_blocks, several_motions, simulate_levels
@@ -23,7 +24,13 @@ from rocking.motion.motion import Motion
 from rocking.problem import Model
 from rocking.treatment import Treatment
 
-Band = Literal["fisher", "bootstrap"]
+Band = Literal["likelihood", "bootstrap"]
+
+#: Intensities, in SI units, far beyond any motion; whole numbers that double precision counts exactly.
+_INTENSITIES: Final = (1e-50, 1e50)
+_MOST_TRIALS: Final = 2.0**53
+#: Logarithm of how far beyond the data a median is still believed.
+_BEYOND: Final = math.log(1000.0)
 
 #: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
 OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
@@ -42,7 +49,7 @@ def fragility(
     chattering: str | Treatment = "certified",
     polarity: Polarity = "+",
     confidence: float = 0.9,
-    band: Band = "fisher",
+    band: Band = "likelihood",
     samples: int = 1000,
     seed: int = 0,
     threads: int | None = None,
@@ -70,7 +77,7 @@ def fragility(
         As for `simulate_many`. With both polarities each motion counts twice, unless all blocks are symmetric: they do
         the same under a motion and its mirror image, which is no second outcome.
     confidence, band, samples, seed
-        As for `fit_fragility`; the bootstrap draws motions, each with all its outcomes.
+        As for `fit_fragility`, whose clusters are the motions, each with all its outcomes.
 
     Returns
     -------
@@ -109,7 +116,7 @@ def fragility(
         table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
         intensity = (values[:, None] / how.unit_of(many, model)[None, :])[None, :, :, None]
     else:
-        stripes = increasing_numbers(levels, "levels")
+        stripes = checks.increasing_numbers(levels, "levels", InvalidOption)
         table = simulate_levels(many, shaken, how, stripes, model=model, **options)
         intensity = stripes[:, None, None, None]
     if "polarity" not in table.dims:
@@ -137,7 +144,7 @@ def fit_fragility(
     period: float | None = None,
     damping: float = 0.05,
     confidence: float = 0.9,
-    band: Band = "fisher",
+    band: Band = "likelihood",
     samples: int = 1000,
     seed: int = 0,
     block: Block | None = None,
@@ -155,14 +162,15 @@ def fit_fragility(
     trials : array_like
         Number of trials at each intensity.
     clusters : array_like of int, shape (n,), optional
-        Which outcomes belong together (the motion, for instance), for the bootstrap; by default each is on its own.
+        Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own. Fewer
+        than three clusters of several outcomes bound nothing: then intervals go from 0 to infinity.
     measure, period, damping
         What the intensity is, as for `fragility`.
     confidence : float
         Probability of the intervals and bands.
-    band : {"fisher", "bootstrap"}
-        Whether they come from Fisher's expected information, which takes all outcomes for independent and many; or from
-        fits to clusters drawn with replacement.
+    band : {"likelihood", "bootstrap"}
+        Whether they come from the profile likelihood, adjusted to the differences between clusters where these hold
+        several outcomes (Chandler and Bate 2007); or from fits to clusters drawn with replacement (BCa, Efron 1987).
     samples, seed : int
         How many times the bootstrap draws, and the seed of its random numbers.
     block : Block, optional
@@ -173,8 +181,9 @@ def fit_fragility(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, or there is no best lognormal: no outcome exceeds the limit, or all do, or
-        they are separated (none up to some intensity and all from there on).
+        If an argument is out of its range, or no rising lognormal fits best: no outcome exceeds the limit, or all do,
+        or they are separated (none up to some intensity and all from there on), or all at one intensity, or exceed the
+        limit no more often at higher intensities, or put the median at more than 1000 times any intensity.
 
     Notes
     -----
@@ -183,6 +192,12 @@ def fit_fragility(
 
     References
     ----------
+    Chandler, R. E. and Bate, S. (2007). Inference for clustered data using the independence loglikelihood. Biometrika
+    94(1), 167-183.
+
+    Efron, B. (1987). Better bootstrap confidence intervals. Journal of the American Statistical Association 82(397),
+    171-185.
+
     Baker, J. W. (2015). Efficient analytical fragility function fitting using dynamic structural analysis. Earthquake
     Spectra 31(1), 579-599.
 
@@ -193,8 +208,11 @@ def fit_fragility(
     >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
     median 3.1509 m/s^2, dispersion 0.3042
     """
-    x = positive_numbers(intensity, "intensity")
-    count = _whole(trials, "trials", x.size, 1.0, math.inf)
+    how = Measure(measure, period, damping)
+    x = checks.positive_numbers(intensity, "intensity", InvalidOption)
+    if x.min() < _INTENSITIES[0] or x.max() > _INTENSITIES[1]:
+        raise InvalidOption("intensity must be from {:g} to {:g}: check its units".format(*_INTENSITIES))
+    count = _whole(trials, "trials", x.size, 1.0, _MOST_TRIALS)
     outcomes = exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}
     groups = np.arange(x.size) if clusters is None else _clusters(clusters, x.size)
     bands = _Bands(confidence, band, samples, seed)
@@ -202,7 +220,7 @@ def fit_fragility(
         _curve(name, x, _whole(values, "exceeded", x.size, 0.0, count), count, groups, bands)
         for name, values in outcomes.items()
     ]
-    return Fragility(tuple(curves), Measure(measure, period, damping), description, block, "nonlinear")
+    return Fragility(tuple(curves), how, description, block, "nonlinear")
 
 
 @dataclass(frozen=True)
@@ -215,26 +233,33 @@ class _Bands:
     seed: int
 
     def __post_init__(self) -> None:
-        share(self.confidence, "confidence")
+        checks.share(self.confidence, "confidence", InvalidOption)
         if self.kind not in get_args(Band):
             raise InvalidOption(f"band must be one of {', '.join(get_args(Band))}, not {self.kind!r}")
-        if not (isinstance(self.samples, int) and self.samples >= 1):
-            raise InvalidOption(f"samples must be a whole number of at least 1, not {self.samples!r}")
-        if not (isinstance(self.seed, int) and self.seed >= 0):
-            raise InvalidOption(f"seed must be a whole number that is not negative, not {self.seed!r}")
+        checks.whole(self.samples, "samples", InvalidOption, 1)
+        checks.whole(self.seed, "seed", InvalidOption, 0)
 
 
 def _curve(
     name: str, intensity: Floats, exceeded: Floats, trials: Floats, clusters: Integers, bands: _Bands
 ) -> FragilityCurve:
     z = np.log(intensity)
-    fault = lognormal.separation(z, exceeded, trials)
+    fault = lognormal.unidentified(z, exceeded, trials)
     if fault is not None:
         raise InvalidOption(f"no lognormal can be fitted to {name!r}: {fault}")
     fitted = lognormal.fit(z, exceeded[None, :], trials[None, :])
-    replicates, degenerate = None, 0
+    middle = float(-fitted.intercept[0] / fitted.slope[0])
+    if not z.min() - _BEYOND <= middle <= z.max() + _BEYOND:
+        raise InvalidOption(
+            f"no lognormal can be fitted to {name!r}: the outcomes hardly depend on the intensity, and put the median "
+            f"{'above' if middle > z.max() else 'below'} all intensities by a factor of more than 1000: motions nearer "
+            "to it, or another measure, are needed"
+        )
+    uncertainty: Confidence
     if bands.kind == "bootstrap":
-        replicates, degenerate = lognormal.resampled(z, exceeded, trials, clusters, bands.samples, bands.seed)
+        uncertainty = Resamples.of(z, exceeded, trials, fitted, clusters, bands.samples, bands.seed)
+    else:
+        uncertainty = LikelyRegion.of(z, exceeded, trials, clusters, fitted, bands.confidence)
     gained = lognormal.gain(z, exceeded, trials, fitted)
     return FragilityCurve(
         limit_state=name,
@@ -243,8 +268,7 @@ def _curve(
         trials=trials,
         fitted=fitted,
         covariance=lognormal.covariance(z, trials, fitted),
-        replicates=replicates,
-        degenerate=degenerate / bands.samples,
+        uncertainty=uncertainty,
         confidence=bands.confidence,
         likelihood=gained,
         goodness=lognormal.goodness(z, exceeded, trials, fitted),
@@ -253,16 +277,19 @@ def _curve(
 
 def _passed(ratio: Floats, limit: float, name: str) -> Floats:
     """Whether peak rotation over slenderness passes a limit: 1 or 0; infinite is overturning."""
-    if not (isinstance(limit, (int, float)) and limit >= 0.0):
-        raise InvalidOption(f"the limit {name!r} must be a rotation over slenderness, 0 or more, not {limit!r}")
+    what = f"the limit {name!r} (rotation over slenderness)"
+    if not checks.number(limit, what, InvalidOption) >= 0.0:
+        raise InvalidOption(f"{what} must be 0 or more, not {limit!r}")
     return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
 
 
 def _whole(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
     """Whole numbers, one for each intensity, between two bounds."""
+    given = np.asarray(values)
+    given = given.astype(np.float64) if given.dtype.kind == "b" else checks.numbers(given, name, InvalidOption)
     try:
-        numbers = np.broadcast_to(np.asarray(values, dtype=np.float64), size)
-    except (TypeError, ValueError):
+        numbers = np.broadcast_to(given, size)
+    except ValueError:
         raise InvalidOption(f"{name} must hold one number for each of the {size} intensities") from None
     if not np.all((numbers >= least) & (numbers <= np.asarray(most)) & (numbers == np.floor(numbers))):
         raise InvalidOption(f"{name} must be whole numbers, at least {least:g} and no more than the trials")

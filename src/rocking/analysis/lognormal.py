@@ -19,6 +19,9 @@ _ITERATIONS: Final = 100
 #: The likelihood is at its maximum when the parameters move by less than this part of themselves.
 _CONVERGED: Final = 1e-11
 
+#: Outcomes that overlap by less than this part of the intensities' range are separated, to all that can be told.
+_NARROW: Final = 1e-6
+
 #: Slope that stands for a step.
 STEEP: Final = 1e9
 
@@ -38,9 +41,14 @@ class Probit(NamedTuple):
         """Probability at logarithms of the intensity, shape (fits, len(z))."""
         from scipy.special import ndtr
 
-        at = self.intercept[:, None] + self.slope[:, None] * z
-        result: Floats = ndtr(at)
+        result: Floats = ndtr(self.score(z))
         return result
+
+    def score(self, z: Floats) -> Floats:
+        """Return normal scores of the probability, shape (fits, len(z)); at intensity 0 nothing is exceeded."""
+        finite = np.isfinite(z)
+        at = self.intercept[:, None] + self.slope[:, None] * np.where(finite, z, 0.0)
+        return np.where(finite, at, z)
 
 
 @dataclass(frozen=True)
@@ -81,8 +89,8 @@ class Goodness:
     p_value: float
 
 
-def separation(z: Floats, exceeded: Floats, trials: Floats) -> str | None:
-    """Say why no lognormal fits best; None where one does.
+def unidentified(z: Floats, exceeded: Floats, trials: Floats) -> str | None:
+    """Say why no rising lognormal fits best; None where one does.
 
     Parameters
     ----------
@@ -96,13 +104,22 @@ def separation(z: Floats, exceeded: Floats, trials: Floats) -> str | None:
         return f"none of the {_count(trials)} outcomes exceeds the limit: stronger motions are needed"
     if not no.size:
         return f"all of the {_count(trials)} outcomes exceed the limit: weaker motions are needed"
-    if no.max() <= yes.min():
-        return (
-            f"the outcomes are separated, none exceeds the limit up to {math.exp(no.max()):.6g} and all do from "
-            f"{math.exp(yes.min()):.6g} on: the fragility is a step there, and motions in between are needed"
+    if z.min() == z.max():
+        return f"all outcomes are at one intensity, {math.exp(z[0]):.6g}: others are needed"
+    if no.max() <= yes.min() + _overlap(z):
+        low, high = math.exp(no.max()), math.exp(yes.min())
+        where = (
+            f"below {low:.6g} and all do above it" if low >= high else f"up to {low:.6g} and all do from {high:.6g} on"
         )
-    if yes.max() <= no.min():
-        return "the outcomes are separated the wrong way round: the limit is exceeded by the weakest motions only"
+        return (
+            f"the outcomes are separated, none exceeds the limit {where}: the fragility is a step there, and motions "
+            "near it are needed"
+        )
+    if not _rising(z, exceeded[None, :], trials[None, :])[0]:
+        return (
+            "the outcomes contradict a curve that rises, the limit is exceeded no more often at higher intensities: "
+            "another measure or more motions are needed"
+        )
     return None
 
 
@@ -114,16 +131,22 @@ def fit(z: Floats, exceeded: Floats, trials: Floats) -> Probit:
     z : ndarray, shape (n,)
         Logarithms of the intensity.
     exceeded, trials : ndarray, shape (fits, n)
-        Outcomes that exceeded, of how many, at each; not separated.
+        Outcomes that exceeded, of how many, at each; not `unidentified`.
     """
     centre = z.mean()
     spread = z.std()
     zero_one = (z - centre) / spread
     beta = np.zeros((len(trials), 2))
     now = likelihood(zero_one, exceeded, trials, beta)
+    powers = np.stack([np.ones_like(zero_one), zero_one])
+    most = np.einsum("fn,jn,kn->fjk", trials, powers, powers)
     for _ in range(_ITERATIONS):
-        gradient, information = _scores(zero_one, exceeded, trials, beta)
-        step = np.asarray(np.linalg.solve(information, gradient[..., None])[..., 0], dtype=np.float64)
+        with np.errstate(all="ignore"):
+            gradient, information = scores(zero_one, exceeded, trials, beta)
+            step = solved(information, gradient)
+        # Far from the maximum the information may vanish to rounding; the complete data's (EM) still leads uphill.
+        lost = ~np.isfinite(step).all(axis=1)
+        step[lost] = solved(most[lost], gradient[lost])
         step, then = _uphill(zero_one, exceeded, trials, beta, step, now)
         beta, now = beta + step, then
         if np.all(np.abs(step) <= _CONVERGED * np.abs(beta).max(axis=1, keepdims=True)):
@@ -146,7 +169,7 @@ def likelihood(z: Floats, exceeded: Floats, trials: Floats, beta: Floats) -> Flo
 def covariance(z: Floats, trials: Floats, fitted: Probit) -> Floats:
     """Inverse of Fisher's expected information of intercept and slope, shape (2, 2), of one fit."""
     beta = np.column_stack([fitted.intercept, fitted.slope])
-    information = _scores(z, np.zeros_like(trials), trials, beta)[1][0]
+    information = scores(z, np.zeros_like(trials), trials, beta)[1][0]
     return np.asarray(np.linalg.inv(information), dtype=np.float64)
 
 
@@ -185,74 +208,48 @@ def goodness(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit) -> Goo
     if freedom < 1:
         return Goodness(math.nan, max(freedom, 0), math.nan)
     # A group whose variance vanishes is one that the fit is certain of, and right about.
-    statistic = float(np.sum((seen - expected) ** 2 / np.maximum(variance, np.finfo(float).tiny)))
+    with np.errstate(over="ignore"):
+        statistic = float(np.sum((seen - expected) ** 2 / np.maximum(variance, np.finfo(float).tiny)))
     return Goodness(statistic, freedom, float(gammaincc(0.5 * freedom, 0.5 * statistic)))
 
 
-def resampled(
-    z: Floats, exceeded: Floats, trials: Floats, clusters: Integers, samples: int, seed: int
-) -> tuple[Probit, int]:
-    """Fit data sets drawn anew from the clusters, with replacement; and count those that have no best fit.
+def limits(z: Floats, exceeded: Floats, trials: Floats) -> tuple[Probit, NDArray[np.bool_]]:
+    """Limits that likelihoods of rising curves without a maximum tend to, and which of the fits have a maximum."""
+    from scipy.special import ndtri
 
-    These are what the likelihood tends to: a step between separated outcomes, 0 or 1 everywhere without either kind.
-    """
-    order = np.argsort(z, kind="stable")
-    starts = np.flatnonzero(np.diff(z[order], prepend=-np.inf))
-    count = int(clusters.max()) + 1
-    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=samples)
-    weights = drawn[:, clusters[order]]
-    levels = z[order][starts]
-    yes, all_of = (np.add.reduceat(weights * values[order], starts, axis=1) for values in (exceeded, trials))
-    fits, overlap = _limits(levels, yes, all_of)
-    if overlap.any():
-        fitted = fit(levels, yes[overlap], all_of[overlap])
-        fits.intercept[overlap], fits.slope[overlap] = fitted.intercept, fitted.slope
-    return fits, samples - int(overlap.sum())
-
-
-def corrected_percentiles(replicates: Floats, estimate: Floats, confidence: float) -> tuple[Floats, Floats]:
-    """Return the ends of intervals from the bootstrap: percentiles, corrected for the median bias (Efron 1981).
-
-    Parameters
-    ----------
-    replicates : ndarray, shape (fits, n)
-        Resampled values of n quantities.
-    estimate : ndarray, shape (n,)
-        Their estimates.
-    confidence : float
-        Probability that an interval shall hold the true value.
-    """
-    from scipy.special import ndtr, ndtri
-
-    count = len(replicates)
-    below = (np.sum(replicates < estimate, axis=0) + 0.5 * np.sum(replicates == estimate, axis=0)) / count
-    bias = ndtri(np.clip(below, 0.5 / count, 1.0 - 0.5 / count))
-    reach = ndtri(0.5 + 0.5 * confidence)
-    ordered = np.sort(replicates, axis=0)
-    low, high = (
-        np.take_along_axis(ordered, rounded((count - 1) * ndtr(2.0 * bias + end)).astype(np.int64)[None, :], axis=0)[0]
-        for rounded, end in ((np.floor, -reach), (np.ceil, reach))
-    )
-    return low, high
-
-
-def _limits(z: Floats, exceeded: Floats, trials: Floats) -> tuple[Probit, NDArray[np.bool_]]:
-    """Limits that likelihoods without a maximum tend to, and which of the fits have a maximum."""
     yes, no = exceeded > 0, exceeded < trials
-    lowest_yes, highest_yes = np.where(yes, z, np.inf).min(axis=1), np.where(yes, z, -np.inf).max(axis=1)
-    lowest_no, highest_no = np.where(no, z, np.inf).min(axis=1), np.where(no, z, -np.inf).max(axis=1)
-    rising, falling = highest_no <= lowest_yes, highest_yes <= lowest_no
+    lowest_yes, highest_no = np.where(yes, z, np.inf).min(axis=1), np.where(no, z, -np.inf).max(axis=1)
     never, always = ~yes.any(axis=1), ~no.any(axis=1)
-    middle = np.where(rising, highest_no + lowest_yes, highest_yes + lowest_no) / 2.0
-    slope = np.where(rising, STEEP, -STEEP)
-    slope[never | always] = 0.0
-    with np.errstate(invalid="ignore"):
-        intercept = -slope * middle
-    intercept[never], intercept[always] = -np.inf, np.inf
-    return Probit(intercept, slope), ~(rising | falling)
+    step = (highest_no <= lowest_yes + _overlap(z)) & ~never & ~always
+    slope = np.where(step, STEEP, 0.0)
+    # A curve that would fall is level at best: one probability, 0 or 1 without either kind of outcome.
+    intercept = ndtri(exceeded.sum(axis=1) / trials.sum(axis=1))
+    intercept[step] = -0.5 * STEEP * (highest_no + lowest_yes)[step]
+    return Probit(intercept, slope), ~step & _rising(z, exceeded, trials)
 
 
-def _scores(z: Floats, exceeded: Floats, trials: Floats, beta: Floats) -> tuple[Floats, Floats]:
+def _overlap(z: Floats) -> float:
+    """Overlap of the outcomes of either kind that is too narrow for a slope to be found from it."""
+    return _NARROW * float(z.max() - z.min())
+
+
+def _rising(z: Floats, exceeded: Floats, trials: Floats) -> NDArray[np.bool_]:
+    """Whether the likelihood of each data set grows as the level curve begins to rise."""
+    centred = z - z.mean()
+    share = exceeded.sum(axis=1, keepdims=True) / trials.sum(axis=1, keepdims=True)
+    pull = np.sum((exceeded - trials * share) * centred, axis=1)
+    return np.asarray(pull > 1e-12 * np.sum(trials * np.abs(centred), axis=1))
+
+
+def solved(matrix: Floats, right: Floats) -> Floats:
+    """Solve symmetric positive systems of two equations, shapes (fits or 1, 2, 2) and (fits, 2)."""
+    a, b, c = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 1]
+    ratio = b / a
+    second = (right[:, 1] - ratio * right[:, 0]) / (c - ratio * b)
+    return np.stack([right[:, 0] / a - ratio * second, second], axis=1)
+
+
+def scores(z: Floats, exceeded: Floats, trials: Floats, beta: Floats) -> tuple[Floats, Floats]:
     """Gradient of the likelihood and Fisher's expected information, shapes (fits, 2) and (fits, 2, 2)."""
     from scipy.special import log_ndtr
 

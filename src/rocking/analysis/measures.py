@@ -7,6 +7,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
+from rocking import checks
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.kernels.state import Floats
@@ -46,6 +47,12 @@ class Measure:
             raise InvalidOption(f"measure must be one of {', '.join(get_args(MeasureName))}, not {self.name!r}")
         if (self.name == "sa") != (self.period is not None):
             raise InvalidOption('period= (s) goes with measure="sa", and only with it')
+        if self.period is not None:
+            object.__setattr__(self, "period", checks.positive(self.period, "period", InvalidOption, "s"))
+        damping = checks.number(self.damping, "damping", InvalidOption)
+        if not 0.0 <= damping < 1.0:
+            raise InvalidOption(f"damping must be a fraction of critical from 0 to below 1, not {damping:g}")
+        object.__setattr__(self, "damping", damping)
 
     @property
     def units(self) -> str:

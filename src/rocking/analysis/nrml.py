@@ -33,6 +33,8 @@ Format = Literal["continuous", "discrete"]
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,100}")
 #: Intensities of a discrete function.
 _LEVELS: Final = 40
+#: Range of intensities over the lowest, at least: they are written with eight digits.
+_NARROWEST: Final = 1e-5
 
 
 class Header(NamedTuple):
@@ -120,6 +122,11 @@ def fragility_function(
         raise InvalidOption(f"format must be continuous or discrete, not {kind!r}")
     low, high = (scale.factor * end for end in valid)
     low = max(low, no_damage or 0.0)
+    if not high > low * (1.0 + _NARROWEST):
+        raise InvalidOption(
+            f"a fragility model needs a range of intensities, not {low:.6g} to {high:.6g}: the data are all at one "
+            "intensity, or below the one that lifts the block"
+        )
     function = ET.Element("fragilityFunction", {"id": _name(taxonomy, "taxonomy"), "format": kind})
     measure = {"imt": scale.imt} | ({} if no_damage is None else {"noDamageLimit": f"{no_damage:.8g}"})
     if kind == "continuous":
@@ -163,11 +170,14 @@ def _moments(median: float, dispersion: float) -> tuple[float, float]:
     """Mean and standard deviation of a lognormal."""
     try:
         mean = median * math.exp(0.5 * dispersion**2)
-        return mean, mean * math.sqrt(math.expm1(dispersion**2))
+        deviation = mean * math.sqrt(math.expm1(dispersion**2))
     except OverflowError:
+        deviation = math.inf
+    if not math.isfinite(deviation):
         raise InvalidOption(
             f'a dispersion of {dispersion:.3g} is too wide for the mean and stddev of NRML; use format="discrete"'
-        ) from None
+        )
+    return mean, deviation
 
 
 def _listed(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:

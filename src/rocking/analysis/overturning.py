@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking import checks
 from rocking.analysis.boundaries import Boundaries, boundaries
-from rocking.analysis.checks import increasing_numbers, share
-from rocking.analysis.pairs import simulate_pairs
 from rocking.block import Block, Blocks
 from rocking.constants import VERSION
+from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.kernels.state import Floats, Integers
 from rocking.motion import pulses
@@ -122,14 +122,17 @@ def overturning_map(
     >>> print(f"{float(result.overturning_amplitude[0]):.7f}")
     1.8007239
     """
-    levels, ratios = increasing_numbers(amplitudes, "amplitudes"), increasing_numbers(frequencies, "frequencies")
-    width = share(tolerance, "tolerance")
+    levels, ratios = (
+        checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption),
+        checks.increasing_numbers(frequencies, "frequencies", InvalidOption),
+    )
+    width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
     if all(side.restitution == 1.0 for side in block.sides):
         raise InvalidOption("a block with restitution 1 never comes to rest; an overturning map needs one below 1")
     slowest = min(side.p for side in block.sides)
     unit = _unit_pulse(pulse, slowest / (2.0 * math.pi), parameters)
     chattering = Certified(width * unit.duration)
-    problem = _Problem(_resized(block, ratios), unit, min(block.uplift_thresholds(model)), model, chattering)
+    problem = _PulseProblem(_resized(block, ratios), unit, min(block.uplift_thresholds(model)), model, chattering)
     modes, peaks = problem.grid(levels, progress)
     edges = boundaries(levels, modes, problem.modes, tolerance=width, progress=progress)
     attributes = {
@@ -182,7 +185,7 @@ def overturning_figure(dataset: xr.Dataset, *, title: str = "") -> Figure:
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _PulseProblem:
     """Blocks, one for every frequency, under multiples of one pulse."""
 
     blocks: Blocks
@@ -206,13 +209,17 @@ class _Problem:
     def _followed(self, column: Integers, level: Floats, done: Callable[[int], None]) -> tuple[Integers, Floats]:
         blocks = self.blocks.select(column)
         factors = self.threshold * level
-        ends = simulate_pairs(blocks, self.unit, factors, model=self.model, chattering=self.chattering, done=done)
-        rested = (ends.uplifts > 1) | ((ends.rests > 0) & (ends.last_rest <= self.unit.duration))
-        modes = np.where(ends.uplifts == 0, NO_UPLIFT, np.where(rested, RESTS, ROCKS))
-        modes[ends.overturned] = ends.impacts[ends.overturned]
-        for k in np.flatnonzero(ends.overturned & (ends.uplifts > 1)):
+        ends = np.empty(len(blocks), dtype=OUTCOME)
+        for task, outcomes in simulate_each(Setup(blocks, self.model, self.chattering), self.unit, factors):
+            ends[task.blocks] = outcomes
+            done(len(outcomes))
+        overturned, uplifts = ends["overturned"], ends["uplifts"]
+        rested = (uplifts > 1) | ((ends["rests"] > 0) & (ends["last_rest"] <= self.unit.duration))
+        modes = np.where(uplifts == 0, NO_UPLIFT, np.where(rested, RESTS, ROCKS))
+        modes[overturned] = ends["impacts"][overturned]
+        for k in np.flatnonzero(overturned & (uplifts > 1)):
             modes[k] = self._last_impacts(blocks[int(k)], float(level[k]))
-        return modes, ends.peak
+        return modes, ends["peak_rotation"]
 
     def _last_impacts(self, block: Block, level: float) -> int:
         """Impacts since the last uplift, of a block that had been at rest in between."""

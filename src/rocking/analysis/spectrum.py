@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.checks import positive_numbers, share
+from rocking import checks
 from rocking.block import Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.ensemble import simulate_many
@@ -100,9 +100,9 @@ def rocking_spectrum(
     """
     rates = _rates(p, size, gravity)
     shares = _shares(fractiles)
-    axes = {"p": rates, "alpha": positive_numbers(alpha, "alpha")}
+    axes = {"p": rates, "alpha": checks.positive_numbers(alpha, "alpha", InvalidOption)}
     if restitution is not None:
-        axes["restitution"] = positive_numbers(restitution, "restitution")
+        axes["restitution"] = checks.positive_numbers(restitution, "restitution", InvalidOption)
     blocks = Blocks.grid(**axes, gravity=gravity)
     table = simulate_many(blocks, motions, model=model, chattering=chattering, threads=threads, progress=progress)
     return _spectrum(table, axes, blocks, shares)
@@ -224,11 +224,13 @@ _UNITS = {"p": "rad/s", "alpha": "rad", "restitution": "1"}
 
 def _rates(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> Floats:
     if p is not None and size is None:
-        return positive_numbers(p, "p")
+        return checks.positive_numbers(p, "p", InvalidOption)
     if size is not None and p is None:
-        return np.sqrt(0.75 * positive_numbers(gravity, "gravity") / positive_numbers(size, "size"))
+        g = checks.positive(gravity, "gravity", InvalidOption, "m/s^2")
+        return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", InvalidOption))
     raise InvalidOption("a spectrum needs either p (rad/s) or size (half diagonals, m)")
 
 
 def _shares(fractiles: Sequence[float]) -> Floats:
-    return np.array([share(value, "each of fractiles") for value in fractiles])
+    each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
+    return np.array([checks.share(value, "each of fractiles", InvalidOption) for value in each])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.block.single import Block
+from rocking import checks
+from rocking.block.single import ALPHA, GRAVITY, RESTITUTION, Block, Limits, P, within
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
 
@@ -58,25 +58,31 @@ class Blocks:
         *,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        if restitution is None:
-            restitution = 1.0 - 1.5 * np.sin(np.asarray(alpha, dtype=np.float64)) ** 2
+        angles = checks.numbers(alpha, "alpha", InvalidBlock)
+        with np.errstate(invalid="ignore"):
+            kept = (
+                1.0 - 1.5 * np.sin(angles) ** 2
+                if restitution is None
+                else checks.numbers(restitution, "restitution", InvalidBlock)
+            )
         try:
-            columns = [_columns(values) for values in (p, alpha, restitution)]
+            columns = [_columns(values) for values in (checks.numbers(p, "p", InvalidBlock), angles, kept)]
             arrays = np.broadcast_arrays(*columns)
-        except (TypeError, ValueError):
+        except ValueError:
             raise InvalidBlock(
                 "p, alpha and restitution must be numbers, or arrays of shape (n,) or (n, 2) with one n"
             ) from None
-        if not (math.isfinite(gravity) and gravity > 0.0):
-            raise InvalidBlock(f"gravity must be positive, in m/s^2, not {gravity}")
-        _check(arrays[0] > 0.0, arrays[0], "p must be positive, in rad/s")
-        _check((arrays[1] > 0.0) & (arrays[1] < 0.5 * np.pi), arrays[1], "alpha must be between 0 and pi/2 rad")
-        _check((arrays[2] > 0.0) & (arrays[2] <= 1.0), arrays[2], "restitution must be in (0, 1]; give restitution=")
+        g = within(gravity, "gravity", GRAVITY, "m/s^2")
+        _check(arrays[0], P, "p must be positive, from {:g} to {:g} rad/s")
+        _check(
+            arrays[1], ALPHA._replace(high=np.nextafter(ALPHA.high, 0.0)), "alpha must be from {:g} to below pi/2 rad"
+        )
+        _check(arrays[2], RESTITUTION, "restitution must be in (0, 1], at least {:g}; give restitution=")
         for name, array in zip(("p", "alpha", "restitution"), arrays, strict=True):
             held = np.array(array)
             held.flags.writeable = False
             object.__setattr__(self, name, held)
-        object.__setattr__(self, "gravity", float(gravity))
+        object.__setattr__(self, "gravity", g)
 
     @classmethod
     def grid(
@@ -101,9 +107,10 @@ class Blocks:
         >>> len(Blocks.grid(p=[1.0, 2.0, 3.0], alpha=[0.1, 0.2], restitution=[0.9]))
         6
         """
-        axes = [np.atleast_1d(np.asarray(axis, dtype=np.float64)) for axis in (p, alpha)]
+        given: dict[str, ArrayLike] = {"p": p, "alpha": alpha}
         if restitution is not None:
-            axes.append(np.atleast_1d(np.asarray(restitution, dtype=np.float64)))
+            given["restitution"] = restitution
+        axes = [np.atleast_1d(checks.numbers(axis, name, InvalidBlock)) for name, axis in given.items()]
         if any(axis.ndim != 1 or axis.size == 0 for axis in axes):
             raise InvalidBlock("each parameter of a grid must be a number or a sequence of at least one number")
         columns = [column.ravel() for column in np.meshgrid(*axes, indexing="ij")]
@@ -146,8 +153,7 @@ class Blocks:
         return Blocks(self.p[index], self.alpha[index], self.restitution[index], gravity=self.gravity)
 
 
-def _columns(values: ArrayLike) -> Floats:
-    array = np.asarray(values, dtype=np.float64)
+def _columns(array: Floats) -> Floats:
     if array.ndim == 2 and array.shape[1] == 2:
         return array
     if array.ndim > 1:
@@ -155,7 +161,7 @@ def _columns(values: ArrayLike) -> Floats:
     return np.repeat(np.atleast_1d(array)[:, None], 2, axis=1)
 
 
-def _check(good: NDArray[np.bool_], values: Floats, rule: str) -> None:
-    bad = np.argwhere(~good)
+def _check(values: Floats, limits: Limits, rule: str) -> None:
+    bad = np.argwhere(~((values >= limits.low) & (values <= limits.high)))
     if len(bad):
-        raise InvalidBlock(f"{rule}, not {values[tuple(bad[0])]:g} (block {bad[0][0]})")
+        raise InvalidBlock(f"{rule.format(*limits)}, not {values[tuple(bad[0])]:g} (block {bad[0][0]})")

@@ -5,13 +5,33 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final, NamedTuple
 
+from rocking import checks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
 
 Number = float | int
 Sided = float | tuple[float, float]
+
+
+class Limits(NamedTuple):
+    """Lowest and highest value of a parameter, both included."""
+
+    low: float
+    high: float
+
+
+# Far beyond any block, and far enough from the ends of double precision for fourth powers of p, for the quotients of
+# a motion's largest acceleration with gravity and slenderness, and for products of all of them.
+P: Final = Limits(1e-6, 1e6)
+ALPHA: Final = Limits(1e-9, 0.5 * math.pi)
+GRAVITY: Final = Limits(1e-6, 1e6)
+#: Restitution; below it one impact is the end of rocking, to double precision.
+RESTITUTION: Final = Limits(1e-9, 1.0)
+_LENGTH: Final = Limits(1e-20, 1e20)
+_MASS: Final = Limits(1e-30, 1e30)
+_HEAVIEST_BEAM: Final = 1e12
 
 
 @dataclass(frozen=True)
@@ -88,9 +108,9 @@ class Block:
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        b = _positive(half_width, "half_width", "m")
-        h = _positive(half_height, "half_height", "m")
-        g = _positive(gravity, "gravity", "m/s^2")
+        b = _length(half_width, "half_width")
+        h = _length(half_height, "half_height")
+        g = within(gravity, "gravity", GRAVITY, "m/s^2")
         alpha, radius = math.atan2(b, h), math.hypot(b, h)
         p = math.sqrt(0.75 * g / radius)
         e = _restitutions(restitution, (housner_restitution(alpha),) * 2)
@@ -136,8 +156,8 @@ class Block:
         >>> Block.from_parameters(p=(2.5, 2.2), alpha=(0.12, 0.2), restitution=(0.9, 0.85)).alpha
         (0.12, 0.2)
         """
-        g = _positive(gravity, "gravity", "m/s^2")
-        rates = [_positive(value, "p", "rad/s") for value in _pair(p, "p")]
+        g = within(gravity, "gravity", GRAVITY, "m/s^2")
+        rates = [within(value, "p", P, "rad/s") for value in _pair(p, "p")]
         angles = [_angle(value) for value in _pair(alpha, "alpha")]
         e = _restitutions(restitution, tuple(housner_restitution(angle) for angle in angles))
         sides = tuple(Side(rates[i], angles[i], e[i], 0.75 * g / rates[i] ** 2) for i in range(2))
@@ -190,10 +210,10 @@ class Block:
         >>> abs(body.p - rectangle.p) < 1e-15, abs(body.restitution - rectangle.restitution) < 1e-15
         (True, True)
         """
-        plus, minus = (_positive(value, "distances", "m") for value in _pair(distances, "distances"))
-        h = _positive(height, "height", "m")
-        k = _positive(radius_of_gyration, "radius_of_gyration", "m")
-        g = _positive(gravity, "gravity", "m/s^2")
+        plus, minus = (_length(value, "distances") for value in _pair(distances, "distances"))
+        h = _length(height, "height")
+        k = _length(radius_of_gyration, "radius_of_gyration")
+        g = within(gravity, "gravity", GRAVITY, "m/s^2")
         radii = math.hypot(plus, h), math.hypot(minus, h)
         inertias = [k * k + radius * radius for radius in radii]
         kept = k * k + h * h - plus * minus
@@ -244,12 +264,10 @@ class Block:
         >>> frame.alpha == column.alpha, round(frame.radius / column.radius, 12)
         (True, 1.4)
         """
-        b = _positive(half_width, "half_width", "m")
-        h = _positive(half_height, "half_height", "m")
-        g = _positive(gravity, "gravity", "m/s^2")
-        gamma = _number(mass_ratio, "mass_ratio")
-        if gamma < 0.0:
-            raise InvalidBlock(f"mass_ratio must not be negative, not {gamma:g}: 0 means columns without a beam")
+        b = _length(half_width, "half_width")
+        h = _length(half_height, "half_height")
+        g = within(gravity, "gravity", GRAVITY, "m/s^2")
+        gamma = checks.within(mass_ratio, "mass_ratio (0: no beam)", InvalidBlock, 0.0, _HEAVIEST_BEAM)
         alpha = math.atan2(b, h)
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
@@ -345,13 +363,16 @@ def _fill(
     half_height: float | None,
     mass: float | None,
 ) -> None:
+    for side in sides:
+        within(side.p, "p (from the sizes)", P, "rad/s")
+        within(side.alpha, "alpha (from the sizes)", ALPHA, "rad")
     fields = {
         "sides": sides,
         "gravity": gravity,
         "description": description,
         "half_width": half_width,
         "half_height": half_height,
-        "mass": None if mass is None else _positive(mass, "mass", "kg"),
+        "mass": None if mass is None else within(mass, "mass", _MASS, "kg"),
     }
     for name, value in fields.items():
         object.__setattr__(block, name, value)
@@ -361,32 +382,30 @@ def _sided(plus: float, minus: float) -> Sided:
     return plus if plus == minus else (plus, minus)
 
 
-def _number(value: object, name: str) -> float:
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise InvalidBlock(f"{name} must be a number, not {value!r}") from None
-    if not math.isfinite(number):
-        raise InvalidBlock(f"{name} must be finite, not {number}")
-    return number
+def within(value: object, name: str, limits: Limits, unit: str) -> float:
+    """Return a positive number within its limits as a float.
+
+    Raises
+    ------
+    InvalidBlock
+        If it is anything else.
+    """
+    return checks.within(checks.positive(value, name, InvalidBlock, unit), name, InvalidBlock, *limits, unit)
 
 
-def _positive(value: object, name: str, unit: str) -> float:
-    number = _number(value, name)
-    if number <= 0.0:
-        raise InvalidBlock(f"{name} must be positive, in {unit}, not {number:g}")
-    return number
+def _length(value: object, name: str) -> float:
+    return within(value, name, _LENGTH, "m")
 
 
 def _angle(value: object) -> float:
-    number = _positive(value, "alpha", "rad")
-    if number >= 0.5 * math.pi:
+    number = checks.positive(value, "alpha", InvalidBlock, "rad")
+    if number >= ALPHA.high:
         raise InvalidBlock(f"alpha must be below pi/2 rad for a block that can stand, not {number:g}")
-    return number
+    return within(number, "alpha", ALPHA, "rad")
 
 
 def _pair(value: Any, name: str) -> tuple[object, object]:
-    if isinstance(value, str) or not hasattr(value, "__len__"):
+    if isinstance(value, (str, bytes)) or not hasattr(value, "__len__") or getattr(value, "ndim", 1) == 0:
         return value, value
     values = tuple(value)
     if len(values) != 2:
@@ -402,8 +421,7 @@ def _restitutions(given: object, default: tuple[float, ...]) -> tuple[float, flo
                 "to rock that way; give restitution= a value in (0, 1]"
             )
         return default[0], default[1]
-    values = [_number(value, "restitution") for value in _pair(given, "restitution")]
-    for value in values:
-        if not 0.0 < value <= 1.0:
-            raise InvalidBlock(f"restitution must be in (0, 1], not {value:g}")
-    return values[0], values[1]
+    plus, minus = (
+        checks.within(value, "restitution", InvalidBlock, *RESTITUTION) for value in _pair(given, "restitution")
+    )
+    return plus, minus

@@ -11,7 +11,7 @@ from rocking.chattering import critical_surface
 from rocking.chattering.parameters import FloatArray, broadcast, checked_frequency, checked_restitution
 from rocking.errors import InvalidOption
 from rocking.kernels.paper import fitted_amplitudes
-from rocking.kernels.sine_critical import critical_amplitudes
+from rocking.kernels.sine.critical import critical_amplitudes
 
 
 def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact") -> FloatArray:

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking import checks
 from rocking.chattering.asymptotic import asymptotic_times
 from rocking.chattering.parameters import (
     FloatArray,
@@ -24,14 +25,16 @@ from rocking.chattering.parameters import (
 )
 from rocking.chattering.series import series_times
 from rocking.errors import InvalidOption
-from rocking.kernels.sine_lanes import BLOCK, LANES, rest_times
-from rocking.kernels.sine_sequence import resolve, semianalytical_times
+from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED
+from rocking.kernels.sine.lanes import BLOCK, BLOCKS, LANES, Answers, rest_phases
+from rocking.kernels.sine.sequence import IMPACT as RESOLVED
+from rocking.kernels.sine.sequence import resolve, semianalytical_phases
 
-#: Sequences that are worth a thread of their own.
-_SEQUENCES_PER_THREAD: Final = 4096
+#: Sequences of a part, which is sorted and computed by one thread: few enough for a core's own cache.
+_PART: Final = 1 << 14
 
-#: Classes of eta by which sequences are sorted, so that those of a block take about as many impacts.
-_RESTITUTION_CLASSES: Final = 1000
+#: Classes of eta, and of the excess of a over one as a share of 1 - eta, by which sequences are sorted.
+_CLASSES: Final = 255
 
 #: Two ulp: what adding to a phase and dividing by omega may lose of the bracket.
 _ROUNDING: Final = 2.0**-51
@@ -80,8 +83,9 @@ def chattering_time(
     -------
     array of float
         p times the chattering time, of the broadcast shape of a, omega and eta (a number for numbers). NaN where
-        a < 1, 0 where a = 1. "exact" and "semianalytical" give NaN for incomplete chattering; the two expansions
-        are finite for every a >= 1 (infinite at eta = 1) and know nothing of it.
+        a < 1, 0 where a = 1. "exact" and "semianalytical" give NaN for incomplete chattering, and infinity where
+        double precision decides nothing (known nowhere but possible within rounding of the critical amplitude); the two
+        expansions are finite for every a >= 1 (infinite at eta = 1) and know nothing of it.
 
     Raises
     ------
@@ -127,8 +131,8 @@ def is_complete(a: ArrayLike, omega: ArrayLike, eta: ArrayLike) -> NDArray[np.bo
     Returns
     -------
     array of bool
-        Of the broadcast shape. True is proven by certificate, False by an arc that outlasts half a period; a < 1
-        never lifts off and is False.
+        Of the broadcast shape. True is proven by certificate, False by an arc that outlasts half a period (or, within
+        rounding of the critical amplitude, by the lack of a proof); a < 1 never lifts off and is False.
 
     Raises
     ------
@@ -201,21 +205,21 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     True
     """
     amplitude, frequency, restitution = _single_case(a, omega, eta)
-    if not 1e-15 <= tolerance < math.inf:
+    if checks.finite(tolerance, "tolerance", InvalidOption) < 1e-15:
         raise InvalidOption(f"tolerance must be at least 1e-15 and finite, not {tolerance!r}")
     if amplitude == 1.0:
         return ChatteringSequence(np.zeros(0, IMPACT), True, 0.0, 0.0, 0.0)
     capacity = _FIRST_CAPACITY
     while True:
-        impacts, rest, lower, upper = _resolved(amplitude, frequency, restitution, tolerance, capacity)
-        if not math.isnan(rest):
+        status, impacts, phases = _resolved(amplitude, frequency, restitution, tolerance, capacity)
+        if status != UNRESOLVED or impacts.size < capacity:
             break
         capacity *= 2
         if capacity > _LARGEST_CAPACITY:
             raise InvalidOption(f"the sequence takes more than {_LARGEST_CAPACITY} impacts: lower eta = {eta!r}")
-    if rest == -math.inf:
-        return ChatteringSequence(impacts, False, math.nan, math.nan, math.nan)
-    return ChatteringSequence(impacts, True, rest, lower, upper)
+    if status == FOUND:
+        return ChatteringSequence(impacts, True, *phases)
+    return ChatteringSequence(impacts, False, math.nan, math.nan, math.nan)
 
 
 def interval_ratios(a: float, omega: float, eta: float, n: int) -> FloatArray:
@@ -254,7 +258,7 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> FloatArray:
     amplitude, frequency, restitution = _single_case(a, omega, eta)
     n = checked_count(n, "n", 1, 100_000)
     ratios = np.full(n, math.nan)
-    intervals = _resolved(amplitude, frequency, restitution, -1.0, n + 2)[0]["interval"]
+    intervals = _resolved(amplitude, frequency, restitution, -1.0, n + 2)[1]["interval"]
     intervals = intervals[intervals > 0.0]
     known = max(0, intervals.size - 2)
     ratios[:known] = intervals[2:] / intervals[:known]
@@ -270,48 +274,62 @@ def _single_case(a: float, omega: float, eta: float) -> tuple[float, float, floa
 
 def _resolved(
     a: float, omega: float, eta: float, tolerance: float, capacity: int
-) -> tuple[NDArray[np.void], float, float, float]:
-    """Impacts, time of rest and bracket; NaN: the capacity is used up, minus infinity: incomplete."""
-    intervals, before, after = np.zeros((3, capacity))
-    count, rest, lower, upper = resolve(a - 1.0, 1.0 / (omega * omega), eta, tolerance, intervals, before, after)
+) -> tuple[int, NDArray[np.void], tuple[float, float, float]]:
+    """Status, impacts, and time of rest with its bracket; the status is UNRESOLVED where the capacity is used up."""
+    table = np.zeros(capacity, RESOLVED)
+    status, count, rest, lower, upper = resolve(a - 1.0, 1.0 / (omega * omega), eta, tolerance, table)
+    table = table[:count]
     impacts = np.zeros(count, IMPACT)
-    impacts["interval"] = intervals[:count] / omega
-    impacts["time"] = np.cumsum(intervals[:count]) / omega
+    impacts["interval"] = table["interval"] / omega
+    impacts["time"] = np.cumsum(table["interval"]) / omega
     impacts["side"] = np.where(np.arange(count) % 2 == 0, 1, -1)
-    impacts["speed_before"] = before[:count] / omega
-    impacts["speed_after"] = after[:count] / omega
-    return impacts, rest / omega, lower / omega * (1.0 - _ROUNDING), upper / omega * (1.0 + _ROUNDING)
+    impacts["speed_before"] = table["before"] / omega
+    impacts["speed_after"] = table["after"] / omega
+    return status, impacts, (rest / omega, lower / omega * (1.0 - _ROUNDING), upper / omega * (1.0 + _ROUNDING))
 
 
 def _exact_times(a: FloatArray, omega: FloatArray, eta: FloatArray) -> FloatArray:
     shape, (amplitudes, frequencies, restitutions) = broadcast(a, omega, eta)
-    times = np.where(amplitudes == 1.0, 0.0, math.nan)
-    order = _alike_together(np.flatnonzero(restitutions < 1.0), restitutions)
+    phases = np.where(amplitudes == 1.0, 0.0, math.nan)
+    statuses = np.full(phases.size, FOUND, np.int8)
 
-    def part(selected: NDArray[np.int64]) -> None:
-        rest_times(amplitudes, frequencies, restitutions, selected, np.zeros(BLOCK), times)
+    def part(some: slice) -> None:
+        sequences = amplitudes[some], frequencies[some], restitutions[some]
+        order = _alike_together(sequences[0], sequences[2])
+        rest_phases(sequences, order, np.zeros(BLOCKS + 1, BLOCK), Answers(phases[some], statuses[some]))
 
-    _share(part, order)
-    return times.reshape(shape)[()]
-
-
-def _alike_together(order: NDArray[np.int64], eta: FloatArray) -> NDArray[np.int64]:
-    """Sort the sequences by eta, coarsely (a radix sort)."""
-    classes = (eta[order] * _RESTITUTION_CLASSES).astype(np.uint16)
-    if order.size <= LANES or classes.min() == classes.max():
-        return order
-    return order[np.argsort(classes, kind="stable")]
+    _share(part, phases.size)
+    return (_told(phases, statuses) / frequencies).reshape(shape)[()]
 
 
-def _share(part: Callable[[NDArray[np.int64]], None], order: NDArray[np.int64]) -> None:
-    """Run a compiled function, which holds no lock, on whole blocks of the sequences in several threads."""
-    threads = min(_cores(), order.size // _SEQUENCES_PER_THREAD)
+def _told(phases: FloatArray, statuses: NDArray[np.int8]) -> FloatArray:
+    """Mark phases as the interface does times: NaN for incomplete chattering, infinity for what is not resolved."""
+    phases[statuses == OUTLASTS] = math.nan
+    phases[statuses == UNRESOLVED] = math.inf
+    return phases
+
+
+def _alike_together(a: FloatArray, eta: FloatArray) -> NDArray[np.int64]:
+    """Pick the sequences that rock, sorted coarsely by eta and then by a: those of a block take like steps."""
+    rock = np.flatnonzero((a > 1.0) & (eta < 1.0))
+    if rock.size <= LANES:
+        return rock
+    loss = 1.0 - eta[rock]
+    classes = (_CLASSES * loss).astype(np.uint16)
+    share = (_CLASSES * np.minimum((a[rock] - 1.0) / loss, 1.0)).astype(np.uint16)
+    return rock[np.argsort(classes * np.uint16(_CLASSES) + share, kind="stable")]
+
+
+def _share(part: Callable[[slice], None], size: int) -> None:
+    """Run a compiled function, which holds no lock, on parts of so many sequences, in several threads if worth it."""
+    parts = [slice(start, start + _PART) for start in range(0, size, _PART)]
+    threads = min(_cores(), len(parts))
     if threads < 2:
-        part(order)
+        for some in parts:
+            part(some)
         return
-    size = -(-order.size // (4 * threads * LANES)) * LANES
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(part, (order[start : start + size] for start in range(0, order.size, size))))
+        list(pool.map(part, parts))
 
 
 def _cores() -> int:
@@ -323,8 +341,9 @@ def _cores() -> int:
 def _semianalytical_times(a: FloatArray, omega: FloatArray, eta: FloatArray, resolved: int) -> FloatArray:
     shape, (amplitudes, frequencies, restitutions) = broadcast(a, omega, eta)
     times = np.where(amplitudes == 1.0, 0.0, math.nan)
-    rests = np.flatnonzero(restitutions < 1.0)
-    some = np.zeros(rests.size)
-    semianalytical_times(amplitudes[rests], frequencies[rests], restitutions[rests], resolved, some)
-    times[rests] = some
+    rocks = np.flatnonzero((amplitudes > 1.0) & (restitutions < 1.0))
+    phases = np.zeros(rocks.size)
+    statuses = np.full(rocks.size, UNRESOLVED, np.int8)
+    semianalytical_phases((amplitudes[rocks], frequencies[rocks], restitutions[rocks]), resolved, phases, statuses)
+    times[rocks] = _told(phases, statuses) / frequencies[rocks]
     return times.reshape(shape)[()]

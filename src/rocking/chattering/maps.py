@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking import checks
 from rocking.chattering.exceedance import exceedances
 from rocking.chattering.families import Case, Family
 from rocking.chattering.parameters import FloatArray
@@ -187,7 +188,7 @@ def _outcome(rest: float, later: FloatArray) -> Outcome:
 
 
 def _axis(values: ArrayLike, name: str) -> FloatArray:
-    axis = np.asarray(values, dtype=float)
+    axis = checks.numbers(values, f"values of {name}", InvalidOption)
     if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or not (np.diff(axis) > 0.0).all():
         raise InvalidOption(f"the values of {name} must be finite numbers in increasing order")
     return axis

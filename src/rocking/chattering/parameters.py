@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking import checks
 from rocking.errors import InvalidOption
 
 FloatArray = NDArray[np.float64]
@@ -49,9 +50,7 @@ def checked_slenderness(alpha: ArrayLike) -> FloatArray:
 
 def checked_count(value: int, name: str, lowest: int, highest: int) -> int:
     """Check a whole number against bounds."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not lowest <= value <= highest:
-        raise InvalidOption(f"{name} must be a whole number from {lowest} to {highest}, not {value!r}")
-    return int(value)
+    return checks.whole(value, name, InvalidOption, lowest, highest)
 
 
 def single(values: FloatArray, name: str) -> float:
@@ -72,10 +71,7 @@ def broadcast(*parameters: FloatArray) -> tuple[tuple[int, ...], list[FloatArray
 
 
 def _finite(given: ArrayLike, name: str, meaning: str) -> FloatArray:
-    try:
-        values = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidOption(f"{name} ({meaning}) must be a number or an array of numbers, not {given!r}") from None
+    values = checks.numbers(given, f"{name} ({meaning})", InvalidOption)
     _require(np.isfinite(values), values, name, f"finite ({meaning})")
     return values
 

@@ -271,7 +271,7 @@ def _speed_left(response: Response, rest: float) -> float:
 
 def _rotation_error(response: Response, certified: Response) -> float:
     end = min(response.duration, certified.duration)
-    nodes = np.concatenate([response.trail.nodes[:, 0], certified.trail.nodes[:, 0]])
+    nodes = np.concatenate([response.trail.nodes["time"], certified.trail.nodes["time"]])
     times = np.concatenate([np.linspace(0.0, end, _EVEN_TIMES), nodes[nodes <= end]])
     slenderness = min(side.alpha for side in certified.block.sides)
     return float(np.max(np.abs(response.rotation(times) - certified.rotation(times)))) / slenderness

@@ -18,7 +18,7 @@ from rocking.chattering.parameters import (
     checked_restitution,
 )
 from rocking.errors import InvalidOption
-from rocking.kernels.sine_series import phase_coefficients
+from rocking.kernels.sine.series import phase_coefficients
 
 _HIGHEST_ORDER: Final = 40
 
@@ -160,14 +160,16 @@ def _summed(coefficients: FloatArray, eps: FloatArray) -> FloatArray:
 
 
 def _coefficients(omega: FloatArray, eta: FloatArray, order: int) -> FloatArray:
-    shape, (frequencies, restitutions) = broadcast(omega, eta)
-    coefficients = np.full((frequencies.size, order), math.inf)
-    for i in np.flatnonzero(restitutions < 1.0):
-        w = float(frequencies[i])
-        coefficients[i] = phase_coefficients(1.0 / (w * w), float(restitutions[i]), order) / w
+    """Coefficients of the broadcast parameters, formed once for each pair of different values."""
+    shape, parameters = broadcast(omega, eta)
+    pairs, where = np.unique(np.stack(parameters), axis=1, return_inverse=True)
+    coefficients = np.full((pairs.shape[1], order), math.inf)
+    for i in np.flatnonzero(pairs[1] < 1.0):
+        w, restitution = pairs[:, i].tolist()
+        coefficients[i] = phase_coefficients(1.0 / (w * w), restitution, order) / w
         if not np.isfinite(coefficients[i]).all():
             raise InvalidOption(
-                f"the expansion at omega = {w:g}, eta = {restitutions[i]:g} is not resolved to order {order} "
+                f"the expansion at omega = {w:g}, eta = {restitution:g} is not resolved to order {order} "
                 "in double precision: lower the order, or take eta further from 1"
             )
-    return coefficients.reshape((*shape, order))
+    return coefficients[where.ravel()].reshape((*shape, order))

@@ -80,7 +80,7 @@ def fragility(
     confidence
         Probability of the intervals and bands.
     bootstrap
-        Draws of the bootstrap for the bands; 0: Fisher's information.
+        Draws of the bootstrap for the bands; 0: the profile likelihood.
     seed
         Seed of its random numbers.
     taxonomy
@@ -112,7 +112,7 @@ def fragility(
         model=model,
         chattering=options.treatment_from(chattering),
         confidence=confidence,
-        band="bootstrap" if bootstrap != 0 else "fisher",
+        band="bootstrap" if bootstrap != 0 else "likelihood",
         samples=bootstrap or 1,
         seed=seed,
     )
@@ -121,7 +121,7 @@ def fragility(
         "description": fitted.description,
         "measure": {"name": measure, "units": fitted.measure.units, **fitted.measure.options()},
         "model": model,
-        "band": "bootstrap" if bootstrap else "fisher",
+        "band": "bootstrap" if bootstrap else "likelihood",
         "curves": [curve.summary() for curve in fitted.curves],
     }
     if folder is not None:

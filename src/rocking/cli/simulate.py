@@ -213,9 +213,9 @@ def write(response: Response, result: dict[str, Any], folder: Path) -> None:
         np.savetxt(
             folder / "events.csv",
             response.events,
-            fmt=["%.15g", "%s", "%d", "%.6g"],
+            fmt=["%.15g", "%s", "%d"],
             delimiter=",",
-            header="time_s,kind,side,sensitivity_s",
+            header="time_s,kind,side",
             comments="",
         )
         (folder / "result.json").write_text(json.dumps(options.plain(result), indent=2) + "\n", "utf-8")

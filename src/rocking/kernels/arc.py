@@ -1,12 +1,13 @@
 """One arc between two events as a Taylor series (paper, Eq. 15), linear or nonlinear alike.
 
-The rotation is written in the frame of the side that the block leans to: u = |theta| >= 0, and the motion as
-A(t) = i a(t)/g with i the sign of that side. The two models read
+The rotation is written in the frame of the side that the block leans to: u = |theta| >= 0, and the ground acceleration
+as A(t) = i a(t)/g with i the sign of that side. The two models read
 
-    linear      u'' = lam (u - alpha - A)
+    linear      u'' = lam u - gain (threshold + A)
     nonlinear   u'' = -lam (sin(alpha - u) + A cos(alpha - u))
 
-with lam = p^2, and the coefficients c[k] of u follow by recurrence.
+and the coefficients c[k] of u follow by recurrence. In the linear model lam may have any sign: p^2 for a rocking block
+(whose gain is p^2, too), 0 for a ball, negative for an oscillator with a stop.
 """
 
 import math
@@ -14,44 +15,79 @@ import math
 import numpy as np
 
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.state import COSINE, GROUND, ORDER, SINE, SPARE, Floats
+from rocking.kernels.ground import Ground, acceleration, local_series
+from rocking.kernels.state import ORDER, Floats, Record
 
-#: Terms below this fraction of the largest one no longer count.
-NEGLIGIBLE = 2.0**-58
+#: Terms of the velocity below this fraction of the largest one no longer count. (Those of the rotation are no measure:
+#: over a step that is short beside 1/p they vanish beside u long before the velocity has converged.)
+NEGLIGIBLE = 2.0**-56
+
+#: First step from an impact, over the arc's duration under constant acceleration.
+_FIRST_STEP = 1.3
 
 _WEIGHT = 1.0 / ((np.arange(ORDER + 1) + 1.0) * (np.arange(ORDER + 1) + 2.0))
 _INVERSE = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
 
 
 @inlined
-def local_motion(coefficients: Floats, offset: float, factor: float, h: float, A: Floats) -> int:
-    """Motion's polynomial about ``offset``, times ``factor``, into A; returns the degree that counts within h."""
-    degree = coefficients.shape[0] - 1
-    for k in range(degree + 1):
-        A[k] = coefficients[k] * factor
-    if offset > 0.0:
-        move(A, degree, offset)
+def sign_of(side: int) -> float:
+    """Sign of the rotation on a side."""
+    return 1.0 - 2.0 * side
+
+
+@inlined
+def restoring(block: Record, side: int, ground: float) -> float:
+    """Restoring acceleration of a side at zero rotation, for a ground acceleration in units of g."""
+    return block.gain[side] * (block.threshold[side] + sign_of(side) * ground)
+
+
+@shared
+def expand(
+    ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float
+) -> tuple[int, float, int]:
+    """Series of the arc from a state into scratch, for a time of at most ``left``; returns (order, step, degree)."""
+    h = step_length(ground, block, state, left)
+    degree = local_series(ground, state.piece, state.offset, sign_of(state.side), scratch.ground)
+    degree = significant_degree(scratch.ground, degree, h)
+    if rules.nonlinear:
+        order, h = expand_nonlinear(block, state, scratch, degree, h)
+        return order, h, degree
+    if degree <= 1:
+        order = linear_order(block.stiffness[state.side], h)
+        expand_linear(block, state, scratch, degree, order)
+        return order, h, degree
+    expand_linear(block, state, scratch, degree, ORDER)
+    order, h = converged(scratch.rotation, degree, h)
+    return order, h, degree
+
+
+@inlined
+def step_length(ground: Ground, block: Record, state: Record, left: float) -> float:
+    """Length of the next Taylor step."""
+    h = min(left, 1.0 / np.sqrt(abs(block.stiffness[state.side])))
+    if state.u == 0.0 and state.v > 0.0:
+        g = restoring(block, state.side, acceleration(ground, state.piece, state.offset))
+        if g > 0.0:
+            h = min(h, _FIRST_STEP * 2.0 * state.v / g)
+    return h
+
+
+@inlined
+def significant_degree(A: Floats, degree: int, h: float) -> int:
+    """Degree of a polynomial without the highest powers that do not count within h."""
     while degree > 1 and abs(A[degree]) * h**degree < NEGLIGIBLE * abs(A[0]):
         degree -= 1
     return degree
 
 
 @inlined
-def move(c: Floats, degree: int, t: float) -> None:
-    """Centre of a polynomial moved by t, in place."""
-    for k in range(degree):
-        for j in range(degree - 1, k - 1, -1):
-            c[j] += t * c[j + 1]
-
-
-@inlined
 def linear_order(lam: float, h: float) -> int:
-    """Order at which a linear arc's series has converged over h <= 1/p, for a motion of degree 0 or 1.
+    """Order at which a linear arc's series has converged over h, for a motion of degree 0 or 1.
 
     Every coefficient after the motion's own follows from the one two before, so the ratio of c[k] h^k to c[2] h^2
     (slower than all that comes from the initial state) is known beforehand.
     """
-    squared = lam * h * h
+    squared = abs(lam) * h * h
     ratio = 1.0
     for k in range(2, ORDER - 2, 2):
         ratio *= squared * _WEIGHT[k]
@@ -62,45 +98,54 @@ def linear_order(lam: float, h: float) -> int:
 
 @inlined
 def converged(c: Floats, degree: int, h: float) -> tuple[int, float]:
-    """Order at which a full series has converged over h, or else a step over which it has; returns (order, h')."""
-    largest = max(abs(c[0]), abs(c[1]) * h)
-    previous = term = largest
+    """Order at which a full series has converged over h, or else a step over which it has; returns (order, h').
+
+    Past the motion's degree a coefficient follows from the one two before: two that do not count end the series.
+    """
+    largest = term = abs(c[1]) * h
     power = h * h
     for k in range(2, ORDER + 1):
         previous = term
-        term = abs(c[k]) * power
+        term = k * abs(c[k]) * power
         largest = max(largest, term)
-        if k > degree + 2 and term + previous <= NEGLIGIBLE * largest:
+        if k > degree + 3 and term + previous <= NEGLIGIBLE * largest:
             return k, h
         power *= h
     return ORDER, shortened(c, h)
 
 
-@shared
-def expand_linear(u: float, v: float, lam: float, alpha: float, A: Floats, degree: int, order: int, c: Floats) -> None:
-    """Series of a linear arc into c, up to ``order``."""
-    c[0] = u
-    c[1] = v
-    c[2] = 0.5 * lam * (u - alpha - A[0])
+@inlined
+def expand_linear(block: Record, state: Record, scratch: Record, degree: int, order: int) -> None:
+    """Series of a linear arc, up to ``order``."""
+    c, A, side = scratch.rotation, scratch.ground, state.side
+    lam, gain = block.stiffness[side], block.gain[side]
+    c[0] = state.u
+    c[1] = state.v
+    c[2] = 0.5 * (lam * state.u - gain * (block.threshold[side] + A[0]))
     for k in range(1, degree + 1):
-        c[k + 2] = lam * (c[k] - A[k]) * _WEIGHT[k]
+        c[k + 2] = (lam * c[k] - gain * A[k]) * _WEIGHT[k]
     for k in range(degree + 1, order - 1):
         c[k + 2] = lam * c[k] * _WEIGHT[k]
 
 
 @shared
-def expand_nonlinear(
-    u: float, v: float, lam: float, alpha: float, A: Floats, degree: int, h: float, c: Floats, S: Floats, C: Floats
-) -> tuple[int, float]:
-    """Series of a nonlinear arc into c, of sin and cos(alpha - u) into S and C; returns (order, h')."""
-    c[0] = u
-    c[1] = v
-    S[0] = math.sin(alpha - u)
-    C[0] = math.cos(alpha - u)
+def expand_nonlinear(block: Record, state: Record, scratch: Record, degree: int, h: float) -> tuple[int, float]:
+    """Series of a nonlinear arc, and of sin and cos(alpha - u); returns (order, h').
+
+    Coefficients may vanish one after another (a release from rest where sin and cos balance), so that small terms alone
+    do not end the series: a majorant of the velocity's, |u''| h^2 times those of an exponential, must be small as well.
+    """
+    c, A, S, C = scratch.rotation, scratch.ground, scratch.sine, scratch.cosine
+    lam, psi = block.stiffness[state.side], block.slenderness[state.side] - state.u
+    c[0] = state.u
+    c[1] = state.v
+    S[0] = math.sin(psi)
+    C[0] = math.cos(psi)
     power = h * h
-    largest = max(abs(u), abs(v) * h)
-    previous = largest
-    term = largest
+    stiff = lam * math.hypot(1.0, A[0])
+    rate = (math.sqrt(stiff) + abs(state.v) + stiff * h) * h
+    majorant = stiff * power
+    largest = term = abs(state.v) * h
     for k in range(ORDER - 1):
         value = S[k]
         for j in range(min(k, degree) + 1):
@@ -108,35 +153,40 @@ def expand_nonlinear(
         value *= -lam * _WEIGHT[k]
         c[k + 2] = value
         previous = term
-        term = abs(value) * power
+        term = (k + 2) * abs(value) * power
         largest = max(largest, term)
+        if k > degree and majorant <= NEGLIGIBLE * largest and term + previous <= NEGLIGIBLE * largest:
+            return k + 2, h
         sine = 0.0
         cosine = 0.0
         for j in range(k + 1):
-            rate = (j + 1) * c[j + 1]
-            sine -= rate * C[k - j]
-            cosine += rate * S[k - j]
+            turn = (j + 1) * c[j + 1]
+            sine -= turn * C[k - j]
+            cosine += turn * S[k - j]
         S[k + 1] = sine * _INVERSE[k + 1]
         C[k + 1] = cosine * _INVERSE[k + 1]
-        if k > degree and term + previous <= NEGLIGIBLE * largest:
-            return k + 2, h
         power *= h
+        majorant *= rate * _INVERSE[k + 2]
     return ORDER, shortened(c, h)
 
 
 @shared
 def shortened(c: Floats, h: float) -> float:
-    """Step, not longer than h, at which the last two terms of a full series no longer count."""
+    """Step, not longer than h, at which the last terms of a full series no longer count.
+
+    The last four, since three may vanish (a release from rest where sin and cos balance has every fourth power only).
+    """
     excess = np.inf
     while excess > 1.0:
-        largest = term = previous = 0.0
+        largest = last = 0.0
         power = 1.0
         for k in range(ORDER + 1):
-            previous = term
-            term = abs(c[k]) * power
+            term = k * abs(c[k]) * power
             largest = max(largest, term)
+            if k > ORDER - 4:
+                last += term
             power *= h
-        excess = (term + previous) / (NEGLIGIBLE * largest)
+        excess = last / (NEGLIGIBLE * largest)
         if excess > 1.0:
             h *= 0.9 * excess ** (-1.0 / ORDER)
     return h
@@ -153,41 +203,3 @@ def evaluate(c: Floats, order: int, t: float) -> tuple[float, float, float]:
         v = v * t + u
         u = u * t + c[k]
     return u, v, 2.0 * w
-
-
-@shared
-def vary_linear(
-    du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Floats
-) -> tuple[float, float]:
-    """Variation (du, dv) after time t of a linear arc when the motion is scaled by 1 + epsilon.
-
-    The variation obeys the arc's own equation with alpha = 0, so its series is an arc's series.
-    """
-    expand_linear(du, dv, lam, 0.0, scratch[GROUND], degree, order, scratch[SPARE])
-    total, rate, _ = evaluate(scratch[SPARE], order, t)
-    return total, rate
-
-
-@shared
-def vary_nonlinear(
-    du: float, dv: float, lam: float, degree: int, order: int, t: float, scratch: Floats
-) -> tuple[float, float]:
-    """Variation (du, dv) after time t of a nonlinear arc when the motion is scaled by 1 + epsilon.
-
-    Needs A, S and C as `expand_nonlinear` left them. Solves d'' = lam ((cos - A sin) d - A cos).
-    """
-    A, S, C, d = scratch[GROUND], scratch[SINE], scratch[COSINE], scratch[SPARE]
-    d[0] = du
-    d[1] = dv
-    for k in range(order - 1):
-        value = 0.0
-        for j in range(k + 1):
-            stiffness = C[j]
-            for m in range(min(j, degree) + 1):
-                stiffness -= A[m] * S[j - m]
-            value += stiffness * d[k - j]
-        for m in range(min(k, degree) + 1):
-            value -= A[m] * C[k - m]
-        d[k + 2] = lam * value * _WEIGHT[k]
-    total, rate, _ = evaluate(d, order, t)
-    return total, rate

@@ -1,99 +1,115 @@
-"""What a march carries along: the problem, its state, its tables and its scratch space, as plain arrays."""
+"""What a march carries along, as numpy records: compiled code passes them by pointer, and reads fields by name."""
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
+from numba import config
 from numpy.typing import NDArray
+
+from rocking.kernels.status import GOING
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Records = NDArray[np.void]
+
+#: One record of the types below.
+Record = Any
 
 #: Highest power in an arc's series; enough for steps of 1/p to full double precision.
 ORDER = 22
 
-
-class Shaking(NamedTuple):
-    """The ground motion: its pieces (s, m/s^2), 1/g, and its approximation error in units of g."""
-
-    breakpoints: Floats
-    coefficients: Floats
-    inverse_g: float
-    error: float
-
-
-class Rules(NamedTuple):
-    """How to compute: model, end of chattering (see `status`), width of a good bracket (s), when to stop (s).
-
-    ``record`` says whether the tables are written and variations carried, or only the state is kept.
-    """
-
-    nonlinear: bool
-    treatment: int
-    tolerance: float
-    stop: float
-    endless: bool
-    record: bool
-
-
-class Trail(NamedTuple):
-    """What it takes to follow a response again: the problem and the nodes of its steps."""
-
-    shaking: Shaking
-    sides: Floats
-    rules: Rules
-    nodes: Floats
-
-
-# Kernels pass their arrays by value, so what belongs together is one array: many in a tuple cost more than an arc.
-
-# A march's tables, shape (4, n, 6), one row each. Nodes: time, piece, offset, side (+1, -1; 0 at rest), u, u'.
-# Impacts: time, side entered, speed before, speed after, shift of the time per unit of scaling. Events: time, kind,
-# side, shift. Sequences: start, end, lower, upper, impacts.
-NODE_TABLE, IMPACT_TABLE, EVENT_TABLE, SEQUENCE_TABLE = range(4)
-
-# Scratch space, shape (5, n): the series of one step (rotation, ground, sine, cosine) and a spare one.
-SERIES, GROUND, SINE, COSINE, SPARE = range(5)
-
-# Columns of a block's side (rows: side +, side -): p^2, alpha, uplift threshold in g, its gain (see `chatter`),
-# restitution, and the limit of a treatment other than the certificate.
-STIFFNESS, SLENDERNESS, THRESHOLD, GAIN, RESTITUTION, LIMIT = range(6)
-
-# Integers of the state. RUN counts the impacts since chattering was proven, SMOOTH marks an uplift that is not a
-# jump, STALLED counts the rests brought about only because time hardly advanced from one impact to the next.
-PIECE, SIDE, NODES, IMPACTS, EVENTS, SEQUENCES, RUN, SMOOTH, STALLED, UPLIFTS = range(10)
-
-# Floats of the state: position in the motion, rotation, its rate, their variations, times of the last uplift, impact
-# and proof, the speed below which a proof is worth trying, the highest rotation so far, the end.
-OFFSET, U, V, DU, DV, UPLIFTED, STRUCK, RESTED, RESTING, RUN_START, WORTH, PEAK, PEAK_TIME, PEAK_CHANGE, END = range(15)
-
-#: Side index of a block at rest.
+#: Side of a block at rest.
 AT_REST = -1
 
-
-def new_state() -> tuple[Integers, Floats]:
-    """State of a block at rest at time zero."""
-    at, x = np.zeros(UPLIFTS + 1, dtype=np.int64), np.zeros(END + 1)
-    at[SIDE] = AT_REST
-    return at, x
+#: A march that ends at no piece of the motion.
+TO_THE_END = 2**62
 
 
-def new_states(count: int) -> tuple[Integers, Floats]:
-    """States of many blocks at rest at time zero, one row each."""
-    at, x = np.zeros((count, UPLIFTS + 1), dtype=np.int64), np.zeros((count, END + 1))
-    at[:, SIDE] = AT_REST
-    return at, x
+def _record(**fields: Any) -> np.dtype[np.void]:
+    return np.dtype(
+        [(name, *(kind if isinstance(kind, tuple) else (kind,))) for name, kind in fields.items()], align=True
+    )
 
 
-def new_scratch(columns: int) -> Floats:
-    """Scratch space for motions with that many coefficients in a piece."""
-    return np.zeros((SPARE + 1, max(ORDER + 1, columns + 2)))
+_SIDES = ("f8", (2,))
+_SERIES = ("f8", (ORDER + 2,))
+
+#: A block, side by side: lambda in u'' = lambda u - ...; uplift threshold in g and its gain (the restoring acceleration
+#: at zero rotation is gain (threshold + side a/g)); restitution on leaving the side, and the side entered from it; the
+#: rotation at which the block has overturned; slenderness, its sine and cosine; limit of a treatment other than the
+#: certificate. What most turns of a march need comes first, here and below: fewer cache lines to fetch.
+BLOCK = _record(
+    stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, restitution=_SIDES, entered=("i8", (2,)), fallen="f8",
+    slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES,
+)  # fmt: skip
+
+#: How to compute: model, end of chattering (see `status`), width of a good bracket (s), when to stop (s), whether that
+#: is never, and whether the tables are written or only the state is kept.
+RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endless="?", record="?")
+
+#: Where a march stands. ``until`` is the first piece that is not marched through and ``budget`` the number of turns
+#: left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a jump;
+#: ``worth`` is the speed below which a proof is worth trying; ``stalled`` counts the rests brought about only because
+#: time hardly advanced from one impact to the next.
+STATE = _record(
+    piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
+    run="i8", worth="f8", struck="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8", run_start="f8",
+    uplifted="f8", rested="f8", resting="f8", end="f8",
+    nodes="i8", events="i8", sequences="i8", uplifts="i8", rests="i8", stalled="i8",
+)  # fmt: skip
+
+#: A step of a response: the state at its start, as `expand` takes it. Elsewhere a side is +1 or -1, and 0 at rest.
+NODE_ROW = _record(time="f8", piece="i8", offset="f8", side="i8", u="f8", v="f8")
+IMPACT_ROW = _record(time="f8", side="i8", speed_before="f8", speed_after="f8")
+EVENT_ROW = _record(time="f8", kind="i8", side="i8")
+SEQUENCE_ROW = _record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
+
+#: Row k of a march's table holds its k-th node, impact, event and chattering sequence: one array, since kernels pass
+#: arrays by value.
+TABLE = _record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
+
+#: Scratch space: the series of one step, of the ground and of sin and cos(alpha - u) about its start, and a spare one.
+SCRATCH = _record(rotation=_SERIES, ground=_SERIES, sine=_SERIES, cosine=_SERIES, spare=_SERIES)
 
 
-def new_tables(rows: int) -> Floats:
-    """Empty tables for a first try."""
-    return np.empty((SEQUENCE_TABLE + 1, rows, 6))
+def records(count: int, kind: np.dtype[np.void]) -> Records:
+    """Zeroed records."""
+    return attributed(np.zeros(count, dtype=kind))
 
 
-def grown(tables: Floats) -> Floats:
-    """Tables with twice the room and the same rows."""
-    return np.concatenate([tables, np.empty_like(tables)], axis=1)
+def attributed(array: Records) -> Records:
+    """Give records as kernels take them: uncompiled ones read fields as attributes, which is slow elsewhere."""
+    return array.view(np.recarray) if config.DISABLE_JIT else array
+
+
+def record(kind: np.dtype[np.void], **values: Any) -> Record:
+    """One record with these values."""
+    made = records(1, kind)[0]
+    for name, value in values.items():
+        made[name] = value
+    return made
+
+
+def new_states(count: int, budget: int) -> Records:
+    """States of blocks at rest at time zero, on their way to the end."""
+    states = records(count, STATE)
+    states["side"] = AT_REST
+    states["until"] = TO_THE_END
+    states["ending"] = GOING
+    states["budget"] = budget
+    return states
+
+
+def new_scratch() -> Record:
+    """Scratch space for one march at a time."""
+    return record(SCRATCH)
+
+
+def new_table(rows: int) -> Records:
+    """Empty table for a first try."""
+    return records(rows, TABLE)
+
+
+def grown(table: Records) -> Records:
+    """Table with twice the room and the same rows."""
+    return attributed(np.concatenate([table, np.zeros_like(table)]))

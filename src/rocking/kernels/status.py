@@ -19,9 +19,11 @@ VELOCITY: Final = 1
 INTERVAL: Final = 2
 TIME: Final = 3
 
-# How a march ended.
+# How a march ended. GOING, FULL and PAUSED ones can be taken on.
 DONE: Final = 0
 FELL: Final = 1
 BALANCED: Final = 2
 FULL: Final = 3
 GOING: Final = 4
+PAUSED: Final = 5
+UNFINISHED: Final = 6

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking import checks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.checks import finite, positive
 from rocking.motion.piecewise import Floats
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def cumulative_absolute_velocity(motion: Motion) -> float:
 
 def significant_duration(motion: Motion, start: float, end: float) -> float:
     """Time between two fractions of the Arias intensity, s."""
+    start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
     if not 0.0 <= start < end <= 1.0:
         raise InvalidMotion(f"a significant duration needs 0 <= start < end <= 1, not {start} and {end}")
     cumulated = np.append(0.0, np.cumsum(_energies(motion)))
@@ -51,14 +52,14 @@ def spectral_acceleration(
     """Pseudo-spectral acceleration, m/s^2."""
     from rocking.kernels import oscillator  # numba: loaded only where it is used
 
-    periods = np.asarray(period, dtype=np.float64)
+    periods = checks.numbers(period, "period of a spectral acceleration", InvalidMotion)
     if not np.all(np.isfinite(periods) & (periods > 0.0)):
         raise InvalidMotion("the period of a spectral acceleration must be a positive number of seconds")
     if np.any(periods < 1e-6 * motion.duration):
         raise InvalidMotion(
             f"a period below a millionth of the duration, {motion.duration:.6g} s, takes too long: use pga"
         )
-    if not 0.0 <= finite(damping, "damping") < 1.0:
+    if not 0.0 <= checks.finite(damping, "damping", InvalidMotion) < 1.0:
         raise InvalidMotion(f"the damping must be a fraction of critical from 0 to below 1, not {damping}")
     frequencies = np.ravel(2.0 * np.pi / periods)
     peaks = np.empty_like(frequencies)
@@ -71,7 +72,7 @@ def spectral_acceleration(
 def target(motion: Motion, what: str, period: float | None, damping: float) -> float:
     """Present value of the measure `what` ("pga", "pgv", "sa") that the motion is to be scaled to."""
     if what == "sa":
-        return float(spectral_acceleration(motion, positive(period, "period", "seconds"), damping))
+        return float(spectral_acceleration(motion, checks.positive(period, "period", InvalidMotion, "s"), damping))
     return motion.pga if what == "pga" else motion.pgv
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -11,14 +10,21 @@ from typing import Any, Final, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking import checks
+from rocking.constants import HIGHEST_DEGREE
 from rocking.errors import InvalidMotion
 from rocking.motion import measures, piecewise, processing
-from rocking.motion.checks import finite, positive
 from rocking.motion.piecewise import Floats
 
 # Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take.
 _STRONGEST: Final = 1e50
 _LONGEST: Final = 1e15
+#: Far below any ground motion; pieces may be shorter, but must not change faster than over this time.
+_SHORTEST: Final = 1e-9
+#: Pieces that meet within this part of the peak acceleration do not jump.
+_JUMP: Final = 1e-12
+#: Even breakpoints are off their grid by no more than this part of the duration, some units in its last place.
+_ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
 
 
 @dataclass(frozen=True)
@@ -81,14 +87,18 @@ class Motion:
     error : float
         Bound on the difference from the motion that `description` describes, m/s^2, beyond the rounding of
         breakpoints and coefficients; 0 where the pieces are the motion itself (records).
+
+    Attributes
+    ----------
     step : float or None
-        Sampling step if the motion is linear between even samples, s.
+        Sampling step if all pieces are straight lines and equally long, s; it follows from them. Neighbouring lines may
+        jump.
 
     Raises
     ------
     InvalidMotion
-        If the arrays do not describe a piecewise polynomial, or a number is beyond all sense (accelerations of
-        1e50 m/s^2, times of 1e15 s).
+        If the arrays do not describe a piecewise polynomial, its degree is above 20, or a number is beyond all sense
+        (accelerations of 1e50 m/s^2, also where a piece would last 1e-9 s; durations below 1e-9 s or above 1e15 s).
 
     Examples
     --------
@@ -105,7 +115,7 @@ class Motion:
     description: Description = field(default_factory=lambda: Description("polynomials"))
     history: tuple[str, ...] = ()
     error: float = 0.0
-    step: float | None = None
+    step: float | None = field(init=False)
 
     def __post_init__(self) -> None:
         breakpoints = _frozen_floats(self.breakpoints, "breakpoints", 1)
@@ -117,19 +127,30 @@ class Motion:
             )
         if breakpoints[0] != 0.0 or not np.all(np.diff(breakpoints) > 0.0):
             raise InvalidMotion("the breakpoints of a motion must start at 0 and increase strictly")
-        with np.errstate(over="ignore"):
-            bounds = piecewise.value(np.abs(coefficients), np.diff(breakpoints))
-        if breakpoints[-1] > _LONGEST or not np.all(bounds <= _STRONGEST):
-            raise InvalidMotion(f"a motion must stay below {_STRONGEST:g} m/s^2 and {_LONGEST:g} s: check its units")
-        if self.step is not None:
-            positive(self.step, "sampling step", "seconds")
-        if not (math.isfinite(self.error) and self.error >= 0.0):
+        if coefficients.shape[1] > HIGHEST_DEGREE + 1:
             raise InvalidMotion(
-                f"the approximation error of a motion must be finite and not negative, not {self.error}"
+                f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {coefficients.shape[1] - 1}: "
+                "split them into shorter ones of a lower degree"
             )
+        if not _SHORTEST <= breakpoints[-1] <= _LONGEST:
+            raise InvalidMotion(
+                f"a motion must last from {_SHORTEST:g} to {_LONGEST:g} s, not {breakpoints[-1]:g} s: check its units"
+            )
+        with np.errstate(over="ignore"):
+            bounds = piecewise.value(np.abs(coefficients), np.maximum(np.diff(breakpoints), _SHORTEST))
+        if not np.all(bounds <= _STRONGEST):
+            raise InvalidMotion(
+                f"a motion must stay below {_STRONGEST:g} m/s^2 on all its pieces, and where they are shorter than "
+                f"{_SHORTEST:g} s so long: check its units"
+            )
+        error = checks.finite(self.error, "approximation error of a motion", InvalidMotion)
+        if error < 0.0:
+            raise InvalidMotion(f"approximation error of a motion must not be negative, not {error:g}")
         object.__setattr__(self, "breakpoints", breakpoints)
         object.__setattr__(self, "coefficients", coefficients)
         object.__setattr__(self, "history", tuple(self.history))
+        object.__setattr__(self, "error", error)
+        object.__setattr__(self, "step", _even_step(breakpoints, coefficients))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Through the constructor, which makes the arrays read-only again.
@@ -140,7 +161,6 @@ class Motion:
             self.description,
             self.history,
             self.error,
-            self.step,
         )
         return Motion, fields
 
@@ -160,7 +180,7 @@ class Motion:
         acceleration : array_like, shape (n,)
             Ground acceleration, m/s^2, n >= 2; the first sample is at time 0.
         dt : float
-            Sampling step, s.
+            Sampling step, s, from 1e-9 to 1e9.
         name : str
             Short name for tables and figures.
         description : Description, optional
@@ -169,7 +189,7 @@ class Motion:
         Raises
         ------
         InvalidMotion
-            If there are fewer than two samples, one of them is not finite, or `dt` is not a positive number.
+            If there are fewer than two samples, one of them is not finite, or `dt` is not a number in its range.
 
         Examples
         --------
@@ -185,7 +205,6 @@ class Motion:
             piecewise.linear(times, samples),
             name=name,
             description=description or Description("samples", text="linear between even samples"),
-            step=step,
         )
 
     @classmethod
@@ -246,6 +265,13 @@ class Motion:
         """Times (s) and accelerations (m/s^2) at the breakpoints; at a jump, the acceleration after it."""
         last = piecewise.value(self.coefficients[-1], np.diff(self.breakpoints)[-1])
         return self.breakpoints, np.append(self.coefficients[:, 0], last)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the acceleration jumps from a piece to the next, beyond rounding; ends of the motion do not count."""
+        ends = piecewise.value(self.coefficients, np.diff(self.breakpoints))
+        gaps = np.abs(self.coefficients[1:, 0] - ends[:-1])
+        return bool(np.any(gaps > _JUMP * self.pga))
 
     @property
     def pga(self) -> float:
@@ -402,11 +428,11 @@ class Motion:
             raise InvalidMotion("scaling to a spectral acceleration needs both sa and period")
         what, target = given[0]
         if what == "factor":
-            return self._times(finite(target, "scale factor"), f"scaled by {target:.6g}")
+            return self._times(checks.finite(target, "scale factor", InvalidMotion), f"scaled by {target:.6g}")
         now = measures.target(self, what, period, damping)
         if now == 0.0:
             raise InvalidMotion(f"{self.name} is zero throughout and cannot be scaled to a {what}")
-        ratio = positive(target, f"target {what}", "m/s" if what == "pgv" else "m/s^2") / now
+        ratio = checks.positive(target, f"target {what}", InvalidMotion, "m/s" if what == "pgv" else "m/s^2") / now
         at_period = f" at {period:.6g} s, damping {damping:.6g}" if what == "sa" else ""
         return self._times(ratio, f"scaled by {ratio:.6g} to a {what} of {target:.6g}{at_period}")
 
@@ -423,14 +449,13 @@ class Motion:
         >>> Motion([0.0, 2.0], [[1.0]]).delayed(1.0).acceleration([0.5, 1.5, 3.5])
         array([0., 1., 0.])
         """
-        wait = positive(delay, "delay", "seconds")
+        wait = checks.positive(delay, "delay", InvalidMotion, "s")
         return replace(
             self,
             breakpoints=np.concatenate([[0.0], self.breakpoints + wait]),
             coefficients=np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients]),
             description=self.description.changed("delayed"),
             history=(*self.history, f"delayed by {wait:.6g} s"),
-            step=None,
         )
 
     def processed(
@@ -456,14 +481,14 @@ class Motion:
         order : int
             Order of the filter in each direction.
         resample : float
-            New sampling step, s: the motion's values at its multiples, joined by straight lines. To a coarser
-            step, remove what lies above its Nyquist frequency with `band_pass`.
+            New sampling step, s: the motion's values at its multiples, joined by straight lines; a jump becomes a
+            slope of one step. To a coarser step, remove what lies above its Nyquist frequency with `band_pass`.
 
         Raises
         ------
         InvalidMotion
             If nothing is asked for, an argument is not usable, or `baseline` or `band_pass` is asked of a
-            motion without even samples (resample it first, in a call of its own).
+            motion that is not linear between even samples, or jumps (resample it first, in a call of its own).
 
         Examples
         --------
@@ -511,7 +536,6 @@ class Motion:
             name=f"{self.name} + {other.name}",
             description=Description("sum", text=f"{self._origin()}; plus {other._origin()}"),
             error=self.error + other.error,
-            step=self.step if np.array_equal(self.breakpoints, other.breakpoints) else None,
         )
 
     def _origin(self) -> str:
@@ -538,11 +562,17 @@ class Motion:
         return piecewise.antiderivative(np.diff(self.breakpoints), self._velocity_pieces())
 
 
+def _even_step(breakpoints: Floats, coefficients: Floats) -> float | None:
+    """Length of the pieces if they are equally long and straight lines, else None."""
+    if coefficients.shape[1] < 2 or np.any(coefficients[:, 2:]):
+        return None
+    step = float(breakpoints[1])
+    off = np.abs(breakpoints - piecewise.even_times(len(breakpoints), step))
+    return step if np.all(off <= _ROUNDING * breakpoints[-1]) else None
+
+
 def _floats(values: ArrayLike, what: str, dimensions: int) -> Floats:
-    try:
-        array = np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise InvalidMotion(f"the {what} of a motion must be real numbers") from error
+    array = np.array(checks.numbers(values, f"{what} of a motion", InvalidMotion), order="C")
     if array.ndim != dimensions:
         raise InvalidMotion(f"the {what} of a motion must have {dimensions} dimension(s), not {array.ndim}")
     return array
@@ -569,4 +599,5 @@ def _samples(acceleration: ArrayLike) -> Floats:
 def _step(dt: float) -> float:
     if np.ndim(dt) != 0:
         raise InvalidMotion("dt must be one number; for uneven times use Motion.from_points(times, acceleration)")
-    return positive(dt, "sampling step dt", "seconds")
+    step = checks.positive(dt, "sampling step dt", InvalidMotion, "s")
+    return checks.within(step, "sampling step dt", InvalidMotion, _SHORTEST, 1.0 / _SHORTEST, "s: check its units")

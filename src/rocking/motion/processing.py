@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
+from rocking import checks
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.checks import finite, positive
 from rocking.motion.piecewise import Floats
 
 if TYPE_CHECKING:
@@ -32,7 +32,10 @@ def pair(values: tuple[T, T], what: str) -> tuple[T, T]:
 
 def trim(motion: Motion, start: float, end: float) -> Motion:
     """Keep the part from `start` to `end` (s); even samples are cut at the nearest sample."""
-    first, last = finite(start, "start of the part to keep"), finite(end, "end of the part to keep")
+    first, last = (
+        checks.finite(start, "start of the part to keep", InvalidMotion),
+        checks.finite(end, "end of the part to keep", InvalidMotion),
+    )
     if not 0.0 <= first < last <= motion.duration * (1.0 + 1e-12):
         raise InvalidMotion(
             f"trim needs 0 <= start < end <= {motion.duration:.6g} s, the motion's duration, "
@@ -51,16 +54,16 @@ def trim(motion: Motion, start: float, end: float) -> Motion:
 def _trimmed_samples(motion: Motion, step: float, first: int, last: int) -> Motion:
     if last <= first:
         raise InvalidMotion(f"trim must keep at least two samples, {step:.6g} s apart")
-    samples = motion.samples[1][first : last + 1]
-    return _noted(_with_samples(motion, samples, step), f"trimmed to {first * step:.6g}-{last * step:.6g} s")
+    times = piecewise.even_times(last - first + 1, step)
+    kept = replace(motion, breakpoints=times, coefficients=motion.coefficients[first:last])
+    return _noted(kept, f"trimmed to {first * step:.6g}-{last * step:.6g} s")
 
 
 def baseline(motion: Motion, degree: int) -> Motion:
     """Subtract the polynomial of the given degree that fits the samples best (least squares)."""
     step = _step(motion, "baseline")
     times, samples = motion.samples
-    if not isinstance(degree, int) or not 0 <= degree <= 10 or degree >= len(samples):
-        raise InvalidMotion(f"the degree of a baseline must be a whole number from 0 to 10, not {degree}")
+    degree = checks.whole(degree, "degree of a baseline", InvalidMotion, 0, min(10, len(samples) - 1))
     fitted = np.polynomial.Legendre.fit(times, samples, degree)(times)
     return _noted(_with_samples(motion, samples - fitted, step), f"baseline of degree {degree} removed")
 
@@ -75,8 +78,7 @@ def band_pass(motion: Motion, low: float | None, high: float | None, *, order: i
 
     step = _step(motion, "band_pass")
     corners = _corners(motion, low, high)
-    if not isinstance(order, int) or not 1 <= order <= 12:
-        raise InvalidMotion(f"the order of a filter must be a whole number from 1 to 12, not {order}")
+    order = checks.whole(order, "order of a filter", InvalidMotion, 1, 12)
     kind: Final = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
     at = corners if kind == "bandpass" else corners[0]
     sections = signal.butter(order, at, btype=kind, output="sos", fs=1.0 / step)
@@ -88,7 +90,9 @@ def band_pass(motion: Motion, low: float | None, high: float | None, *, order: i
 
 
 def _corners(motion: Motion, low: float | None, high: float | None) -> list[float]:
-    corners = [positive(corner, "corner frequency", "Hz") for corner in (low, high) if corner is not None]
+    corners = [
+        checks.positive(corner, "corner frequency", InvalidMotion, "Hz") for corner in (low, high) if corner is not None
+    ]
     nyquist = 0.5 / _step(motion, "band_pass")
     if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
         raise InvalidMotion(
@@ -104,7 +108,7 @@ def _corners(motion: Motion, low: float | None, high: float | None) -> list[floa
 
 def resample(motion: Motion, step: float) -> Motion:
     """Take the motion's values at the multiples of `step` (s) up to its end, joined by straight lines."""
-    new = positive(step, "new sampling step", "seconds")
+    new = checks.positive(step, "new sampling step", InvalidMotion, "s")
     count = math.floor(motion.duration / new * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MOST_SAMPLES:
         raise InvalidMotion(
@@ -118,13 +122,17 @@ def resample(motion: Motion, step: float) -> Motion:
 def _step(motion: Motion, what: str) -> float:
     if motion.step is None:
         raise InvalidMotion(f"{what} needs even samples: call processed(resample=...) on {motion.name} first")
+    if motion.jumps:
+        raise InvalidMotion(
+            f"{what} needs samples joined by lines, but {motion.name} jumps: call processed(resample=...) on it first"
+        )
     return motion.step
 
 
 def _with_samples(motion: Motion, samples: Floats, step: float) -> Motion:
     times = piecewise.even_times(len(samples), step)
     # The samples are the motion from here on: whatever they approximate, the lines between them are exact.
-    return replace(motion, breakpoints=times, coefficients=piecewise.linear(times, samples), error=0.0, step=step)
+    return replace(motion, breakpoints=times, coefficients=piecewise.linear(times, samples), error=0.0)
 
 
 def _noted(motion: Motion, what: str) -> Motion:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 LARGEST_RATIO_SHOWN: Final = 2.0
 
 
-class ChatteringSequence(NamedTuple):
+class DrawnSequence(NamedTuple):
     """One chattering sequence: the times of its impacts and the bracket on the time of rest, s."""
 
     impact_times: FloatArray
@@ -36,7 +36,7 @@ def response_figure(
     motion_time: FloatArray,
     motion_acceleration_g: FloatArray,
     thresholds_g: tuple[float, float],
-    chattering: ChatteringSequence | None,
+    chattering: DrawnSequence | None,
     title: str,
 ) -> Figure:
     """Draw a response above the ground motion that caused it.
@@ -56,7 +56,7 @@ def response_figure(
     thresholds_g : tuple of float
         Acceleration (g, a magnitude) that uplifts the block to side + and to side -; an acceleration
         of the opposite sign is needed, so the first is drawn below zero and the second above.
-    chattering : ChatteringSequence or None
+    chattering : DrawnSequence or None
         The sequence to zoom into: the interval to the next impact against the time to rest, both logarithmic.
         There is no zoom where the time of rest is not bracketed (NaN) or the sequence has a single impact.
     title : str
@@ -104,7 +104,7 @@ def response_figure(
     return figure
 
 
-def _can_be_zoomed(sequence: ChatteringSequence) -> bool:
+def _can_be_zoomed(sequence: DrawnSequence) -> bool:
     return sequence.impact_times.size > 1 and math.isfinite(sequence.rest_upper - sequence.rest_lower)
 
 
@@ -172,7 +172,7 @@ def _draw_motion(axes: Axes, time: FloatArray, acceleration: FloatArray, thresho
     axes.set_xlabel("time (s)")
 
 
-def _mark_sequence(axes: Axes, sequence: ChatteringSequence) -> None:
+def _mark_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     start, end = float(sequence.impact_times[0]), sequence.rest_upper
     axes.plot([start, end], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=axes.get_xaxis_transform())
     axes.annotate(
@@ -188,7 +188,7 @@ def _mark_sequence(axes: Axes, sequence: ChatteringSequence) -> None:
     )
 
 
-def _draw_sequence(axes: Axes, sequence: ChatteringSequence) -> None:
+def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     rest = 0.5 * (sequence.rest_lower + sequence.rest_upper)
     start = sequence.impact_times[:-1]
     interval = np.diff(sequence.impact_times)

@@ -27,7 +27,7 @@ _OTHER_QUANTITY = re.compile(r"\b(VELOCITY|DISPLACEMENT)\s+TIME\b", re.IGNORECAS
 _EXTENSIONS = {"velocity": "VT2", "displacement": "DT2"}
 
 
-class _Header(NamedTuple):
+class _PeerHeader(NamedTuple):
     titles: list[Line]
     sizes: Line
     points: int
@@ -82,17 +82,17 @@ def read(source: Source, request: Request) -> list[Channel]:
     return [channel]
 
 
-def _header(source: Source) -> _Header | None:
+def _header(source: Source) -> _PeerHeader | None:
     lines = source.lines(0, _HEADER_LINES)
     for index, line in enumerate(lines):
         found = _VALUES_FIRST.search(line.text) or _KEYS_FIRST.search(line.text)
         dt = parse(found[2].encode("latin-1")) if found else None
         if found and dt is not None:
-            return _Header(lines[:index], line, int(found[1]), dt)
+            return _PeerHeader(lines[:index], line, int(found[1]), dt)
     return None
 
 
-def _other_quantity(header: _Header) -> tuple[str, int] | None:
+def _other_quantity(header: _PeerHeader) -> tuple[str, int] | None:
     """Return what the file holds instead of acceleration, and where it says so, or None."""
     for line in header.titles:
         found = _OTHER_QUANTITY.search(line.text)

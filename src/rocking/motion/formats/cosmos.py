@@ -36,7 +36,7 @@ _STATION = re.compile(r"^\s*statn\s+no\S*\s+(\S+)\s*(?:code:\s*\S+)?\s*(.*)$", r
 _STEP_MS, _RAW_STEP_S = 62, 34
 
 
-class _Header(NamedTuple):
+class _CosmosHeader(NamedTuple):
     text: list[Line]
     reals: Floats
     data: Line
@@ -77,7 +77,7 @@ def read(source: Source, request: Request) -> list[Channel]:
     return found
 
 
-def _header(source: Source, title: Line) -> _Header:
+def _header(source: Source, title: Line) -> _CosmosHeader:
     stated = _TITLE.search(title.text)
     if stated is None:
         raise source.error("a channel's title with '(Format v01.20 ...' should stand here; mend the file", title.start)
@@ -88,7 +88,7 @@ def _header(source: Source, title: Line) -> _Header:
     found = _DATA_LINE.match(data.text)
     if found is None:
         raise source.error("the line with the number of points should stand here; get the file again", data.start)
-    return _Header(text, reals, data, int(found[1]), found[2].lower())
+    return _CosmosHeader(text, reals, data, int(found[1]), found[2].lower())
 
 
 def _numbers(source: Source, start: int, kind: str) -> tuple[Floats, int]:
@@ -113,7 +113,7 @@ def _after(source: Source, line: Line, count: int) -> int:
     return [line, *source.lines(line.next, count)][-1].next
 
 
-def _channel(source: Source, request: Request, header: _Header, end: int, ordinal: int) -> Channel:
+def _channel(source: Source, request: Request, header: _CosmosHeader, end: int, ordinal: int) -> Channel:
     line = header.data
     spelling = _UNITS.search(line.text)
     unit = request.units(source, find_unit(spelling[1]) if spelling else None, line.start)
@@ -137,7 +137,7 @@ def _channel(source: Source, request: Request, header: _Header, end: int, ordina
     )
 
 
-def _step(source: Source, header: _Header) -> float:
+def _step(source: Source, header: _CosmosHeader) -> float:
     """Return the step (s) of the two in the header that fits the stated duration."""
     steps = [each for each in (_real(header, _STEP_MS) / 1000.0, _real(header, _RAW_STEP_S)) if each > 0.0]
     if not steps:
@@ -155,12 +155,12 @@ def _step(source: Source, header: _Header) -> float:
     return fitting[0]
 
 
-def _real(header: _Header, number: int) -> float:
+def _real(header: _CosmosHeader, number: int) -> float:
     value = float(header.reals[number - 1]) if len(header.reals) >= number else 0.0
     return value if math.isfinite(value) else 0.0
 
 
-def _refuse_unknown(source: Source, header: _Header, values: Floats) -> None:
+def _refuse_unknown(source: Source, header: _CosmosHeader, values: Floats) -> None:
     flag = next((found[1] for line in header.text if (found := _UNKNOWN.search(line.text))), None)
     if flag is not None and (values == float(flag)).any():
         raise source.error(

@@ -20,7 +20,7 @@ _SIGNS = ("DATA_TYPE", "SAMPLING_INTERVAL_S", "NDATA")
 _AZIMUTHS = {"N": 0.0, "E": 90.0}
 
 
-class _Entry(NamedTuple):
+class _EsmEntry(NamedTuple):
     value: str
     at: int
 
@@ -46,7 +46,7 @@ def read(source: Source, request: Request) -> list[Channel]:
     kind = entries["DATA_TYPE"]
     if kind.value.upper() != "ACCELERATION":
         raise source.error(f"this ESM file holds {kind.value.lower()!r}; give the file of the acceleration", kind.at)
-    spelling = entries.get("UNITS", _Entry("", start))
+    spelling = entries.get("UNITS", _EsmEntry("", start))
     unit = request.units(source, find_unit(spelling.value), spelling.at)
     dt = request.step(source, _number(source, entries, "SAMPLING_INTERVAL_S"), entries["SAMPLING_INTERVAL_S"].at)
     values = read_values(source, start, len(source.data))
@@ -72,20 +72,20 @@ def read(source: Source, request: Request) -> list[Channel]:
     return [channel]
 
 
-def _entries(source: Source) -> tuple[dict[str, _Entry], int]:
+def _entries(source: Source) -> tuple[dict[str, _EsmEntry], int]:
     """Return the header's values by their key, and where the data start."""
-    entries: dict[str, _Entry] = {}
+    entries: dict[str, _EsmEntry] = {}
     start = 0
     for line in source.lines(0, _HEADER_LINES):
         found = _KEY.match(line.text)
         if found is None:
             break
-        entries[found[1]] = _Entry(found[2].strip(), line.start)
+        entries[found[1]] = _EsmEntry(found[2].strip(), line.start)
         start = line.next
     return entries, start
 
 
-def _number(source: Source, entries: dict[str, _Entry], key: str) -> float:
+def _number(source: Source, entries: dict[str, _EsmEntry], key: str) -> float:
     entry = entries[key]
     number = parse(entry.value.encode("latin-1"))
     if number is None:

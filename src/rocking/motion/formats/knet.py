@@ -50,7 +50,7 @@ _SENSORS = {"1": "N-S borehole", "2": "E-W borehole", "3": "U-D borehole", "4": 
 _AZIMUTHS = {"N-S": 0.0, "E-W": 90.0}
 
 
-class _Entry(NamedTuple):
+class _KnetEntry(NamedTuple):
     value: str
     at: int
 
@@ -104,7 +104,7 @@ def read(source: Source, request: Request) -> list[Channel]:
     return [channel]
 
 
-def _entries(source: Source) -> tuple[dict[str, _Entry], int]:
+def _entries(source: Source) -> tuple[dict[str, _KnetEntry], int]:
     """Return the header's values by their key, and where the data start."""
     lines = source.lines(0, len(_KEYS))
     for line, key in zip(lines, _KEYS, strict=False):
@@ -115,11 +115,11 @@ def _entries(source: Source) -> tuple[dict[str, _Entry], int]:
     return dict(zip(_KEYS, map(_entry, lines), strict=True)), lines[-1].next
 
 
-def _entry(line: Line) -> _Entry:
-    return _Entry(line.text[_KEY_COLUMNS:].strip(), line.start)
+def _entry(line: Line) -> _KnetEntry:
+    return _KnetEntry(line.text[_KEY_COLUMNS:].strip(), line.start)
 
 
-def _positive(source: Source, entries: dict[str, _Entry], key: str, pattern: re.Pattern[str]) -> list[float]:
+def _positive(source: Source, entries: dict[str, _KnetEntry], key: str, pattern: re.Pattern[str]) -> list[float]:
     """Return the numbers that `pattern` finds in the entry `key`; each must be positive."""
     entry = entries[key]
     found = pattern.match(entry.value)
@@ -130,7 +130,7 @@ def _positive(source: Source, entries: dict[str, _Entry], key: str, pattern: re.
     return positive
 
 
-def _check_duration(source: Source, entries: dict[str, _Entry], rate: float, count: int) -> None:
+def _check_duration(source: Source, entries: dict[str, _KnetEntry], rate: float, count: int) -> None:
     (seconds,) = _positive(source, entries, "Duration Time", _SECONDS)
     stated = seconds * rate
     if not abs(count - stated) < rate:

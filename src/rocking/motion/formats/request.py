@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rocking import checks
 from rocking.errors import InvalidMotion
 from rocking.motion.formats.source import Source
 from rocking.motion.formats.units import CHOICES, Unit, choose_unit
@@ -30,7 +31,10 @@ class Request:
         UnreadableRecord
             If the units are not known.
         """
-        return cls(None if dt is None else _positive(dt), None if units is None else choose_unit(units))
+        return cls(
+            None if dt is None else checks.positive(dt, "sampling step dt", InvalidMotion, "s"),
+            None if units is None else choose_unit(units),
+        )
 
     def step(self, source: Source, stated: float, at: int | None) -> float:
         """Return the step (s) that the file states at the offset `at`.
@@ -61,13 +65,3 @@ class Request:
         if self.unit is not None and unit != self.unit:
             raise source.error(f"the units are {unit.name}, not units = {self.unit.name!r}; leave units out", at)
         return unit
-
-
-def _positive(dt: float) -> float:
-    try:
-        step = float(dt)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidMotion(f"the sampling step dt must be a positive number of seconds, not {dt!r}") from error
-    if not (math.isfinite(step) and step > 0.0):
-        raise InvalidMotion(f"the sampling step dt must be a positive number of seconds, not {dt!r}")
-    return step

@@ -40,7 +40,7 @@ _COMPONENT = re.compile(r"component\s*=\s*(.*)$", re.IGNORECASE)
 _STATION = re.compile(r"station\s*=\s*(.*?)\s*(?:component\s*=|$)", re.IGNORECASE)
 
 
-class _Header(NamedTuple):
+class _SmcHeader(NamedTuple):
     text: list[Line]
     integers: Floats
     reals: Floats
@@ -91,7 +91,7 @@ def read(source: Source, request: Request) -> list[Channel]:
     return [channel]
 
 
-def _header(source: Source, title: Line) -> _Header:
+def _header(source: Source, title: Line) -> _SmcHeader:
     lines = source.lines(title.start, _TEXT_LINES + _INTEGER_LINES + _REAL_LINES)
     if len(lines) < _TEXT_LINES + _INTEGER_LINES + _REAL_LINES:
         raise source.error("the file ends within its header; get the whole file again", lines[-1].start)
@@ -102,7 +102,7 @@ def _header(source: Source, title: Line) -> _Header:
     if comments > _MOST_COMMENTS:
         raise source.error(f"{comments:g} comment lines are too many; correct integer {_COMMENT_COUNT}", rest[0].start)
     rows = source.lines(rest[-1].next, int(comments))
-    return _Header(text, integers, reals, [rest[-1], *rows][-1].next)
+    return _SmcHeader(text, integers, reals, [rest[-1], *rows][-1].next)
 
 
 def _numbers(source: Source, lines: list[Line], layout: Layout) -> Floats:
@@ -111,7 +111,7 @@ def _numbers(source: Source, lines: list[Line], layout: Layout) -> Floats:
     return expect(source, lines[0].start, count, values)
 
 
-def _series(source: Source, request: Request, header: _Header) -> tuple[float | None, Floats | None, Floats]:
+def _series(source: Source, request: Request, header: _SmcHeader) -> tuple[float | None, Floats | None, Floats]:
     """Return step or times, and the values."""
     values = _values(source, header)
     at = header.text[-1].next
@@ -129,7 +129,7 @@ def _series(source: Source, request: Request, header: _Header) -> tuple[float | 
     return request.step(source, dt, at), None, values[1::2]
 
 
-def _values(source: Source, header: _Header) -> Floats:
+def _values(source: Source, header: _SmcHeader) -> Floats:
     count = header.integer(_VALUE_COUNT)
     layout = _PRECISE_VALUES if header.integer(_DIGITS) == _PRECISE_DIGITS else _VALUES
     values = read_values(source, header.data, len(source.data), count=count, layout=layout)

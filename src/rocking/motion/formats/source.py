@@ -135,7 +135,10 @@ def _content(name: str) -> bytes:
     if not stat.S_ISREG(status.st_mode):
         raise UnreadableRecord(f"{name}: this is not a regular file; copy the record into one")
     with open(name, "rb") as file:  # noqa: PTH123
-        raw = file.read(SIZE_LIMIT + 1)
+        # A read sets aside as much memory as it is asked for.
+        raw = file.read(min(status.st_size, SIZE_LIMIT) + 1)
+        if len(raw) > status.st_size:
+            raw += file.read(SIZE_LIMIT + 1 - len(raw))
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
         raise UnreadableRecord(f"{name}: this file is larger than {limit} MiB; cut the record into smaller files")

@@ -1,12 +1,12 @@
 """Plain text and CSV: one column of accelerations with dt=, or times and accelerations; units= in any case.
 
 Heading lines and comments (#, %, !, //) are passed over. The delimiter is a semicolon (a comma is then the decimal
-sign), a comma, or blanks; numbers may be quoted. Exponents may be Fortran's (1.0D-3).
+sign), a comma, or blanks; between blanks a comma within a number is the decimal sign. Numbers may be quoted, and
+exponents Fortran's (1.0D-3). Rows such as "1,5" in a file without any point may be one number or two: they are refused.
 """
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -23,9 +23,16 @@ from rocking.motion.formats.values import Floats, convert, not_a_number, parse
 
 NAME = "text table"
 
+_COMMA = "a comma"
+
 _HEADING_LINES = 64
 _LINES_AT_ONCE = 50_000
 _COMMENT = re.compile(rb"[ \t]*(#|%|!|//)")
+
+#: No row of two numbers is longer; what is, is refused before it is split.
+_ROW_LIMIT = 1024
+_WITHOUT_POINT = re.compile(r"[+-]?\d+(?:,\d+)?(?:[EeDd][+-]?\d+)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[EeDd][+-]?\d+)?")
 
 #: Titles of other formats' tables, which ObsPy reads.
 _OTHER_TITLES = ("TIMESERIES ",)
@@ -39,6 +46,16 @@ class _Shape(NamedTuple):
     columns: int
     start: int
 
+    def ambiguous(self, source: Source) -> bool:
+        """Whether the commas may be decimal signs as well as delimiters: rows such as "1,5" and no point anywhere."""
+        # A comma that blanks follow is no decimal sign, and one at the end of a row neither.
+        return (
+            self.delimiter == _COMMA
+            and self.columns <= 2
+            and _DECIMAL_COMMA.fullmatch(source.line(self.start).text.strip().strip('"')) is not None
+            and b"." not in source.data[self.start :]
+        )
+
 
 class _Row(NamedTuple):
     tokens: list[bytes]
@@ -51,6 +68,8 @@ def recognise(source: Source) -> Identification | None:
     if shape is None or shape.columns > 2:
         return None
     what = "one number" if shape.columns == 1 else f"two numbers, between them {shape.delimiter}"
+    if shape.ambiguous(source):
+        what = "one number with a decimal comma, or two numbers"
     return Identification(NAME, f"from line {source.line_number(shape.start)} on each line holds {what}")
 
 
@@ -67,10 +86,16 @@ def read(source: Source, request: Request) -> list[Channel]:
     ------
     UnreadableRecord
         If units are not given, or dt is not given for a single column, or a row is not like the first one, or
-        times do not increase.
+        times do not increase, or it cannot be told whether commas are decimal signs.
     """
     shape = _shape(source)
     assert shape is not None
+    if shape.ambiguous(source):
+        raise source.error(
+            f"{source.line(shape.start).text.strip()!r} may be one number with a decimal comma, or two numbers; write "
+            "decimal points, or blanks between two numbers",
+            shape.start,
+        )
     if shape.columns == 1 and request.dt is None:
         raise source.error("the file does not say its sampling step; give dt= in seconds", shape.start)
     unit = request.units(source, None, shape.start)
@@ -100,15 +125,18 @@ def _delimiter(line: Line) -> tuple[bytes, str]:
     """Return what turns a row into numbers with points between blanks, and the delimiter's name."""
     if ";" in line.text:
         return bytes.maketrans(b',;"', b".  "), "a semicolon"
+    words = line.text.replace('"', " ").split()
+    if len(words) > 1 and "," in line.text and all(map(_WITHOUT_POINT.fullmatch, words)):
+        return bytes.maketrans(b',"', b". "), "a blank"
     if "," in line.text:
-        return bytes.maketrans(b',"', b"  "), "a comma"
+        return bytes.maketrans(b',"', b"  "), _COMMA
     return bytes.maketrans(b'"', b" "), "a blank"
 
 
 def _values(source: Source, shape: _Shape) -> Floats:
     """Return all numbers, row by row."""
     parts = []
-    for rows in _groups(_rows(source, shape)):
+    for rows in _groups(_rows(source, shape), shape.columns):
         values = convert([token for row in rows for token in row.tokens])
         if values is None or any(len(row.tokens) != shape.columns for row in rows):
             raise _first_bad(source, rows, shape)
@@ -121,15 +149,25 @@ def _rows(source: Source, shape: _Shape) -> Iterator[_Row]:
     while start < len(data):
         end = data.find(b"\n", start)
         end = len(data) if end < 0 else end
-        line = data[start:end]
-        tokens = line.translate(shape.translation).split()
-        if tokens and not _COMMENT.match(line):
-            yield _Row(tokens, start)
+        line = data[start:end].strip()
+        if line and not _COMMENT.match(line):
+            if len(line) > _ROW_LIMIT:
+                raise source.error(f"this row is {len(line)} characters long; make all rows alike", start)
+            tokens = line.translate(shape.translation).split()
+            if tokens:
+                yield _Row(tokens, start)
         start = end + 1
 
 
-def _groups(rows: Iterator[_Row]) -> Iterator[list[_Row]]:
-    while group := list(itertools.islice(rows, _LINES_AT_ONCE)):
+def _groups(rows: Iterator[_Row], columns: int) -> Iterator[list[_Row]]:
+    """Rows in groups, each of which ends with the first row that is not like the others."""
+    group: list[_Row] = []
+    for row in rows:
+        group.append(row)
+        if len(group) == _LINES_AT_ONCE or len(row.tokens) != columns:
+            yield group
+            group = []
+    if group:
         yield group
 
 

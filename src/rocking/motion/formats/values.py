@@ -21,7 +21,8 @@ _NUMERIC = b"0123456789+-.eEdD"
 _BLANK = b" \t\n\v"
 _IS_OTHER = bytes(0 if c in _NUMERIC + _BLANK else 1 for c in range(256))
 _FORTRAN_EXPONENT = bytes.maketrans(b"Dd", b"EE")
-_CHUNK = 4 * 2**20
+#: Bytes at once: the numbers in them take some fifty times the memory while they are converted.
+_CHUNK = 2**20
 _SPACE = re.compile(rb"\s")
 _LINE_END = re.compile(rb"\n")
 
@@ -104,6 +105,8 @@ def bad_number(source: Source, start: int, end: int) -> UnreadableRecord:
 def not_a_number(source: Source, token: bytes, at: int) -> UnreadableRecord:
     """Return the error for a piece of text that should be a finite number."""
     shown, number = token[:_SHOWN].decode("latin-1"), parse(token)
+    if b"," in token and parse(token.replace(b",", b".")) is not None:
+        return source.error(f"{shown!r} is not a number; write decimal points in place of commas", at)
     if number is None or np.isfinite(number):
         return source.error(f"{shown!r} is not a number; correct it or get the record again", at)
     return source.error(f"{shown!r} is not a finite number; a record needs a value at every instant", at)

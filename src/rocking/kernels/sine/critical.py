@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.sine import LARGEST_EXCESS, rest_phase
+from rocking.kernels.sine import FOUND
+from rocking.kernels.sine.arc import LARGEST_EXCESS
+from rocking.kernels.sine.sequence import rest_phase
 
-#: Width of the final bracket on a - 1: a few ulp of a.
-_WIDTH: Final = 1e-15
+#: Width of the final bracket on a - 1, over a: half an ulp.
+_WIDTH: Final = 2.0**-53
 
 #: Distance kept from the extrapolated critical value, over the distance it was extrapolated.
 _CAUTION: Final = 0.01
@@ -40,19 +42,19 @@ def critical_excess(delta: float, eta: float) -> float:
     low = 0.0
     high = LARGEST_EXCESS
     low_gap = math.pi**power
-    older = math.nan
-    older_gap = math.nan
+    older = -1.0
+    older_gap = low_gap
     for step in range(_MAXIMUM_STEPS):
         if high - low <= _WIDTH * (1.0 + low):
             break
         trial = 0.5 * (low + high)
-        if step % 3 > 0 and high - low < _NEAR * high:
+        if step % 3 > 0 and high - low < _NEAR * high and older_gap > low_gap:
             guess = low + low_gap * (low - older) / (older_gap - low_gap)
             caution = max(_CAUTION * abs(guess - low), 0.25 * _WIDTH)
             aimed = guess - caution if step % 3 == 1 else guess + caution
             trial = aimed if low < aimed < high else trial
-        x = rest_phase(trial, delta, eta)
-        if math.isfinite(x):
+        status, x = rest_phase(trial, delta, eta)
+        if status == FOUND:
             older = low
             older_gap = low_gap
             low = trial

@@ -2,7 +2,7 @@
 
 With r = sqrt(eps) every quantity is a power of r times a series in eps = a - 1: phases x = r(...), first-side arcs
 t = r z, second-side arcs t = r^3 z, speeds V = r^3 v, restoring acceleration P = eps p, slope D = r d. So the exact
-impact map of ``sine`` acts on coefficient arrays; its sums are closed as those of numbers are.
+impact map acts on coefficient arrays, and its sums are closed as those of numbers are, by the same formula.
 """
 
 import math
@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.kernels.paper import positive_root
-from rocking.kernels.sine import LEVELS
+from rocking.kernels.sine.closure import LEVELS, remaining_series, richardson_weights
+from rocking.kernels.sine.power_series import PowerSeries
 
 Series = NDArray[np.float64]
 
@@ -22,34 +23,79 @@ _CLOSED: Final = 1e-14
 
 _MAXIMUM_PAIRS: Final = 100_000
 
+#: By so much, as exponent, the speed falls in the first pairs that are formed; and some more pairs.
+_FALLEN: Final = 2.3
+_SPARE_PAIRS: Final = 3
+
 #: These kernels allocate their arrays of coefficients, unlike all others.
 _allocating = numba.njit(cache=True, error_model="numpy")
 
 
-@_allocating
 def phase_coefficients(delta: float, eta: float, order: int) -> Series:
     """Coefficients c_k of omega tau_ch = sqrt(eps) (c_0 + c_1 eps + ...), ``order`` of them; NaN: not resolved."""
-    p = np.zeros(order)
-    d = -square_root_of_two_plus(order)
-    x, w, p, d = series_arc(np.zeros(order), p, d, True, delta)
-    v = eta * w
-    table = np.zeros((LEVELS + 1, order))
-    gone = np.zeros(order)
-    for pair in range(_MAXIMUM_PAIRS):
-        expected = table[LEVELS] - gone
-        extrapolate_series(table, series_closure(v, p, d, eta), gone, eta * eta)
-        remaining = table[LEVELS]
-        change = np.maximum(np.abs(remaining - table[LEVELS - 1]), np.abs(remaining - expected))
-        if not np.all(np.isfinite(change)):
+    count = LEVELS + _SPARE_PAIRS + int(_FALLEN / -math.log(eta))
+    passed, entered = first_impact(delta, eta, order)
+    while passed.shape[0] < _MAXIMUM_PAIRS:
+        more_passed, more_entered = impact_pairs(entered[-1], delta, eta, count)
+        passed = np.concatenate((passed, more_passed))
+        entered = np.concatenate((entered, more_entered))
+        v, p, d = entered.transpose(1, 2, 0)
+        state = PowerSeries(v, 3), PowerSeries(p, 2), PowerSeries(d, 1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            remaining = remaining_series(state, delta, eta).from_power(1)
+            rest, change = extrapolated(remaining.T, passed, eta)
+        x = np.cumsum(passed, axis=0)[-change.shape[0] :]
+        settled = np.flatnonzero((change <= _CLOSED * np.abs(x)).all(axis=1))
+        if settled.size:
+            coefficients: Series = x[settled[0]] + rest[settled[0]]
+            return coefficients
+        if not np.isfinite(change).all():
             break
-        if pair > LEVELS and np.all(change <= _CLOSED * np.abs(x)):
-            return x + remaining
+        count = passed.shape[0]
+    return np.full(order, math.nan)
+
+
+def extrapolated(remaining: Series, passed: Series, eta: float) -> tuple[Series, Series]:
+    """Extrapolate the closures of successive pairs, as ``closure.extrapolate``: last column, and its last changes."""
+    weights = getattr(richardson_weights, "py_func", richardson_weights)(eta)
+    column = less = remaining
+    for k, weight in enumerate(weights):
+        less = column[1:]
+        column = less + (less - column[:-1] + passed[k + 1 :]) * weight
+    from_level = column - less
+    from_pair = column[1:] - column[:-1] + passed[-column.shape[0] + 1 :]
+    return column[1:], np.maximum(np.abs(from_level[1:]), np.abs(from_pair))
+
+
+@_allocating
+def first_impact(delta: float, eta: float, order: int) -> tuple[Series, Series]:
+    """Phase of the first impact, over r, and v, p, d after it; shapes (1, order), (1, 3, order)."""
+    phase = np.zeros((1, order))
+    entered = np.zeros((1, 3, order))
+    start = -square_root_of_two_plus(order)
+    phase[0], w, p, d = series_arc(np.zeros(order), np.zeros(order), start, True, delta)
+    entered[0, 0] = eta * w
+    entered[0, 1] = p
+    entered[0, 2] = d
+    return phase, entered
+
+
+@_allocating
+def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[Series, Series]:
+    """Phase passed, over r, in each of the next pairs of impacts, and v, p, d after it; ``start``: those before."""
+    order = start.shape[1]
+    passed = np.zeros((count, order))
+    entered = np.zeros((count, 3, order))
+    v, p, d = start[0].copy(), start[1].copy(), start[2].copy()
+    for n in range(count):
         second, w, p, d = series_arc(v, p, d, False, delta)
         first, w, p, d = series_arc(eta * w, p, d, True, delta)
         v = eta * w
-        gone = first + raised(second, 1)
-        x = x + gone
-    return np.full(order, math.nan)
+        passed[n] = first + raised(second, 1)
+        entered[n, 0] = v
+        entered[n, 1] = p
+        entered[n, 2] = d
+    return passed, entered
 
 
 @_allocating
@@ -110,7 +156,7 @@ def leading_duration(v: float, p: float, d: float) -> float:
 
 @_allocating
 def series_basis(q: Series, delta: float) -> tuple[Series, Series, Series, Series]:
-    """Return the four basis functions of ``sine.basis`` at a series q without constant term."""
+    """Return the four basis functions of ``basis.Basis`` at a series q without constant term."""
     order = q.size
     sine = np.zeros(order)
     versine = np.zeros(order)
@@ -129,41 +175,6 @@ def series_basis(q: Series, delta: float) -> tuple[Series, Series, Series, Serie
         power = -product(q, power)
         mixed = delta * product(q, mixed) + power
     return sine, versine, E, W
-
-
-@_allocating
-def series_closure(v: Series, p: Series, d: Series, eta: float) -> Series:
-    """Remaining phase over r to second order in the speed, as ``sine.closure``."""
-    pull = -raised(p, 1)
-    pull[0] += 2.0
-    up = reciprocal(pull)
-    down = reciprocal(p)
-    scale = 2.0 / (1.0 - eta * eta)
-    first_up = scale * (raised(up, 1) + eta * down)
-    first_down = scale * (down + eta * raised(up, 1))
-    up2 = product(up, up)
-    down2 = product(down, down)
-    drift_up = scale * product(d, raised(up2, 2) - eta * down2)
-    drift_down = scale * product(d, eta * raised(up2, 3) - raised(down2, 1))
-    own_up = product(
-        product(d, up2), (4.0 / 3.0) * raised(up, 3) - (2.0 / 3.0) * eta * raised(first_down, 2)
-    ) + 2.0 * eta * product(up, drift_down)
-    own_down = product(product(d, down2), (2.0 / 3.0) * eta * first_up - (4.0 / 3.0) * down) + 2.0 * eta * product(
-        down, drift_up
-    )
-    second = (own_up + eta * eta * own_down) / (1.0 - eta**4)
-    return product(v, first_up + product(v, second))
-
-
-@_allocating
-def extrapolate_series(table: Series, T: Series, gone: Series, Q: float) -> None:
-    """Add one closure to the last row of Richardson's table, as ``sine.extrapolate``."""
-    power = Q * Q
-    for k in range(LEVELS + 1):
-        power *= Q
-        old = table[k] - gone
-        table[k] = T
-        T = T + (T - old) * (power / (1.0 - power))
 
 
 @_allocating
@@ -198,14 +209,6 @@ def quotient(a: Series, b: Series) -> Series:
             total -= c[k] * b[n - k]
         c[n] = total / b[0]
     return c
-
-
-@_allocating
-def reciprocal(a: Series) -> Series:
-    """Invert, truncated."""
-    one = np.zeros(a.size)
-    one[0] = 1.0
-    return quotient(one, a)
 
 
 @_allocating

@@ -1,0 +1,235 @@
+"""Confidence in a fitted lognormal: the region of its likelihood, or fits to data drawn anew.
+
+Both give an interval for any quantity of the curve's intercept and slope, and both know that a fragility rises.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from rocking.analysis import lognormal
+from rocking.analysis.lognormal import Probit
+from rocking.kernels.state import Floats, Integers
+
+#: Directions in which a region is measured: between them 4e-5 of an interval's width is lost.
+_RAYS: Final = 360
+_DOUBLINGS: Final = 100
+_NEWTON: Final = 12
+
+#: Clusters that tell how far they differ, at least; and the most that one may weigh in its own leaving out.
+_FEWEST: Final = 3
+_LEVERAGE: Final = 0.9
+
+Quantity = Callable[[Probit], Floats]
+Ends = tuple[Floats, Floats]
+_Data = tuple[Floats, Floats, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class LikelyRegion:
+    """Parameters whose likelihood is not significantly below the maximum: intervals are of the profile likelihood.
+
+    A quantity lies, with the given confidence, between its extremes on the region. The region is convex, since the
+    likelihood is concave, and ends where curves no longer rise. Where clusters hold several outcomes each, it is
+    stretched to the covariance that the clusters show (Chandler and Bate 2007), each left out in turn, and Student's
+    distribution takes the place of the normal one. Fewer than three clusters tell nothing of it: then the region is
+    the whole plane.
+
+    Attributes
+    ----------
+    rim : Probit
+        Intercepts and slopes all around.
+    """
+
+    rim: Probit
+
+    @classmethod
+    def of(
+        cls, z: Floats, exceeded: Floats, trials: Floats, clusters: Integers, fitted: Probit, confidence: float
+    ) -> LikelyRegion:
+        """Measure the region from the maximum outwards."""
+        from scipy.special import chdtri, stdtrit
+
+        centre, spread = z.mean(), z.std()
+        data = (z - centre) / spread, exceeded, trials
+        best = Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread)
+        count = int(clusters.max()) + 1
+        if count == len(z):
+            rim = _rim(data, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
+        elif count < _FEWEST:
+            return cls(Probit(np.array([-np.inf, np.inf, 0.0]), np.array([0.0, 0.0, lognormal.STEEP])))
+        else:
+            rim = _rim(data, best, 0.5 * float(stdtrit(count - 1.0, 0.5 + 0.5 * confidence)) ** 2)
+            rim = np.column_stack(best) + (rim - np.column_stack(best)) @ _stretch(data, clusters, best).T
+        intercepts, slopes = _rising(rim).T
+        slopes = slopes / spread
+        return cls(Probit(intercepts - slopes * centre, slopes))
+
+    def interval(self, quantity: Quantity, estimate: Floats, gradient: Floats, confidence: float) -> Ends:
+        """Extremes of a quantity."""
+        values = quantity(self.rim)
+        return values.min(axis=0), values.max(axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class Resamples:
+    """Fits to data drawn anew from the clusters of outcomes, with replacement; intervals are BCa (Efron 1987).
+
+    Attributes
+    ----------
+    fits : Probit
+        A step where the drawn outcomes are separated; level where they do not rise.
+    degenerate : float
+        Share of such.
+    influence : ndarray, shape (clusters, 2)
+        How far each cluster pulls intercept and slope: its score over the observed information.
+    """
+
+    fits: Probit
+    degenerate: float
+    influence: Floats
+
+    @classmethod
+    def of(
+        cls,
+        z: Floats,
+        exceeded: Floats,
+        trials: Floats,
+        fitted: Probit,
+        clusters: Integers,
+        samples: int,
+        seed: int,
+    ) -> Resamples:
+        """Draw and fit."""
+        order = np.argsort(z, kind="stable")
+        starts = np.flatnonzero(np.diff(z[order], prepend=-np.inf))
+        count = int(clusters.max()) + 1
+        drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=samples)
+        weights = drawn[:, clusters[order]]
+        levels = z[order][starts]
+        yes, all_of = (np.add.reduceat(weights * values[order], starts, axis=1) for values in (exceeded, trials))
+        fits, regular = lognormal.limits(levels, yes, all_of)
+        if regular.any():
+            found = lognormal.fit(levels, yes[regular], all_of[regular])
+            fits.intercept[regular], fits.slope[regular] = found.intercept, found.slope
+        influence = _influences(z, exceeded, trials, clusters, fitted)
+        return cls(fits, 1.0 - float(regular.mean()), influence)
+
+    def interval(self, quantity: Quantity, estimate: Floats, gradient: Floats, confidence: float) -> Ends:
+        """Percentiles of a quantity, corrected for its bias and its skewness.
+
+        Parameters
+        ----------
+        quantity : callable
+            Values (fits, n) of n quantities from fits.
+        estimate : ndarray, shape (n,)
+            Their estimates.
+        gradient : ndarray, shape (2, n)
+            Their derivatives with respect to intercept and slope.
+        confidence : float
+            Probability that an interval shall hold the true value.
+        """
+        from scipy.special import ndtr, ndtri
+
+        values = quantity(self.fits)
+        count = len(values)
+        below = (np.sum(values < estimate, axis=0) + 0.5 * np.sum(values == estimate, axis=0)) / count
+        bias = ndtri(np.clip(below, 0.5 / count, 1.0 - 0.5 / count))
+        pulls = self.influence @ gradient
+        tiny = np.finfo(float).tiny
+        acceleration = np.sum(pulls**3, axis=0) / (6.0 * np.maximum(np.sum(pulls**2, axis=0) ** 1.5, tiny))
+        reach = float(ndtri(0.5 + 0.5 * confidence))
+        ordered = np.sort(values, axis=0)
+        ends = []
+        for rounded, end in ((np.floor, -reach), (np.ceil, reach)):
+            share = ndtr(bias + (bias + end) / np.maximum(1.0 - acceleration * (bias + end), tiny))
+            place = rounded((count - 1) * share).astype(np.int64)
+            ends.append(np.take_along_axis(ordered, place[None, :], axis=0)[0])
+        return ends[0], ends[1]
+
+
+Confidence = LikelyRegion | Resamples
+
+
+def _rim(data: _Data, best: Probit, drop: float) -> Floats:
+    """Points all around the maximum where the logarithm of the likelihood is lower by `drop`, shape (rays, 2)."""
+    where, exceeded, trials = data
+    z, level = np.unique(where, return_inverse=True)
+    shape = _RAYS, z.size
+    yes, all_of = (
+        np.broadcast_to(np.bincount(level, counts).astype(np.float64), shape) for counts in (exceeded, trials)
+    )
+    top = np.column_stack(best)
+    floor = lognormal.likelihood(z, yes[:1], all_of[:1], top)[0] - drop
+    angle = np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False)
+    wide = np.linalg.cholesky(np.asarray(lognormal.covariance(z, all_of[0], best)))
+    directions = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ wide.T
+    reach = np.ones(_RAYS)
+    for _ in range(_DOUBLINGS):
+        short = lognormal.likelihood(z, yes, all_of, top + reach[:, None] * directions) > floor
+        if not short.any():
+            break
+        reach[short] *= 2.0
+    # From beyond, Newton's rule does not overshoot the root of a concave function.
+    for _ in range(_NEWTON):
+        here = top + reach[:, None] * directions
+        above = lognormal.likelihood(z, yes, all_of, here) - floor
+        with np.errstate(over="ignore", invalid="ignore"):
+            fall = -np.sum(lognormal.scores(z, yes, all_of, here)[0] * directions, axis=1)
+        beyond = (above < 0.0) & (fall > 0.0)
+        reach[beyond] += above[beyond] / fall[beyond]
+    return np.asarray(top + reach[:, None] * directions)
+
+
+def _rising(rim: Floats) -> Floats:
+    """Cut the region off where the slope is 0."""
+    after = np.roll(rim, -1, axis=0)
+    up = rim[:, 1] >= 0.0
+    cut = up != (after[:, 1] >= 0.0)
+    share = rim[cut, 1] / (rim[cut, 1] - after[cut, 1])
+    corners = np.column_stack([rim[cut, 0] + share * (after[cut, 0] - rim[cut, 0]), np.zeros(share.size)])
+    return np.vstack([rim[up], corners])
+
+
+def _stretch(data: _Data, clusters: Integers, best: Probit) -> Floats:
+    """Map from the likelihood's covariance to that which the clusters show."""
+    scores, bends = _by_cluster(data, clusters, best)
+    count = len(scores)
+    root = np.linalg.cholesky(np.linalg.inv(bends.sum(axis=0)))
+    # Without the cluster the information is less by its leverage, so that its score moves the parameters further.
+    leverage, axes = np.linalg.eigh(root.T @ bends @ root)
+    freed = np.einsum("cij,cj,ckj->cik", axes, 1.0 / (1.0 - np.minimum(leverage, _LEVERAGE)), axes)
+    moved = np.einsum("cij,cj->ci", freed, scores @ root)
+    variance, axis = np.linalg.eigh(moved.T @ moved * (count - 1.0) / count)
+    wide = axis * np.sqrt(np.maximum(variance, 0.0)) @ axis.T
+    return np.asarray(root @ wide @ np.linalg.inv(root))
+
+
+def _influences(z: Floats, exceeded: Floats, trials: Floats, clusters: Integers, fitted: Probit) -> Floats:
+    """Score of each cluster over the observed information: what an infinitesimal jackknife leaves."""
+    centre = z.mean()
+    best = Probit(fitted.intercept + fitted.slope * centre, fitted.slope)
+    scores, bends = _by_cluster((z - centre, exceeded, trials), clusters, best)
+    moved = lognormal.solved(bends.sum(axis=0, keepdims=True), scores)
+    return np.stack([moved[:, 0] - moved[:, 1] * centre, moved[:, 1]], axis=1)
+
+
+def _by_cluster(data: _Data, clusters: Integers, fitted: Probit) -> tuple[Floats, Floats]:
+    """Score and observed information of each cluster, shapes (clusters, 2) and (clusters, 2, 2)."""
+    from scipy.special import log_ndtr
+
+    z, exceeded, trials = data
+    at = fitted.intercept + fitted.slope * z
+    density, below, above = -0.5 * at * at - 0.5 * math.log(2.0 * math.pi), log_ndtr(at), log_ndtr(-at)
+    up, down = np.exp(density - below), np.exp(density - above)
+    pull = exceeded * up - (trials - exceeded) * down
+    bend = exceeded * up * (up + at) + (trials - exceeded) * down * (down - at)
+    scores = np.stack([np.bincount(clusters, pull * power) for power in (np.ones_like(z), z)], axis=1)
+    sums = [np.bincount(clusters, bend * power) for power in (np.ones_like(z), z, z * z)]
+    bends = np.stack([sums[0], sums[1], sums[1], sums[2]], axis=1).reshape(-1, 2, 2)
+    return np.asarray(scores, dtype=np.float64), np.asarray(bends, dtype=np.float64)

@@ -1,0 +1,129 @@
+"""Checks of arguments, the same for every part of the package; each is told which error to raise.
+
+A number is any real number of Python's or NumPy's, or an array of no dimension that holds one. Text and truth values
+are not, though ``float`` takes them: "0.2" is more often a mistake than a wish.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from numbers import Integral, Real
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rocking.errors import RockingError
+
+#: Characters of a value in a message.
+_SHOWN: Final = 60
+
+Floats = NDArray[np.float64]
+Error = Callable[[str], RockingError]
+
+
+def number(value: object, name: str, error: Error) -> float:
+    """Return `value` as a float, or raise `error` unless it is one real number (perhaps not finite)."""
+    result = _real(value)
+    if result is None:
+        raise error(f"{name} must be a number, not {_shown(value)}")
+    return result
+
+
+def finite(value: object, name: str, error: Error) -> float:
+    """Return `value` as a float, or raise `error` unless it is one finite number."""
+    result = _real(value)
+    if result is None or not math.isfinite(result):
+        raise error(f"{name} must be a finite number, not {_shown(value)}")
+    return result
+
+
+def positive(value: object, name: str, error: Error, unit: str = "") -> float:
+    """Return `value` as a float, or raise `error` unless it is one positive finite number."""
+    result = _real(value)
+    if result is None or not (math.isfinite(result) and result > 0.0):
+        raise error(f"{name} must be a positive number{_in(unit)}, not {_shown(value)}")
+    return result
+
+
+def within(value: object, name: str, error: Error, low: float, high: float, unit: str = "") -> float:
+    """Return `value` as a float, or raise `error` unless it is a number from `low` to `high`, both included."""
+    result = _real(value)
+    if result is None or not low <= result <= high:
+        raise error(f"{name} must be a number from {low:g} to {high:g}{_in(unit)}, not {_shown(value)}")
+    return result
+
+
+def share(value: object, name: str, error: Error, below: float = 1.0) -> float:
+    """Return `value` as a float, or raise `error` unless it is a number above 0 and below `below`."""
+    result = _real(value)
+    if result is None or not 0.0 < result < below:
+        raise error(f"{name} must be a number between 0 and {below:g}, not {_shown(value)}")
+    return result
+
+
+def whole(value: object, name: str, error: Error, least: int, most: int | None = None) -> int:
+    """Return `value` as an int, or raise `error` unless it is a whole number of a whole type within its bounds."""
+    single = _single(value)
+    usable = isinstance(single, Integral) and not isinstance(single, bool)
+    if not usable or not least <= single or not (most is None or single <= most):
+        bounds = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise error(f"{name} must be a whole number {bounds}, not {_shown(value)}")
+    return int(single)
+
+
+def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
+    """Return real numbers (perhaps not finite) as an array of their shape, or raise `error`."""
+    if np.ma.is_masked(values):
+        raise error(f"{name} must be numbers throughout, but some are masked")
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind == "O":
+            given = np.reshape([number(value, name, error) for value in given.ravel()], given.shape)
+    except (TypeError, ValueError):
+        raise error(f"{name} must be a number or an array of numbers, not {_shown(values)}") from None
+    if given.dtype.kind not in "iuf" and given.size:
+        raise error(f"{name} must be a number or an array of numbers, not {_shown(values)}")
+    return np.asarray(given, dtype=np.float64)
+
+
+def positive_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
+    """Return one or more positive finite numbers as a flat array, or raise `error`."""
+    axis = np.atleast_1d(numbers(values, name, error))
+    if axis.ndim != 1 or not axis.size or not np.all(np.isfinite(axis) & (axis > 0.0)):
+        raise error(f"{name} must be one or more positive finite numbers")
+    return axis
+
+
+def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
+    """Return positive finite numbers in increasing order, or raise `error`."""
+    axis = positive_numbers(values, name, error)
+    if not np.all(np.diff(axis) > 0.0):
+        raise error(f"{name} must increase from one to the next")
+    return axis
+
+
+def _real(value: object) -> float | None:
+    """Value as a float (infinite where it is too large for one), or None if it is not one real number."""
+    single = _single(value)
+    if not isinstance(single, Real) or isinstance(single, bool):
+        return None
+    try:
+        return float(single)
+    except OverflowError:
+        return math.inf
+
+
+def _single(value: object) -> Any:
+    """Value, or what an array of no dimension holds."""
+    return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
+
+
+def _in(unit: str) -> str:
+    return f", in {unit}" if unit else ""
+
+
+def _shown(value: object) -> str:
+    text = " ".join((f"{value:g}" if isinstance(value, float) else repr(value)).split())
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 10]}...{text[-7:]}"

@@ -1,0 +1,250 @@
+"""The one engine for many simulations: any tasks of blocks under a scaled motion, on any executor."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from collections.abc import Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.block import Blocks
+from rocking.kernels import state, status
+from rocking.kernels.ground import Ground
+from rocking.kernels.lanes import crew, scheduler
+from rocking.kernels.march import march
+from rocking.kernels.state import Floats, Integers, Record, Records
+from rocking.motion.motion import Motion
+from rocking.problem import Model, ground_of, records_of, rules_of
+from rocking.treatment import AsymptoticTime, Treatment
+
+#: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; all else is as far as it came.
+OUTCOME = np.dtype(
+    [
+        ("overturned", "?"), ("unfinished", "?"), ("peak_rotation", "f8"), ("peak_time", "f8"), ("impacts", "i8"),
+        ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("last_rest", "f8"), ("duration", "f8"),
+    ]
+)  # fmt: skip
+
+#: Steps that a simulation may take, besides a few for every piece of its motion.
+BUDGET: Final = 3_000_000
+_BUDGET_OF_A_PIECE: Final = 4
+
+#: Steps of one call of a kernel, for one block and for each of many: some milliseconds until an interrupt is seen.
+SLICE: Final = 50_000
+_FIRST_SLICE: Final = 5_000
+
+#: Blocks that go through a motion together: as many as the fastest cache holds.
+_TOGETHER: Final = 16 * crew.WIDTH
+
+#: Block-steps of one task: enough to pay for the call, few enough to stop soon when interrupted.
+_TASK: Final = 8_000_000
+
+#: Tasks that are handed out ahead of the results, for each thread.
+_AHEAD: Final = 2
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What all simulations share: n blocks, and how to compute.
+
+    Attributes
+    ----------
+    blocks : Blocks
+        n blocks.
+    model, treatment, duration
+        As for `rocking.simulate`.
+    """
+
+    blocks: Blocks
+    model: Model
+    treatment: Treatment
+    duration: float | None = None
+
+
+@dataclass(frozen=True)
+class Task:
+    """Some of the blocks under one motion times a factor.
+
+    Attributes
+    ----------
+    blocks : slice or ndarray of int
+        Which blocks.
+    motion : Motion
+        What shakes them.
+    factor : float
+        Factor on the motion.
+    key : tuple of int
+        Where the outcomes belong, for the caller.
+    """
+
+    blocks: slice | Integers
+    motion: Motion
+    factor: float = 1.0
+    key: tuple[int, ...] = ()
+
+
+def simulate_tasks(
+    setup: Setup, tasks: Iterable[Task], *, threads: int | None = None, executor: Executor | None = None
+) -> Iterator[tuple[Task, NDArray[np.void]]]:
+    """Outcomes of every task, as they are finished: structured arrays (`OUTCOME`), one row a block.
+
+    Parameters
+    ----------
+    setup : Setup
+        Blocks and rules.
+    tasks : iterable of Task
+        Taken as they are needed, a few ahead of the results.
+    threads : int, optional
+        Number of threads; by default one for every core.
+    executor : concurrent.futures.Executor, optional
+        Who does the work instead: threads, processes or a cluster.
+
+    Notes
+    -----
+    What becomes of a block depends on the block and its motion alone, bit for bit, whatever shares its task. An
+    interrupt leaves the rest undone.
+    """
+    if executor is not None:
+        yield from _in_flight(setup, tasks, executor, _AHEAD * cores(), None)
+        return
+    count = threads or cores()
+    stop = threading.Event()
+    with ThreadPoolExecutor(count) as pool:
+        try:
+            yield from _in_flight(setup, tasks, pool, _AHEAD * count, stop)
+        except BaseException:
+            stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def cores() -> int:
+    """Count the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def parts_of(count: int, motion: Motion) -> Iterator[slice]:
+    """Ranges of ``count`` blocks, each as large as a task should be."""
+    size = _TOGETHER * max(1, _TASK // (_TOGETHER * len(motion.coefficients)))
+    for start in range(0, count, size):
+        yield slice(start, min(start + size, count))
+
+
+def simulate_each(
+    setup: Setup, motion: Motion, factors: Floats, *, threads: int | None = None
+) -> Iterator[tuple[Task, NDArray[np.void]]]:
+    """Outcomes for block k under the motion times factor k; those that share a factor are simulated together."""
+    order = np.argsort(factors, kind="stable")
+    starts = np.flatnonzero(np.diff(factors[order], prepend=np.nan) != 0.0)
+    groups = np.split(order, starts[1:])
+    tasks = (
+        Task(group[part], motion, float(factors[group[0]])) for group in groups for part in parts_of(len(group), motion)
+    )
+    return simulate_tasks(setup, tasks, threads=threads)
+
+
+def _in_flight(
+    setup: Setup, tasks: Iterable[Task], executor: Executor, most: int, stop: threading.Event | None
+) -> Iterator[tuple[Task, NDArray[np.void]]]:
+    """Keep a number of tasks with an executor, and give results as they come."""
+    pending: dict[Future[NDArray[np.void]], Task] = {}
+    for task in tasks:
+        arguments = (setup, task) if stop is None else (setup, task, stop)
+        pending[executor.submit(simulate_task, *arguments)] = task
+        if len(pending) >= most:
+            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                yield pending.pop(future), future.result()
+    while pending:
+        for future in wait(pending, return_when=FIRST_COMPLETED).done:
+            yield pending.pop(future), future.result()
+
+
+def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None) -> NDArray[np.void]:
+    """Outcomes of one task; where ``stop`` is set on the way, of no use."""
+    blocks = setup.blocks.select(task.blocks)
+    how, motion = setup.treatment, task.motion
+    if isinstance(how, AsymptoticTime):
+        motion = motion.scaled(factor=task.factor)
+    limits = how.limits(blocks, motion)
+    rules = rules_of(blocks, setup.model, how, setup.duration, record=False)
+    ground = ground_of(task.motion, blocks.gravity, task.factor)
+    bodies = records_of(blocks, setup.model, limits)
+    states = state.new_states(len(blocks), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))
+    for chosen, substeps in _companies(bodies, task.motion.step, setup.model):
+        if stop is not None and stop.is_set():
+            break
+        _march_together(ground, rules, (bodies, states), chosen, task.motion.step, substeps)
+    _march_on(ground, rules, bodies, states, stop)
+    return _outcomes(states)
+
+
+def _companies(bodies: Records, step: float | None, model: Model) -> Iterator[tuple[Integers, int]]:
+    """Blocks that go together, with the substeps that they need; -1 for those that march alone."""
+    substeps = np.full(len(bodies), -1)
+    if step is not None:
+        width = step * np.sqrt(np.abs(bodies["stiffness"]).max(axis=1))
+        finer = np.ceil(width / crew.LONGEST_SUBSTEP) if model == "nonlinear" else np.zeros(len(bodies))
+        substeps = np.where(width <= crew.LONGEST_STEP, finer, -1.0).astype(np.int64)
+    for count in np.unique(substeps):
+        chosen = np.flatnonzero(substeps == count)
+        for start in range(0, len(chosen), _TOGETHER):
+            yield chosen[start : start + _TOGETHER], int(count)
+
+
+def _march_together(
+    ground: Ground,
+    rules: Record,
+    whole: tuple[Records, Records],
+    chosen: Integers,
+    step: float | None,
+    substeps: int,
+) -> None:
+    """Take some of the blocks through the motion in lanes, or one after the other where they cannot."""
+    bodies, states = whole
+    pieces = len(ground.pieces) - 1
+    together = crew.crew_of(bodies[chosen], states[chosen], pieces, step or 1.0, max(substeps, 0))
+    if substeps < 0:
+        scheduler.march_each(ground, rules, state.new_scratch(), together)
+    else:
+        scheduler.run_lanes(ground, rules, state.new_scratch(), together, substeps)
+    states[chosen] = together.states
+
+
+def _march_on(ground: Ground, rules: Record, bodies: Records, states: Records, stop: threading.Event | None) -> None:
+    """Take those on that have used up their first slice of steps, until their budget is spent."""
+    nothing, scratch = state.new_table(0), state.new_scratch()
+    for k in np.flatnonzero(np.isin(states["ending"], (status.GOING, status.PAUSED))):
+        one = states[k]
+        one["until"] = state.TO_THE_END
+        for _ in range(slices(ground)):
+            if stop is not None and stop.is_set():
+                return
+            one["budget"] = SLICE
+            one["ending"] = march(ground, bodies[k], rules, nothing, scratch, one)
+            if one["ending"] != status.PAUSED:
+                break
+        else:
+            one["ending"] = status.UNFINISHED
+
+
+def slices(ground: Ground) -> int:
+    """Count the slices in the budget of a simulation."""
+    return math.ceil((BUDGET + _BUDGET_OF_A_PIECE * len(ground.pieces)) / SLICE)
+
+
+def _outcomes(states: Records) -> NDArray[np.void]:
+    outcomes = np.empty(len(states), dtype=OUTCOME)
+    outcomes["overturned"] = states["ending"] == status.FELL
+    outcomes["unfinished"] = states["ending"] == status.UNFINISHED
+    for name, field in (
+        ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
+        ("rests", "rests"), ("time_at_rest", "resting"), ("last_rest", "rested"), ("duration", "end"),
+    ):  # fmt: skip
+        outcomes[name] = states[field]
+    return outcomes

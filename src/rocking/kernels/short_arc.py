@@ -1,0 +1,253 @@
+"""Steps so short that nine terms of the series are exact: in registers, with one look at what may happen on the way.
+
+What cannot be seen at a glance (two impacts close to each other, a rotation near the highest so far, a fall) is left
+UNDECIDED, and takes the long way through `expand` and `advance`. The series are the same, so are the answers.
+"""
+
+import math
+
+import numpy as np
+
+from rocking.kernels.arc import sign_of
+from rocking.kernels.compiled import inlined
+from rocking.kernels.ground import Ground, acceleration, coefficient, columns_of
+from rocking.kernels.impact import Arrival
+from rocking.kernels.state import Record
+from rocking.kernels.status import IMPACT, STEP, UNDECIDED
+
+#: Coefficients c[0] to c[9].
+Series = tuple[float, float, float, float, float, float, float, float, float, float]
+
+#: Largest lam t^2 of a linear step, and (lam (1 + |a|/g) + v^2) t^2 of a nonlinear one. Two powers on, terms are then
+#: smaller by a factor of 20,000 or more: what follows the last two is nothing where they are as small as this, beside
+#: the first two of the velocity.
+SHORT_LINEAR = 4e-3
+SHORT_NONLINEAR = 1.2e-3
+_LAST_TERMS = 2.0**-40
+
+_NEWTON_STEPS = 8
+_SETTLED = 1e-8
+
+
+@inlined
+def short_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> Arrival:
+    """Step to the next impact or over ``left``, or the part of it that is short; UNDECIDED where it is not simple."""
+    if columns_of(ground) != 2:
+        return undecided()
+    if rules.nonlinear:
+        t, c = reach_nonlinear(ground, block, state, left), nonlinear_series(ground, block, state)
+    else:
+        t, c = reach_linear(block, state, left), linear_series(ground, block, state)
+    return look(c, t, state, block.fallen)
+
+
+@inlined
+def undecided() -> Arrival:
+    """No answer."""
+    return Arrival(UNDECIDED, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@inlined
+def reach_linear(block: Record, state: Record, left: float) -> float:
+    """Time over which nine terms of a linear arc are exact; ``left`` where that is enough."""
+    size = abs(block.stiffness[state.side])
+    return left if size * left * left <= SHORT_LINEAR else min(left, math.sqrt(SHORT_LINEAR / size))
+
+
+@inlined
+def reach_nonlinear(ground: Ground, block: Record, state: Record, left: float) -> float:
+    """Time over which nine terms of a nonlinear arc are exact; ``left`` where that is enough."""
+    start = coefficient(ground, state.piece, 0) + coefficient(ground, state.piece, 1) * state.offset
+    push = max(abs(start), abs(start + coefficient(ground, state.piece, 1) * left))
+    size = block.stiffness[state.side] * (1.0 + push) + state.v * state.v
+    return left if size * left * left <= SHORT_NONLINEAR else min(left, math.sqrt(SHORT_NONLINEAR / size))
+
+
+@inlined
+def linear_series(ground: Ground, block: Record, state: Record) -> Series:
+    """Series of a linear arc under a ground acceleration that changes evenly."""
+    side = state.side
+    lam, gain = block.stiffness[side], block.gain[side]
+    push = sign_of(side) * acceleration(ground, state.piece, state.offset)
+    rate = sign_of(side) * coefficient(ground, state.piece, 1)
+    c2 = 0.5 * (lam * state.u - gain * (block.threshold[side] + push))
+    c3 = (lam * state.v - gain * rate) * (1.0 / 6.0)
+    return linear_tail(state.u, state.v, c2, c3, lam)
+
+
+@inlined
+def linear_tail(u: float, v: float, c2: float, c3: float, lam: float) -> Series:
+    """Series of a linear arc from its first four coefficients."""
+    c4, c5 = lam * c2 * (1.0 / 12.0), lam * c3 * (1.0 / 20.0)
+    c6, c7 = lam * c4 * (1.0 / 30.0), lam * c5 * (1.0 / 42.0)
+    c8, c9 = lam * c6 * (1.0 / 56.0), lam * c7 * (1.0 / 72.0)
+    return u, v, c2, c3, c4, c5, c6, c7, c8, c9
+
+
+@inlined
+def nonlinear_series(ground: Ground, block: Record, state: Record) -> Series:
+    """Series of a nonlinear arc under a ground acceleration that changes evenly, by the recurrence of `arc`."""
+    side, u, v = state.side, state.u, state.v
+    l2 = -0.5 * block.stiffness[side]
+    a = sign_of(side) * acceleration(ground, state.piece, state.offset)
+    b = sign_of(side) * coefficient(ground, state.piece, 1)
+    s0, c0 = block.sine[side], block.cosine[side]
+    if u != 0.0:
+        psi = block.slenderness[side] - u
+        s0, c0 = math.sin(psi), math.cos(psi)
+    u2 = l2 * (s0 + a * c0)
+    s1, c1 = -(v * c0), v * s0
+    u3 = l2 * (s1 + (a * c1 + b * c0)) * (1.0 / 3.0)
+    r2 = 2.0 * u2
+    s2, c2 = -0.5 * (v * c1 + r2 * c0), 0.5 * (v * s1 + r2 * s0)
+    u4 = l2 * (s2 + (a * c2 + b * c1)) * (1.0 / 6.0)
+    r3 = 3.0 * u3
+    s3, c3 = -(v * c2 + r2 * c1 + r3 * c0) * (1.0 / 3.0), (v * s2 + r2 * s1 + r3 * s0) * (1.0 / 3.0)
+    u5 = l2 * (s3 + (a * c3 + b * c2)) * (1.0 / 10.0)
+    r4 = 4.0 * u4
+    s4 = -0.25 * ((v * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
+    c4 = 0.25 * ((v * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
+    u6 = l2 * (s4 + (a * c4 + b * c3)) * (1.0 / 15.0)
+    r5 = 5.0 * u5
+    s5 = -0.2 * ((v * c4 + r2 * c3) + (r3 * c2 + r4 * c1) + r5 * c0)
+    c5 = 0.2 * ((v * s4 + r2 * s3) + (r3 * s2 + r4 * s1) + r5 * s0)
+    u7 = l2 * (s5 + (a * c5 + b * c4)) * (1.0 / 21.0)
+    r6 = 6.0 * u6
+    s6 = -(1.0 / 6.0) * ((v * c5 + r2 * c4) + (r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0))
+    c6 = (1.0 / 6.0) * ((v * s5 + r2 * s4) + (r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0))
+    u8 = l2 * (s6 + (a * c6 + b * c5)) * (1.0 / 28.0)
+    r7 = 7.0 * u7
+    s7 = -(1.0 / 7.0) * ((v * c6 + r2 * c5) + (r3 * c4 + r4 * c3) + ((r5 * c2 + r6 * c1) + r7 * c0))
+    c7 = (1.0 / 7.0) * ((v * s6 + r2 * s5) + (r3 * s4 + r4 * s3) + ((r5 * s2 + r6 * s1) + r7 * s0))
+    u9 = l2 * (s7 + (a * c7 + b * c6)) * (1.0 / 36.0)
+    return u, v, u2, u3, u4, u5, u6, u7, u8, u9
+
+
+@inlined
+def look(c: Series, t: float, state: Record, fallen: float) -> Arrival:
+    """Where a short arc is after t, or at its first impact before; UNDECIDED where that takes a closer look."""
+    if c[1] == 0.0 and c[2] == 0.0:  # balanced, perhaps for ever
+        return undecided()
+    outcome = STEP
+    rest = later_curvature(c, t)
+    most = 2.0 * c[2] + 6.0 * max(c[3], 0.0) * t + rest
+    least = 2.0 * c[2] + 6.0 * min(c[3], 0.0) * t - rest
+    if c[0] == 0.0:
+        # u/t > v + min(u'')/2 t: no impact while that is positive.
+        if not c[1] + 0.5 * min(least, 0.0) * t > 0.0:
+            t, outcome = impact_from_ground(c, t), IMPACT
+    else:
+        end = rotation(c, t)
+        # No dip below both ends by more than t^2/8 of the curvature.
+        if not min(c[0], end) > 0.125 * t * t * max(most, 0.0):
+            falls = most < 0.0 or c[1] + max(most, 0.0) * t < 0.0
+            t, outcome = impact_from_above(c, t) if end < 0.0 and falls else np.nan, IMPACT
+    if math.isnan(t) or not is_complete(c, t):
+        return undecided()
+    end, speed = (rotation(c, t) if outcome == STEP else 0.0), velocity(c, t)
+    top, height = t, end
+    rises = c[1] + min(least, 0.0) * t > 0.0
+    if not rises and max(c[0], end) - 0.125 * t * t * min(least, 0.0) > state.peak:
+        if not (most < 0.0 and c[1] > 0.0 and speed < 0.0):
+            return undecided()
+        top = summit(c, t)
+        height = rotation(c, top)
+    if not max(c[0], height) < fallen:
+        return undecided()
+    return Arrival(outcome, t, end, speed, top, height)
+
+
+@inlined
+def later_curvature(c: Series, t: float) -> float:
+    """Size of what the terms from the fourth power on add to u'' within t, at most."""
+    high = 56.0 * abs(c[8]) + 72.0 * abs(c[9]) * t
+    middle = 30.0 * abs(c[6]) + 42.0 * abs(c[7]) * t
+    low = 12.0 * abs(c[4]) + 20.0 * abs(c[5]) * t
+    square = t * t
+    return square * (low + square * (middle + square * high))
+
+
+@inlined
+def is_complete(c: Series, t: float) -> bool:
+    """Whether nine terms are enough at t, for the velocity to its last place."""
+    t2 = t * t
+    t4 = t2 * t2
+    return 9.0 * (abs(c[8]) + abs(c[9]) * t) * (t4 * t4) <= _LAST_TERMS * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
+
+
+@inlined
+def rotation(c: Series, t: float) -> float:
+    """Value of a series, added up in pairs: a shorter wait than Horner's rule."""
+    t2 = t * t
+    low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
+    high = (c[6] + c[7] * t) + (c[8] + c[9] * t) * t2
+    return c[0] + t * (c[1] + t * (low + high * (t2 * t2)))
+
+
+@inlined
+def velocity(c: Series, t: float) -> float:
+    """Value of a series' derivative."""
+    t2 = t * t
+    low = (2.0 * c[2] + 3.0 * c[3] * t) + (4.0 * c[4] + 5.0 * c[5] * t) * t2
+    high = (6.0 * c[6] + 7.0 * c[7] * t) + (8.0 * c[8] + 9.0 * c[9] * t) * t2
+    return c[1] + t * (low + high * (t2 * t2))
+
+
+@inlined
+def over_time(c: Series, t: float) -> tuple[float, float]:
+    """Value and slope of a series without constant term, divided by t."""
+    t2 = t * t
+    low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
+    high = (c[6] + c[7] * t) + (c[8] + c[9] * t) * t2
+    low_slope = (c[2] + 2.0 * c[3] * t) + (3.0 * c[4] + 4.0 * c[5] * t) * t2
+    high_slope = (5.0 * c[6] + 6.0 * c[7] * t) + (7.0 * c[8] + 8.0 * c[9] * t) * t2
+    return c[1] + t * (low + high * (t2 * t2)), low_slope + high_slope * (t2 * t2)
+
+
+@inlined
+def summit(c: Series, left: float) -> float:
+    """Time of the highest rotation of an arc that is concave, rises first and falls at ``left``; NaN: not found."""
+    t = min(left, -0.5 * c[1] / c[2])
+    for _ in range(_NEWTON_STEPS):
+        t2 = t * t
+        low = (2.0 * c[2] + 6.0 * c[3] * t) + (12.0 * c[4] + 20.0 * c[5] * t) * t2
+        high = (30.0 * c[6] + 42.0 * c[7] * t) + (56.0 * c[8] + 72.0 * c[9] * t) * t2
+        step = velocity(c, t) / (low + high * (t2 * t2))
+        t -= step
+        if abs(step) <= _SETTLED * t:
+            return t if 0.0 < t < left else np.nan
+    return np.nan
+
+
+@inlined
+def impact_from_ground(c: Series, left: float) -> float:
+    """Duration of the arc that an impact starts, where it ends before ``left`` and u/t falls all the way; else NaN."""
+    root = c[2] * c[2] - 4.0 * c[3] * c[1]
+    if not (c[2] < 0.0 and root > 0.0):
+        return np.nan
+    t = 2.0 * c[1] / (math.sqrt(root) - c[2])
+    if not t < left:
+        return np.nan
+    for _ in range(_NEWTON_STEPS):
+        f, slope = over_time(c, t)
+        step = f / slope
+        t -= step
+        if abs(step) <= _SETTLED * t:
+            falls = c[2] + 2.0 * max(c[3], 0.0) * t + 0.25 * later_curvature(c, t) < 0.0
+            return t if falls and t < left else np.nan
+    return np.nan
+
+
+@inlined
+def impact_from_above(c: Series, left: float) -> float:
+    """Time to the one root of an arc that is above ground now and below it at ``left``; NaN if it is not found."""
+    square = c[1] * c[1] - 4.0 * c[2] * c[0]
+    if not square > 0.0:
+        return np.nan
+    t = min(left, 2.0 * c[0] / (math.sqrt(square) - c[1]))
+    for _ in range(_NEWTON_STEPS):
+        step = rotation(c, t) / velocity(c, t)
+        t -= step
+        if abs(step) <= _SETTLED * t:
+            return t if 0.0 < t < left else np.nan
+    return np.nan

@@ -1,0 +1,212 @@
+"""One arc: from the impact, or the uplift, that starts it to the impact that ends it."""
+
+import math
+from typing import Final, NamedTuple
+
+from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED
+from rocking.kernels.sine.basis import Basis, basis
+
+#: No first arc ends before x = pi beyond this a - 1: even without growth, U(pi) = pi kappa - pi^2/2 + 2.
+LARGEST_EXCESS: Final = math.hypot(1.0, math.pi / 2 - 2 / math.pi) - 1.0
+
+#: A fourth-order correction of this size, over the shorter of the arc and its time of growth, errs by less than an ulp.
+_LARGEST_CORRECTION: Final = 1e-4
+
+#: Corrections of an estimate before the root is bracketed, and steps of that search.
+_CORRECTIONS: Final = 3
+_MAXIMUM_STEPS: Final = 400
+
+#: Growth sqrt(delta) t above which a search only halves: a landing there is within rounding of none.
+_LARGEST_GROWTH: Final = 100.0
+
+_SIXTH: Final = 1.0 / 6.0
+
+
+class State(NamedTuple):
+    """Speed, and the first side's restoring acceleration with its rate of change, at an impact."""
+
+    V: float
+    P: float
+    D: float
+
+
+class Landing(NamedTuple):
+    """An estimate's correction: duration, state just before the impact (V is positive), and size of the correction."""
+
+    t: float
+    impact: State
+    change: float
+
+
+@inlined
+def pull(P: float, s: float) -> float:
+    """Restoring acceleration of the first (s > 0) or second side."""
+    return P if s > 0.0 else 2.0 - P
+
+
+@inlined
+def guess_landing(start: State, s: float, delta: float) -> float:
+    """Estimate the duration of a short arc: root of the series to t^2, then one Newton step on it to t^3.
+
+    Times a reciprocal, here and below: a compiler may not turn the division by a constant into a product.
+    """
+    V, P, D = start
+    G = pull(P, s)
+    t = 4.0 * V / (G + math.sqrt(max(0.0, G * G + (8.0 / 3.0) * V * (s * D - delta * V))))
+    growth = delta * t * t
+    bend = s * t * D
+    twist = s * t * t * (1.0 - P)
+    value = V * (1.0 + _SIXTH * growth) - t * (G * (0.5 + 0.25 * _SIXTH * growth) + _SIXTH * (bend + 0.25 * twist))
+    slope = 2.0 * _SIXTH * V * delta * t - (G * (0.5 + 0.125 * growth) + 2.0 * _SIXTH * bend + 0.125 * twist)
+    return t - value / slope
+
+
+@inlined
+def guess_brief(start: State, s: float, delta: float) -> float:
+    """Estimate the duration of a brief arc: root of the series to t^2, itself expanded in the speed.
+
+    For an arc that is `brief` it errs by less than a relative 1e-4, and without square root or second division.
+    """
+    V, P, D = start
+    inverse = 1.0 / pull(P, s)
+    curved = (2.0 / 3.0) * V * inverse * inverse * (delta * V - s * D)
+    return 2.0 * V * inverse * (1.0 + curved * (1.0 + 2.0 * curved))
+
+
+@inlined
+def brief(entered: State, delta: float) -> bool:
+    """Whether both arcs after entering the second side are brief: little growth, and accelerations change little."""
+    V, P, D = entered
+    least = min(P, 2.0 - P)
+    turning = V * (delta * V + abs(D)) <= 0.03 * (least * least)
+    return turning & (V * V * (1.0 + delta * least) <= 1.5e-4 * (least * least * least))
+
+
+@inlined
+def height(t: float, start: State, s: float, delta: float, at: Basis) -> float:
+    """Height of an arc at t, where the basis is ``at``, times its decay."""
+    V, P, D = start
+    q = t * t
+    A = at.decay * at.sine + (1.0 + delta) * q * at.E
+    B = at.decay * at.versine + (1.0 + delta) * q * at.W
+    return t * (V * A - t * (pull(P, s) * B + s * t * (D * at.E + t * (1.0 - P) * at.W)))
+
+
+@inlined
+def land(t: float, start: State, s: float, delta: float, at: Basis) -> Landing:
+    """Correct an estimate t of an arc's duration to fourth order; ``at`` is the basis at t.
+
+    The size is that of Newton's step, larger where the arc lands flat: relative to t, its fourth power is the error.
+    Not that of the whole correction, which vanishes at places that are no roots, too.
+    """
+    V, P, D = start
+    q = t * t
+    mean = 1.0 - P
+    A = at.decay * at.sine + (1.0 + delta) * q * at.E
+    B = at.decay * at.versine + (1.0 + delta) * q * at.W
+    bend = at.decay * at.versine + delta * q * at.W
+    G = pull(P, s)
+    speed = V * (at.decay + delta * q * B) - t * (G * A + s * t * (D * bend + t * mean * at.E))
+    P_there = P + q * at.versine * mean + t * at.sine * D
+    D_there = D - q * at.versine * D + t * at.sine * mean
+    there = height(t, start, s, delta, at)
+    acceleration = delta * there - at.decay * pull(P_there, s)
+    jerk = delta * speed - s * at.decay * D_there
+    snap = delta * acceleration - s * at.decay * (1.0 - P_there)
+    inverse = 1.0 / speed
+    newton = -there * inverse
+    c2 = 0.5 * acceleration * inverse
+    c3 = jerk * inverse * _SIXTH
+    dt = newton * (1.0 - newton * (c2 - newton * (2.0 * c2 * c2 - c3)))
+    impact_speed = -(speed + dt * (acceleration + dt * (0.5 * jerk + dt * snap * _SIXTH))) / at.decay
+    mean = 1.0 - P_there
+    P_impact = P_there + dt * (D_there + dt * (0.5 * mean - dt * D_there * _SIXTH))
+    D_impact = D_there + dt * (mean - dt * (0.5 * D_there + dt * mean * _SIXTH))
+    return Landing(t + dt, State(impact_speed, P_impact, D_impact), abs(newton) * (1.0 + abs(t * c2)))
+
+
+@inlined
+def precise(landing: Landing, t: float, delta: float) -> bool:
+    """Whether the correction of the estimate t was small enough to be the last; never for NaN."""
+    reach = t * t * (1.0 + delta)
+    return landing.change * landing.change * (1.0 + reach) <= _LARGEST_CORRECTION * _LARGEST_CORRECTION * (t * t)
+
+
+@shared
+def arc(start: State, t: float, s: float, delta: float, left: float) -> tuple[int, float, State]:
+    """Duration of an arc and state just before its impact, from an estimate t of the duration.
+
+    Status: FOUND; OUTLASTS if it is still up when the time ``left`` to x = pi is over; UNRESOLVED.
+    """
+    for _ in range(_CORRECTIONS):
+        if not (0.0 < t < left and delta * t * t < _LARGEST_GROWTH**2):
+            break
+        landing = land(t, start, s, delta, basis(t, delta))
+        if precise(landing, t, delta) and landing.t < left:
+            return FOUND, landing.t, landing.impact
+        t = landing.t
+    return bracketed_arc(start, s, delta, left)
+
+
+@shared
+def bracketed_arc(start: State, s: float, delta: float, left: float) -> tuple[int, float, State]:
+    """Find the same between bounds, where the estimate leads nowhere: a long arc, or one that never ends.
+
+    A corrected estimate is taken where the bounds are closing in at least as fast as by halving.
+    """
+    if outlasts(start, s, delta, left):
+        return OUTLASTS, left, start
+    low = 0.0
+    high = left
+    t = 0.5 * left
+    width = left
+    for _ in range(_MAXIMUM_STEPS):
+        at = basis(t, delta)
+        corrected = 0.0
+        if delta * t * t < _LARGEST_GROWTH**2:
+            landing = land(t, start, s, delta, at)
+            if precise(landing, t, delta) and landing.t < left:
+                return FOUND, landing.t, landing.impact
+            corrected = landing.t
+        if height(t, start, s, delta, at) > 0.0:
+            low = t
+        else:
+            high = t
+        closing_in = high - low <= 0.5 * width
+        width = high - low
+        t = corrected if closing_in and low < corrected < high else 0.5 * (low + high)
+    return UNRESOLVED, left, start
+
+
+@inlined
+def outlasts(start: State, s: float, delta: float, left: float) -> bool:
+    """Whether an arc is still up when the time ``left`` to x = pi is over."""
+    return height(left, start, s, delta, basis(left, delta)) >= 0.0
+
+
+@inlined
+def guess_first_impact(kappa: float, delta: float) -> float:
+    """Phase of the first impact to two orders in kappa (Eq. 32, mended)."""
+    return 4.0 * kappa / (1.0 + (4.0 / 15.0) * (1.0 - delta) * kappa * kappa)
+
+
+@inlined
+def uplift(excess: float) -> State:
+    """State at uplift for a = 1 + excess; there D is -kappa."""
+    return State(0.0, 0.0, -math.sqrt(excess * (2.0 + excess)))
+
+
+@shared
+def first_arc(excess: float, delta: float) -> tuple[int, float, State]:
+    """Status and phase of the first impact for a = 1 + excess > 1, and the state just before it."""
+    start = uplift(min(excess, LARGEST_EXCESS))
+    if excess > LARGEST_EXCESS:
+        return OUTLASTS, math.pi, start
+    return arc(start, guess_first_impact(-start.D, delta), 1.0, delta, math.pi)
+
+
+@inlined
+def bounced(impact: State, eta: float) -> State:
+    """State after an impact."""
+    return State(eta * impact.V, impact.P, impact.D)

@@ -1,0 +1,121 @@
+"""Uplift: when the ground acceleration first passes the threshold of a side."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.ground import (
+    Ground,
+    bounds_within,
+    last_piece,
+    length_of,
+    local_series,
+    move,
+    next_beyond,
+    start_of,
+)
+from rocking.kernels.root import first_root
+from rocking.kernels.state import AT_REST, Floats, Record
+
+#: Accelerations closer to a threshold than this fraction of it are at the threshold.
+_ROUNDING = 2.0**-48
+
+
+class Uplift(NamedTuple):
+    """Where a block lifts off: piece of the motion, offset within it, side, and whether the motion jumps there."""
+
+    piece: int
+    offset: float
+    side: int
+    jump: bool
+
+
+@shared
+def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offset: float, stop: float) -> Uplift:
+    """First instant from (piece, offset) at which the motion passes a side's threshold.
+
+    Side AT_REST when it never does before ``stop``; the piece is then the last one looked at.
+    """
+    A, d = scratch.ground, scratch.spare
+    plus, minus = block.threshold[0], block.threshold[1]
+    while True:
+        quiet = next_beyond(ground, piece, -plus, minus)
+        if quiet > piece:
+            piece, offset = quiet, 0.0
+        if piece == last_piece(ground) or not start_of(ground, piece) + offset < stop:
+            return Uplift(piece, offset, AT_REST, False)
+        length = length_of(ground, piece)
+        left = length - offset
+        bounds = bounds_within(ground, piece, offset, left, A)
+        if bounds.high > minus or -bounds.low > plus:
+            degree = local_series(ground, piece, offset, 1.0, A)
+            to_plus, jump_plus = first_excess(A, degree, left, plus, -1.0, d)
+            to_minus, jump_minus = first_excess(A, degree, left, minus, 1.0, d)
+            # A passing that rounding puts at the end of the piece is left to the next one, which may turn back.
+            if to_plus < to_minus and offset + to_plus < length:
+                return Uplift(piece, offset + to_plus, 0, jump_plus)
+            if to_minus < to_plus and offset + to_minus < length:
+                return Uplift(piece, offset + to_minus, 1, jump_minus)
+        piece += 1
+        offset = 0.0
+
+
+@shared
+def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float, d: Floats) -> tuple[float, bool]:
+    """First time in [0, h) from which sign * A(t) > threshold, and whether it is so by a jump; inf when never.
+
+    ``d`` is scratch space.
+    """
+    gap = threshold - sign * A[0]
+    if gap < -_ROUNDING * threshold:
+        return 0.0, True
+    if degree <= 1:
+        rate = sign * A[1] if degree == 1 else 0.0
+        if rate > 0.0 and gap < rate * h - _ROUNDING * threshold:
+            return max(0.0, gap) / rate, False
+        return np.inf, False
+    d[0] = gap
+    for k in range(1, degree + 1):
+        d[k] = -sign * A[k]
+    return first_passing(d, degree, h), False
+
+
+@shared
+def first_passing(d: Floats, degree: int, h: float) -> float:
+    """First time in [0, h) from which a polynomial, not negative before, is negative beyond rounding; inf when never.
+
+    From a root that is but a touch the search goes on with what is left once the root is divided out. Changes ``d``.
+    """
+    rounding = 0.0
+    for k in range(degree, -1, -1):
+        rounding = rounding * h + _ROUNDING * abs(d[k])
+    start = 0.0
+    for _ in range(degree + 1):
+        lead = leading_power(d, degree, h - start, rounding)
+        if lead > degree:
+            return np.inf
+        if d[lead] < 0.0:
+            return start
+        time = first_root(d, lead, degree, h - start)
+        if not start + time < h:
+            return np.inf
+        move(d, degree, time)
+        start += time
+        if d[1] < 0.0 and d[1] * d[1] <= 2.0 * d[2] * rounding:  # a dip below zero that is lost in rounding
+            across = -2.0 * d[1] / d[2]
+            move(d, degree, across)
+            start += across
+        d[0] = 0.0
+    return np.inf
+
+
+@inlined
+def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
+    """Lowest power of a polynomial whose term counts within h; above ``degree`` where none does."""
+    lead = 0
+    power = 1.0
+    while lead <= degree and abs(d[lead]) * power <= rounding:
+        lead += 1
+        power *= h
+    return lead

@@ -1,0 +1,188 @@
+"""How a response changes with what it was computed from: the variational equation along its steps, jumps at its events.
+
+A quantity x is changed to x (1 + epsilon), and d/d epsilon at 0 is carried along: through an arc by the linearised
+equation of motion, through an impact by the saltation that follows from its shift in time.
+"""
+
+import numpy as np
+
+from rocking.kernels.arc import evaluate, expand, restoring, sign_of
+from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.ground import acceleration, length_of, slope
+from rocking.kernels.state import AT_REST, ORDER, Floats, Record
+from rocking.kernels.trace import Trail
+
+#: What may be changed: the motion, the initial rotation and velocity, and p, slenderness and restitution of both sides.
+MOTION, ROTATION, VELOCITY, FREQUENCY, SLENDERNESS, RESTITUTION = range(6)
+
+#: Shape of the work space: series of the stiffness, of the forcing and of the variation.
+WORK = (3, ORDER + 2)
+
+_WEIGHT = 1.0 / ((np.arange(ORDER + 1) + 1.0) * (np.arange(ORDER + 1) + 2.0))
+
+#: An uplift is a jump where the motion is beyond the threshold by more than this fraction of it.
+_JUMP = 1e-9
+
+
+@kernel
+def vary(
+    trail: Trail, scratch: Record, work: Floats, what: int, peak_time: float, impacts: Floats, events: Floats
+) -> float:
+    """Change of the peak rotation per unit of epsilon; shifts of the times of all impacts and events into arrays.
+
+    Assumes a peak that is not an overturning. ``work`` is scratch space.
+    """
+    nodes = trail.nodes
+    struck = happened = 0
+    du = nodes[0].u if what == ROTATION else 0.0
+    dv = nodes[0].v if what == VELOCITY else 0.0
+    at_peak = du
+    for k in range(nodes.shape[0]):
+        node = nodes[k]
+        if k + 1 == nodes.shape[0]:
+            if node.side != AT_REST and happened < events.shape[0]:
+                events[happened] = -du / node.v
+            break
+        following = nodes[k + 1]
+        if node.side == AT_REST:
+            events[happened] = uplift_shift(trail, following, what)
+            happened += 1
+            du = dv = 0.0
+        elif following.side == AT_REST:
+            events[happened] = rest_shift(trail, node, what, dv, impacts[struck - 1] if struck > 0 else 0.0, following)
+            happened += 1
+        else:
+            order = expand_variation(trail, scratch, work, node, what, (du, dv), following.time - node.time)
+            if node.time < peak_time <= following.time:
+                at_peak, _, _ = evaluate(work[2], order, peak_time - node.time)
+            t = elapsed(trail, node, following)
+            du, dv, _ = evaluate(work[2], order, t)
+            if following.u == 0.0:
+                _, speed, _ = evaluate(scratch.rotation, order, t)
+                shift = du / -speed
+                du, dv = saltation(trail, node, following, what, shift, (dv, -speed))
+                impacts[struck] = shift
+                struck += 1
+    return at_peak
+
+
+@inlined
+def elapsed(trail: Trail, node: Record, following: Record) -> float:
+    """Length of a step, without the rounding of absolute times."""
+    if following.piece == node.piece:
+        return following.offset - node.offset
+    if following.piece == node.piece + 1:
+        return length_of(trail.ground, node.piece) - node.offset + following.offset
+    return following.time - node.time
+
+
+@shared
+def expand_variation(
+    trail: Trail, scratch: Record, work: Floats, node: Record, what: int, start: tuple[float, float], left: float
+) -> int:
+    """Series of the variation along the arc from a node, into the last row of ``work``; returns its order."""
+    order, _, degree = expand(trail.ground, trail.block, trail.rules, scratch, node, left)
+    expand_coefficients(trail, scratch, work, node.side, degree, order)
+    if what == FREQUENCY:
+        for k in range(order - 1):
+            work[1, k] = 2.0 * scratch.rotation[k + 2] / _WEIGHT[k]
+    elif what == SLENDERNESS:
+        for k in range(order - 1):
+            work[1, k] = -trail.block.slenderness[node.side] * work[0, k]
+    elif what != MOTION:
+        for k in range(order - 1):
+            work[1, k] = 0.0
+    work[2, 0], work[2, 1] = start
+    for k in range(order - 1):
+        value = work[1, k]
+        for j in range(k + 1):
+            value += work[0, j] * work[2, k - j]
+        work[2, k + 2] = value * _WEIGHT[k]
+    return order
+
+
+@inlined
+def expand_coefficients(trail: Trail, scratch: Record, work: Floats, side: int, degree: int, order: int) -> None:
+    """Series of d u''/d u, and of u'' per unit of change of the motion, into the first two rows of ``work``."""
+    lam, gain = trail.block.stiffness[side], trail.block.gain[side]
+    A, S, C = scratch.ground, scratch.sine, scratch.cosine
+    for k in range(order - 1):
+        stiffness, forcing = 0.0, 0.0
+        if trail.rules.nonlinear:
+            stiffness = C[k]
+            for j in range(min(k, degree) + 1):
+                stiffness -= A[j] * S[k - j]
+                forcing += A[j] * C[k - j]
+            work[0, k] = lam * stiffness
+            work[1, k] = -lam * forcing
+        else:
+            work[0, k] = lam if k == 0 else 0.0
+            work[1, k] = -gain * A[k] if k <= degree else 0.0
+
+
+@inlined
+def saltation(
+    trail: Trail, node: Record, following: Record, what: int, shift: float, rates: tuple[float, float]
+) -> tuple[float, float]:
+    """Variation after an impact that shifts; ``rates`` are that of the velocity before it, and the speed of impact."""
+    block = trail.block
+    dv, speed = rates
+    ground = acceleration(trail.ground, following.piece, following.offset)
+    e = block.restitution[node.side]
+    faster = -(dv - restoring(block, node.side, ground) * shift) + (speed if what == RESTITUTION else 0.0)
+    return -e * speed * shift, e * faster + restoring(block, following.side, ground) * shift
+
+
+@inlined
+def uplift_shift(trail: Trail, node: Record, what: int) -> float:
+    """Shift of the uplift with which a node begins."""
+    ground, block, rules, _ = trail
+    push = -sign_of(node.side) * acceleration(ground, node.piece, node.offset)
+    rate = -sign_of(node.side) * slope(ground, node.piece, node.offset)
+    threshold = block.threshold[node.side]
+    if abs(push - threshold) > _JUMP * threshold:
+        return 0.0
+    if what == MOTION:
+        return -push / rate
+    if what == SLENDERNESS:
+        growth = 1.0 + threshold * threshold if rules.nonlinear else 1.0
+        return block.slenderness[node.side] * growth / rate
+    return 0.0
+
+
+@inlined
+def rest_shift(trail: Trail, node: Record, what: int, dv: float, shift: float, rest: Record) -> float:
+    """Shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
+
+    ``shift`` is that of the impact with which the node begins, ``dv`` the variation of the velocity after it at the
+    time that it has unchanged. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g at the impact.
+    """
+    if rest.time == node.time:
+        return shift
+    block, i = trail.block, node.side
+    j = block.entered[i]
+    here = acceleration(trail.ground, node.piece, node.offset)
+    g_i, g_j = restoring(block, i, here), restoring(block, j, here)
+    dg_i, dg_j = restoring_shift(trail, node, i, what, shift), restoring_shift(trail, node, j, what, shift)
+    e_i, e_j = block.restitution[i], block.restitution[j]
+    de = 1.0 if what == RESTITUTION else 0.0
+    per_speed = 2.0 * (1.0 / g_i + e_i / g_j)
+    change = -2.0 * (dg_i / (g_i * g_i) + e_i * dg_j / (g_j * g_j) - de * e_i / g_j)
+    change += per_speed * 2.0 * de * e_i * e_j / (1.0 - e_i * e_j)
+    return shift + (per_speed * (dv - g_i * shift) + change * node.v) / (1.0 - e_i * e_j)
+
+
+@inlined
+def restoring_shift(trail: Trail, node: Record, j: int, what: int, shift: float) -> float:
+    """Change of a side's restoring acceleration at an impact that shifts."""
+    ground, block, rules, _ = trail
+    here = acceleration(ground, node.piece, node.offset)
+    change = block.gain[j] * sign_of(j) * shift * slope(ground, node.piece, node.offset)
+    if what == MOTION:
+        change += block.gain[j] * sign_of(j) * here
+    elif what == FREQUENCY:
+        change += 2.0 * restoring(block, j, here)
+    elif what == SLENDERNESS:
+        stiff = block.cosine[j] - sign_of(j) * here * block.sine[j] if rules.nonlinear else 1.0
+        change += block.stiffness[j] * stiff * block.slenderness[j]
+    return change

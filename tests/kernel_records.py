@@ -1,0 +1,99 @@
+"""Blocks, motions, rules and states as kernels take them, stated in few words."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from oracles.problem import Problem
+
+from rocking.kernels import state, status
+from rocking.kernels.ground import Ground
+from rocking.kernels.ground import ground_of as laid_out
+from rocking.kernels.state import Record
+
+GRAVITY = 9.80665
+ULP = 2.0**-52
+PLUS, MINUS = 0, 1
+
+Pair = tuple[float, float]
+
+
+def in_units_of_g(breakpoints: Sequence[float], coefficients: Sequence[Sequence[float]], error: float = 0.0) -> Ground:
+    return laid_out(np.array(breakpoints, dtype=float), np.array(coefficients, dtype=float), 1.0, error)
+
+
+#: No motion at all.
+NO_GROUND = laid_out(np.zeros(1), np.zeros((0, 2)), 1.0, 0.0)
+
+
+def rocking_block(
+    p: Pair = (2.0, 2.0),
+    alpha: Pair = (0.15, 0.15),
+    e: Pair = (0.9, 0.9),
+    *,
+    nonlinear: bool = False,
+    limit: float = 0.0,
+    fallen: float = 0.5 * math.pi,
+) -> Record:
+    p, alpha = np.array(p, dtype=float), np.array(alpha, dtype=float)
+    return state.record(
+        state.BLOCK,
+        stiffness=p * p,
+        slenderness=alpha,
+        sine=np.sin(alpha),
+        cosine=np.cos(alpha),
+        threshold=np.tan(alpha) if nonlinear else alpha,
+        gain=p * p * np.cos(alpha) if nonlinear else p * p,
+        restitution=e,
+        limit=limit,
+        entered=(1, 0),
+        fallen=fallen,
+    )
+
+
+def one_sided(stiffness: float, gain: float, threshold: float, e: float) -> Record:
+    """Something that bounces on one side: u'' = stiffness u - gain (threshold + a), and back with e times the speed."""
+    return state.record(
+        state.BLOCK,
+        stiffness=stiffness,
+        threshold=(threshold, math.inf),
+        gain=gain,
+        restitution=e,
+        entered=(0, 0),
+        fallen=math.inf,
+    )
+
+
+def rules_for(
+    *,
+    nonlinear: bool = False,
+    treatment: int = status.CERTIFIED,
+    tolerance: float = 1e-12,
+    stop: float = math.inf,
+    record: bool = True,
+) -> Record:
+    return state.record(
+        state.RULES,
+        nonlinear=nonlinear,
+        treatment=treatment,
+        tolerance=tolerance,
+        stop=stop,
+        endless=stop == math.inf,
+        record=record,
+    )
+
+
+def state_of(side: int, u: float, v: float, *, piece: int = 0, offset: float = 0.0, **others: float) -> Record:
+    """A block on its way: a march goes on from here to the end."""
+    made = state.new_states(1, 10**6)[0]
+    for name, value in {"side": side, "u": u, "v": v, "piece": piece, "offset": offset, "peak": u, **others}.items():
+        made[name] = value
+    return made
+
+
+def block_of(problem: Problem) -> Record:
+    return rocking_block(problem.p, problem.alpha, problem.restitution, nonlinear=problem.model == "nonlinear")
+
+
+def ground_of(problem: Problem, error: float = 0.0) -> Ground:
+    return laid_out(problem.breakpoints, problem.coefficients, 1.0 / problem.gravity, error)

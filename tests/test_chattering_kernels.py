@@ -1,0 +1,118 @@
+"""Parts of the sine theory's kernels by themselves: basis, lanes, statuses, power series."""
+
+import mpmath
+import numpy as np
+import pytest
+from numpy.polynomial import polynomial
+
+from rocking import chattering
+from rocking.chattering import duration
+from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED, lanes
+from rocking.kernels.sine.arc import State, arc
+from rocking.kernels.sine.basis import basis
+from rocking.kernels.sine.closure import remaining_phase, remaining_series
+from rocking.kernels.sine.power_series import PowerSeries
+from rocking.kernels.sine.sequence import rest_phase
+
+
+def exact_basis(t, delta):
+    """Definitions of E and W in fifty digits, over the factor that a long arc's are scaled by."""
+    with mpmath.workdps(50):
+        t, delta = mpmath.mpf(t), mpmath.mpf(delta)
+        rate = mpmath.sqrt(delta)
+        S, C = mpmath.sinh(rate * t) / rate, (mpmath.cosh(rate * t) - 1) / delta
+        E = (S - mpmath.sin(t)) / ((1 + delta) * t**3)
+        W = (C - 1 + mpmath.cos(t)) / ((1 + delta) * t**4)
+        return mpmath.sin(t) / t, (1 - mpmath.cos(t)) / t**2, E, W
+
+
+@pytest.mark.parametrize("reach", [1e-9, 0.0029, 0.0031, 0.119, 0.121, 1.49, 1.51, 11.9, 12.1, 200.0, 1e4, 4e5])
+@pytest.mark.parametrize("delta", [1e-6, 0.1, 1.0, 40.0, 1e6, 1e12])
+def test_the_basis_is_right_on_both_sides_of_every_change_of_sum(reach, delta):
+    t = float(np.sqrt(reach / (1.0 + delta)))
+    if t > np.pi:
+        return
+    *values, decay = basis(t, delta)
+    exact = exact_basis(t, delta)
+    assert values[:2] == pytest.approx([float(x) for x in exact[:2]], rel=4e-16)
+    with mpmath.workdps(50):
+        scale = mpmath.exp(-mpmath.sqrt(mpmath.mpf(delta)) * t) if decay < 1.0 else mpmath.mpf(1)
+        scaled = [float(x * scale) for x in exact[2:]]
+    assert decay == pytest.approx(float(scale), rel=1e-12)
+    # The argument of the exponential is rounded, and so is the difference in E and W.
+    assert values[2:] == pytest.approx(scaled, rel=1e-14 + 3e-16 * np.sqrt(reach))
+
+
+def test_an_arc_tells_what_became_of_it():
+    lands = State(0.01, 0.3, 0.5)
+    assert arc(lands, 0.06, 1.0, 1.0, 2.0)[0] == FOUND
+    assert arc(lands, 1e-3, 1.0, 1.0, 2.0)[1] == pytest.approx(arc(lands, 0.06, 1.0, 1.0, 2.0)[1], rel=1e-15)
+    assert arc(lands, 0.06, 1.0, 1.0, 0.02)[0] == OUTLASTS
+    assert arc(State(1.0, 0.3, 0.5), 0.06, 1.0, 1e12, 3.0)[0] == OUTLASTS
+
+
+@pytest.mark.parametrize("omega", [1e-6, 1e-3, 2.0, 1e3])
+def test_a_sequence_has_a_status_and_finite_numbers(omega):
+    critical = float(chattering.critical_amplitude(omega, 0.5)) - 1.0
+    for share, status in ((0.5, FOUND), (1.01, OUTLASTS), (30.0, OUTLASTS)):
+        told, phase = rest_phase(share * critical, 1.0 / omega**2, 0.5)
+        assert told == status
+        assert 0.0 < phase <= np.pi
+
+
+def test_what_is_not_resolved_is_told_as_infinite():
+    told = duration._told(np.array([1.0, 2.0, 3.0]), np.array([FOUND, OUTLASTS, UNRESOLVED], np.int8))
+    assert told == pytest.approx([1.0, np.nan, np.inf], nan_ok=True)
+
+
+@pytest.mark.parametrize("count", [1, 2, 63, 64, 65, 511, 512, 513, 1100])
+def test_every_number_of_sequences_fills_the_lanes(count):
+    rng = np.random.default_rng(count)
+    eta = rng.choice([0.05, 0.5, 0.92, 0.97, 0.995], count)
+    omega = rng.uniform(0.4, 10.0, count)
+    critical = chattering.critical_amplitude(omega, eta)
+    share = rng.uniform(0.01, 1.9, count)
+    share[np.abs(share - 1.0) < 0.02] = 0.5
+    a = 1.0 + (critical - 1.0) * share
+    times = chattering.chattering_time(a, omega, eta)
+    assert (np.isfinite(times) == (share < 1.0)).all()
+    for k in (0, count // 2, count - 1):
+        status, phase = rest_phase(a[k] - 1.0, 1.0 / omega[k] ** 2, eta[k])
+        expected = phase / omega[k] if status == FOUND else np.nan
+        assert times[k] == pytest.approx(expected, rel=1e-12, nan_ok=True)
+
+
+def test_a_part_of_the_array_may_hold_nothing_that_rocks():
+    a = np.full(3 * duration._PART + 5, 0.5)
+    a[-1] = 1.03
+    times = chattering.chattering_time(a, 2.0, 0.92)
+    assert np.isnan(times[:-1]).all()
+    assert times[-1] == pytest.approx(1.1259476769338108721, rel=1e-14)
+
+
+def test_slots_are_whole_blocks():
+    assert [lanes.blocks_of(n) for n in (0, 1, lanes.LANES, lanes.LANES + 1)] == [0, 1, 1, 2]
+
+
+def test_power_series_multiply_and_divide_as_polynomials():
+    rng = np.random.default_rng(0)
+    a, b = rng.uniform(0.5, 2.0, (2, 6, 3))
+    x, y = PowerSeries(a, 1), PowerSeries(b, 3)
+    product = x * y
+    assert product.lowest == 4
+    for n in range(3):
+        assert product.coefficients[:, n] == pytest.approx(polynomial.polymul(a[:, n], b[:, n])[:6])
+    assert ((product / y).coefficients, (product / y).lowest) == (pytest.approx(a), 1)
+    assert (2.0 / x * x).coefficients[0] == pytest.approx(2.0)
+    total = 2.0 - (y - x) ** 2
+    assert total.lowest == 0
+    assert total.coefficients[0] == pytest.approx(2.0)
+    assert total.coefficients[1] == pytest.approx(-(a[0] ** 2))
+
+
+def test_the_closure_of_series_is_that_of_numbers():
+    """A series of one term is a number."""
+    V, P, D = 0.013, 0.4, 0.7
+    one = [PowerSeries(np.array([[value]]), 0) for value in (V, P, D)]
+    number = float(remaining_series(tuple(one), 0.25, 0.9).coefficients[0, 0])
+    assert number == pytest.approx(remaining_phase(State(V, P, D), 0.25, 0.9), rel=1e-14)

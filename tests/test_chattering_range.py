@@ -1,0 +1,79 @@
+"""The theory over its whole range of frequency and restitution, against many digits and against limits."""
+
+import numpy as np
+import pytest
+from oracles.slow_sine import rest_time
+
+from rocking import chattering
+
+#: Shares of a_cr - 1, some close to either side of one.
+SHARES = (1e-3, 0.4, 0.95, 1.003)
+
+
+def assert_agrees(share, omega, eta):
+    """Time, verdict and completeness are those of many digits, up to what a few ulp of a change."""
+    a = 1.0 + share * (float(chattering.critical_amplitude(omega, eta)) - 1.0)
+    expected = rest_time(a, omega, eta)
+    assert bool(chattering.is_complete(a, omega, eta)) == (expected is not None)
+    time = float(chattering.chattering_time(a, omega, eta))
+    if expected is None:
+        assert np.isnan(time)
+    else:
+        assert time == pytest.approx(float(expected), rel=5e-14)
+
+
+@pytest.mark.parametrize("omega", [1e-6, 1e-3, 0.0042, 0.05, 1e3])
+@pytest.mark.parametrize("eta", [0.05, 0.5])
+@pytest.mark.parametrize("share", SHARES)
+def test_times_and_verdicts_agree_with_many_digits(share, omega, eta):
+    assert_agrees(share, omega, eta)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("omega", [1e-6, 1e-5, 1e-4, 1e-3, 0.0042, 0.0043, 0.02, 0.1, 0.5, 3.0, 30.0, 1e3])
+@pytest.mark.parametrize("eta", [0.05, 0.2, 0.7, 0.9, 0.99])
+def test_times_and_verdicts_agree_with_many_digits_everywhere(omega, eta):
+    for share in (*SHARES, 0.1, 0.8, 1.5, 3.0) if eta < 0.9 else SHARES[1:]:
+        assert_agrees(share, omega, eta)
+
+
+@pytest.mark.parametrize("omega", [1e-6, 1e-5, 1e-4, 1e-3, 4e-3, 0.01])
+def test_under_slow_forcing_the_first_arc_decides(omega):
+    """The part of it that grows as exp(tau) vanishes where sqrt(a^2 - 1) = omega, but for exp(-pi/omega)."""
+    critical = chattering.critical_amplitude(omega, [0.01, 0.05, 0.2, 0.5, 0.9])
+    assert critical == pytest.approx(np.sqrt(1.0 + omega**2), rel=0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("eta", [1e-300, 1e-100, 1e-8, 0.01, 0.9, 0.999, 0.99999])
+@pytest.mark.parametrize("omega", [1e-6, 1e-3, 1.0, 1e6])
+def test_time_and_sequence_have_an_answer_at_every_corner(omega, eta):
+    critical = float(chattering.critical_amplitude(omega, eta)) - 1.0
+    assert 0.0 < critical < 0.38
+    below, above = 1.0 + 0.5 * critical, 1.0 + 1.01 * critical
+    time = float(chattering.chattering_time(below, omega, eta))
+    sequence = chattering.sequence(below, omega, eta, tolerance=1e-9)
+    assert 0.0 < sequence.lower <= sequence.time <= sequence.upper < np.pi / omega
+    assert sequence.time == pytest.approx(time, rel=1e-9)
+    assert not chattering.is_complete(above, omega, eta)
+    assert not chattering.sequence(above, omega, eta).complete
+
+
+def test_a_place_where_the_correction_of_an_arc_vanishes_is_no_landing():
+    assert not chattering.is_complete(1.1151407720386019, 1.0146326207140592, 0.6062211928500365)
+
+
+def test_no_amplitude_above_the_critical_one_is_complete():
+    rng = np.random.default_rng(5)
+    eta = rng.uniform(0.5, 0.97, 100_000)
+    omega = rng.uniform(0.4, 10.0, 100_000)
+    critical = chattering.critical_amplitude(omega, eta, method="approximation")
+    a = critical + 1e-7 + (critical - 1.0) * rng.uniform(0.0, 0.2, 100_000)
+    assert not chattering.is_complete(a, omega, eta).any()
+
+
+@pytest.mark.parametrize("omega", [1e-6, 1e-3, 0.0042, 2.0, 1e3])
+def test_the_semianalytical_scheme_holds_over_the_same_range(omega):
+    a = 1.0 + np.array([0.3, 0.9, 1.01]) * (chattering.critical_amplitude(omega, 0.5) - 1.0)
+    exact = chattering.chattering_time(a, omega, 0.5)
+    semianalytical = chattering.chattering_time(a, omega, 0.5, method="semianalytical")
+    assert semianalytical == pytest.approx(exact, rel=1e-12, nan_ok=True)

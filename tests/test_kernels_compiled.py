@@ -1,0 +1,158 @@
+"""Where compiled kernels are kept, and that they never are those of other sources."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numba
+import pytest
+
+from rocking.kernels import compiled
+
+KERNELS = Path(compiled.__file__).parent
+SOURCE = KERNELS.parent.parent
+
+
+@pytest.fixture
+def places(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
+    """A folder for everything, nothing remembered of other folders, and no wish of the user's."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(compiled, "_HERE", tmp_path / "package")
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.delenv("LOCALAPPDATA", raising=False)
+    (tmp_path / "package").mkdir()
+    compiled.cache_folder.cache_clear()
+    yield tmp_path
+    compiled.cache_folder.cache_clear()
+
+
+def block(folder: Path) -> None:
+    """Make a folder that nothing can be made in: a file, which stops even the superuser."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.write_text("")
+
+
+def test_the_cache_lies_beside_the_sources_where_it_can(places: Path) -> None:
+    folder = compiled.cache_folder()
+    assert folder is not None
+    assert folder.parent == places / "package" / "__pycache__"
+    assert folder.is_dir()
+
+
+def test_it_falls_back_to_the_users_then_to_a_temporary_one_then_to_none(places: Path) -> None:
+    for blocked, expected in (
+        (places / "package" / "__pycache__", places / "home" / ".cache" / "rocking"),
+        (places / "home" / ".cache", places / "temporary"),
+        (places / "temporary", None),
+    ):
+        block(blocked)
+        compiled.cache_folder.cache_clear()
+        folder = compiled.cache_folder()
+        assert folder is None if expected is None else folder is not None and folder.is_relative_to(expected)
+
+
+def test_the_users_wish_comes_first(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(places / "wished"))
+    folder = compiled.cache_folder()
+    assert folder is not None
+    assert folder.parent == places / "wished"
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(places / "xdg"))
+    block(places / "package" / "__pycache__")
+    compiled.cache_folder.cache_clear()
+    folder = compiled.cache_folder()
+    assert folder is not None
+    assert folder.parent == places / "xdg" / "rocking"
+
+
+def test_without_a_place_kernels_are_compiled_all_the_same(places: Path) -> None:
+    for folder in (places / "package" / "__pycache__", places / "home", places / "temporary"):
+        block(folder)
+    assert compiled.cache_folder() is None
+
+    @compiled.kernel
+    def twice(x: float) -> float:
+        return 2.0 * x
+
+    assert twice(21.0) == 42.0
+
+
+def test_the_fingerprint_changes_with_the_content_of_any_kernel(places: Path) -> None:
+    package = places / "package"
+    shutil.copytree(KERNELS, package, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+    sources = sorted(package.rglob("*.py"))
+    assert len(sources) > 20
+    before = compiled._fingerprint()
+    assert compiled._fingerprint() == before
+    seen = {before}
+    for source in sources:
+        text = source.read_bytes()
+        source.write_bytes(text + b"# changed\n")
+        seen.add(compiled._fingerprint())
+        source.write_bytes(text)
+    assert len(seen) == len(sources) + 1
+    assert compiled._fingerprint() == before
+    sources[0].rename(sources[0].with_name("renamed.py"))
+    assert compiled._fingerprint() not in seen
+
+
+PROGRAM = """
+import rocking
+block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+response = rocking.simulate(block, None, model="linear", initial_rotation=0.02)
+print(f"{response.events['time'][-1]:.12f}", len(response.impacts))
+"""
+
+
+def started(program: str, source: Path, cache: Path) -> subprocess.Popen[str]:
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(source),
+        "NUMBA_CACHE_DIR": str(cache),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    return subprocess.Popen(
+        [sys.executable, "-c", program], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def finished(process: subprocess.Popen[str]) -> str:
+    out, error = process.communicate(timeout=900)
+    assert process.returncode == 0, error
+    return out
+
+
+@pytest.mark.slow
+def test_processes_that_start_at_once_with_an_empty_cache_all_give_the_same_answer(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    answers = {finished(process) for process in [started(PROGRAM, SOURCE, cache) for _ in range(4)]}
+    assert len(answers) == 1
+    (folder,) = cache.iterdir()
+    compiled_once = sorted(path.name for path in folder.rglob("*.nbc"))
+    assert len(compiled_once) > 0
+    answers.add(finished(started(PROGRAM, SOURCE, cache)))
+    assert len(answers) == 1
+    assert sorted(path.name for path in folder.rglob("*.nbc")) == compiled_once
+
+
+@pytest.mark.slow
+def test_a_change_in_a_kernel_that_others_call_is_seen(tmp_path: Path) -> None:
+    """Restitution is halved in the file of the impact; the entry point's own file stays as it is."""
+    source, cache = tmp_path / "source", tmp_path / "cache"
+    shutil.copytree(SOURCE, source, ignore=shutil.ignore_patterns("__pycache__"))
+    before = finished(started(PROGRAM, source, cache))
+    impact = source / "rocking" / "kernels" / "impact.py"
+    text = impact.read_text()
+    changed = text.replace("block.restitution[left] * speed", "0.5 * block.restitution[left] * speed")
+    assert changed != text
+    impact.write_text(changed)
+    after = finished(started(PROGRAM, source, cache))
+    assert float(after.split()[0]) < 0.9 * float(before.split()[0])
+    assert len(list(cache.iterdir())) == 2

@@ -1,0 +1,218 @@
+"""Motions as kernels read them: pieces, bounds on windows of them, and stretches that are passed over."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kernel_records import ULP, in_units_of_g
+from oracles.exact import exact, polynomial
+
+from rocking.kernels.arc import significant_degree
+from rocking.kernels.ground import (
+    STRETCH,
+    Ground,
+    acceleration,
+    bounds_over,
+    bounds_within,
+    ground_of,
+    local_series,
+    move,
+    next_beyond,
+    slope,
+)
+from rocking.kernels.ground import ground_of as laid_out
+from rocking.kernels.state import new_scratch
+
+#: Limits that no motion passes.
+ANYTHING = (-math.inf, math.inf)
+
+quick = settings(deadline=None, max_examples=100)
+
+
+def numbers(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers far from underflow."""
+    return st.floats(low, high).map(lambda x: x if abs(x) > 1e-30 else 0.0)
+
+
+def work() -> np.ndarray:
+    return new_scratch()["ground"]
+
+
+rows = st.lists(numbers(-3.0, 3.0), min_size=1, max_size=14)
+
+
+@st.composite
+def grounds(draw: st.DrawFn, *, most: int = 6) -> Ground:
+    """Pieces of one degree, with jumps between them or continuous."""
+    columns = draw(st.integers(1, 6))
+    pieces = draw(st.lists(st.lists(numbers(-1.0, 1.0), min_size=columns, max_size=columns), min_size=1, max_size=most))
+    widths = [draw(st.floats(0.01, 2.0)) for _ in pieces]
+    if draw(st.booleans()):
+        for k in range(1, len(pieces)):
+            pieces[k][0] = float(np.polynomial.Polynomial(pieces[k - 1])(widths[k - 1]))
+    return in_units_of_g(np.cumsum([draw(st.floats(0.0, 9.0)), *widths]), pieces)
+
+
+def dense(ground: Ground, piece: int, offset: float, window: float, count: int = 200) -> tuple[np.ndarray, np.ndarray]:
+    """Times since the start of the window, and accelerations, on all the pieces that it touches."""
+    times, values, elapsed = [], [], 0.0
+    while True:
+        length = ground.pieces[piece, 1]
+        span = min(window - elapsed, length - offset)
+        local = np.linspace(0.0, span, count)
+        times.append(elapsed + local)
+        values.append(np.polynomial.Polynomial(ground.pieces[piece, 2:])(offset + local))
+        if elapsed + length - offset >= window:
+            return np.concatenate(times), np.concatenate(values)
+        elapsed, piece, offset = elapsed + length - offset, piece + 1, 0.0
+
+
+@quick
+@given(rows, numbers(0.0, 3.0), st.sampled_from([1.0, -1.0]))
+def test_the_local_series_is_the_same_polynomial_about_a_later_time(
+    coefficients: list[float], offset: float, sign: float
+) -> None:
+    A = np.full(24, np.nan)
+    degree = local_series(in_units_of_g([0.0, 9.0], [coefficients]), 0, offset, sign, A)
+    exact, sizes = ([f(Fraction(x) * Fraction(sign)) for x in coefficients] for f in (lambda x: x, abs))
+    for row in (exact, sizes):
+        for k in range(len(row) - 1):
+            for j in range(len(row) - 2, k - 1, -1):
+                row[j] += Fraction(offset) * row[j + 1]
+    for k, (value, size) in enumerate(zip(exact, sizes, strict=True)):
+        found = Fraction(float(A[k])) if k <= degree else Fraction(0)
+        assert abs(found - value) <= len(coefficients) * Fraction(ULP) * size
+    assert np.all(np.isnan(A[max(2, len(coefficients)) :]))
+
+
+def test_what_does_not_count_within_a_step_is_dropped() -> None:
+    A = np.array([1.0, 0.0, 1.0, 1e-3, 1e-30])
+    assert [significant_degree(A, 4, h) for h in (1.0, 1e-6, 1e-12)] == [3, 2, 1]
+    assert significant_degree(A, 0, 1.0) == 0
+
+
+@quick
+@given(rows, numbers(0.0, 3.0))
+def test_value_and_slope_are_those_of_the_polynomial(coefficients: list[float], offset: float) -> None:
+    ground, f = in_units_of_g([0.0, 9.0], [coefficients]), polynomial(coefficients)
+    size = sum(abs(c) * offset**k for k, c in enumerate(coefficients))
+    steepness = sum(k * abs(c) * offset ** (k - 1) for k, c in enumerate(coefficients) if k > 0)
+    at = exact(offset)
+    assert abs(exact(acceleration(ground, 0, offset)) - f(at)) <= exact(2.0 * len(coefficients) * ULP * size)
+    assert abs(exact(slope(ground, 0, offset)) - f.derivative()(at)) <= exact(2.0 * len(coefficients) * ULP * steepness)
+
+
+def test_the_last_piece_has_no_end_and_no_motion() -> None:
+    ground = laid_out(np.array([1.0, 3.0]), np.array([[2.0]]), 0.5, 0.25)
+    assert ground.pieces.tolist() == [[1.0, 2.0, 1.0, 0.0], [3.0, math.inf, 0.0, 0.0]]
+    assert ground.error == 0.125
+    assert laid_out(np.zeros(1), np.zeros((0, 2)), 1.0, 0.0).pieces.tolist() == [[0.0, math.inf, 0.0, 0.0]]
+    assert bounds_over(ground, 1, 0.3, 5.0, ANYTHING, work()) == (0.0, 0.0, 0.0, 0.0)
+
+
+@quick
+@given(rows, st.floats(0.0, 2.0))
+def test_a_polynomial_is_moved_and_moved_back(coefficients: list[float], t: float) -> None:
+    c = np.array(coefficients)
+    move(c, len(c) - 1, t)
+    reached = np.polynomial.Polynomial(coefficients)(t)
+    assert c[0] == pytest.approx(reached, abs=1e-14 * sum(abs(x) * t**k for k, x in enumerate(coefficients)))
+    size = sum(abs(x) * (2.0 * t) ** k for k, x in enumerate(np.abs(c)))
+    move(c, len(c) - 1, -t)
+    assert np.all(np.abs(c - coefficients) * t ** np.arange(len(c)) <= 1e-13 * (size + np.sum(np.abs(coefficients))))
+
+
+@quick
+@given(grounds(), st.floats(0.0, 0.99), st.floats(1e-6, 1.0))
+def test_the_bounds_on_a_window_within_a_piece_hold_every_value_and_slope(
+    ground: Ground, share: float, part: float
+) -> None:
+    length = float(ground.pieces[0, 1])
+    offset = share * length
+    window = part * (length - offset)
+    bounds = bounds_within(ground, 0, offset, window, work())
+    f = polynomial(ground.pieces[0, 2:])
+    for t in np.linspace(offset, offset + window, 25):
+        assert exact(bounds.low) <= f(exact(t)) <= exact(bounds.high)
+        assert abs(f.derivative()(exact(t))) <= exact(bounds.slope * (1.0 + 1e-13))
+
+
+@quick
+@given(st.lists(numbers(-1.0, 1.0), min_size=2, max_size=2), st.floats(0.0, 1.0), st.floats(1e-6, 1.0))
+def test_the_bounds_on_an_even_change_are_its_ends(row: list[float], offset: float, window: float) -> None:
+    bounds = bounds_within(in_units_of_g([0.0, 2.0], [row]), 0, offset, window, work())
+    ends = [row[0] + row[1] * t for t in (offset, offset + window)]
+    size = abs(row[0]) + 2.0 * abs(row[1])
+    assert bounds[:3] == pytest.approx((min(ends), max(ends), abs(row[1])), abs=2.0**-46 * size)
+
+
+@quick
+@given(grounds(), st.integers(0, 5), st.floats(0.0, 0.99), st.floats(1e-6, 12.0))
+def test_the_bounds_over_any_window_hold_dense_samples_their_slopes_and_their_jumps(
+    ground: Ground, piece: int, share: float, window: float
+) -> None:
+    piece = min(piece, len(ground.pieces) - 2)
+    offset = share * float(ground.pieces[piece, 1])
+    bounds = bounds_over(ground, piece, offset, window, ANYTHING, work())
+    times, values = dense(ground, piece, offset, window)
+    size = np.max(np.abs(ground.pieces[:, 2:]) @ 2.0 ** np.arange(ground.pieces.shape[1] - 2))
+    assert bounds.low <= np.min(values) + 1e-13 * size
+    assert np.max(values) <= bounds.high + 1e-13 * size
+    # Along the way, what is not a jump changes no faster than the slope allows.
+    assert np.all(np.abs(np.diff(values)) <= bounds.slope * np.diff(times) * (1.0 + 1e-9) + bounds.jumps + 1e-13 * size)
+    jumps = np.abs(np.diff(values))[np.diff(times) == 0.0]
+    assert bounds.jumps >= np.sum(jumps) * (1.0 - 1e-12) - 1e-13 * size
+    assert bounds.jumps <= np.sum(jumps) + 1e-12 * size
+
+
+def test_every_jump_of_a_window_is_counted_and_none_beyond() -> None:
+    ground = in_units_of_g([0.0, 1.0, 2.0, 3.0], [[0.0, 0.25], [0.5, 0.0], [-0.25, 0.0]])
+    expected = {0.5: 0.0, 1.5: 0.25, 2.5: 1.0, 3.5: 1.25, 9.0: 1.25}
+    for window, jumps in expected.items():
+        assert bounds_over(ground, 0, 0.0, window, ANYTHING, work()).jumps == pytest.approx(jumps, abs=1e-12)
+    assert bounds_over(ground, 1, 0.5, 1.0, ANYTHING, work()).jumps == pytest.approx(0.75, abs=1e-12)
+
+
+def test_a_window_in_which_the_motion_passes_a_limit_has_no_bounds() -> None:
+    ground = ground_of(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 0.0], [0.5, 0.0]]), 1.0, 0.0)
+    assert bounds_over(ground, 0, 0.0, 1.5, (-0.6, 0.6), work()).high == pytest.approx(0.5)
+    for limits in ((-0.6, 0.4), (0.1, 0.6)):
+        assert np.all(np.isnan(bounds_over(ground, 0, 0.0, 1.5, limits, work())))
+    assert np.all(np.isfinite(bounds_over(ground, 0, 0.0, 0.9, (-0.6, 0.4), work())))
+
+
+def test_a_window_over_too_many_pieces_has_no_bounds() -> None:
+    ground = in_units_of_g(np.arange(401.0), np.zeros((400, 2)))
+    assert np.all(np.isfinite(bounds_over(ground, 0, 0.0, 250.0, ANYTHING, work())))
+    assert np.all(np.isnan(bounds_over(ground, 0, 0.0, 300.0, ANYTHING, work())))
+
+
+@quick
+@given(st.integers(0, 2**32 - 1), st.integers(1, 300), st.integers(1, 4), st.floats(0.1, 1.0), st.floats(0.1, 1.0))
+def test_no_piece_that_passes_the_threshold_is_passed_over(
+    seed: int, count: int, columns: int, below: float, above: float
+) -> None:
+    random = np.random.default_rng(seed)
+    coefficients = random.normal(size=(count, columns)) * 0.1 * random.random((count, 1)) ** 4
+    coefficients[random.integers(count)] *= 10.0
+    ground = in_units_of_g(0.1 * np.arange(count + 1), coefficients)
+    samples = np.array([dense(ground, k, 0.0, float(ground.pieces[k, 1]), 30)[1] for k in range(count)])
+    beyond = np.append(np.max(samples, axis=1) > above, True) | np.append(np.min(samples, axis=1) < -below, True)
+    for piece in random.integers(0, count + 1, size=20):
+        found = next_beyond(ground, int(piece), -below, above)
+        assert piece <= found <= piece + np.argmax(beyond[piece:])
+
+
+def test_stretches_without_anything_are_passed_over() -> None:
+    count = 10 * STRETCH
+    coefficients = np.full((count, 2), [0.1, 0.0])
+    coefficients[7 * STRETCH + 5, 0] = -0.5
+    ground = in_units_of_g(np.arange(count + 1.0), coefficients)
+    assert next_beyond(ground, 3, -0.2, 0.2) == 7 * STRETCH
+    assert next_beyond(ground, 7 * STRETCH + 3, -0.2, 0.2) == 7 * STRETCH + 3
+    assert next_beyond(ground, 8 * STRETCH, -0.2, 0.2) == count
+    assert next_beyond(ground, 3, -0.6, 0.2) == count
+    assert next_beyond(ground, 3, -0.6, 0.05) == 3

@@ -1,0 +1,381 @@
+"""Steps of many lanes: exact where they are quiet, and quiet only where nothing happens."""
+
+import math
+from typing import NamedTuple
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kernel_records import ULP, in_units_of_g, one_sided, rocking_block, rules_for, state_of
+
+from rocking.kernels import state
+from rocking.kernels.arc import evaluate, expand
+from rocking.kernels.lanes.crew import WIDTH, Crew, crew_of, lean, load, stumpff, unload
+from rocking.kernels.lanes.events import is_quiet
+from rocking.kernels.lanes.linear import step_linear
+from rocking.kernels.lanes.nonlinear import step_nonlinear
+from rocking.kernels.state import Record, Records, new_scratch
+
+mp = mpmath.mp.clone()
+mp.dps = 60
+
+quick = settings(deadline=None, max_examples=150)
+QUARTER_TURN = 0.5 * math.pi
+
+
+@quick
+@given(st.floats(-300.0, 0.0), st.sampled_from([1.0, -1.0]), st.integers(1, 3))
+def test_stumpffs_functions_are_exact_to_two_units_in_the_last_place(exponent: float, sign: float, k: int) -> None:
+    """c_k(q) = sum q^j/(k + 2j)!: (sinh z)/z, (cosh z - 1)/z^2, (sinh z - z)/z^3 with z^2 = q."""
+    q = sign * 10.0**exponent
+    with mpmath.workdps(60):
+        exact = sum(mp.mpf(q) ** j / mp.factorial(k + 2 * j) for j in range(40))
+        found = float(stumpff(k, q))
+        assert abs(found - exact) <= 2.0 * ULP * exact
+        if exponent > -8.0:
+            z = mp.sqrt(mp.mpf(q))
+            closed = {1: mp.sinh(z) / z, 2: (mp.cosh(z) - 1) / z**2, 3: (mp.sinh(z) - z) / z**3}[k]
+            assert abs(exact - mp.re(closed)) <= mp.mpf(10) ** -25
+
+
+# ---- Single steps ----
+
+
+class Step(NamedTuple):
+    """What one lane's step started from and how it ended."""
+
+    block: Record
+    start: Record
+    end: Record
+    quiet: bool
+
+
+def stepped(
+    blocks: Records,
+    states: Records,
+    row: tuple[float, float],
+    h: float,
+    *,
+    substeps: int = 0,
+    late: float = 0.0,
+    fallen: float = QUARTER_TURN,
+) -> list[Step]:
+    """Take up to a group of blocks through one sample that starts with row[0] and changes by row[1] per second."""
+    crew: Crew = crew_of(blocks, states, 1, h, substeps)
+    for lane in range(len(blocks)):
+        load(crew, lane, lane)
+        if substeps > 0:
+            lean(crew, lane, lane)
+    group = crew.groups[0]
+    before = states.copy()
+    if substeps > 0:
+        busy = step_nonlinear(group, row[0], row[1], h + late, h, substeps, fallen)
+    else:
+        busy = step_linear(group, row[0], row[1], h, late, fallen)
+    events = np.array(group["event"][: len(blocks)], dtype=bool)
+    assert busy == np.sum(group["event"])
+    assert not np.any(group["event"][len(blocks) :]) or not np.all(np.isfinite(row))  # empty lanes
+    ground = in_units_of_g([0.0, 1.0, 2.0], [[0.0, 0.0]] * 2)
+    for lane in range(len(blocks)):
+        assert unload(ground, crew, lane, 1) == lane
+    return [Step(blocks[k], before[k], states[k], not events[k]) for k in range(len(blocks))]
+
+
+def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: float = 1.0) -> tuple[Records, Records]:
+    """A group of blocks in motion: steps from next to nothing to one over p, rotations and speeds of all sizes."""
+    blocks, states = state.records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
+    width = 10.0 ** random.uniform(-9.0, -1.4 if nonlinear else 0.0, WIDTH)
+    for k in range(WIDTH):
+        p, alpha = width[k] / h, 10.0 ** random.uniform(-2.0, 0.0)
+        block = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
+        if not nonlinear:
+            block["stiffness"] *= stiffness
+        blocks[k] = block
+        states[k]["side"] = random.integers(2)
+        states[k]["u"] = alpha * 10.0 ** random.uniform(-6.0, 0.1)
+        speed = max(p * alpha, states[k]["u"] / h * 10.0 ** random.uniform(-6.0, 0.0))
+        states[k]["v"] = random.choice([-1.0, 1.0]) * speed * 10.0 ** random.uniform(-4.0, 0.5)
+        states[k]["peak"] = max(states[k]["u"], 2.0 * alpha)
+    return blocks, states
+
+
+def linear_end(step: Step, row: tuple[float, float], t: float) -> tuple[mpmath.mpf, mpmath.mpf]:
+    """Rotation and velocity by Stumpff's functions in 60 digits."""
+    side = int(step.start["side"])
+    lam, gain, threshold = (mp.mpf(float(step.block[name][side])) for name in ("stiffness", "gain", "threshold"))
+    sign, t = 1 - 2 * side, mp.mpf(t)
+    u, v = mp.mpf(float(step.start["u"])), mp.mpf(float(step.start["v"]))
+    w = lam * u - gain * (threshold + sign * mp.mpf(row[0]))
+    j = lam * v - gain * sign * mp.mpf(row[1])
+    c = [sum((lam * t * t) ** i / mp.factorial(k + 2 * i) for i in range(30)) for k in range(4)]
+    return u + v * t + c[2] * w * t**2 + c[3] * j * t**3, v + c[1] * w * t + c[2] * j * t**2
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-9, -1e-9])
+@pytest.mark.parametrize("stiffness", [1.0, 0.0, -1.0], ids=["block", "ball", "oscillator"])
+def test_a_quiet_linear_step_is_exact(stiffness: float, late: float) -> None:
+    """To a few units in the last place of the largest of rotation, way and pull."""
+    random, quiet = np.random.default_rng(1), 0
+    for _ in range(25):
+        h = 10.0 ** random.uniform(-3.0, -1.0)
+        row = (random.normal() * 0.1, random.normal() * 0.1 / h)
+        for step in stepped(*drawn(random, False, h, stiffness), row, h, late=late * h):
+            if not step.quiet:
+                assert step.start["u"] == step.end["u"]
+                assert step.start["v"] == step.end["v"]
+                continue
+            quiet += 1
+            u, v = linear_end(step, row, h * (1.0 + late))
+            side = int(step.start["side"])
+            push = float(step.block["gain"][side]) * (step.block["threshold"][side] + abs(row[0]) + abs(row[1]) * h)
+            size = max(abs(step.start["u"]), abs(step.start["v"]) * h, abs(u), abs(v) * h, push * h * h)
+            assert abs(step.end["u"] - u) <= 4.0 * ULP * size
+            assert abs(step.end["v"] - v) * h <= 8.0 * ULP * size
+    assert quiet > 400
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-13, -1e-13])
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_a_quiet_nonlinear_step_is_the_full_series(substeps: int, late: float) -> None:
+    """To a few units in the last place of the largest of rotation, way, and a fraction of the slenderness."""
+    random, quiet, scratch = np.random.default_rng(2), 0, new_scratch()
+    rules = rules_for(nonlinear=True)
+    for _ in range(25):
+        h = 10.0 ** random.uniform(-3.0, -1.0)
+        row = (random.normal() * 0.1, random.normal() * 0.1 / h)
+        ground = in_units_of_g([0.0, h + late, 2.0], [row, row])
+        for step in stepped(*drawn(random, True, h), row, h, substeps=substeps, late=late):
+            if not step.quiet:
+                assert step.start["u"] == step.end["u"]
+                continue
+            quiet += 1
+            order, reach, _ = expand(ground, step.block, rules, scratch, step.start, h + late)
+            assert reach == h + late
+            u, v, _ = evaluate(scratch["rotation"], order, h + late)
+            alpha = float(step.block["slenderness"][int(step.start["side"])])
+            size = max(step.start["u"], abs(step.start["v"]) * h, abs(u), abs(v) * h, 0.125 * alpha)
+            assert abs(step.end["u"] - u) <= 8.0 * substeps * ULP * size
+            assert abs(step.end["v"] - v) * h <= 8.0 * substeps * ULP * size
+    assert quiet > 400
+
+
+def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Records, Records]:
+    """Steps with turning points: down to nearly nothing and up again, up to nearly the highest and down again."""
+    blocks, states = state.records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
+    for k in range(WIDTH):
+        alpha = 0.2
+        p = random.uniform(0.05, 1.0) * (0.02 if nonlinear else 1.0) / h
+        blocks[k] = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
+        u = alpha * random.uniform(0.01, 1.9)
+        states[k]["side"] = random.integers(2)
+        w = abs(p * p * (u - alpha)) * random.uniform(0.1, 3.0)
+        states[k]["v"] = random.choice([-1.0, 1.0]) * w * h * random.uniform(0.0, 1.2)
+        turn = abs(states[k]["v"]) * h * 0.5
+        states[k]["u"] = max(1e-9, min(u, turn * random.uniform(0.5, 1.5))) if random.random() < 0.5 else u
+        states[k]["peak"] = states[k]["u"] + turn * random.uniform(0.0, 1.5)
+    return blocks, states
+
+
+@pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
+def test_a_lane_is_quiet_only_if_nothing_happens_in_its_step(nonlinear: bool) -> None:
+    """No rotation at or below zero, and none above the highest so far but one that rises to the step's end."""
+    random, scratch, quiet = np.random.default_rng(3), new_scratch(), 0
+    rules = rules_for(nonlinear=nonlinear)
+    for _ in range(150):
+        h = 10.0 ** random.uniform(-3.0, -1.0)
+        row = (random.normal() * 0.3, random.normal() * (0.3 if nonlinear else 2.0) / h)
+        ground = in_units_of_g([0.0, 9.0], [row])
+        fallen = random.choice([0.1, 0.4, QUARTER_TURN])
+        for step in stepped(*shapes(random, h, nonlinear), row, h, substeps=int(nonlinear), fallen=fallen):
+            if not step.quiet:
+                continue
+            quiet += 1
+            order, reach, _ = expand(ground, step.block, rules, scratch, step.start, h)
+            path = [evaluate(scratch["rotation"], order, t)[:2] for t in np.linspace(0.0, reach, 41)]
+            u = np.array([rotation for rotation, _ in path])
+            highest = max(u[0], u[-1])
+            assert np.min(u) > 0.0
+            assert np.max(u) < fallen
+            assert np.max(u) <= max(step.start["peak"], highest) * (1.0 + 1e-14)
+            if highest > step.start["peak"]:
+                assert u[-1] > u[0] * (1.0 - 1e-14)  # it is seen at the end, when it is taken from its lane
+            assert step.end["peak"] >= np.max(u) * (1.0 - 1e-14) or step.start["peak"] >= np.max(u)
+    assert quiet > 500
+
+
+P, ALPHA, H = 0.5, 0.2, 0.005
+
+
+def one(u: float, v: float, peak: float, *, nonlinear: bool = False) -> tuple[Records, Records]:
+    blocks, states = state.records(1, state.BLOCK), state.new_states(1, 0)
+    blocks[0] = rocking_block((P, P), (ALPHA, ALPHA), nonlinear=nonlinear)
+    states[0] = state_of(0, u, v, peak=peak)
+    return blocks, states
+
+
+both = pytest.mark.parametrize("substeps", [0, 1], ids=["linear", "nonlinear"])
+
+
+def is_quiet_step(
+    substeps: int, u: float, v: float, peak: float, row: tuple[float, float], fallen: float = 9.0
+) -> bool:
+    return stepped(*one(u, v, peak, nonlinear=substeps > 0), row, H, substeps=substeps, fallen=fallen)[0].quiet
+
+
+def path(substeps: int, u: float, v: float, row: tuple[float, float]) -> np.ndarray:
+    """Rotation throughout the step."""
+    blocks, states = one(u, v, 0.0, nonlinear=substeps > 0)
+    rules, scratch = rules_for(nonlinear=substeps > 0), new_scratch()
+    order, reach, _ = expand(in_units_of_g([0.0, 9.0], [row]), blocks[0], rules, scratch, states[0], H)
+    return np.array([evaluate(scratch["rotation"], order, t)[0] for t in np.linspace(0.0, reach, 2001)])
+
+
+@both
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
+def test_a_dip_to_the_ground_between_two_ends_above_it_is_an_event(substeps: int, share: float) -> None:
+    """Pushed up while it comes down; a little higher it is quiet."""
+    row = (-1.2, 0.0)
+    v = -share * P * P * H
+    depth = -np.min(path(substeps, 0.0, v, row))
+    for low in (0.9, 0.999):
+        rotation = path(substeps, low * depth, v, row)
+        assert np.min(rotation) < 0.0
+        assert not is_quiet_step(substeps, low * depth, v, 1.0, row)
+    assert is_quiet_step(substeps, depth + 0.2 * P * P * H * H, v, 1.0, row)
+
+
+@both
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
+def test_a_bulge_over_the_highest_so_far_between_two_ends_below_it_is_an_event(substeps: int, share: float) -> None:
+    row, u = (0.8, 0.0), 0.1
+    v = share * 0.9 * P * P * H
+    rotation = path(substeps, u, v, row)
+    top = np.max(rotation)
+    assert max(u, rotation[-1]) < top
+    for below in (1e-6, 0.01, 0.5):
+        assert not is_quiet_step(substeps, u, v, top - below * (top - max(u, rotation[-1])), row)
+    assert is_quiet_step(substeps, u, v, top + 0.2 * P * P * H * H, row)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0], ids=["bulge", "dip"])
+def test_the_curvature_of_an_oscillator_may_be_largest_inside_a_step(up: float) -> None:
+    """u = A cos(omega (t - h/2)) - c over a step of one radian: bulges by A (1 - cos(1/2))."""
+    a, beyond = up, 1.0 - math.cos(0.5)
+    blocks, states = state.records(1, state.BLOCK), state.new_states(1, 0)
+    for share, quiet in ((0.95, False), (1.06, True)):
+        u = 1.0 if up > 0.0 else share * beyond
+        pull = (a * math.cos(0.5) - u) / H**2
+        blocks[0] = one_sided(-1.0 / H**2, pull, 1.0, 0.5)
+        peak = u + share * beyond if up > 0.0 else 9.0
+        states[0] = state_of(0, u, a * math.sin(0.5) / H, peak=peak)
+        found = stepped(blocks, states, (0.0, 0.0), H, fallen=99.0)[0]
+        assert found.quiet == quiet
+        if quiet:
+            assert found.end["u"] == pytest.approx(u, rel=1e-14)
+
+
+@both
+def test_a_rotation_that_rises_all_the_way_is_quiet_and_one_that_turns_is_not(substeps: int) -> None:
+    assert is_quiet_step(substeps, 0.1, 1.0, 0.1, (0.0, 0.0))
+    assert not is_quiet_step(substeps, 0.1, 0.05 * P * P * H, 0.1, (0.0, 0.0))
+
+
+@both
+def test_a_rotation_that_falls_from_the_highest_so_far_is_quiet_but_not_one_that_falls_from_a_higher_one(
+    substeps: int,
+) -> None:
+    assert is_quiet_step(substeps, 0.1, -0.5, 0.1, (0.0, 0.0))
+    assert not is_quiet_step(substeps, 0.1, -0.5, 0.099, (0.0, 0.0))
+
+
+@both
+@pytest.mark.parametrize("v", [0.03 * P * P * H, 0.05 * P * P * H, 0.08 * P * P * H])
+def test_up_down_and_up_within_a_sample_is_an_event_where_the_top_is_new(substeps: int, v: float) -> None:
+    """The motion turns around within the sample: the rotation bulges, dips, and may end above both."""
+    u, strong = 0.1, 0.3
+    row = (strong, -3.0 * strong / H)
+    rotation = path(substeps, u, v, row)
+    turns = np.sum(np.diff(np.sign(np.diff(rotation))) != 0)
+    assert turns == 2
+    assert not is_quiet_step(substeps, u, v, u, row)
+    assert is_quiet_step(substeps, u, v, u + 1.0, row)
+
+
+@both
+def test_down_up_and_down_from_the_highest_so_far_is_an_event(substeps: int) -> None:
+    """At both ends it falls."""
+    u, v, strong = 0.1, -0.01 * P * P * H, 0.3
+    row = (-strong, 3.0 * strong / H)
+    rotation = path(substeps, u, v, row)
+    assert np.sum(np.diff(np.sign(np.diff(rotation))) != 0) == 2
+    assert not is_quiet_step(substeps, u, v, min(u, np.max(rotation)), row)
+    assert is_quiet_step(substeps, u, v, u + 1.0, row)
+
+
+@both
+@pytest.mark.parametrize("below", [1e-3, 1e-9])
+def test_a_fall_is_an_event(substeps: int, below: float) -> None:
+    """At the step's end, or between its ends."""
+    for v, row in ((1.0, (0.0, 0.0)), (0.45 * P * P * H, (0.8, 0.0))):
+        top = np.max(path(substeps, 0.1, v, row))
+        assert not is_quiet_step(substeps, 0.1, v, 1.0, row, fallen=0.1 + (top - 0.1) * (1.0 - below))
+        assert is_quiet_step(substeps, 0.1, v, 1.0, row, fallen=top + 0.2 * P * P * H * H)
+
+
+@pytest.mark.parametrize("strength", [3.0, 30.0, 300.0, 3e3])
+def test_a_nonlinear_series_whose_last_terms_still_count_is_an_event(strength: float) -> None:
+    """Under ever more violent motions a quiet step is still exact, and in the end there is none."""
+    u, v, row = 1.0, 1e-3, (-strength, 0.0)
+    blocks, states = one(u, v, 9.0, nonlinear=True)
+    scratch = new_scratch()
+    order, reach, _ = expand(
+        in_units_of_g([0.0, 9.0], [row]), blocks[0], rules_for(nonlinear=True), scratch, states[0], H
+    )
+    assert reach == H
+    expected = evaluate(scratch["rotation"], order, H)
+    found = stepped(blocks, states, row, H, substeps=1, fallen=math.inf)[0]
+    if found.quiet:
+        assert found.end["u"] == pytest.approx(expected[0], rel=4.0 * ULP)
+        assert found.end["v"] == pytest.approx(expected[1], rel=8.0 * ULP)
+    assert found.quiet == (strength < 100.0)
+
+
+@both
+@pytest.mark.parametrize("what", ["u", "v", "start", "slope"])
+def test_not_a_number_is_an_event(substeps: int, what: str) -> None:
+    values = {"u": 0.1, "v": -0.5, "start": 0.0, "slope": 0.0, "peak": 0.1}
+    values[what] = math.nan
+    row = (values["start"], values["slope"])
+    found = stepped(*one(values["u"], values["v"], values["peak"], nonlinear=substeps > 0), row, H, substeps=substeps)
+    assert not found[0].quiet
+
+
+@pytest.mark.parametrize("which", [0, 1, 3, 4, 8], ids=["start", "end", "dip", "bulge", "limit"])
+def test_the_test_of_events_never_calls_not_a_number_quiet(which: int) -> None:
+    numbers = [0.1, 0.2, 1.0, 0.01, 0.01, -0.1, 0.1, 0.5, 1.5]
+
+    def quiet(x: list[float]) -> bool:
+        return bool(is_quiet((x[0], x[1]), x[2], x[3], x[4], (x[5], x[6]), x[7], x[8]))
+
+    assert quiet(numbers)
+    numbers[which] = math.nan
+    assert not quiet(numbers)
+
+
+@both
+def test_a_lane_does_the_same_whatever_its_company(substeps: int) -> None:
+    random, h, row = np.random.default_rng(4), 0.01, (0.05, 1.0)
+    blocks, states = drawn(random, substeps > 0, h)
+    whole = stepped(blocks.copy(), states.copy(), row, h, substeps=substeps)
+    for k in (0, 7, WIDTH - 1):
+        alone = stepped(blocks[k : k + 1].copy(), states[k : k + 1].copy(), row, h, substeps=substeps)[0]
+        assert alone.quiet == whole[k].quiet
+        assert (alone.end["u"], alone.end["v"]) == (whole[k].end["u"], whole[k].end["v"])
+
+
+@both
+def test_a_lane_without_a_block_never_has_an_event(substeps: int) -> None:
+    for row in ((0.0, 0.0), (100.0, -1e6)):
+        stepped(*one(0.1, 0.0, 1.0, nonlinear=substeps > 0), row, H, substeps=substeps)  # checks it

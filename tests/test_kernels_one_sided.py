@@ -1,0 +1,212 @@
+"""Other systems of the same engine: a ball on a table that moves, and an oscillator with a stop."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from kernel_records import NO_GROUND, ULP, in_units_of_g, one_sided, rules_for, state_of
+from test_kernels_march import Run, run
+
+from rocking.kernels import status
+from rocking.kernels.certificate import Proof, prove_rest
+from rocking.kernels.ground import Ground
+from rocking.kernels.state import Record, new_scratch
+
+G = 9.81
+
+mp = mpmath.mp.clone()
+mp.dps = 40
+
+
+def ball(e: float) -> Record:
+    """u'' = -(g + table's acceleration)."""
+    return one_sided(0.0, G, 1.0, e)
+
+
+def sine_table(amplitude: float, frequency: float, duration: float, width: float) -> Ground:
+    """Table's acceleration amplitude sin(omega t), g: Taylor polynomials on short pieces, good to double precision."""
+    omega, starts = 2.0 * math.pi * frequency, np.arange(0.0, duration, width)
+    rows = []
+    for t in starts:
+        cycle = [math.sin(omega * t), math.cos(omega * t), -math.sin(omega * t), -math.cos(omega * t)]
+        rows.append([amplitude * cycle[k % 4] * omega**k / math.factorial(k) for k in range(14)])
+    return in_units_of_g([*starts, starts[-1] + width], rows)
+
+
+def thrown(ground: Ground, block: Record, v: float, u: float = 0.0, **rules: float) -> Run:
+    return run(ground, block=block, velocity=v, rotation=u, **rules)
+
+
+@pytest.mark.parametrize("e", [0.1, 0.5, 0.9, 0.99])
+@pytest.mark.parametrize("v", [1e-6, 1.0, 30.0])
+@pytest.mark.parametrize("columns", [2, 4])
+def test_a_ball_on_a_table_at_rest_stops_bouncing_at_zenos_time(e: float, v: float, columns: int) -> None:
+    """The sum of 2 v e^n/g; that of the speeds is geometric, too, and the certificate's bracket holds it."""
+    ground = in_units_of_g([0.0, 1e3], [[0.0] * columns])
+    found, zeno = thrown(ground, ball(e), v), 2.0 * v / (G * (1.0 - e))
+    assert found.kinds == [status.REST]
+    assert found.events["time"][0] == pytest.approx(zeno, rel=1e-13, abs=1e-12)
+    (sequence,) = found.sequences
+    assert sequence["lower"] <= zeno * (1.0 + 1e-14)
+    assert zeno <= sequence["upper"] * (1.0 + 1e-14)
+    rounding = 32.0 * ULP * (len(found.impacts) + 5) * zeno
+    assert sequence["upper"] - sequence["lower"] <= max(1e-12, rounding)
+    assert np.all(found.impacts["side"] == 1)
+    speeds = v * e ** np.arange(len(found.impacts))
+    assert found.impacts["speed_before"] == pytest.approx(speeds, rel=1e-13)
+    assert found.at["peak"] == pytest.approx(v * v / (2.0 * G), rel=1e-14)
+    assert found.at["peak_time"] == pytest.approx(v / G, rel=1e-14)
+
+
+def test_a_ball_without_any_motion_of_the_table_needs_no_piece_of_it() -> None:
+    for u in (0.0, 1.0):
+        found = thrown(NO_GROUND, ball(0.5), 1.0, u)
+        first = (1.0 + math.sqrt(1.0 + 2.0 * G * u)) / G
+        speed = math.sqrt(1.0 + 2.0 * G * u)
+        assert found.ending == status.DONE
+        assert found.impacts["time"][0] == pytest.approx(first, rel=1e-14)
+        assert found.events["time"][-1] == pytest.approx(first + 2.0 * 0.5 * speed / (G * 0.5), rel=1e-13)
+
+
+def test_a_ball_may_be_in_the_air_when_the_motion_of_the_table_is_over() -> None:
+    found = thrown(in_units_of_g([0.0, 0.1], [[0.3, 0.0]]), ball(0.5), 1.0)
+    u, v = 0.1 - 0.5 * 1.3 * G * 0.01, 1.0 - 1.3 * G * 0.1
+    flight = (v + math.sqrt(v * v + 2.0 * G * u)) / G
+    assert found.impacts["time"][0] == pytest.approx(0.1 + flight, rel=1e-14)
+
+
+def sine_impacts(amplitude: float, frequency: float, e: float, v: float, count: int) -> list[tuple[float, float]]:
+    """Times and speeds before the first impacts, in 40 digits: the way of the table is integrated in closed form."""
+    omega = 2 * mp.pi * mp.mpf(frequency)
+    g, a = mp.mpf(G), mp.mpf(amplitude) * mp.mpf(G)
+    start, v, found = mp.mpf(0), mp.mpf(v), []
+
+    for _ in range(count):
+
+        def height(t: mpmath.mpf, start: mpmath.mpf = start, v: mpmath.mpf = v) -> mpmath.mpf:
+            moved = a / omega * mp.cos(omega * start) * (t - start)
+            moved -= a / omega**2 * (mp.sin(omega * t) - mp.sin(omega * start))
+            return v * (t - start) - g * (t - start) ** 2 / 2 - moved
+
+        def rate(t: mpmath.mpf, start: mpmath.mpf = start, v: mpmath.mpf = v) -> mpmath.mpf:
+            return v - g * (t - start) - a / omega * (mp.cos(omega * start) - mp.cos(omega * t))
+
+        guess = start + 2 * v / (g + a * mp.sin(omega * start))
+        end = mp.findroot(lambda t, height=height, start=start: height(t) / (t - start), guess)
+        speed = -rate(end)
+        found.append((float(end), float(speed)))
+        start, v = end, mp.mpf(e) * speed
+    return found
+
+
+@pytest.mark.parametrize("frequency", [0.5, 3.0])
+@pytest.mark.parametrize("e", [0.5, 0.9])
+def test_a_ball_on_a_table_that_moves_like_a_sine_bounces_as_in_many_digits(frequency: float, e: float) -> None:
+    amplitude, v = 0.4, 0.5
+    found = thrown(sine_table(amplitude, frequency, 3.0, 0.05 / frequency), ball(e), v)
+    count = min(12, len(found.impacts))
+    assert count > 5
+    expected = np.array(sine_impacts(amplitude, frequency, e, v, count))
+    assert found.impacts["time"][:count] == pytest.approx(expected[:, 0], rel=1e-12)
+    assert found.impacts["speed_before"][:count] == pytest.approx(expected[:, 1], rel=1e-11)
+    (sequence,) = found.sequences
+    rest = sine_impacts(amplitude, frequency, e, v, 400 if e == 0.9 else 60)[-1][0]
+    assert sequence["lower"] - 1e-11 <= rest <= sequence["upper"] + 1e-11
+    assert found.kinds == [status.REST]
+    assert found.events["time"][0] == pytest.approx(rest, abs=1e-11)
+
+
+def test_a_table_that_falls_away_faster_than_the_ball_lets_it_fly() -> None:
+    """At rest until the table's acceleration passes -g, and then up by what it falls more."""
+    ground = in_units_of_g([0.0, 1.0, 1.2, 9.0], [[0.0, -0.5], [-2.0, 0.0], [0.0, 0.0]])
+    found = thrown(ground, ball(0.5), 0.0)
+    assert found.kinds == [status.UPLIFT, status.REST]
+    assert found.events["time"][0] == 1.0
+    assert found.events["side"][0] == 1
+    v, u = G * 0.2, 0.5 * G * 0.04
+    flight = (v + math.sqrt(v * v + 2.0 * G * u)) / G
+    assert found.impacts["time"][0] == pytest.approx(1.2 + flight, rel=1e-13)
+
+
+# ---- An oscillator with a stop: u'' = -omega^2 u - pressed (threshold + a) ----
+
+OMEGA = 3.0
+
+
+def oscillator(e: float, pressed: float = 1.0) -> Record:
+    """Pressed against its stop by a constant force."""
+    return one_sided(-OMEGA * OMEGA, pressed, 1.0, e)
+
+
+def return_time(v: float, pressed: float = 1.0) -> float:
+    """From the stop and back: u = (v/omega) sin(omega t) - (pressed/omega^2)(1 - cos(omega t))."""
+    return 2.0 / OMEGA * math.atan(OMEGA * v / pressed)
+
+
+@pytest.mark.parametrize("e", [0.3, 0.9])
+@pytest.mark.parametrize("v", [1e-4, 0.1, 3.0, 100.0])
+@pytest.mark.parametrize("columns", [2, 3])
+def test_an_oscillator_returns_to_its_stop_as_in_closed_form(e: float, v: float, columns: int) -> None:
+    """The speed at the stop is kept but for restitution, so that the sum of the flights is the time to rest."""
+    found = thrown(in_units_of_g([0.0, 1e3], [[0.0] * columns]), oscillator(e), v)
+    speeds = v * e ** np.arange(2000.0)
+    times = np.cumsum([return_time(s) for s in speeds])
+    count = len(found.impacts)
+    assert found.impacts["time"] == pytest.approx(times[:count], rel=1e-12)
+    assert found.impacts["speed_before"] == pytest.approx(speeds[:count], rel=1e-11)
+    assert found.kinds == [status.REST]
+    assert found.events["time"][0] == pytest.approx(times[-1], abs=2e-12)
+    (sequence,) = found.sequences
+    assert sequence["lower"] - 1e-13 <= times[-1] <= sequence["upper"] + 1e-13
+    top = math.hypot(v / OMEGA, 1.0 / OMEGA**2) - 1.0 / OMEGA**2
+    assert found.at["peak"] == pytest.approx(top, rel=1e-13)
+
+
+def test_an_oscillator_under_an_even_change_of_its_support_meets_its_stop_as_in_many_digits() -> None:
+    """u = A cos + B sin + particular solution, in 40 digits."""
+    rate, v, e = 0.6, 0.4, 0.7
+    found = thrown(in_units_of_g([0.0, 50.0], [[0.2, rate]]), oscillator(e), v)
+    omega, start, v = mp.mpf(OMEGA), mp.mpf(0), mp.mpf(v)
+    for impact in found.impacts[:6]:
+        a = 1 + mp.mpf(0.2) + mp.mpf(rate) * start
+
+        def position(t: mpmath.mpf, a: mpmath.mpf = a, v: mpmath.mpf = v) -> mpmath.mpf:
+            particular = -(a + mp.mpf(rate) * t) / omega**2
+            return (
+                particular
+                + a / omega**2 * mp.cos(omega * t)
+                + (v + mp.mpf(rate) / omega**2) / omega * mp.sin(omega * t)
+            )
+
+        t = mp.findroot(lambda t, position=position: position(t) / t, 2 / omega * mp.atan(omega * v / a))
+        speed = -mp.diff(position, t)
+        start, v = start + t, mp.mpf(e) * speed
+        assert impact["time"] == pytest.approx(float(start), rel=1e-13)
+        assert impact["speed_before"] == pytest.approx(float(speed), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "make, exact", [(ball, lambda v: 2.0 * v / G), (oscillator, return_time)], ids=["ball", "oscillator"]
+)
+@pytest.mark.parametrize("tolerance", [math.inf, 0.0], ids=["by comparison", "of higher order"])
+def test_the_bracket_of_a_body_that_bounces_on_one_side_holds_its_rest(make, exact, tolerance: float) -> None:
+    for e in (0.2, 0.9):
+        for v in (1e-6, 1e-3, 0.05):
+            found: Proof = prove_rest(
+                in_units_of_g([0.0, 1e3], [[0.0, 0.0]]), make(e), rules_for(tolerance=tolerance), new_scratch(),
+                state_of(0, 0.0, v),
+            )  # fmt: skip
+            rest = math.fsum(exact(v * e**n) for n in range(2000))
+            assert found.lower <= rest * (1.0 + 1e-15)
+            assert rest <= found.upper * (1.0 + 1e-15)
+            assert found.lower <= found.time <= found.upper
+            if tolerance == 0.0 and v < 1e-2:
+                assert found.upper - found.lower <= 1e-9 * rest
+
+
+def test_a_march_of_a_ball_without_a_table_of_rows_is_the_same() -> None:
+    ground = sine_table(0.4, 3.0, 3.0, 0.02)
+    kept, alone = thrown(ground, ball(0.9), 0.5), run(ground, block=ball(0.9), velocity=0.5, rows=0, keep=False)
+    for name in ("peak", "peak_time", "impacts", "rests", "rested", "end"):
+        assert kept.at[name] == alone.at[name]

@@ -1,0 +1,256 @@
+"""Steps at a glance: what they decide is what the full series says, and they never miss an impact or a peak."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from flint import fmpq_poly
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kernel_records import ULP, in_units_of_g, rocking_block, rules_for, state_of
+from oracles.exact import exact, real_roots
+
+from rocking.kernels.arc import evaluate, expand
+from rocking.kernels.impact import Arrival, advance
+from rocking.kernels.short_arc import short_step
+from rocking.kernels.state import Record, new_scratch
+from rocking.kernels.status import IMPACT, OVERTURN, STEP, UNDECIDED
+
+quick = settings(deadline=None, max_examples=200)
+models = pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
+
+
+class Case:
+    """An arc under an even change of the ground acceleration."""
+
+    def __init__(self, nonlinear: bool, side: int, p: float, alpha: float, row: tuple[float, float]) -> None:
+        self.nonlinear, self.side, self.p, self.alpha, self.row = nonlinear, side, p, alpha, row
+        self.ground = in_units_of_g([0.0, 1e3], [row])
+        self.block = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
+        self.rules = rules_for(nonlinear=nonlinear)
+        self.scratch = new_scratch()
+
+    def short(self, start: Record, left: float) -> Arrival:
+        return short_step(self.ground, self.block, self.rules, start, left)
+
+    def long(self, start: Record, left: float) -> tuple[Arrival, float]:
+        """Arrival, and how far the series reaches."""
+        order, h, _ = expand(self.ground, self.block, self.rules, self.scratch, start, left)
+        return advance(start, self.scratch, order, h, self.block["fallen"]), h
+
+    def curvature(self, u: float) -> float:
+        """Size of u''."""
+        a = abs(self.row[0])
+        return self.p**2 * (1.0 + a if self.nonlinear else abs(u) + self.alpha + a)
+
+
+def cases(nonlinear: bool, count: int, seed: int) -> Iterator[tuple[Case, float, float, float]]:
+    """Arcs of blocks and motions over many powers of ten: case, u, v, time left."""
+    random = np.random.default_rng(seed)
+
+    def power(low: float, high: float) -> float:
+        return float(10.0 ** random.uniform(low, high))
+
+    for _ in range(count):
+        p, alpha, left = power(-2.0, 2.0), power(-3.0, 0.0), power(-5.0, 0.3)
+        sign = random.choice([-1.0, 1.0], size=3)
+        row = (sign[0] * alpha * power(-3.0, 1.5), sign[1] * alpha * power(-3.0, 2.0) * p / left)
+        case = Case(nonlinear, int(random.integers(2)), p, alpha, row)
+        u = 0.0 if random.random() < 0.5 else alpha * power(-12.0, 0.2)
+        v = p * alpha * power(-9.0, 1.0)
+        if random.random() < 0.5:  # an arc that ends nearby
+            v = power(-1.0, 0.2) * (0.5 * case.curvature(0.0) * left / p if u == 0.0 else -u * p / left)
+        yield case, u, v if u == 0.0 else sign[2] * v, left / p
+
+
+@models
+def test_what_a_short_step_decides_is_what_the_full_series_says(nonlinear: bool) -> None:
+    """Outcome, time, rotation, velocity and peak to a few units in the last place, over many powers of ten."""
+    decided = {STEP: 0, IMPACT: 0}
+    for number, (case, u, v, left) in enumerate(cases(nonlinear, 6000, 1)):
+        start = state_of(case.side, u, v, peak=u + (number % 2) * case.alpha)
+        found = case.short(start, left)
+        if found.outcome == UNDECIDED:
+            continue
+        decided[found.outcome] += 1
+        assert 0.0 < found.time <= left
+        expected, reach = case.long(start, found.time if found.outcome == STEP else left)
+        if reach < found.time:
+            continue
+        t = found.time
+        size = max(u, abs(v) * t, abs(found.v) * t, found.u)
+        assert found.outcome == expected.outcome
+        assert abs(found.time - expected.time) * abs(found.v) <= 8.0 * ULP * size
+        assert abs(found.u - expected.u) <= 8.0 * ULP * size
+        # The velocity is compared at the impact's own time.
+        shift = case.curvature(u) * abs(found.time - expected.time)
+        assert abs(found.v - expected.v) * t <= 16.0 * ULP * size + shift * t
+        highest, height = max(float(start["peak"]), expected.height), max(float(start["peak"]), found.height)
+        assert abs(highest - height) <= 8.0 * ULP * size
+    assert min(decided.values()) > 500
+
+
+@models
+def test_a_short_step_decides_on_what_is_common(nonlinear: bool) -> None:
+    """Or else nothing is gained: arcs of a small rotation, well below the highest so far, under moderate motions."""
+    random = np.random.default_rng(2)
+    decided = 0
+    for _ in range(500):
+        case = Case(nonlinear, 0, 2.0, 0.2, (random.uniform(-0.1, 0.1), random.uniform(-3.0, 3.0)))
+        u, v = random.choice([0.0, 0.05]), random.uniform(1e-3, 0.05)
+        decided += case.short(state_of(0, u, v, peak=0.2), 0.005).outcome != UNDECIDED
+    assert decided > 450
+
+
+@quick
+@given(
+    st.just(0.0) | st.floats(1e-9, 1e-2),
+    st.floats(-0.2, 0.2),
+    st.floats(-1.5, 1.5),
+    st.floats(-60.0, 60.0),
+    st.floats(1e-4, 0.03),
+    st.integers(0, 1),
+)
+def test_the_first_impact_is_never_missed(u: float, v: float, a: float, slope: float, left: float, side: int) -> None:
+    """Against the isolated roots of the exact series of the linear model, 25 terms of it."""
+    v = max(abs(v), 1e-9) if u == 0.0 else v
+    case = Case(False, side, 2.0, 0.2, (a, slope))
+    found = case.short(state_of(side, u, v), left)
+    sign = 1.0 - 2.0 * side
+    c = [exact(u), exact(v), -2 * (exact(0.2) + exact(sign * a) - exact(u))]
+    c.append(4 * (c[1] - exact(sign * slope)) / 6)
+    while len(c) < 25:
+        c.append(4 * c[-2] / ((len(c) - 1) * len(c)))
+    roots = [float(r.mid()) for r in real_roots(fmpq_poly(c[1:] if u == 0.0 else c)) if r > 0]
+    first = min(roots, default=math.inf)
+    if found.outcome == IMPACT:
+        size = max(u, abs(v) * found.time)
+        assert abs(found.time - first) * abs(found.v) <= 16.0 * ULP * size or found.time == pytest.approx(
+            first, rel=1e-13
+        )
+    elif found.outcome == STEP:
+        assert first > found.time * (1.0 - 1e-14)
+
+
+def lower_than_before(case: Case, u: float, v: float, peak: float = 9.0) -> Record:
+    """State of a block that has been higher."""
+    return state_of(case.side, u, v, peak=peak)
+
+
+@models
+@pytest.mark.parametrize("depth", [1e-9, 1e-5, 1e-3, 0.1])
+@pytest.mark.parametrize("t", [1e-4, 1e-3, 5e-3])
+def test_a_dip_below_the_ground_between_two_ends_above_it_is_not_stepped_over(
+    nonlinear: bool, depth: float, t: float
+) -> None:
+    """A block pushed up while it comes down: u = k (t - m)^2 - d has two roots within the step."""
+    case = Case(nonlinear, 0, 2.0, 0.2, (-0.7, 0.0))
+    curvature = -4.0 * (math.sin(0.2) - 0.7 * math.cos(0.2) if nonlinear else 0.2 - 0.7)
+    middle = 0.5 * t
+    low = depth * 0.5 * curvature * middle**2
+    u, v = 0.5 * curvature * middle**2 - low, -curvature * middle
+    found = case.short(lower_than_before(case, u, v), t)
+    assert found.outcome in (UNDECIDED, IMPACT)
+    if found.outcome == IMPACT:
+        assert found.time < middle
+    touching = case.short(lower_than_before(case, u + 3.0 * low, v), t)
+    assert touching.outcome in (UNDECIDED, STEP)
+
+
+@models
+@pytest.mark.parametrize("scale", [1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("second", [1.000001, 1.1, 2.0, 5.0])
+def test_of_two_impacts_within_a_step_the_first_is_taken_or_none(nonlinear: bool, scale: float, second: float) -> None:
+    """An arc from the ground that comes down and would come up again: u/t has two roots."""
+    r1, r2 = scale, scale * second
+    alpha, p = 0.2, 2.0
+    left = 1.2 * r2
+    # c2 and c3 of u = k t (r1 - t)(r2 - t), from the threshold and the slope of the motion.
+    down = 0.1
+    k = p * p * down / 2.0 / (r1 + r2)
+    v = k * r1 * r2
+    gain = p * p * (math.cos(alpha) if nonlinear else 1.0)
+    a = 2.0 * k * (r1 + r2) / gain - (math.tan(alpha) if nonlinear else alpha)
+    slope = -6.0 * k / gain
+    case = Case(nonlinear, 0, p, alpha, (a, slope))
+    found = case.short(lower_than_before(case, 0.0, v), left)
+    assert found.outcome in (UNDECIDED, IMPACT)
+    if found.outcome == IMPACT:
+        assert found.time == pytest.approx(r1, rel=0.05 + 0.2 / (second - 1.0) * scale)
+        assert found.v < 0.0
+
+
+@models
+@pytest.mark.parametrize("below", [1e-12, 1e-6, 1e-3, 0.5])
+def test_a_peak_within_a_step_that_may_be_a_new_one_is_looked_at_closely(nonlinear: bool, below: float) -> None:
+    case = Case(nonlinear, 1, 2.0, 0.2, (0.0, 0.0))
+    u, v, left = 0.01, 1e-4, 1e-3
+    expected, _ = case.long(state_of(1, u, v), left)
+    assert u < expected.height
+    assert expected.u < expected.height
+    peak = u + (expected.height - u) * (1.0 - below)
+    found = case.short(lower_than_before(case, u, v, peak), left)
+    assert (found.outcome, found.height) == (STEP, pytest.approx(expected.height, rel=1e-15))
+    assert found.top == pytest.approx(expected.top, rel=1e-9)
+    assert case.short(lower_than_before(case, u, v, 0.02), left).outcome == STEP
+
+
+@models
+def test_a_hump_on_a_convex_stretch_is_left_to_a_closer_look(nonlinear: bool) -> None:
+    """The summit of a step is looked for only where the arc is concave throughout."""
+    alpha = 0.2
+    case = Case(nonlinear, 1, 2.0, alpha, (-0.05, 600.0))  # pushed ever harder to the other side, then back
+    u, v, left = 0.1, 1e-3, 1e-3
+    step = case.short(lower_than_before(case, u, v, 0.5 * u), left)
+    long, _ = case.long(lower_than_before(case, u, v, 0.5 * u), left)
+    assert step.outcome in (UNDECIDED, STEP)
+    if step.outcome == STEP:
+        assert step.height == pytest.approx(long.height, rel=1e-14)
+
+
+@models
+def test_a_fall_is_left_to_a_closer_look(nonlinear: bool) -> None:
+    case = Case(nonlinear, 0, 2.0, 0.2, (0.0, 0.0))
+    near = 0.5 * math.pi - 1e-4
+    assert case.short(state_of(0, near, 1.0), 1e-3).outcome == UNDECIDED
+    assert case.long(state_of(0, near, 1.0), 1e-3)[0].outcome == OVERTURN
+    assert case.short(state_of(0, near, 1e-4), 1e-3).outcome == STEP
+
+
+@models
+def test_a_balanced_block_is_left_to_a_closer_look(nonlinear: bool) -> None:
+    case = Case(nonlinear, 0, 2.0, 0.2, (0.0, 0.0))
+    assert case.short(state_of(0, 0.2, 0.0), 1e-3).outcome == UNDECIDED
+
+
+@models
+@pytest.mark.parametrize("what", ["u", "v", "acceleration", "slope", "left"])
+@pytest.mark.parametrize("grounded", [True, False])
+def test_not_a_number_is_undecided(nonlinear: bool, what: str, grounded: bool) -> None:
+    values = {"u": 0.0 if grounded else 0.01, "v": 0.01, "acceleration": 0.1, "slope": 0.3, "left": 1e-3}
+    values[what] = math.nan
+    case = Case(nonlinear, 0, 2.0, 0.2, (values["acceleration"], values["slope"]))
+    start = state_of(0, values["u"], values["v"], peak=1.0, offset=1e-3)
+    assert case.short(start, values["left"]).outcome == UNDECIDED
+
+
+@models
+@pytest.mark.parametrize("columns", [3, 5])
+def test_motions_of_a_higher_degree_take_the_long_way(nonlinear: bool, columns: int) -> None:
+    case = Case(nonlinear, 0, 2.0, 0.2, (0.1, 0.3))
+    case.ground = in_units_of_g([0.0, 9.0], [[0.1, 0.3, *[0.0] * (columns - 2)]])
+    assert case.short(state_of(0, 0.01, 0.0, peak=1.0), 1e-3).outcome == UNDECIDED
+
+
+@models
+def test_a_long_step_goes_as_far_as_it_is_short(nonlinear: bool) -> None:
+    """What is left of it comes next: the end is on the arc."""
+    case = Case(nonlinear, 0, 2.0, 0.2, (0.02, 0.1))
+    start = state_of(0, 0.1, 0.5, peak=1.0)
+    found = case.short(start, 5.0)
+    assert found.outcome == STEP
+    assert 0.005 < found.time < 0.05
+    order, _, _ = expand(case.ground, case.block, case.rules, case.scratch, start, 0.5)
+    u, v, _ = evaluate(case.scratch["rotation"], order, found.time)
+    assert (found.u, found.v) == (pytest.approx(u, rel=4.0 * ULP), pytest.approx(v, rel=16.0 * ULP))
