@@ -19,7 +19,8 @@ def assert_agrees(share, omega, eta):
     if expected is None:
         assert np.isnan(time)
     else:
-        assert time == pytest.approx(float(expected), rel=5e-14)
+        # Extrapolation ends when it agrees to 1e-13; where restitution is near one it is no better than that.
+        assert time == pytest.approx(float(expected), rel=5e-14 if eta < 0.95 else 2e-13)
 
 
 @pytest.mark.parametrize("omega", [1e-6, 1e-3, 0.0042, 0.05, 1e3])
