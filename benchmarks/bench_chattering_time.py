@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rocking import chattering
-from rocking.chattering import duration
+from rocking.chattering.theory import duration
 
 CASE = (1.03, 2.0, 0.92)
 CASE_TIME = 1.1259476769338108721

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 import rocking
-from rocking.analysis import dynamic_figure, fragility, incremental_dynamic_analysis
+from rocking.analysis.fragility import fragility
+from rocking.analysis.incremental import dynamic_figure, incremental_dynamic_analysis
 
 OUT = Path("out")
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import rocking
-from rocking.analysis import overturning_figure, overturning_map
+from rocking.analysis.overturning import overturning_figure, overturning_map
 
 OUT = Path("out")
 

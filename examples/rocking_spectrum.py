@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import rocking
-from rocking.analysis import rocking_spectrum, spectrum_figure
+from rocking.analysis.spectrum import rocking_spectrum, spectrum_figure
 
 OUT = Path("out")
 

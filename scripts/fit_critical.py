@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rocking.chattering import critical_amplitude, critical_surface
+from rocking.chattering import critical_amplitude
+from rocking.chattering.theory import surface
 
-TARGET = Path(__file__).resolve().parents[1] / "src" / "rocking" / "chattering" / "critical_coefficients.py"
+TARGET = Path(__file__).resolve().parents[1] / "src" / "rocking" / "chattering" / "theory" / "surface_coefficients.py"
 
 #: Coefficients kept in 1/omega^2 and sqrt(1 - eta), and nodes that determine them.
 KEPT = (8, 10)
@@ -51,7 +52,7 @@ def main() -> None:
 def fit():
     """Interpolating coefficients of a_cr - 1, cut to those kept and rounded to 1e-12."""
     nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-    omega, eta = critical_surface.parameters(*np.meshgrid(nodes, nodes, indexing="ij"))
+    omega, eta = surface.parameters(*np.meshgrid(nodes, nodes, indexing="ij"))
     excess = critical_amplitude(omega, eta) - 1.0
     transform = chebyshev.chebvander(nodes, NODES - 1) * (2.0 / NODES)
     transform[:, 0] /= 2.0
@@ -63,7 +64,7 @@ def measured_error(coefficients):
     side = np.linspace(-1.0, 1.0, CHECKS)
     x, y = np.meshgrid(side, side, indexing="ij")
     approximate = 1.0 + chebyshev.chebval2d(x, y, coefficients)
-    return float(np.abs(approximate - critical_amplitude(*critical_surface.parameters(x, y))).max())
+    return float(np.abs(approximate - critical_amplitude(*surface.parameters(x, y))).max())
 
 
 def write(coefficients, error):

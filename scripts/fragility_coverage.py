@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import ndtri
 
-from rocking import InvalidOption
-from rocking.analysis import fit_fragility
+from rocking import InvalidOption, fit_fragility
 
 TABLE = Path(__file__).resolve().parents[1] / "docs" / "_tables" / "fragility-coverage.txt"
 DATA_SETS = 500

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.analysis import calibration_population as population
-from rocking.analysis.calibration_history import HistoryCalibration
-from rocking.analysis.calibration_population import Evidence
-from rocking.analysis.calibration_scores import Scores
-from rocking.analysis.calibration_space import Candidates, Space
+from rocking.analysis.calibration import population
+from rocking.analysis.calibration.history import HistoryCalibration
+from rocking.analysis.calibration.population import Evidence
+from rocking.analysis.calibration.scores import Scores
+from rocking.analysis.calibration.space import Candidates, Space
 
 HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
 STEP = 0.02

@@ -6,7 +6,7 @@ import pytest
 from numpy.polynomial import polynomial
 
 from rocking import chattering
-from rocking.chattering import duration
+from rocking.chattering.theory import duration
 from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED, lanes
 from rocking.kernels.sine.arc import State, arc
 from rocking.kernels.sine.basis import basis

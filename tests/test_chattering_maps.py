@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
-from rocking.chattering.exceedance import exceedances
 from rocking.chattering.families import Case
 from rocking.chattering.maps import Outcome, chattering_map, map_figure
+from rocking.motion.exceedance import exceedances
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
 THRESHOLD = BLOCK.gravity * 0.2

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from oracles.sine_chattering import settle
 
 from rocking import chattering
-from rocking.chattering import duration
+from rocking.chattering.theory import duration
 from rocking.errors import InvalidOption
 
 EPS_SERIES_C1 = 10.827447906757

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.analysis import fragility, incremental_dynamic_analysis, overturning_map, rocking_spectrum
+from rocking import fragility, incremental_dynamic_analysis, overturning_map, rocking_spectrum
 from rocking.cli import main
 
 RECORD = "el-centro-meloland-270"

@@ -13,7 +13,7 @@ from scipy import stats
 from scipy.optimize import minimize
 
 import rocking
-from rocking.analysis import fit_fragility, fragility
+from rocking import fit_fragility, fragility
 from rocking.block import Blocks
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "fragility.py"

@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import brentq
 
 import rocking
-from rocking.analysis import mode_name, overturning_figure, overturning_map
 from rocking.analysis.boundaries import boundaries
+from rocking.analysis.overturning import mode_name, overturning_figure, overturning_map
 from rocking.block import Blocks
 from rocking.engine import Setup, simulate_each
 from rocking.treatment import Certified

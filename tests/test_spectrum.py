@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import rocking
-from rocking.analysis import rocking_spectrum, spectrum_figure
-from rocking.analysis.spectrum import fractiles_of
+from rocking.analysis.spectrum import fractiles_of, rocking_spectrum, spectrum_figure
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "rocking_spectrum.py"
 PULSES = [rocking.pulses.one_sine(5.0, frequency) for frequency in (0.5, 0.8, 1.3, 2.0)]

@@ -12,14 +12,14 @@ from numbers import Integral, Real
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rocking.arrays import Floats
 from rocking.errors import RockingError
 
 #: Characters of a value in a message.
 _SHOWN: Final = 60
 
-Floats = NDArray[np.float64]
 Error = Callable[[str], RockingError]
 
 

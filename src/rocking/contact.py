@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rocking.kernels.state import Floats
+from rocking.arrays import Floats
 
 
 def contact_forces(

@@ -13,12 +13,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.arrays import Floats, Integers
 from rocking.block import Blocks
 from rocking.kernels import state, status
 from rocking.kernels.ground import Ground
 from rocking.kernels.lanes import crew, scheduler
 from rocking.kernels.march import march
-from rocking.kernels.state import Floats, Integers, Record, Records
+from rocking.kernels.state import Record, Records
 from rocking.motion.motion import Motion
 from rocking.problem import Model, ground_of, records_of, rules_of
 from rocking.treatment import AsymptoticTime, Treatment

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.constants import VERSION
 from rocking.engine import OUTCOME, Setup, Task, cores, parts_of, simulate_tasks
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.kernels.state import Floats
 from rocking.motion import measures
 from rocking.motion.motion import Motion
 from rocking.problem import Model, rules_of

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.contact import contact_forces, friction_demand
 from rocking.errors import InvalidOption, OutputError
 from rocking.kernels import state, status, variation
-from rocking.kernels.state import Floats
 from rocking.kernels.trace import Trail, trace
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion

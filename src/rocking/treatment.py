@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.kernels import status
-from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
 
 

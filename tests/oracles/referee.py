@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rocking
+from rocking.arrays import Floats
 
 GRAVITY = 9.80665
 ULP = 2.0**-52
@@ -26,7 +27,6 @@ EXPLAINED = 0.05
 VISIBLE = 1e3
 """A change by this many tolerances makes a response ambiguous, by its own definition."""
 
-Floats = NDArray[np.float64]
 Drawn = np.random.Generator
 
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.kernels.state import Floats, Integers
+from rocking.arrays import Floats, Integers
 from rocking.progress import Progress
 
 #: From so many changes on, no further ones are looked for in an interval of the grid.

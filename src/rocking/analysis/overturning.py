@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.boundaries import Boundaries, boundaries
+from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.constants import VERSION
 from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
-from rocking.kernels.state import Floats, Integers
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.problem import Model

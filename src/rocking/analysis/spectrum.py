@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
 from rocking.problem import Model
 from rocking.treatment import Treatment

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.block.single import ALPHA, GRAVITY, RESTITUTION, Block, Limits, P, within
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.chattering.exceedance import exceedances
+from rocking.motion.exceedance import exceedances
 from rocking.response import Response
 
 EPISODE: Final = np.dtype(

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.chattering.exceedance import exceedances
+from rocking.arrays import Floats
 from rocking.chattering.families import Case, Family
-from rocking.chattering.parameters import FloatArray
 from rocking.errors import InvalidOption
+from rocking.motion.exceedance import exceedances
 from rocking.simulation import simulate
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def _followed(case: Case) -> _Point:
     )
 
 
-def _outcome(rest: float, later: FloatArray) -> Outcome:
+def _outcome(rest: float, later: Floats) -> Outcome:
     """Outcome from the upper bound on the first rest and the later times at which a threshold is passed."""
     if math.isnan(rest):
         return Outcome.UNPROVEN
@@ -187,7 +187,7 @@ def _outcome(rest: float, later: FloatArray) -> Outcome:
     return Outcome.RESTS_LATER if rest <= later.max() else Outcome.RESTS_AT_LAST
 
 
-def _axis(values: ArrayLike, name: str) -> FloatArray:
+def _axis(values: ArrayLike, name: str) -> Floats:
     axis = checks.numbers(values, f"values of {name}", InvalidOption)
     if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or not (np.diff(axis) > 0.0).all():
         raise InvalidOption(f"the values of {name} must be finite numbers in increasing order")

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.arrays import Floats
 from rocking.block import Block
-from rocking.chattering.parameters import FloatArray
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.problem import Model
@@ -63,13 +63,13 @@ class SchemeOutcome:
     treatment: Treatment
     response: Response
     rests: NDArray[np.void]
-    missed: FloatArray
+    missed: Floats
     peak_error: float
     rotation_error: float
     overturns_wrongly: bool
 
     @property
-    def false_rests(self) -> FloatArray:
+    def false_rests(self) -> Floats:
         """Times of rests that are none, s."""
         return np.asarray(self.rests["time"][np.isnan(self.rests["certified"])], dtype=float)
 
@@ -245,7 +245,7 @@ def _outcome(scheme: Treatment, response: Response, certified: Response) -> Sche
     )
 
 
-def _rests(response: Response) -> FloatArray:
+def _rests(response: Response) -> Floats:
     """Start and end of each rest that follows an impact, shape (n, 2); the last may have no end."""
     stretches = []
     events = response.events
@@ -255,7 +255,7 @@ def _rests(response: Response) -> FloatArray:
     return np.array(stretches, dtype=float).reshape(-1, 2)
 
 
-def _counterpart(stretch: FloatArray, proven: FloatArray) -> float:
+def _counterpart(stretch: Floats, proven: Floats) -> float:
     """Time of the proven rest that overlaps with a stretch at rest; NaN where none does."""
     overlap = np.minimum(proven[:, 1], stretch[1]) - np.maximum(proven[:, 0], stretch[0])
     matching = np.flatnonzero(overlap > 0.0)

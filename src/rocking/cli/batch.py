@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rocking.cli import options
 from rocking.errors import InvalidOption, OutputError
 from rocking.motion.motion import Motion
+from rocking.motion.named import named_motion
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +49,7 @@ def motions_from(
     """Motions of several record files or shipped records."""
     if not names:
         raise InvalidOption("give one record or more: files, or names of shipped records (see rocking records)")
-    return [options.motion_from(name, channel=channel, dt=dt, units=units, scale=scale) for name in names]
+    return [named_motion(name, channel=channel, dt=dt, units=units, scale=scale) for name in names]
 
 
 def write(

@@ -10,12 +10,13 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from rocking.analysis.calibration import Calibration
-from rocking.analysis.calibration import calibrate as run
-from rocking.analysis.calibration_history import HistoryCalibration, calibrate_history
+from rocking.analysis.calibration.history import HistoryCalibration, calibrate_history
+from rocking.analysis.calibration.outcomes import Calibration
+from rocking.analysis.calibration.outcomes import calibrate as run
+from rocking.analysis.calibration.tables import Outcomes, read
 from rocking.cli import batch, options
-from rocking.cli.calibrate_data import Outcomes, read
 from rocking.errors import InvalidOption, OutputError
+from rocking.motion.named import named_motion
 from rocking.problem import Model
 
 
@@ -88,12 +89,12 @@ def calibrate(
     choices |= {name: value for name, value in (("model", model), ("two_sided", two_sided)) if value is not None}
     if isinstance(table, Outcomes):
         _refuse("a history", motion=motion, initial_rotation=initial_rotation)
-        others = [options.motion_from(name, channel=channel, dt=dt, units=units) for name in predict]
+        others = [named_motion(name, channel=channel, dt=dt, units=units) for name in predict]
         found = run(table.motions, table.overturned, seed, candidates=candidates, **choices)
         results = _outcomes_results(found, table, folds, dict(zip(predict, found.predict(others), strict=True)))
     else:
         _refuse("outcomes", predict=predict or None, folds=folds or None)
-        shaking = None if motion is None else options.motion_from(motion, channel=channel, dt=dt, units=units)
+        shaking = None if motion is None else named_motion(motion, channel=channel, dt=dt, units=units)
         choices |= {"initial_rotation": initial_rotation, "seed": seed}
         results = _history_results(calibrate_history(table.times, table.rotation, shaking, **choices))
     if folder is not None:

@@ -8,9 +8,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from rocking.analysis.fragility_curve import Fragility
-from rocking.analysis.fragility_function import fragility as run
-from rocking.analysis.measures import MeasureName
+from rocking.analysis.fragility.curve import Fragility
+from rocking.analysis.fragility.fit import fragility as run
+from rocking.analysis.intensity import MeasureName
 from rocking.cli import batch, options
 from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption

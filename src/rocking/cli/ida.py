@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from rocking.analysis.dynamic import dynamic_figure, incremental_dynamic_analysis
-from rocking.analysis.measures import MeasureName
+from rocking.analysis.incremental import dynamic_figure, incremental_dynamic_analysis
+from rocking.analysis.intensity import MeasureName
 from rocking.cli import batch, options
 from rocking.problem import Model
 

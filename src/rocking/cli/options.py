@@ -12,25 +12,7 @@ import numpy as np
 
 from rocking.block import Block
 from rocking.errors import InvalidBlock, InvalidOption, OutputError
-from rocking.motion import formats, records
-from rocking.motion.motion import Motion
 from rocking.treatment import Certified, IntervalThreshold, Treatment, VelocityThreshold, treatment
-
-
-def motion_from(
-    name: str,
-    *,
-    channel: str | None = None,
-    dt: float | None = None,
-    units: str | None = None,
-    scale: float = 1.0,
-) -> Motion:
-    """Motion of a record file, or of a shipped record of that name, times a factor."""
-    if not Path(name).exists() and name in records.names():
-        motion = records.load(name)
-    else:
-        motion = formats.read(name, channel=channel, dt=dt, units=units)
-    return motion if scale == 1.0 else motion.scaled(scale)
 
 
 def block_from(

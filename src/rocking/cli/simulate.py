@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from rocking.cli import options
 from rocking.errors import OutputError
 from rocking.motion.motion import Motion
+from rocking.motion.named import named_motion
 from rocking.problem import Model
 from rocking.response import Response
 from rocking.simulation import simulate as run
@@ -84,7 +85,7 @@ def simulate(
     block = options.block_from(half_width, half_height, p, alpha, restitution)
     how = options.treatment_from(chattering)
     folder = None if out is None else options.output_folder(out)
-    shaking = options.motion_from(motion, channel=channel, dt=dt, units=units, scale=scale)
+    shaking = named_motion(motion, channel=channel, dt=dt, units=units, scale=scale)
     response = run(
         block,
         shaking,

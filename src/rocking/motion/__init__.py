@@ -1,5 +1,5 @@
 """Ground motions: piecewise polynomials in time."""
 
-from rocking.motion.motion import Description, Motion
+import lazy_loader
 
-__all__ = ["Description", "Motion"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.piecewise import Floats
 
 if TYPE_CHECKING:
     from rocking.motion.motion import Motion

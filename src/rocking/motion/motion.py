@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.constants import HIGHEST_DEGREE
 from rocking.errors import InvalidMotion
 from rocking.motion import measures, piecewise, processing
-from rocking.motion.piecewise import Floats
 
 # Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take.
 _STRONGEST: Final = 1e50

@@ -6,9 +6,8 @@ Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, x count
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rocking.arrays import Floats
 
 
 def value(coefficients: Floats, x: Floats) -> Floats:

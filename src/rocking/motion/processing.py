@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final, TypeVar
 import numpy as np
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.piecewise import Floats
 
 if TYPE_CHECKING:
     from rocking.motion.motion import Motion

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 from rocking.motion.motion import Description, Motion
-from rocking.motion.piecewise import Floats
 
 # Relative to the peak; covers the terms left out and the rounding of the coefficients.
 _ERROR: Final = 1e-15

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from rocking.plot.style import ABOVE, GROUND, INK, REST, STYLE, FloatArray
+from rocking.arrays import Floats
+from rocking.plot.style import ABOVE, GROUND, INK, REST, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,34 +37,34 @@ class SpectrumCurves(NamedTuple):
     """
 
     label: str
-    singles: FloatArray
-    fractiles: FloatArray
-    overturned: FloatArray
+    singles: Floats
+    fractiles: Floats
+    overturned: Floats
 
 
 class ScaledMotion(NamedTuple):
     """One motion scaled up: levels, peak rotation over slenderness, and the bands (n, 2) of levels that overturn."""
 
     label: str
-    levels: FloatArray
-    peak: FloatArray
-    bands: FloatArray
+    levels: Floats
+    peak: Floats
+    bands: Floats
 
 
 class FragilityLine(NamedTuple):
     """A fitted curve with its confidence band, and the shares seen at (grouped) intensities."""
 
     label: str
-    intensity: FloatArray
-    probability: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    seen_at: FloatArray
-    seen: FloatArray
+    intensity: Floats
+    probability: Floats
+    lower: Floats
+    upper: Floats
+    seen_at: Floats
+    seen: Floats
 
 
 def spectrum_figure(
-    *, x: FloatArray, curves: Sequence[SpectrumCurves], fractiles: Sequence[float], x_label: str, title: str
+    *, x: Floats, curves: Sequence[SpectrumCurves], fractiles: Sequence[float], x_label: str, title: str
 ) -> Figure:
     """Draw peak rotations against the size of the block, and below them the share of motions that overturn it.
 
@@ -110,7 +111,7 @@ def spectrum_figure(
 
 
 def _draw_spectrum(
-    axes: Axes, x: FloatArray, curve: SpectrumCurves, fractiles: Sequence[float], style: Mapping[str, Any]
+    axes: Axes, x: Floats, curve: SpectrumCurves, fractiles: Sequence[float], style: Mapping[str, Any]
 ) -> None:
     for single in curve.singles:
         axes.plot(x, _cut(single), color=style["color"], linewidth=0.5, alpha=0.35)
@@ -120,16 +121,16 @@ def _draw_spectrum(
         axes.plot(x, _cut(fractile), linewidth=1.8 if k == middle else 0.9, label=label, **style)
 
 
-def _cut(values: FloatArray) -> FloatArray:
+def _cut(values: Floats) -> Floats:
     """Values with gaps where they are infinite."""
     return np.where(np.isfinite(values), values, np.nan)
 
 
 def regions_figure(
     *,
-    x: FloatArray,
+    x: Floats,
     y_range: tuple[float, float],
-    edges: Sequence[FloatArray],
+    edges: Sequence[Floats],
     regions: Sequence[Sequence[int]],
     names: Mapping[int, str],
     x_label: str,
@@ -168,8 +169,8 @@ def regions_figure(
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-    polygons: dict[int, list[FloatArray]] = {region: [] for region in names}
-    lines: list[FloatArray] = []
+    polygons: dict[int, list[Floats]] = {region: [] for region in names}
+    lines: list[Floats] = []
     for abscissae, bounds, inside in _runs(x, edges, regions, y_range):
         curves = [np.column_stack([abscissae, bound]) for bound in bounds]
         for region, low, high in zip(inside, curves, curves[1:], strict=False):
@@ -188,8 +189,8 @@ def regions_figure(
 
 
 def _runs(
-    x: FloatArray, edges: Sequence[FloatArray], regions: Sequence[Sequence[int]], y_range: tuple[float, float]
-) -> Iterator[tuple[FloatArray, FloatArray, Sequence[int]]]:
+    x: Floats, edges: Sequence[Floats], regions: Sequence[Sequence[int]], y_range: tuple[float, float]
+) -> Iterator[tuple[Floats, Floats, Sequence[int]]]:
     """Yield runs of abscissae with the same regions: abscissae, bounds of shape (regions + 1, abscissae), regions.
 
     Two runs meet half way: a boundary that both have runs straight from one to the other, any other one level.
@@ -207,7 +208,7 @@ def _runs(
         yield np.array(at), np.stack(bounds, axis=1), regions[start]
 
 
-def _meeting(columns: Sequence[FloatArray], regions: Sequence[Sequence[int]], here: int, there: int) -> FloatArray:
+def _meeting(columns: Sequence[Floats], regions: Sequence[Sequence[int]], here: int, there: int) -> Floats:
     """Bounds half way from one abscissa to the next."""
     bounds = columns[here].copy()
     for mine, other in _shared(regions[here], regions[there]):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from rocking.plot.style import ABOVE, GROUND, INK, STYLE, FloatArray
+from rocking.arrays import Floats
+from rocking.plot.style import ABOVE, GROUND, INK, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +40,7 @@ class Mark(NamedTuple):
 
 
 def excitation_figure(
-    *, time: FloatArray, acceleration: FloatArray, marks: tuple[Mark, ...], rest: float, title: str
+    *, time: Floats, acceleration: Floats, marks: tuple[Mark, ...], rest: float, title: str
 ) -> Figure:
     """Draw a sine with the thresholds, its exceedances, the first two initiations and the time to the first rest.
 
@@ -83,9 +84,9 @@ def excitation_figure(
 
 def history_figure(
     *,
-    time: FloatArray,
-    rotations: Mapping[str, FloatArray],
-    acceleration: FloatArray,
+    time: Floats,
+    rotations: Mapping[str, Floats],
+    acceleration: Floats,
     limits: tuple[float, float],
     detail: Detail,
     marks: tuple[Mark, ...],
@@ -146,13 +147,13 @@ def history_figure(
     return figure
 
 
-def _draw_responses(axes: Axes, time: FloatArray, rotations: Mapping[str, FloatArray]) -> None:
+def _draw_responses(axes: Axes, time: Floats, rotations: Mapping[str, Floats]) -> None:
     axes.axhline(0.0, color=INK, linewidth=0.4)
     for (name, rotation), style in zip(rotations.items(), _SCHEMES, strict=False):
         axes.plot(time, 1e3 * rotation, label=name, **style)
 
 
-def _draw_excitation(axes: Axes, time: FloatArray, acceleration: FloatArray) -> None:
+def _draw_excitation(axes: Axes, time: Floats, acceleration: Floats) -> None:
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, acceleration, color=GROUND, linewidth=1.2, label="ground acceleration")
     beyond: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}

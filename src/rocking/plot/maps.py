@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.plot.style import STYLE, FloatArray
+from rocking.arrays import Floats
+from rocking.plot.style import STYLE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,8 +20,8 @@ _COLOURS: Final = ("#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a2
 
 def outcome_figure(
     *,
-    x: FloatArray,
-    y: FloatArray,
+    x: Floats,
+    y: Floats,
     outcome: NDArray[np.integer],
     meanings: Sequence[str],
     x_label: str,

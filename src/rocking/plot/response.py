@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from rocking.plot.style import ABOVE, GROUND, INK, REST, STYLE, FloatArray
+from rocking.arrays import Floats
+from rocking.plot.style import ABOVE, GROUND, INK, REST, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,21 +21,21 @@ LARGEST_RATIO_SHOWN: Final = 2.0
 class DrawnSequence(NamedTuple):
     """One chattering sequence: the times of its impacts and the bracket on the time of rest, s."""
 
-    impact_times: FloatArray
+    impact_times: Floats
     rest_lower: float
     rest_upper: float
 
 
 def response_figure(
     *,
-    time: FloatArray,
-    rotation_over_slenderness: FloatArray,
-    impact_times: FloatArray,
-    rest_intervals: FloatArray,
-    uplift_times: FloatArray,
+    time: Floats,
+    rotation_over_slenderness: Floats,
+    impact_times: Floats,
+    rest_intervals: Floats,
+    uplift_times: Floats,
     overturn_time: float | None,
-    motion_time: FloatArray,
-    motion_acceleration_g: FloatArray,
+    motion_time: Floats,
+    motion_acceleration_g: Floats,
     thresholds_g: tuple[float, float],
     chattering: DrawnSequence | None,
     title: str,
@@ -108,12 +109,12 @@ def _can_be_zoomed(sequence: DrawnSequence) -> bool:
     return sequence.impact_times.size > 1 and math.isfinite(sequence.rest_upper - sequence.rest_lower)
 
 
-def _shade_rest(axes: Axes, rest_intervals: FloatArray) -> None:
+def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
     for number, (start, end) in enumerate(rest_intervals):
         axes.axvspan(start, end, color=REST, linewidth=0.0, label="at rest" if number == 0 else None)
 
 
-def _draw_rotation(axes: Axes, time: FloatArray, ratio: FloatArray) -> None:
+def _draw_rotation(axes: Axes, time: Floats, ratio: Floats) -> None:
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, ratio, color=INK, linewidth=0.9, label="rotation")
     lowest = max(float(np.min(ratio, initial=0.0)), -LARGEST_RATIO_SHOWN)
@@ -125,7 +126,7 @@ def _draw_rotation(axes: Axes, time: FloatArray, ratio: FloatArray) -> None:
     axes.tick_params(labelbottom=False)
 
 
-def _mark_events(axes: Axes, impact_times: FloatArray, uplift_times: FloatArray, overturn_time: float | None) -> None:
+def _mark_events(axes: Axes, impact_times: Floats, uplift_times: Floats, overturn_time: float | None) -> None:
     rug = axes.get_xaxis_transform()
     if impact_times.size:
         axes.plot(
@@ -159,7 +160,7 @@ def _mark_events(axes: Axes, impact_times: FloatArray, uplift_times: FloatArray,
         )
 
 
-def _draw_motion(axes: Axes, time: FloatArray, acceleration: FloatArray, thresholds: tuple[float, float]) -> None:
+def _draw_motion(axes: Axes, time: Floats, acceleration: Floats, thresholds: tuple[float, float]) -> None:
     plus, minus = thresholds
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, acceleration, color=GROUND, linewidth=0.6, label="ground acceleration")
@@ -212,7 +213,7 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     axes.set_title(f"A: at rest at {rest:.6f} s,\nbracket {width:.0e} s wide", color=ABOVE, loc="left")
 
 
-def _limit_time(axes: Axes, time: FloatArray, motion_time: FloatArray) -> None:
+def _limit_time(axes: Axes, time: Floats, motion_time: Floats) -> None:
     start = min(np.min(time), np.min(motion_time, initial=np.inf))
     end = max(np.max(time), np.max(motion_time, initial=-np.inf))
     axes.set_xlim(float(start), float(end))

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from rocking.plot.style import ABOVE, GROUND, INK, STYLE, FloatArray
+from rocking.arrays import Floats
+from rocking.plot.style import ABOVE, GROUND, INK, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,14 +22,12 @@ _LAST_CYCLES: Final = 5
 class Ratios(NamedTuple):
     """Ratios of intervals of one sequence, their limit, and what to write above them."""
 
-    values: FloatArray
+    values: Floats
     limit: float
     title: str
 
 
-def chattering_figure(
-    *, time: FloatArray, rotation: FloatArray, impact_times: FloatArray, rest: float, late_impact: int
-) -> Figure:
+def chattering_figure(*, time: Floats, rotation: Floats, impact_times: Floats, rest: float, late_impact: int) -> Figure:
     """Draw a chattering sequence (a) with details of its first cycles (b) and of late ones (c).
 
     Parameters
@@ -68,7 +67,7 @@ def chattering_figure(
     return figure
 
 
-def _draw_whole(axes: Axes, time: FloatArray, rotation: FloatArray, impact_times: FloatArray, rest: float) -> None:
+def _draw_whole(axes: Axes, time: Floats, rotation: Floats, impact_times: Floats, rest: float) -> None:
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, 1e3 * rotation, color=INK, linewidth=0.9)
     axes.plot(
@@ -97,7 +96,7 @@ def _draw_whole(axes: Axes, time: FloatArray, rotation: FloatArray, impact_times
     axes.set_ylabel(r"rotation, $10^3\,\phi$")
 
 
-def _draw_cycles(axes: Axes, time: FloatArray, rotation: FloatArray, impacts: FloatArray, number: int) -> None:
+def _draw_cycles(axes: Axes, time: Floats, rotation: Floats, impacts: Floats, number: int) -> None:
     """Draw the stretch between the given impacts, which are numbered from `number` on."""
     margin = 0.06 * (impacts[-1] - impacts[0])
     shown = (time >= impacts[0] - margin) & (time <= impacts[-1] + margin)

@@ -4,11 +4,6 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
-
 # Luminances differ, so that the figures read in grey as well.
 INK: Final = "#10243e"
 GROUND: Final = "#94a0ad"

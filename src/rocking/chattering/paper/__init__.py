@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Final
 
-from rocking.chattering.paper.critical import figure_5, figure_6, figure_7
+from rocking.chattering.paper.amplitudes import figure_5, figure_6, figure_7
 from rocking.chattering.paper.figure import PaperFigure, Statement
 from rocking.chattering.paper.histories import figure_4, figure_9, figure_10, figure_11
 from rocking.chattering.paper.sequences import figure_2, figure_3

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
+from rocking.arrays import Floats
 from rocking.block import Block
-from rocking.chattering.parameters import FloatArray
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.response import Response
@@ -43,7 +43,7 @@ def simulated(a: float, treatment: str | Treatment) -> Response:
     return simulate(block(), motion, model="linear", chattering=treatment, duration=motion.duration)
 
 
-def dense_times(impacts: FloatArray, end: float, *, shortest: float = 0.0) -> FloatArray:
+def dense_times(impacts: Floats, end: float, *, shortest: float = 0.0) -> Floats:
     """Lay times from 0 to the end: even ones, and some within each arc that is not shorter than the shortest."""
     marks = np.concatenate([[0.0], impacts[impacts < end], [end]])
     lengths = np.diff(marks)

@@ -7,11 +7,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from rocking.chattering.critical import critical_amplitude
-from rocking.chattering.duration import chattering_time
+from rocking.arrays import Floats
 from rocking.chattering.paper.case import CYCLES, ETA, OMEGA, PERIOD, block, dense_times, excitation, simulated
 from rocking.chattering.paper.figure import PaperFigure, Statement, Table
-from rocking.chattering.parameters import FloatArray
+from rocking.chattering.theory.amplitude import critical_amplitude
+from rocking.chattering.theory.duration import chattering_time
 from rocking.plot.histories import Detail, Mark, excitation_figure, history_figure
 from rocking.response import Response
 from rocking.treatment import AsymptoticTime, Certified, Treatment, VelocityThreshold
@@ -186,7 +186,7 @@ def _initiations(responses: dict[str, Response]) -> tuple[Mark, ...]:
     )
 
 
-def _acceleration(a: float, time_over_period: FloatArray) -> FloatArray:
+def _acceleration(a: float, time_over_period: Floats) -> Floats:
     rocking = block()
     return excitation(a).acceleration(time_over_period * PERIOD) / (rocking.gravity * rocking.sides[0].alpha)
 

@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from rocking.chattering.asymptotic import first_impact_speed, first_interval
-from rocking.chattering.duration import interval_ratios, sequence
 from rocking.chattering.paper.case import ETA, OMEGA, dense_times, simulated
 from rocking.chattering.paper.figure import PaperFigure, Statement
+from rocking.chattering.theory.asymptotic import first_impact_speed, first_interval
+from rocking.chattering.theory.duration import interval_ratios, sequence
 from rocking.plot.sequences import Ratios, chattering_figure, ratio_figure
 
 #: Impact at which the detail of Fig. 2(c) starts, and the one from which the paper calls the ratios of Fig. 3 constant.

@@ -10,13 +10,14 @@ import math
 import re
 from typing import NamedTuple
 
+from rocking.arrays import Floats
 from rocking.motion.formats import csmip
 from rocking.motion.formats.channel import Channel, to_acceleration
 from rocking.motion.formats.identification import Identification
 from rocking.motion.formats.request import Request
 from rocking.motion.formats.source import Line, Source
 from rocking.motion.formats.units import find_unit
-from rocking.motion.formats.values import Floats, expect, read_values
+from rocking.motion.formats.values import expect, read_values
 
 NAME = "COSMOS"
 

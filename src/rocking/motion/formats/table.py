@@ -13,13 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rocking.arrays import Floats
 from rocking.errors import UnreadableRecord
 from rocking.motion.formats.channel import Channel, to_acceleration
 from rocking.motion.formats.identification import Identification
 from rocking.motion.formats.request import Request
 from rocking.motion.formats.source import Line, Source
 from rocking.motion.formats.timing import even_step, first_fault
-from rocking.motion.formats.values import Floats, convert, not_a_number, parse
+from rocking.motion.formats.values import convert, not_a_number, parse
 
 NAME = "text table"
 

@@ -7,12 +7,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rocking.arrays import Floats
 from rocking.errors import UnreadableRecord
 from rocking.motion.formats.source import Source
-
-Floats = NDArray[np.float64]
 
 #: A number in a header, as a regular expression.
 NUMBER = r"[+-]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[EeDd][+-]?\d{1,4})?"

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.errors import InvalidOption
-
-FloatArray = NDArray[np.float64]
 
 #: Frequencies (forcing over the block's p) for which double precision resolves the problem.
 LOWEST_FREQUENCY: Final = 1e-6
@@ -20,12 +19,12 @@ HIGHEST_FREQUENCY: Final = 1e6
 LARGEST_RESTITUTION: Final = 0.99999
 
 
-def checked_amplitude(a: ArrayLike) -> FloatArray:
+def checked_amplitude(a: ArrayLike) -> Floats:
     """Return amplitudes as an array; any finite number is one."""
     return _finite(a, "a", "the acceleration amplitude over g alpha")
 
 
-def checked_frequency(omega: ArrayLike) -> FloatArray:
+def checked_frequency(omega: ArrayLike) -> Floats:
     """Return frequencies as an array."""
     values = _finite(omega, "omega", "the forcing frequency over p")
     usable = (values >= LOWEST_FREQUENCY) & (values <= HIGHEST_FREQUENCY)
@@ -33,7 +32,7 @@ def checked_frequency(omega: ArrayLike) -> FloatArray:
     return values
 
 
-def checked_restitution(eta: ArrayLike) -> FloatArray:
+def checked_restitution(eta: ArrayLike) -> Floats:
     """Return coefficients of restitution as an array."""
     values = _finite(eta, "eta", "the coefficient of restitution")
     usable = (values > 0.0) & ((values <= LARGEST_RESTITUTION) | (values == 1.0))
@@ -41,7 +40,7 @@ def checked_restitution(eta: ArrayLike) -> FloatArray:
     return values
 
 
-def checked_slenderness(alpha: ArrayLike) -> FloatArray:
+def checked_slenderness(alpha: ArrayLike) -> Floats:
     """Return slenderness angles as an array."""
     values = _finite(alpha, "alpha", "the slenderness angle in rad")
     _require((values > 0.0) & (values < 0.5 * np.pi), values, "alpha", "between 0 and pi/2 rad")
@@ -53,14 +52,14 @@ def checked_count(value: int, name: str, lowest: int, highest: int) -> int:
     return checks.whole(value, name, InvalidOption, lowest, highest)
 
 
-def single(values: FloatArray, name: str) -> float:
+def single(values: Floats, name: str) -> float:
     """Return the one value of a parameter that may not be an array."""
     if values.ndim:
         raise InvalidOption(f"{name} must be a single number here, not an array of shape {values.shape}")
     return float(values)
 
 
-def broadcast(*parameters: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
+def broadcast(*parameters: Floats) -> tuple[tuple[int, ...], list[Floats]]:
     """Return the common shape of the parameters, and each as a flat array of that size."""
     try:
         shape = np.broadcast_shapes(*(parameter.shape for parameter in parameters))
@@ -70,13 +69,13 @@ def broadcast(*parameters: FloatArray) -> tuple[tuple[int, ...], list[FloatArray
     return shape, [np.broadcast_to(parameter, shape).ravel() for parameter in parameters]
 
 
-def _finite(given: ArrayLike, name: str, meaning: str) -> FloatArray:
+def _finite(given: ArrayLike, name: str, meaning: str) -> Floats:
     values = checks.numbers(given, f"{name} ({meaning})", InvalidOption)
     _require(np.isfinite(values), values, name, f"finite ({meaning})")
     return values
 
 
-def _require(usable: NDArray[np.bool_], values: FloatArray, name: str, condition: str) -> None:
+def _require(usable: NDArray[np.bool_], values: Floats, name: str, condition: str) -> None:
     if usable.all():
         return
     index = np.argwhere(~usable)[0]

@@ -11,18 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.analysis import calibration_population as population
-from rocking.analysis.calibration_population import Evidence
-from rocking.analysis.calibration_scores import Scores
-from rocking.analysis.calibration_space import PARAMETERS, Candidates, Range, Space
+from rocking.analysis.calibration import population
+from rocking.analysis.calibration.population import Evidence
+from rocking.analysis.calibration.scores import Scores
+from rocking.analysis.calibration.space import PARAMETERS, Candidates, Range, Space
+from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
 from rocking.problem import Model
-
-Flags = NDArray[np.bool_]
 
 #: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
 _LAPSE: Final = 0.005

@@ -11,21 +11,21 @@ from typing import Final
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rocking.chattering.critical_coefficients import COEFFICIENTS
-from rocking.chattering.parameters import FloatArray
+from rocking.arrays import Floats
+from rocking.chattering.theory.surface_coefficients import COEFFICIENTS
 
 #: Where the expansion holds.
 FREQUENCIES: Final = (0.4, 10.0)
 RESTITUTIONS: Final = (0.5, 0.97)
 
 
-def evaluate(omega: FloatArray, eta: FloatArray) -> FloatArray:
+def evaluate(omega: Floats, eta: Floats) -> Floats:
     """Approximate critical amplitude within the expansion's domain."""
-    amplitudes: FloatArray = 1.0 + chebyshev.chebval2d(*coordinates(omega, eta), COEFFICIENTS)
+    amplitudes: Floats = 1.0 + chebyshev.chebval2d(*coordinates(omega, eta), COEFFICIENTS)
     return amplitudes
 
 
-def coordinates(omega: FloatArray, eta: FloatArray) -> tuple[FloatArray, FloatArray]:
+def coordinates(omega: Floats, eta: Floats) -> tuple[Floats, Floats]:
     """Coordinates of the domain, each from -1 to 1."""
     return (
         _scaled(1.0 / omega**2, 1.0 / FREQUENCIES[1] ** 2, 1.0 / FREQUENCIES[0] ** 2),
@@ -33,16 +33,16 @@ def coordinates(omega: FloatArray, eta: FloatArray) -> tuple[FloatArray, FloatAr
     )
 
 
-def parameters(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def parameters(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Omega and eta at coordinates from -1 to 1."""
     inverse_square = _unscaled(x, 1.0 / FREQUENCIES[1] ** 2, 1.0 / FREQUENCIES[0] ** 2)
     root = _unscaled(y, np.sqrt(1.0 - RESTITUTIONS[1]), np.sqrt(1.0 - RESTITUTIONS[0]))
     return inverse_square**-0.5, 1.0 - root**2
 
 
-def _scaled(value: FloatArray, low: float, high: float) -> FloatArray:
+def _scaled(value: Floats, low: float, high: float) -> Floats:
     return (2.0 * value - low - high) / (high - low)
 
 
-def _unscaled(coordinate: FloatArray, low: float, high: float) -> FloatArray:
+def _unscaled(coordinate: Floats, low: float, high: float) -> Floats:
     return 0.5 * (low + high + (high - low) * coordinate)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from rocking.chattering.parameters import FloatArray
+from rocking.arrays import Floats
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 
 
-def exceedances(motion: Motion, thresholds: tuple[float, float]) -> FloatArray:
+def exceedances(motion: Motion, thresholds: tuple[float, float]) -> Floats:
     """Stretches of time in which a resting block would be lifted.
 
     Parameters
@@ -40,12 +40,12 @@ def exceedances(motion: Motion, thresholds: tuple[float, float]) -> FloatArray:
     return cuts[np.flatnonzero(np.diff(beyond, prepend=False, append=False))].reshape(-1, 2)
 
 
-def _crossings(motion: Motion, level: float) -> FloatArray:
+def _crossings(motion: Motion, level: float) -> Floats:
     """Find times, s, among which are all those at which the motion passes a level inside a piece."""
     widths = np.diff(motion.breakpoints)
     shifted = motion.coefficients.copy()
     shifted[:, 0] -= level
     offsets = piecewise.root_candidates(widths, shifted)
     inside = (offsets > 0.0) & (offsets < widths[:, np.newaxis])
-    times: FloatArray = (motion.breakpoints[:-1, np.newaxis] + offsets)[inside]
+    times: Floats = (motion.breakpoints[:-1, np.newaxis] + offsets)[inside]
     return times

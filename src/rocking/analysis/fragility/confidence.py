@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from rocking.analysis import lognormal
-from rocking.analysis.lognormal import Probit
-from rocking.kernels.state import Floats, Integers
+from rocking.analysis.fragility import lognormal
+from rocking.analysis.fragility.lognormal import Probit
+from rocking.arrays import Floats, Integers
 
 #: Directions in which a region is measured: between them 4e-5 of an interval's width is lost.
 _RAYS: Final = 360

@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.analysis.boundaries import Boundaries, boundaries
-from rocking.analysis.measures import Measure, MeasureName
-from rocking.analysis.scaled import several_blocks, several_motions, simulate_levels
+from rocking.analysis.intensity import Measure, MeasureName
+from rocking.analysis.levels import several_blocks, several_motions, simulate_levels
+from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
-from rocking.kernels.state import Floats, Integers
 from rocking.motion.motion import Motion
 from rocking.problem import Model
 from rocking.treatment import Certified

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis import lognormal, nrml
-from rocking.analysis.confidence import Confidence, Resamples
-from rocking.analysis.lognormal import Probit
-from rocking.analysis.measures import Measure
+from rocking.analysis.fragility import lognormal, nrml
+from rocking.analysis.fragility.confidence import Confidence, Resamples
+from rocking.analysis.fragility.lognormal import Probit
+from rocking.analysis.intensity import Measure
+from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, OutputError
-from rocking.kernels.state import Floats
 from rocking.problem import Model
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class FragilityCurve:
 
         Examples
         --------
-        >>> from rocking.analysis import fit_fragility
+        >>> from rocking import fit_fragility
         >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
         >>> curve.probability([curve.median, 0.0]).round(12).tolist()
         [0.5, 0.0]

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis import lognormal
-from rocking.analysis.confidence import Confidence, LikelyRegion, Resamples
-from rocking.analysis.fragility_curve import Fragility, FragilityCurve
-from rocking.analysis.measures import Measure, MeasureName
-from rocking.analysis.scaled import several_blocks, several_motions, simulate_levels
+from rocking.analysis.fragility import lognormal
+from rocking.analysis.fragility.confidence import Confidence, LikelyRegion, Resamples
+from rocking.analysis.fragility.curve import Fragility, FragilityCurve
+from rocking.analysis.intensity import Measure, MeasureName
+from rocking.analysis.levels import several_blocks, several_motions, simulate_levels
+from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.ensemble import Polarity, simulate_many
 from rocking.errors import InvalidOption
-from rocking.kernels.state import Floats, Integers
 from rocking.motion.motion import Motion
 from rocking.problem import Model
 from rocking.treatment import Treatment

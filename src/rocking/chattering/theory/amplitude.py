@@ -7,14 +7,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.chattering import critical_surface
-from rocking.chattering.parameters import FloatArray, broadcast, checked_frequency, checked_restitution
+from rocking.arrays import Floats
+from rocking.chattering.theory import surface
+from rocking.chattering.theory.parameters import broadcast, checked_frequency, checked_restitution
 from rocking.errors import InvalidOption
 from rocking.kernels.paper import fitted_amplitudes
 from rocking.kernels.sine.critical import critical_amplitudes
 
 
-def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact") -> FloatArray:
+def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact") -> Floats:
     """Amplitude of the ground acceleration up to which chattering is complete.
 
     Parameters
@@ -51,7 +52,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     >>> round(float(critical_amplitude(2.0, 0.92, method="eq77")), 6)
     1.037899
     """
-    methods: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
+    methods: dict[str, Callable[[Floats, Floats], Floats]] = {
         "exact": _exact,
         "eq76": _eq76,
         "eq77": _eq77,
@@ -63,7 +64,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     return methods[method](frequencies, restitutions).reshape(shape)[()]
 
 
-def _exact(omega: FloatArray, eta: FloatArray) -> FloatArray:
+def _exact(omega: Floats, eta: Floats) -> Floats:
     amplitudes = np.ones(omega.size)
     lossy = np.flatnonzero(eta < 1.0)
     found = np.zeros(lossy.size)
@@ -72,24 +73,24 @@ def _exact(omega: FloatArray, eta: FloatArray) -> FloatArray:
     return amplitudes
 
 
-def _eq76(omega: FloatArray, eta: FloatArray) -> FloatArray:
+def _eq76(omega: Floats, eta: Floats) -> Floats:
     amplitudes = np.zeros(omega.size)
     fitted_amplitudes(omega, eta, True, amplitudes)
     return amplitudes
 
 
-def _eq77(omega: FloatArray, eta: FloatArray) -> FloatArray:
+def _eq77(omega: Floats, eta: Floats) -> Floats:
     amplitudes = np.zeros(omega.size)
     fitted_amplitudes(omega, eta, False, amplitudes)
     return amplitudes
 
 
-def _approximation(omega: FloatArray, eta: FloatArray) -> FloatArray:
-    low, high = critical_surface.FREQUENCIES
-    least, most = critical_surface.RESTITUTIONS
+def _approximation(omega: Floats, eta: Floats) -> Floats:
+    low, high = surface.FREQUENCIES
+    least, most = surface.RESTITUTIONS
     if (omega < low).any() or (omega > high).any() or (eta < least).any() or (eta > most).any():
         raise InvalidOption(
             f'method="approximation" holds for omega from {low:g} to {high:g} and eta from {least:g} to {most:g} only: '
             'use method="exact" elsewhere'
         )
-    return critical_surface.evaluate(omega, eta)
+    return surface.evaluate(omega, eta)

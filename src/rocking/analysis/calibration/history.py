@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.calibration_space import HIGHEST, PARAMETERS, Range, even_fractions, value_range
+from rocking.analysis.calibration.space import HIGHEST, PARAMETERS, Range, even_fractions, value_range
+from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.errors import InvalidOption
-from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
 from rocking.problem import Model
 from rocking.response import Response

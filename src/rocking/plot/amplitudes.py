@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.plot.style import ABOVE, GROUND, INK, REST, STYLE, FloatArray
+from rocking.arrays import Floats
+from rocking.plot.style import ABOVE, GROUND, INK, REST, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,8 +25,8 @@ _CURVES: Final[tuple[dict[str, Any], ...]] = (
 
 def duration_figure(
     *,
-    amplitude: FloatArray,
-    durations: Mapping[str, FloatArray],
+    amplitude: Floats,
+    durations: Mapping[str, Floats],
     critical: float,
     title: str,
 ) -> Figure:
@@ -79,7 +80,7 @@ def duration_figure(
     return figure
 
 
-def surface_figure(*, omega: FloatArray, eta: FloatArray, exact: FloatArray, fitted: FloatArray) -> Figure:
+def surface_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats) -> Figure:
     """Draw the critical amplitude over frequency and restitution, and the error of its fit.
 
     Parameters
@@ -128,7 +129,7 @@ def surface_figure(*, omega: FloatArray, eta: FloatArray, exact: FloatArray, fit
     return figure
 
 
-def frequency_figure(*, omega: FloatArray, critical: Mapping[str, FloatArray], title: str) -> Figure:
+def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: str) -> Figure:
     """Draw the critical amplitude against frequency by several methods, and its spread.
 
     Parameters

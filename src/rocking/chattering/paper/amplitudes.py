@@ -8,12 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from rocking.chattering.critical import critical_amplitude
-from rocking.chattering.duration import chattering_time
+from rocking.arrays import Floats
 from rocking.chattering.paper.case import ETA, OMEGA
 from rocking.chattering.paper.figure import PaperFigure, Statement
-from rocking.chattering.parameters import FloatArray
-from rocking.plot.critical import duration_figure, frequency_figure, surface_figure
+from rocking.chattering.theory.amplitude import critical_amplitude
+from rocking.chattering.theory.duration import chattering_time
+from rocking.plot.amplitudes import duration_figure, frequency_figure, surface_figure
 
 #: Amplitudes of Fig. 5, gathered towards both of its vertical tangents, and how far it goes past the second.
 _AMPLITUDES: Final = 201
@@ -151,7 +151,7 @@ def _duration_statements(critical: float) -> tuple[Statement, ...]:
     )
 
 
-def _over_half_period(a: FloatArray, method: str) -> FloatArray:
+def _over_half_period(a: Floats, method: str) -> Floats:
     return np.asarray(chattering_time(a, OMEGA, ETA, method=method)) * (OMEGA / math.pi)
 
 
@@ -165,14 +165,14 @@ def _crossing(critical: float) -> float:
     return low
 
 
-def _exponent(values: FloatArray) -> float:
+def _exponent(values: Floats) -> float:
     """Local exponent of what has these values at the distances `_NEAR`."""
     return float(np.log(values[0] / values[1]) / np.log(_NEAR[0] / _NEAR[1]))
 
 
-def _spread(critical: FloatArray) -> FloatArray:
+def _spread(critical: Floats) -> Floats:
     """Largest over smallest along the frequencies (the first axis), minus one, %."""
-    spread: FloatArray = 100.0 * (critical.max(axis=0) / critical.min(axis=0) - 1.0)
+    spread: Floats = 100.0 * (critical.max(axis=0) / critical.min(axis=0) - 1.0)
     return spread
 
 

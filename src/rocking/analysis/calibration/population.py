@@ -12,14 +12,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rocking.analysis.calibration_space import Candidates, Space
-from rocking.kernels.state import Floats
+from rocking.analysis.calibration.space import Candidates, Space
+from rocking.arrays import Flags, Floats, Integers
 from rocking.progress import Progress
-
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 #: Prior of the dispersion from test to test: lognormal, medians for p, alpha, restitution and for the three ratios.
 _DISPERSION_MEDIANS: Final = np.array([0.10, 0.10, 0.10, 0.05, 0.10, 0.05])

@@ -8,9 +8,9 @@ from typing import Final, Literal, get_args
 import numpy as np
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
-from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
 from rocking.problem import Model
 

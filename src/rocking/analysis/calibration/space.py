@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
-from rocking.kernels.state import Floats
 
 #: Parameters of a block's side, in the order of the coordinates.
 PARAMETERS: Final = ("p", "alpha", "restitution")

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.chattering.asymptotic import asymptotic_times
-from rocking.chattering.parameters import (
-    FloatArray,
+from rocking.arrays import Floats
+from rocking.chattering.theory.asymptotic import asymptotic_times
+from rocking.chattering.theory.parameters import (
     broadcast,
     checked_amplitude,
     checked_count,
@@ -23,7 +23,7 @@ from rocking.chattering.parameters import (
     checked_restitution,
     single,
 )
-from rocking.chattering.series import series_times
+from rocking.chattering.theory.series import series_times
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED
 from rocking.kernels.sine.lanes import BLOCK, BLOCKS, LANES, Answers, rest_phases
@@ -55,7 +55,7 @@ def chattering_time(
     method: str = "exact",
     order: int = 4,
     resolved: int = 60,
-) -> FloatArray:
+) -> Floats:
     """Dimensionless time from uplift to rest of a slender block under a sine.
 
     The block lifts off at rest as the ground acceleration a sin(omega tau + psi) reaches 1, and chatters. Chattering
@@ -109,7 +109,7 @@ def chattering_time(
     order = checked_count(order, "order", 1, 40)
     resolved = checked_count(resolved, "resolved", 1, 1_000_000)
     parameters = checked_amplitude(a), checked_frequency(omega), checked_restitution(eta)
-    methods: dict[str, Callable[[], FloatArray]] = {
+    methods: dict[str, Callable[[], Floats]] = {
         "exact": lambda: _exact_times(*parameters),
         "asymptotic": lambda: asymptotic_times(*parameters),
         "series": lambda: series_times(*parameters, order),
@@ -222,7 +222,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     return ChatteringSequence(impacts, False, math.nan, math.nan, math.nan)
 
 
-def interval_ratios(a: float, omega: float, eta: float, n: int) -> FloatArray:
+def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
     """Ratios of the intervals between every second impact, which tend to eta^2.
 
     Parameters
@@ -288,7 +288,7 @@ def _resolved(
     return status, impacts, (rest / omega, lower / omega * (1.0 - _ROUNDING), upper / omega * (1.0 + _ROUNDING))
 
 
-def _exact_times(a: FloatArray, omega: FloatArray, eta: FloatArray) -> FloatArray:
+def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     shape, (amplitudes, frequencies, restitutions) = broadcast(a, omega, eta)
     phases = np.where(amplitudes == 1.0, 0.0, math.nan)
     statuses = np.full(phases.size, FOUND, np.int8)
@@ -302,14 +302,14 @@ def _exact_times(a: FloatArray, omega: FloatArray, eta: FloatArray) -> FloatArra
     return (_told(phases, statuses) / frequencies).reshape(shape)[()]
 
 
-def _told(phases: FloatArray, statuses: NDArray[np.int8]) -> FloatArray:
+def _told(phases: Floats, statuses: NDArray[np.int8]) -> Floats:
     """Mark phases as the interface does times: NaN for incomplete chattering, infinity for what is not resolved."""
     phases[statuses == OUTLASTS] = math.nan
     phases[statuses == UNRESOLVED] = math.inf
     return phases
 
 
-def _alike_together(a: FloatArray, eta: FloatArray) -> NDArray[np.int64]:
+def _alike_together(a: Floats, eta: Floats) -> NDArray[np.int64]:
     """Pick the sequences that rock, sorted coarsely by eta and then by a: those of a block take like steps."""
     rock = np.flatnonzero((a > 1.0) & (eta < 1.0))
     if rock.size <= LANES:
@@ -338,7 +338,7 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
-def _semianalytical_times(a: FloatArray, omega: FloatArray, eta: FloatArray, resolved: int) -> FloatArray:
+def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int) -> Floats:
     shape, (amplitudes, frequencies, restitutions) = broadcast(a, omega, eta)
     times = np.where(amplitudes == 1.0, 0.0, math.nan)
     rocks = np.flatnonzero((amplitudes > 1.0) & (restitutions < 1.0))

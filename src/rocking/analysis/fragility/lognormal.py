@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.kernels.state import Floats, Integers
+from rocking.arrays import Floats, Integers
 
 _ITERATIONS: Final = 100
 #: The likelihood is at its maximum when the parameters move by less than this part of themselves.

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rocking.analysis.measures import Measure
+from rocking.analysis.intensity import Measure
+from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
 from rocking.problem import Model
 

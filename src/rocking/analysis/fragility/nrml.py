@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from rocking.analysis.measures import Measure
+from rocking.analysis.intensity import Measure
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, OutputError
 from rocking.problem import Model
 
 if TYPE_CHECKING:
-    from rocking.analysis.fragility_curve import FragilityCurve
+    from rocking.analysis.fragility.curve import FragilityCurve
 
 NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
 

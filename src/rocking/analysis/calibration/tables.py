@@ -10,10 +10,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking.cli import options
+from rocking.arrays import Floats
 from rocking.errors import RockingError, UnreadableRecord
-from rocking.kernels.state import Floats
 from rocking.motion.motion import Motion
+from rocking.motion.named import named_motion
 
 _ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
 
@@ -103,7 +103,7 @@ def _outcomes(table: _Table, *, channel: str | None, dt: float | None, units: st
         name = _file_or_name(row["motion"], table.path.parent)
         wanted = row.get("channel") or channel
         try:
-            motions.append(options.motion_from(name, channel=wanted, dt=dt, units=units, scale=scale))
+            motions.append(named_motion(name, channel=wanted, dt=dt, units=units, scale=scale))
         except RockingError as error:
             raise UnreadableRecord(f"{table.path}, line {line}: {error}") from error
     groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.chattering.parameters import (
-    FloatArray,
+from rocking.arrays import Floats
+from rocking.chattering.theory.parameters import (
     broadcast,
     checked_amplitude,
     checked_frequency,
@@ -24,7 +24,7 @@ CYCLE: Final = np.dtype(
 )
 
 
-def asymptotic_times(a: FloatArray, omega: FloatArray, eta: FloatArray) -> FloatArray:
+def asymptotic_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     """Eq. 65; its sums depend on eta alone and are formed once for each value of it."""
     values, where = np.unique(eta, return_inverse=True)
     sums = np.array([eq65_sums(float(value)) for value in values])[where.reshape(eta.shape)]
@@ -93,7 +93,7 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     return table
 
 
-def first_interval(a: ArrayLike, omega: ArrayLike) -> FloatArray:
+def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
     """Time from uplift to the first impact, to two orders (Eq. 32).
 
     Parameters
@@ -129,7 +129,7 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> FloatArray:
     return (math.sqrt(2.0) / frequency * np.sqrt(eps) * (4.0 + second * eps))[()]
 
 
-def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> FloatArray:
+def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
     """Angular velocity just before the first impact, to two orders (Eq. 34).
 
     Parameters
@@ -164,7 +164,7 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> FloatArray:
     return (4.0 * math.sqrt(2.0) / frequency * eps * np.sqrt(eps) * (4.0 / 3.0 + second * eps))[()]
 
 
-def _expansion_parameters(a: ArrayLike, omega: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _expansion_parameters(a: ArrayLike, omega: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Eps (NaN below uplift), omega^2 and omega."""
     amplitude = checked_amplitude(a)
     frequency = checked_frequency(omega)

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.chattering.parameters import (
-    FloatArray,
+from rocking.arrays import Floats
+from rocking.chattering.theory.parameters import (
     broadcast,
     checked_amplitude,
     checked_count,
@@ -27,7 +27,7 @@ _LOOK_AHEAD: Final = 6
 _FEWEST: Final = 16
 
 
-def series_times(a: FloatArray, omega: FloatArray, eta: FloatArray, order: int) -> FloatArray:
+def series_times(a: Floats, omega: Floats, eta: Floats, order: int) -> Floats:
     """Sum of the first terms of the expansion."""
     coefficients = _coefficients(omega, eta, order)
     shape = np.broadcast_shapes(a.shape, coefficients.shape[:-1])
@@ -35,7 +35,7 @@ def series_times(a: FloatArray, omega: FloatArray, eta: FloatArray, order: int) 
     return _summed(coefficients, eps)[()]
 
 
-def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> FloatArray:
+def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> Floats:
     """Coefficients of tau_ch = sqrt(eps) (C1 + C3 eps + C5 eps^2 + ...), eps = a - 1.
 
     Parameters
@@ -87,9 +87,9 @@ class SeriesDiagnosis:
         Estimated radius of convergence in eps, from the ratios of the coefficients.
     """
 
-    time: FloatArray
-    error: FloatArray
-    radius: FloatArray
+    time: Floats
+    error: Floats
+    radius: Floats
 
 
 def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> SeriesDiagnosis:
@@ -142,15 +142,15 @@ def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: i
     return SeriesDiagnosis(time[()], error[()], radius.copy()[()])
 
 
-def _radius(coefficients: FloatArray) -> FloatArray:
+def _radius(coefficients: Floats) -> Floats:
     """Limit of the ratios of successive coefficients, extrapolated linearly in 1/k."""
     k = coefficients.shape[-1] - 1
     ratios = coefficients[..., :-1] / coefficients[..., 1:]
-    radius: FloatArray = k * ratios[..., -1] - (k - 1) * ratios[..., -2]
+    radius: Floats = k * ratios[..., -1] - (k - 1) * ratios[..., -2]
     return radius
 
 
-def _summed(coefficients: FloatArray, eps: FloatArray) -> FloatArray:
+def _summed(coefficients: Floats, eps: Floats) -> Floats:
     """Horner's scheme; exactly zero at eps = 0."""
     total = np.zeros(eps.shape)
     for k in reversed(range(coefficients.shape[-1])):
@@ -159,7 +159,7 @@ def _summed(coefficients: FloatArray, eps: FloatArray) -> FloatArray:
         return np.where(eps == 0.0, 0.0, np.sqrt(eps) * total)
 
 
-def _coefficients(omega: FloatArray, eta: FloatArray, order: int) -> FloatArray:
+def _coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
     """Coefficients of the broadcast parameters, formed once for each pair of different values."""
     shape, parameters = broadcast(omega, eta)
     pairs, where = np.unique(np.stack(parameters), axis=1, return_inverse=True)

@@ -8,14 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking.arrays import Floats
 from rocking.block import Block
-from rocking.chattering.parameters import (
-    FloatArray,
-    broadcast,
-    checked_frequency,
-    checked_restitution,
-    checked_slenderness,
-)
+from rocking.chattering.theory.parameters import broadcast, checked_frequency, checked_restitution, checked_slenderness
 from rocking.motion import pulses
 from rocking.simulation import simulate
 
@@ -29,7 +24,7 @@ _FIRST_HIGH: Final = 1.5
 _LEAD: Final = 0.1
 
 
-def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike) -> FloatArray:
+def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike) -> Floats:
     """Critical amplitude of the nonlinear block, which `critical_amplitude` gives in the slender limit.
 
     Parameters

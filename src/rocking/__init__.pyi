@@ -1,0 +1,56 @@
+from . import chattering
+from .analysis.calibration import Calibration, HistoryCalibration, calibrate, calibrate_history
+from .analysis.fragility import Fragility, fit_fragility, fragility
+from .analysis.incremental import incremental_dynamic_analysis
+from .analysis.overturning import overturning_map
+from .analysis.spectrum import rocking_spectrum
+from .block import Block, Blocks
+from .ensemble import simulate_many
+from .errors import (
+    InvalidBlock,
+    InvalidMotion,
+    InvalidOption,
+    OutputError,
+    RockingError,
+    UnreadableRecord,
+)
+from .motion import Motion, pulses, records
+from .motion.formats import read
+from .response import Response
+from .simulation import simulate
+from .treatment import AsymptoticTime, Certified, IntervalThreshold, VelocityThreshold
+
+__version__: str
+
+__all__ = [
+    "AsymptoticTime",
+    "Block",
+    "Blocks",
+    "Calibration",
+    "Certified",
+    "Fragility",
+    "HistoryCalibration",
+    "IntervalThreshold",
+    "InvalidBlock",
+    "InvalidMotion",
+    "InvalidOption",
+    "Motion",
+    "OutputError",
+    "Response",
+    "RockingError",
+    "UnreadableRecord",
+    "VelocityThreshold",
+    "calibrate",
+    "calibrate_history",
+    "chattering",
+    "fit_fragility",
+    "fragility",
+    "incremental_dynamic_analysis",
+    "overturning_map",
+    "pulses",
+    "read",
+    "records",
+    "rocking_spectrum",
+    "simulate",
+    "simulate_many",
+]

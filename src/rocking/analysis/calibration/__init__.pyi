@@ -1,0 +1,14 @@
+from .history import HistoryCalibration, Measured, calibrate_history
+from .outcomes import Calibration, Estimate, Validation, calibrate
+from .scores import Scores
+
+__all__ = [
+    "Calibration",
+    "Estimate",
+    "HistoryCalibration",
+    "Measured",
+    "Scores",
+    "Validation",
+    "calibrate",
+    "calibrate_history",
+]

@@ -1,0 +1,42 @@
+from . import families
+from .amplitude import critical_amplitude_nonlinear
+from .episodes import ChatteringEpisodes, chattering_episodes
+from .maps import Outcome, chattering_map, map_figure
+from .paper import paper_figure
+from .schemes import SchemeComparison, SchemeOutcome, compare_schemes
+from .theory.amplitude import critical_amplitude
+from .theory.asymptotic import asymptotic_table, first_impact_speed, first_interval
+from .theory.duration import (
+    ChatteringSequence,
+    chattering_time,
+    interval_ratios,
+    is_complete,
+    sequence,
+)
+from .theory.series import SeriesDiagnosis, series_coefficients, series_diagnosis
+
+__all__ = [
+    "ChatteringEpisodes",
+    "ChatteringSequence",
+    "Outcome",
+    "SchemeComparison",
+    "SchemeOutcome",
+    "SeriesDiagnosis",
+    "asymptotic_table",
+    "chattering_episodes",
+    "chattering_map",
+    "chattering_time",
+    "compare_schemes",
+    "critical_amplitude",
+    "critical_amplitude_nonlinear",
+    "families",
+    "first_impact_speed",
+    "first_interval",
+    "interval_ratios",
+    "is_complete",
+    "map_figure",
+    "paper_figure",
+    "sequence",
+    "series_coefficients",
+    "series_diagnosis",
+]
