@@ -1,0 +1,101 @@
+"""Results as people and as machines read them: tables of text, columns named with their units, plain values for JSON."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rocking.errors import OutputError
+
+#: Wider than any table, so that none is wrapped or cut.
+_WIDTH = 100_000
+
+
+def text_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Columns of numbers and texts: numbers to five digits on the right, texts on the left, at least two spaces between.
+
+    Examples
+    --------
+    >>> print(text_table(["record", "peak"], [["Pacoima Dam 164", 6.63581], ["Lone Pine", 0.5]]))
+    record             peak
+    Pacoima Dam 164  6.6358
+    Lone Pine           0.5
+    """
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="")
+    for k, name in enumerate(header):
+        numeric = all(isinstance(row[k], (int, float, np.number)) for row in rows)
+        table.add_column(Text(name), justify="right" if numeric else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*(Text(cell(entry)) for entry in row))
+    console = Console(file=io.StringIO(), width=_WIDTH, color_system=None, legacy_windows=False)
+    with console.capture() as captured:
+        console.print(table)
+    return "\n".join(line.rstrip() for line in captured.get().splitlines())
+
+
+def cell(entry: Any) -> str:
+    """Entry of a table as text: numbers to five digits, infinity and NaN as words."""
+    if isinstance(entry, (bool, np.bool_)):
+        return "yes" if entry else "no"
+    if isinstance(entry, (float, np.floating)):
+        return "infinite" if math.isinf(entry) else "-" if math.isnan(entry) else f"{entry:.5g}"
+    return str(entry)
+
+
+def named(quantity: str, unit: str) -> str:
+    """Name of a column or a field with its unit: the one rule for all files that the package writes.
+
+    Examples
+    --------
+    >>> named("ground_acceleration", "m/s^2"), named("rotation", "rad"), named("impacts", "1")
+    ('ground_acceleration_m_s2', 'rotation_rad', 'impacts')
+    """
+    return quantity if unit == "1" else f"{quantity}_{unit.replace('/', '_').replace('^', '')}"
+
+
+def rows_of(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
+    """Rows of a structured array as mappings."""
+    names = table.dtype.names or ()
+    return [dict(zip(names, row.tolist(), strict=True)) for row in table]
+
+
+def plain(value: Any) -> Any:
+    """Value that JSON knows: lists for arrays, null for NaN and infinity."""
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def to_json(result: Mapping[str, Any]) -> str:
+    """Result as JSON."""
+    return json.dumps(plain(result), indent=2, allow_nan=False)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    try:
+        Path(path).write_text(text, "utf-8")
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
