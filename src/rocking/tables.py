@@ -1,4 +1,4 @@
-"""Results as people and as machines read them: tables of text, columns named with their units, plain values for JSON."""
+"""Results as people and machines read them: text tables, names with units, plain values for JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _WIDTH = 100_000
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """Columns of numbers and texts: numbers to five digits on the right, texts on the left, at least two spaces between.
+    """Columns of text at least two spaces apart: numbers, to five digits, on the right, texts on the left.
 
     Examples
     --------
@@ -83,7 +83,7 @@ def plain(value: Any) -> Any:
 
 
 def to_json(result: Mapping[str, Any]) -> str:
-    """Result as JSON."""
+    """Return a result as JSON, NaN and infinity as null."""
     return json.dumps(plain(result), indent=2, allow_nan=False)
 
 
