@@ -17,7 +17,7 @@ from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.maps import chattering_map, map_figure
 from rocking.chattering.paper import FIGURES, paper_figure
 from rocking.chattering.paper.case import excitation
-from rocking.chattering.schemes import compare_schemes, scheme_name
+from rocking.chattering.schemes import compare_schemes
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TABLES = DOCS / "_tables"
@@ -87,7 +87,7 @@ def table_of_comparison(comparison):
         worst = outcome.largest_error
         rows.append(
             (
-                scheme_name(outcome.treatment),
+                outcome.treatment.label,
                 len(outcome.rests),
                 outcome.false_rests.size,
                 outcome.missed.size,
@@ -95,7 +95,7 @@ def table_of_comparison(comparison):
                 outcome.verdict,
             )
         )
-    rows += [(scheme_name(scheme), "", "", "", "", "not applicable") for scheme, _ in comparison.not_applicable]
+    rows += [(scheme.label, "", "", "", "", "not applicable") for scheme, _ in comparison.not_applicable]
     return markdown(("scheme", "rests", "false", "missed", "worst error of a true rest, s", "verdict"), rows)
 
 

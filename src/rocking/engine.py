@@ -21,8 +21,9 @@ from rocking.kernels.lanes import crew, scheduler
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.motion.motion import Motion
-from rocking.problem import Model, ground_of, records_of, rules_of
-from rocking.treatment import AsymptoticTime, Treatment
+from rocking.problem import ground_of, records_of, rules_of
+from rocking.treatment import Treatment
+from rocking.treatment.base import Model
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; all else is as far as it came.
 OUTCOME = np.dtype(
@@ -169,11 +170,8 @@ def _in_flight(
 def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None) -> NDArray[np.void]:
     """Outcomes of one task; where ``stop`` is set on the way, of no use."""
     blocks = setup.blocks.select(task.blocks)
-    how, motion = setup.treatment, task.motion
-    if isinstance(how, AsymptoticTime):
-        motion = motion.scaled(factor=task.factor)
-    limits = how.limits(blocks, motion)
-    rules = rules_of(blocks, setup.model, how, setup.duration, record=False)
+    limits = setup.treatment.limits(blocks, task.motion, setup.model, task.factor)
+    rules = rules_of(blocks, setup.model, setup.treatment, setup.duration, record=False)
     ground = ground_of(task.motion, blocks.gravity, task.factor)
     bodies = records_of(blocks, setup.model, limits)
     states = state.new_states(len(blocks), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))

@@ -18,9 +18,10 @@ from rocking.engine import OUTCOME, Setup, Task, cores, parts_of, simulate_tasks
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import measures
 from rocking.motion.motion import Motion
-from rocking.problem import Model, rules_of
+from rocking.problem import rules_of
 from rocking.progress import Progress
 from rocking.treatment import Treatment, treatment
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

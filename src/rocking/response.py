@@ -20,8 +20,8 @@ from rocking.kernels import state, status, variation
 from rocking.kernels.trace import Trail, trace
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.treatment import Treatment
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,9 +12,10 @@ from rocking.kernels import state, status
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.problem import Model, ground_of, records_of, rules_of
+from rocking.problem import ground_of, records_of, rules_of
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
+from rocking.treatment.base import Model
 
 #: Rows of the first table per piece of the motion.
 _FIRST_ROWS = 1.25
@@ -81,7 +82,10 @@ def simulate(
     how, blocks = treatment(chattering), Blocks.of([block])
     rules = rules_of(blocks, model, how, duration, record=True)
     trail = Trail(
-        ground_of(motion, block.gravity), records_of(blocks, model, how.limits(blocks, motion))[0], rules, NO_NODES
+        ground_of(motion, block.gravity),
+        records_of(blocks, model, how.limits(blocks, motion, model))[0],
+        rules,
+        NO_NODES,
     )
     start = state.new_states(1, 0)[0]
     start["side"], start["u"], start["v"] = _initial_state(initial_rotation, initial_velocity)

@@ -17,8 +17,8 @@ from rocking.block import Block, Blocks
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.treatment import Certified
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,7 @@ from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 MeasureName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
 

@@ -13,7 +13,7 @@ from rocking.block import Block, Blocks
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

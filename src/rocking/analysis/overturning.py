@@ -20,10 +20,10 @@ from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.progress import Progress
 from rocking.simulation import simulate
 from rocking.treatment import Certified
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

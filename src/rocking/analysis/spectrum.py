@@ -15,8 +15,8 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.treatment import Treatment
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,7 +17,7 @@ from rocking.analysis.calibration.tables import Outcomes, read
 from rocking.cli import batch, options
 from rocking.errors import InvalidOption, OutputError
 from rocking.motion.named import named_motion
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 
 def calibrate(

@@ -14,7 +14,8 @@ from rocking.analysis.intensity import MeasureName
 from rocking.cli import batch, options
 from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption
-from rocking.problem import Model
+from rocking.treatment import treatment
+from rocking.treatment.base import Model
 
 
 def fragility(
@@ -110,7 +111,7 @@ def fragility(
         limits=_limits(limits),
         polarity=polarity,
         model=model,
-        chattering=options.treatment_from(chattering),
+        chattering=treatment(chattering),
         confidence=confidence,
         band="bootstrap" if bootstrap != 0 else "likelihood",
         samples=bootstrap or 1,

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from rocking.analysis.incremental import dynamic_figure, incremental_dynamic_analysis
 from rocking.analysis.intensity import MeasureName
 from rocking.cli import batch, options
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,7 @@ from rocking.analysis.overturning import mode_name, overturning_figure, overturn
 from rocking.block import Block
 from rocking.cli import batch, options
 from rocking.errors import InvalidBlock
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,6 @@ import numpy as np
 
 from rocking.block import Block
 from rocking.errors import InvalidBlock, InvalidOption, OutputError
-from rocking.treatment import Certified, IntervalThreshold, Treatment, VelocityThreshold, treatment
 
 
 def block_from(
@@ -41,24 +40,6 @@ def numbers(text: str, option: str) -> float | list[float]:
             f"{option} takes a number, or two with a comma between (side +, side -), not {text!r}"
         ) from None
     return values[0] if len(values) == 1 else values
-
-
-def treatment_from(text: str) -> Treatment:
-    """Treatment from its name, or from "certified=TOLERANCE", "velocity=THRESHOLD", "interval=SECONDS"."""
-    name, given, value = text.partition("=")
-    if not given:
-        return treatment(name)
-    with_parameter: dict[str, Callable[[float], Treatment]] = {
-        "certified": Certified,
-        "velocity": VelocityThreshold,
-        "interval": IntervalThreshold,
-    }
-    if name not in with_parameter:
-        raise InvalidOption(f"--chattering {name} takes no parameter; those that do are {', '.join(with_parameter)}")
-    parameter = numbers(value, f"--chattering {name}")
-    if not isinstance(parameter, float):
-        raise InvalidOption(f"--chattering {name} takes one number, not {value!r}")
-    return with_parameter[name](parameter)
 
 
 def output_folder(folder: Path) -> Path:

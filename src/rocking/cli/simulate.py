@@ -13,9 +13,10 @@ from rocking.cli import options
 from rocking.errors import OutputError
 from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
-from rocking.problem import Model
 from rocking.response import Response
 from rocking.simulation import simulate as run
+from rocking.treatment import treatment
+from rocking.treatment.base import Model
 
 #: Chattering sequences that the printed table lists.
 _LISTED = 12
@@ -83,7 +84,7 @@ def simulate(
         Print the result as JSON.
     """
     block = options.block_from(half_width, half_height, p, alpha, restitution)
-    how = options.treatment_from(chattering)
+    how = treatment(chattering)
     folder = None if out is None else options.output_folder(out)
     shaking = named_motion(motion, channel=channel, dt=dt, units=units, scale=scale)
     response = run(

@@ -9,7 +9,8 @@ from cyclopts import Parameter
 
 from rocking.analysis.spectrum import rocking_spectrum, spectrum_figure
 from rocking.cli import batch, options
-from rocking.problem import Model
+from rocking.treatment import treatment
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,7 +79,7 @@ def spectrum(
         restitution=None if restitution is None else batch.values(restitution, "--restitution"),
         fractiles=batch.values(fractiles, "--fractiles").tolist(),
         model=model,
-        chattering=options.treatment_from(chattering),
+        chattering=treatment(chattering),
     )
     result = _result(dataset)
     if folder is not None:

@@ -17,9 +17,9 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.response import Response
 from rocking.simulation import simulate
+from rocking.treatment.base import Model
 
 #: Blocks that the search starts from.
 _CANDIDATES: Final = 2048

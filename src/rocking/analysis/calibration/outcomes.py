@@ -20,7 +20,7 @@ from rocking.block import Blocks
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 #: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
 _LAPSE: Final = 0.005

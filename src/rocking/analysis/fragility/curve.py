@@ -19,7 +19,7 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, OutputError
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -21,8 +21,8 @@ from rocking.block import Block, Blocks
 from rocking.ensemble import Polarity, simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.treatment import Treatment
+from rocking.treatment.base import Model
 
 Band = Literal["likelihood", "bootstrap"]
 
