@@ -125,7 +125,7 @@ def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command)
         ([RECORD, *BLOCK, "--model", "cubic"], "cubic"),
         ([RECORD, *BLOCK, "--chattering", "hope"], "hope"),
         ([RECORD, *BLOCK, "--chattering", "velocity=0"], "positive"),
-        ([RECORD, *BLOCK, "--chattering", "time=3"], "no parameter"),
+        ([RECORD, *BLOCK, "--chattering", "time=3"], "eq76, eq77, exact"),
         ([RECORD, *BLOCK, "--chattering", "time"], "sinusoidal"),
         ([RECORD, *BLOCK, "--duration", "-3"], "duration"),
         ([RECORD, *BLOCK, "--scale", "nan"], "scale"),

@@ -13,8 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
+from rocking.errors import Unfinished
 from rocking.kernels import state, status
 from rocking.kernels.ground import Ground
 from rocking.kernels.lanes import crew, scheduler
@@ -141,14 +142,39 @@ def parts_of(count: int, motion: Motion) -> Iterator[slice]:
 def simulate_each(
     setup: Setup, motion: Motion, factors: Floats, *, threads: int | None = None
 ) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Outcomes for block k under the motion times factor k; those that share a factor are simulated together."""
+    """Outcomes for block k under the motion times factor k; those that share a factor are simulated together.
+
+    Raises
+    ------
+    Unfinished
+        If a simulation is given up.
+    """
     order = np.argsort(factors, kind="stable")
     starts = np.flatnonzero(np.diff(factors[order], prepend=np.nan) != 0.0)
     groups = np.split(order, starts[1:])
     tasks = (
         Task(group[part], motion, float(factors[group[0]])) for group in groups for part in parts_of(len(group), motion)
     )
-    return simulate_tasks(setup, tasks, threads=threads)
+    for task, outcomes in simulate_tasks(setup, tasks, threads=threads):
+        require_finished(outcomes["unfinished"])
+        yield task, outcomes
+
+
+def require_finished(unfinished: Flags) -> None:
+    """Check that no simulation was given up: what is known of one that was is no verdict.
+
+    Raises
+    ------
+    Unfinished
+        If one was.
+    """
+    count = int(np.count_nonzero(unfinished))
+    if count:
+        raise Unfinished(
+            f"{count} of {unfinished.size} simulations were given up after more than {BUDGET} steps, so that their "
+            "verdicts are not known: blocks whose restitution is so near 1 hardly come to rest; lower it, or look at "
+            "each with simulate_many"
+        )
 
 
 def _in_flight(

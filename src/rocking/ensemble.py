@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -209,7 +210,7 @@ def _dataset(
         name: (kept, results[name].squeeze(axis=tuple(dropped)), {"units": units, "long_name": meaning})
         for name, (units, meaning) in VARIABLES.items()
     }
-    coordinates: dict[str, Any] = {"motion": ("motion", [motion.name for motion in motions])}
+    coordinates: dict[str, Any] = {"motion": ("motion", _names(motions))}
     if scales.measure is not None:
         units = {"factor": "1", "pgv": "m/s"}.get(scales.measure, "m/s^2")
         coordinates["scale"] = ("scale", scales.values, {"measure": scales.measure, "units": units, **scales.options})
@@ -226,6 +227,17 @@ def _dataset(
         "histories": ["; ".join(motion.history) for motion in motions],
     }
     return xr.Dataset(variables, coordinates, attributes)
+
+
+def _names(motions: Sequence[Motion]) -> list[str]:
+    """Names of motions, numbered where several share one: a row of a table must say which it is."""
+    shared = {name for name, count in Counter(motion.name for motion in motions).items() if count > 1}
+    seen: Counter[str] = Counter()
+    names = []
+    for motion in motions:
+        seen[motion.name] += 1
+        names.append(f"{motion.name} #{seen[motion.name]}" if motion.name in shared else motion.name)
+    return names
 
 
 def _block_coordinates(blocks: Blocks) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 from rocking.analysis.intensity import Measure
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
+from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
@@ -24,6 +25,20 @@ def several_blocks(blocks: Blocks | Block | Sequence[Block]) -> Blocks:
     if isinstance(blocks, Blocks):
         return blocks
     return Blocks.of([blocks] if isinstance(blocks, Block) else blocks)
+
+
+def described(blocks: Blocks | Block | Sequence[Block]) -> str:
+    """Name blocks in a few words: one by its sizes or parameters, several by their number."""
+    if isinstance(blocks, Block):
+        return blocks.description
+    many = several_blocks(blocks)
+    if len(many) > 1:
+        return f"{len(many)} blocks"
+    return f"block with p = {_pair(many.p[0])} rad/s, alpha = {_pair(many.alpha[0])} rad"
+
+
+def _pair(sides: Floats) -> str:
+    return f"{sides[0]:.4g}" if sides[0] == sides[1] else f"({sides[0]:.4g}, {sides[1]:.4g})"
 
 
 def several_motions(motions: Motion | Sequence[Motion], measure: Measure) -> tuple[list[Motion], Floats]:
@@ -69,4 +84,5 @@ def simulate_levels(
         parts.append(simulate_many(blocks.select(group), motions, model=model, **targets, **options))
         parts[-1] = parts[-1].assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units}))
     whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
+    require_finished(whole.unfinished.values)
     return whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")

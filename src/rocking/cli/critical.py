@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rocking.chattering import critical_amplitude
-from rocking.cli import options
 from rocking.errors import InvalidOption, OutsideFit
+from rocking.tables import to_json
 
 _METHODS = {
     "exact": "exact",
@@ -41,7 +41,7 @@ def critical(
     amplitudes |= {method: _amplitude(omega, eta, method) for method in _METHODS if method != "exact"}
     result: dict[str, Any] = {"omega": omega, "eta": eta, "critical_amplitude": amplitudes}
     if as_json:
-        options.print_json(result)
+        print(to_json(result))
         return
     for method, name in _METHODS.items():
         amplitude = amplitudes[method]

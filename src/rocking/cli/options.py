@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from rocking.block import Block
 from rocking.errors import InvalidBlock, InvalidOption, OutputError
@@ -58,27 +52,3 @@ def output_folder(folder: Path) -> Path:
     except OSError as error:
         raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
     return folder
-
-
-def print_json(result: Mapping[str, Any]) -> None:
-    """Print a result for machines: plain JSON, NaN and infinity as null."""
-    print(json.dumps(plain(result), indent=2, allow_nan=False))
-
-
-def rows(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
-    """Rows of a structured array as mappings."""
-    names = table.dtype.names or ()
-    return [dict(zip(names, row.tolist(), strict=True)) for row in table]
-
-
-def plain(value: Any) -> Any:
-    """Value that JSON knows: no arrays, no NaN."""
-    if isinstance(value, Mapping):
-        return {key: plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +14,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
 from rocking.response import Response
 from rocking.simulation import simulate as run
+from rocking.tables import rows_of, to_json
 from rocking.treatment import treatment
 from rocking.treatment.base import Model
 
@@ -100,7 +100,7 @@ def simulate(
     if folder is not None:
         write(response, result, folder)
     if as_json:
-        options.print_json(result)
+        print(to_json(result))
     else:
         print(table(response, shaking))
         if folder is not None:
@@ -136,8 +136,8 @@ def summary(response: Response, motion: Motion) -> dict[str, Any]:
         "duration_s": response.duration,
         "time_at_rest_s": response.time_at_rest,
         "ambiguous": response.ambiguous,
-        "events": options.rows(response.events),
-        "chattering": options.rows(response.chattering),
+        "events": rows_of(response.events),
+        "chattering": rows_of(response.chattering),
     }
 
 
@@ -220,7 +220,7 @@ def write(response: Response, result: dict[str, Any], folder: Path) -> None:
             header="time_s,kind,side",
             comments="",
         )
-        (folder / "result.json").write_text(json.dumps(options.plain(result), indent=2) + "\n", "utf-8")
+        (folder / "result.json").write_text(to_json(result) + "\n", "utf-8")
     except OSError as error:
         raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
     response.to_csv(folder / "response.csv")
