@@ -180,7 +180,7 @@ class Calibration:
 
         See Also
         --------
-        rocking.analysis.Scores : accuracy, log loss and Brier score.
+        rocking.analysis.calibration.Scores : accuracy, log loss and Brier score.
         """
         labels = _labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
