@@ -11,7 +11,8 @@ from rocking.analysis.intensity import Measure
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.ensemble import simulate_many
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import InvalidMotion
+from rocking.motion import accepted
 from rocking.motion.motion import Motion
 from rocking.problem import Model
 
@@ -21,9 +22,7 @@ if TYPE_CHECKING:
 
 def several_blocks(blocks: Blocks | Block | Sequence[Block]) -> Blocks:
     """Blocks as a struct of arrays."""
-    if isinstance(blocks, Blocks):
-        return blocks
-    return Blocks.of([blocks] if isinstance(blocks, Block) else blocks)
+    return Blocks.of(blocks)
 
 
 def several_motions(motions: Motion | Sequence[Motion], measure: Measure) -> tuple[list[Motion], Floats]:
@@ -34,11 +33,9 @@ def several_motions(motions: Motion | Sequence[Motion], measure: Measure) -> tup
     InvalidOption
         If there is none.
     InvalidMotion
-        If one is zero throughout.
+        If one is no motion, or zero throughout.
     """
-    shaken = [motions] if isinstance(motions, Motion) else list(motions)
-    if not shaken:
-        raise InvalidOption("motions must hold at least one motion")
+    shaken = accepted.several_motions(motions)
     values = np.array([measure.of(motion) for motion in shaken])
     if not np.all(values > 0.0):
         raise InvalidMotion(f"{shaken[int(np.argmin(values))].name} is zero throughout and has no intensity")
