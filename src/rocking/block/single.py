@@ -127,7 +127,7 @@ class Block:
         p = math.sqrt(0.75 * g / radius)
         e = _restitutions(restitution, (housner_restitution(alpha),) * 2)
         sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
-        _fill(self, sides, g, f"rectangular block, {2 * b:g} m x {2 * h:g} m", b, h, mass)
+        _fill(self, sides, g, f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m", b, h, mass)
 
     @classmethod
     def from_parameters(
@@ -234,7 +234,7 @@ class Block:
             Side(math.sqrt(g * radii[i] / inertias[i]), math.atan2((plus, minus)[i], h), e[i], radii[i])
             for i in range(2)
         )
-        text = f"body on pivots {plus:g} m and {minus:g} m from its centre of mass, {h:g} m high"
+        text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, {h:.5g} m high"
         return _made(cls, (sides[0], sides[1]), g, text, mass)
 
     @classmethod
@@ -286,7 +286,7 @@ class Block:
         e = _restitutions(restitution, (kept / (1.0 + 3.0 * gamma),) * 2)
         p = math.sqrt(0.75 * g / radius)
         sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
-        return _made(cls, sides, g, f"frame of columns {2 * b:g} m x {2 * h:g} m, mass ratio {gamma:g}")
+        return _made(cls, sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}")
 
     def __str__(self) -> str:
         """Return description and parameters in one line."""
