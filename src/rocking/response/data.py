@@ -10,7 +10,7 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption, OutputError
-from rocking.response.history import even_times
+from rocking.response.history import History, even_times
 from rocking.tables import named, rows_of, write_text
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def records(response: Response, table: Table) -> list[dict[str, Any]]:
 
 
 def _histories(response: Response, times: Floats) -> dict[str, tuple[Floats, str]]:
-    states = response.history.states(times)
+    states = History(response.trail, response.duration).states(times)
     ground = np.zeros_like(times) if response.motion is None else response.motion.acceleration(times)
     return {
         "rotation": (states[:, 0], "rad"),

@@ -130,8 +130,7 @@ class Response:
         return svg.captioned(f"Response: {summary.line(self)}", svg.history(times, drawn, "rotation / slenderness"))
 
     @property
-    def history(self) -> History:
-        """Rotation and its derivatives as functions of time."""
+    def _history(self) -> History:
         return History(self.trail, self.duration)
 
     @property
@@ -151,7 +150,7 @@ class Response:
         if not self.overturned:
             return math.nan
         plus, minus = self.block.sides
-        return self.history.tipping_time((plus.alpha, minus.alpha))
+        return self._history.tipping_time((plus.alpha, minus.alpha))
 
     @property
     def sensitivity(self) -> Sensitivity:
@@ -183,7 +182,7 @@ class Response:
     @property
     def rest_intervals(self) -> Floats:
         """Start and end of each interval at rest, shape (n, 2), s."""
-        return self.history.rests()
+        return self._history.rests()
 
     def rotation(self, time: ArrayLike) -> Floats:
         """Rotation theta, rad, at any time, from the series of the arc in which it lies.
@@ -203,15 +202,15 @@ class Response:
         InvalidOption
             If a time is not a number.
         """
-        return self.history.states(time)[..., 0]
+        return self._history.states(time)[..., 0]
 
     def angular_velocity(self, time: ArrayLike) -> Floats:
         """Angular velocity, rad/s, at any time (just after an impact, at one); NaN outside [0, duration]."""
-        return self.history.states(time)[..., 1]
+        return self._history.states(time)[..., 1]
 
     def angular_acceleration(self, time: ArrayLike) -> Floats:
         """Angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
-        return self.history.states(time)[..., 2]
+        return self._history.states(time)[..., 2]
 
     def normal_force(self, time: ArrayLike) -> Floats:
         """Return the normal force over the weight at any time; impulses at impacts are not part of it."""
@@ -272,7 +271,7 @@ class Response:
 
     @property
     def _contact(self) -> Contact:
-        return Contact(self.history, self.block, self.tipping_time if self.overturned else self.duration)
+        return Contact(self._history, self.block, self.tipping_time if self.overturned else self.duration)
 
     def summary(self) -> str:
         """Return what happened in words, line by line, as ``rocking simulate`` prints it.
