@@ -12,6 +12,7 @@ import xarray as xr
 
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
+from rocking.response import Sensitivity
 from rocking.response.summary import time_text
 
 TABLES = {
@@ -57,6 +58,13 @@ def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(s
         assert len(max(re.findall(r'points="([^"]*)"', page), key=len).split()) <= 400
     extreme = np.max(np.abs([float(text) for text in re.findall(r">(-?[\d.]+)</text>", shaken._repr_html_())[:2]]))
     assert extreme == pytest.approx(shaken.peak_over_slenderness, rel=2e-3)
+
+
+def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatch):
+    """A sensitivity is a pass along all steps."""
+    monkeypatch.setattr(Sensitivity, "along", None)
+    assert "rocks" in repr(shaken)
+    assert "rocks" in shaken._repr_html_()
 
 
 @pytest.mark.parametrize(

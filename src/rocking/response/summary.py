@@ -47,7 +47,7 @@ def line(response: Response) -> str:
     shaken = "no motion" if response.motion is None else response.motion.name
     peak = "" if response.overturned else f", peak {response.peak_over_slenderness:.4f} of the slenderness"
     return (
-        f"{response.block.description} under {shaken}: {_outcome(response, response.sensitivity)}{peak}; "
+        f"{response.block.description} under {shaken}: {_outcome(response, f'{response.overturn_time:.4f} s')}{peak}; "
         f"{len(response.events)} events, {len(response.impacts)} impacts resolved, {response.duration:.5g} s"
     )
 
@@ -171,16 +171,17 @@ def _before_tipping(response: Response) -> str:
     return f", until it tips at {response.tipping_time:.4f} s" if response.overturned else ""
 
 
-def _outcome(response: Response, known: Sensitivity) -> str:
+def _outcome(response: Response, overturn_time: str) -> str:
     if response.overturned:
-        return f"overturns at {time_text(response.overturn_time, known.driving()[1][-1])}"
+        return f"overturns at {overturn_time}"
     if len(response.events) == 0 and len(response.impacts) == 0:
         return "does not move"
     return "rocks and does not overturn"
 
 
 def _verdict(response: Response, known: Sensitivity) -> str:
-    verdict = _outcome(response, known)
+    changes = known.driving()[1]
+    verdict = _outcome(response, time_text(response.overturn_time, changes[-1]) if response.overturned else "")
     if response.unfinished:
         verdict += f"; UNFINISHED: given up at {response.duration:.4f} s, after too many steps"
     if response.stalled:
