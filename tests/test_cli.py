@@ -32,7 +32,7 @@ def run(capsys):
 def test_simulate_prints_a_verdict(run):
     code, out, err = run("simulate", "ridgecrest-clc-090", *BLOCK)
     assert (code, err) == (0, "")
-    for word in ("uplift", "impacts", "complete chattering proven", "peak rotation", "friction", "verdict"):
+    for word in ("uplift", "impacts resolved", "complete chattering proven", "peak rotation", "friction", "verdict"):
         assert word in out
 
 
@@ -47,7 +47,7 @@ def test_simulate_json_is_the_response(run):
     block = rocking.Block.from_parameters((2.5, 2.2), (0.12, 0.2), (0.9, 0.85))
     response = rocking.simulate(block, rocking.records.load(RECORD))
     assert result["peak_rotation_rad"] == response.peak_rotation
-    assert [event["time"] for event in result["events"]] == list(response.events["time"])
+    assert [event["time_s"] for event in result["events"]] == list(response.events["time"])
     assert result["overturn_time_s"] is None or response.overturned
 
 

@@ -18,6 +18,7 @@ from rocking.constants import VERSION
 from rocking.engine import OUTCOME, Setup, Task, cores, parts_of, simulate_tasks
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import measures
+from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
 from rocking.problem import rules_of
 from rocking.progress import Progress
@@ -114,10 +115,7 @@ def simulate_many(
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    many = _blocks(blocks)
-    shaken = [motions] if isinstance(motions, Motion) else list(motions)
-    if not shaken:
-        raise InvalidOption("motions must hold at least one motion")
+    many, shaken = Blocks.of(blocks), several_motions(motions)
     how = treatment(chattering)
     rules_of(many, model, how, duration, record=False)  # checked before anything is computed
     scales = _scales(factor=factor, pga=pga, pgv=pgv, sa=sa, period=period, damping=damping)
@@ -172,12 +170,6 @@ def _scales(*, period: float | None, damping: float, **measures: ArrayLike | Non
     if period is None:
         raise InvalidOption("sa= needs period=, in s")
     return _Scales(name, values, {"period": period, "damping": damping})
-
-
-def _blocks(blocks: Blocks | Block | Sequence[Block]) -> Blocks:
-    if isinstance(blocks, Blocks):
-        return blocks
-    return Blocks.of([blocks] if isinstance(blocks, Block) else blocks)
 
 
 def _threads(threads: int | None) -> int:

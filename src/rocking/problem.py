@@ -56,8 +56,7 @@ def rules_of(
     InvalidOption
         If the model is unknown, the duration is not positive, or it is not given where nothing comes to rest.
     """
-    if model not in get_args(Model):
-        raise InvalidOption(f"model must be one of {', '.join(get_args(Model))}, not {model!r}")
+    checks.one_of(model, "model", InvalidOption, get_args(Model))
     if duration is None:
         if np.any(np.prod(blocks.restitution, axis=1) == 1.0):
             raise InvalidOption("a block with restitution 1 never comes to rest; give duration= to say when to stop")

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 from rocking import checks
-from rocking.block import Block, Blocks
+from rocking.block import Block, Blocks, one_block
 from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state, status
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
+from rocking.motion.accepted import one_motion
 from rocking.motion.motion import Motion
 from rocking.problem import ground_of, records_of, rules_of
 from rocking.response import Response
@@ -61,6 +62,8 @@ def simulate(
 
     Raises
     ------
+    InvalidBlock, InvalidMotion
+        If the block is no `Block`, or the motion no `Motion`.
     InvalidOption
         If an argument is out of its range, or the block would never come to rest and no duration is given.
 
@@ -79,7 +82,7 @@ def simulate(
     >>> response.overturned, len(response.impacts) > 50, f"{response.events['time'][-1]:.6f}"
     (False, True, '4.235818')
     """
-    how, blocks = treatment(chattering), Blocks.of([block])
+    how, blocks, motion = treatment(chattering), Blocks.of([one_block(block)]), one_motion(motion)
     rules = rules_of(blocks, model, how, duration, record=True)
     trail = Trail(
         ground_of(motion, block.gravity),

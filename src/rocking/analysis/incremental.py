@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.analysis.boundaries import Boundaries, boundaries
 from rocking.analysis.intensity import Measure, MeasureName
-from rocking.analysis.levels import described, several_blocks, several_motions, simulate_levels
+from rocking.analysis.levels import described, several_motions, simulate_levels
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import Setup, simulate_each
@@ -116,7 +116,7 @@ def incremental_dynamic_analysis(
     overturns from 2.9855 to 6.5019
     overturns from 7.2759 to nan
     """
-    many, how = several_blocks(blocks), Measure(measure, period, damping)
+    many, how = Blocks.of(blocks), Measure(measure, period, damping)
     shaken, values = several_motions(motions, how)
     if np.any(np.prod(many.restitution, axis=1) == 1.0):
         raise InvalidOption("a block with restitution 1 never comes to rest; scaling up needs one below 1")

@@ -12,7 +12,8 @@ from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import InvalidMotion
+from rocking.motion import accepted
 from rocking.motion.motion import Motion
 from rocking.treatment.base import Model
 
@@ -20,18 +21,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def several_blocks(blocks: Blocks | Block | Sequence[Block]) -> Blocks:
-    """Blocks as a struct of arrays."""
-    if isinstance(blocks, Blocks):
-        return blocks
-    return Blocks.of([blocks] if isinstance(blocks, Block) else blocks)
-
-
 def described(blocks: Blocks | Block | Sequence[Block]) -> str:
     """Name blocks in a few words: one by its sizes or parameters, several by their number."""
     if isinstance(blocks, Block):
         return blocks.description
-    many = several_blocks(blocks)
+    many = Blocks.of(blocks)
     if len(many) > 1:
         return f"{len(many)} blocks"
     return f"block with p = {_pair(many.p[0])} rad/s, alpha = {_pair(many.alpha[0])} rad"
@@ -49,11 +43,9 @@ def several_motions(motions: Motion | Sequence[Motion], measure: Measure) -> tup
     InvalidOption
         If there is none.
     InvalidMotion
-        If one is zero throughout.
+        If one is no motion, or zero throughout.
     """
-    shaken = [motions] if isinstance(motions, Motion) else list(motions)
-    if not shaken:
-        raise InvalidOption("motions must hold at least one motion")
+    shaken = accepted.several_motions(motions)
     values = np.array([measure.of(motion) for motion in shaken])
     if not np.all(values > 0.0):
         raise InvalidMotion(f"{shaken[int(np.argmin(values))].name} is zero throughout and has no intensity")

@@ -15,7 +15,7 @@ from rocking.analysis.fragility import lognormal
 from rocking.analysis.fragility.confidence import Confidence, LikelyRegion, Resamples
 from rocking.analysis.fragility.curve import Fragility, FragilityCurve
 from rocking.analysis.intensity import Measure, MeasureName
-from rocking.analysis.levels import described, several_blocks, several_motions, simulate_levels
+from rocking.analysis.levels import described, several_motions, simulate_levels
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import require_finished
@@ -106,7 +106,7 @@ def fragility(
     >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
     median 1.443, dispersion 0.524
     """
-    many, how = several_blocks(blocks), Measure(measure, period, damping)
+    many, how = Blocks.of(blocks), Measure(measure, period, damping)
     bands = _Bands(confidence, band, samples, seed)
     if not limits:
         raise InvalidOption("limits must name at least one limit state")
