@@ -89,18 +89,18 @@ def test_the_fingerprint_changes_with_the_content_of_any_kernel(places: Path) ->
     shutil.copytree(KERNELS, package, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
     sources = sorted(package.rglob("*.py"))
     assert len(sources) > 20
-    before = compiled._fingerprint()
-    assert compiled._fingerprint() == before
+    before = compiled.fingerprint()
+    assert compiled.fingerprint() == before
     seen = {before}
     for source in sources:
         text = source.read_bytes()
         source.write_bytes(text + b"# changed\n")
-        seen.add(compiled._fingerprint())
+        seen.add(compiled.fingerprint())
         source.write_bytes(text)
     assert len(seen) == len(sources) + 1
-    assert compiled._fingerprint() == before
+    assert compiled.fingerprint() == before
     sources[0].rename(sources[0].with_name("renamed.py"))
-    assert compiled._fingerprint() not in seen
+    assert compiled.fingerprint() not in seen
 
 
 PROGRAM = """

@@ -12,12 +12,14 @@ from .errors import (
     InvalidOption,
     OutputError,
     RockingError,
+    StudyError,
     UnreadableRecord,
 )
 from .motion import Motion, pulses, records
 from .motion.formats import read
 from .response import Response
 from .simulation import simulate
+from .studies import Study, study
 from .treatment import AsymptoticTime, Certified, IntervalThreshold, VelocityThreshold
 
 __version__: str
@@ -38,6 +40,8 @@ __all__ = [
     "OutputError",
     "Response",
     "RockingError",
+    "Study",
+    "StudyError",
     "UnreadableRecord",
     "VelocityThreshold",
     "calibrate",
@@ -53,4 +57,5 @@ __all__ = [
     "rocking_spectrum",
     "simulate",
     "simulate_many",
+    "study",
 ]

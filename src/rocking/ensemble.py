@@ -3,46 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.arrays import Floats
 from rocking.block import Block, Blocks
-from rocking.constants import VERSION
-from rocking.engine import OUTCOME, Setup, Task, cores, parts_of, simulate_tasks
-from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion import measures
+from rocking.engine import OUTCOME, cores, simulate_tasks
+from rocking.errors import InvalidOption
 from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
-from rocking.problem import rules_of
+from rocking.product import VARIABLES, Polarity, Product, Scales
 from rocking.progress import Progress
 from rocking.treatment import Treatment, treatment
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Polarity = Literal["+", "-", "both"]
-
-_SIGNS: dict[str, tuple[int, ...]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
-
-#: Variables of the result, from the fields of the engine's outcome: units, and what each one means.
-VARIABLES: dict[str, tuple[str, str]] = {
-    "overturned": ("1", "whether the rotation reached pi/2"),
-    "peak_rotation": ("rad", "largest rotation in size"),
-    "peak_time": ("s", "time of the peak rotation"),
-    "impacts": ("1", "impacts that were resolved"),
-    "uplifts": ("1", "uplifts from rest"),
-    "rests": ("1", "times the block came to rest"),
-    "time_at_rest": ("s", "time spent at rest"),
-    "unfinished": ("1", "whether the simulation was given up after too many steps; the rest is as far as it came"),
-}
 
 
 def simulate_many(
@@ -115,129 +94,20 @@ def simulate_many(
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    many, shaken = Blocks.of(blocks), several_motions(motions)
-    how = treatment(chattering)
-    rules_of(many, model, how, duration, record=False)  # checked before anything is computed
-    scales = _scales(factor=factor, pga=pga, pgv=pgv, sa=sa, period=period, damping=damping)
-    if polarity not in _SIGNS:
-        raise InvalidOption(f"polarity must be one of {', '.join(_SIGNS)}, not {polarity!r}")
-    count = _threads(threads)
-    shape = (len(shaken), scales.count, len(_SIGNS[polarity]), len(many))
-    results = {name: np.empty(shape, dtype=OUTCOME[name]) for name in VARIABLES}
-    setup = Setup(many, model, how, duration)
-    with Progress("simulating", math.prod(shape), show=progress) as bar:
-        for task, outcomes in simulate_tasks(setup, _tasks(shaken, scales, _SIGNS[polarity], len(many)), threads=count):
+    product = Product(
+        Blocks.of(blocks),
+        tuple(several_motions(motions)),
+        Scales.of(factor=factor, pga=pga, pgv=pgv, sa=sa, period=period, damping=damping),
+        polarity,
+        model,
+        treatment(chattering),
+        duration,
+    )
+    count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    results = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in VARIABLES}
+    with Progress("simulating", math.prod(product.shape), show=progress) as bar:
+        for task, outcomes in simulate_tasks(product.setup(), product.tasks(), threads=count):
             for name, values in results.items():
                 values[(*task.key, task.blocks)] = outcomes[name]
             bar.advance(len(outcomes))
-    return _dataset(results, many, shaken, scales, polarity, model, how)
-
-
-@dataclass(frozen=True)
-class _Scales:
-    """How motions are scaled: a measure and its values; without one, not at all."""
-
-    measure: str | None
-    values: Floats
-    options: dict[str, float]
-
-    @property
-    def count(self) -> int:
-        return len(self.values)
-
-    def factors(self, motion: Motion) -> Floats:
-        """Factors that bring a motion to the values of the measure."""
-        if self.measure is None or self.measure == "factor":
-            return self.values
-        now = measures.target(motion, self.measure, self.options.get("period"), self.options.get("damping", 0.0))
-        if now == 0.0:
-            raise InvalidMotion(f"{motion.name} is zero throughout and cannot be scaled to a {self.measure}")
-        return self.values / now
-
-
-def _scales(*, period: float | None, damping: float, **measures: ArrayLike | None) -> _Scales:
-    given = {name: values for name, values in measures.items() if values is not None}
-    if len(given) > 1:
-        raise InvalidOption(f"motions can be scaled to one measure only, not to {' and '.join(given)}")
-    if "sa" not in given and period is not None:
-        raise InvalidOption("period= belongs to sa=; give sa= as well, or neither")
-    if not given:
-        return _Scales(None, np.ones(1), {})
-    ((name, target),) = given.items()
-    values = checks.positive_numbers(target, name, InvalidOption)
-    if name != "sa":
-        return _Scales(name, values, {})
-    if period is None:
-        raise InvalidOption("sa= needs period=, in s")
-    return _Scales(name, values, {"period": period, "damping": damping})
-
-
-def _threads(threads: int | None) -> int:
-    return cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
-
-
-def _tasks(motions: Sequence[Motion], scales: _Scales, signs: tuple[int, ...], count: int) -> Iterator[Task]:
-    for m, motion in enumerate(motions):
-        for s, factor in enumerate(scales.factors(motion).tolist()):
-            for k, sign in enumerate(signs):
-                for part in parts_of(count, motion):
-                    yield Task(part, motion, sign * factor, (m, s, k))
-
-
-def _dataset(
-    results: dict[str, NDArray[Any]],
-    blocks: Blocks,
-    motions: Sequence[Motion],
-    scales: _Scales,
-    polarity: Polarity,
-    model: Model,
-    how: Treatment,
-) -> xr.Dataset:
-    import xarray as xr
-
-    dimensions = ("motion", "scale", "polarity", "block")
-    dropped = [k for k, gone in ((1, scales.measure is None), (2, polarity != "both")) if gone]
-    kept = tuple(name for k, name in enumerate(dimensions) if k not in dropped)
-    variables = {
-        name: (kept, results[name].squeeze(axis=tuple(dropped)), {"units": units, "long_name": meaning})
-        for name, (units, meaning) in VARIABLES.items()
-    }
-    coordinates: dict[str, Any] = {"motion": ("motion", _names(motions))}
-    if scales.measure is not None:
-        units = {"factor": "1", "pgv": "m/s"}.get(scales.measure, "m/s^2")
-        coordinates["scale"] = ("scale", scales.values, {"measure": scales.measure, "units": units, **scales.options})
-    if polarity == "both":
-        coordinates["polarity"] = ("polarity", ["+", "-"])
-    coordinates |= _block_coordinates(blocks)
-    attributes = {
-        "program": f"rocking {VERSION}",
-        "model": model,
-        "chattering": repr(how),
-        "polarity": polarity,
-        "gravity": blocks.gravity,
-        "motions": [f"{motion.name}: {motion.description.text}" for motion in motions],
-        "histories": ["; ".join(motion.history) for motion in motions],
-    }
-    return xr.Dataset(variables, coordinates, attributes)
-
-
-def _names(motions: Sequence[Motion]) -> list[str]:
-    """Names of motions, numbered where several share one: a row of a table must say which it is."""
-    shared = {name for name, count in Counter(motion.name for motion in motions).items() if count > 1}
-    seen: Counter[str] = Counter()
-    names = []
-    for motion in motions:
-        seen[motion.name] += 1
-        names.append(f"{motion.name} #{seen[motion.name]}" if motion.name in shared else motion.name)
-    return names
-
-
-def _block_coordinates(blocks: Blocks) -> dict[str, Any]:
-    columns = {"p": (blocks.p, "rad/s"), "alpha": (blocks.alpha, "rad"), "restitution": (blocks.restitution, "1")}
-    if blocks.is_symmetric:
-        return {name: ("block", values[:, 0], {"units": units}) for name, (values, units) in columns.items()}
-    return {
-        f"{name}_{side}": ("block", values[:, k], {"units": units})
-        for name, (values, units) in columns.items()
-        for k, side in enumerate(("plus", "minus"))
-    }
+    return product.dataset(results)

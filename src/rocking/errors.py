@@ -28,6 +28,10 @@ class Unfinished(RockingError):
     """Simulations were given up after too many steps, so that an analysis has no answer."""
 
 
+class StudyError(RockingError):
+    """A study is damaged, held by another process, or not the one that is meant."""
+
+
 class OutsideFit(UserWarning):
     """A fitted formula was asked for values beyond those it was fitted to."""
 

@@ -25,6 +25,8 @@ class Progress:
         Number of steps.
     show : bool, optional
         By default only if stderr is a terminal.
+    done : int
+        Steps that were done before.
 
     Examples
     --------
@@ -33,11 +35,11 @@ class Progress:
     ...         progress.advance()
     """
 
-    def __init__(self, what: str, total: int, *, show: bool | None = None) -> None:
+    def __init__(self, what: str, total: int, *, show: bool | None = None, done: int = 0) -> None:
         self._what, self._total = what, total
         self._show = sys.stderr.isatty() if show is None else show
         self._start = time.monotonic()
-        self._done = 0
+        self._done = done
         self._bar: rich.progress.Progress | None = None
 
     def __enter__(self) -> Progress:
@@ -48,6 +50,12 @@ class Progress:
     ) -> None:
         if self._bar is not None:
             self._bar.stop()
+
+    def note(self, text: str) -> None:
+        """Show a few words behind what is being done."""
+        self._what = f"{self._what.partition(',')[0]}, {text}"
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], description=self._what)
 
     def advance(self, steps: int = 1) -> None:
         """Count steps that are done."""

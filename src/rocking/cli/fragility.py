@@ -11,8 +11,8 @@ from cyclopts import Parameter
 from rocking.analysis.fragility.fit import fragility as run
 from rocking.analysis.intensity import MeasureName
 from rocking.cli import batch, options
-from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption
+from rocking.product import Polarity
 from rocking.treatment import treatment
 from rocking.treatment.base import Model
 

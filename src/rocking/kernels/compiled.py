@@ -64,7 +64,7 @@ def cache_folder() -> Path | None:
     that it calls has changed. So the folder's name holds a hash of all of them. numba writes its files under another
     name and renames them, so that any number of processes may share the folder.
     """
-    name = f"kernels-{_fingerprint()}"
+    name = f"kernels-{fingerprint()}"
     for parent in _parents():
         folder = parent / name
         try:
@@ -87,7 +87,7 @@ def _parents() -> Iterator[Path]:
     yield Path(tempfile.gettempdir()) / f"rocking-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
 
 
-def _fingerprint() -> str:
+def fingerprint() -> str:
     """Hash of all kernels' sources and of the compiler's version."""
     sources = sorted(_HERE.rglob("*.py"))
     digest = hashlib.sha256(numba.__version__.encode())

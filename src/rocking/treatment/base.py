@@ -45,6 +45,11 @@ class Treatment(ABC):
     def limits(self, blocks: Blocks, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Limits of both sides of every block under a motion times a factor, shape (n, 2)."""
 
+    def __str__(self) -> str:
+        """Write the treatment so that `treatment` reads it back."""
+        values = [str(getattr(self, parameter.name)) for parameter in fields(self)]
+        return "=".join([self.name, *values])
+
     @classmethod
     def from_text(cls, value: str) -> Treatment:
         """Make the treatment of its one parameter as it is written after "NAME=".
@@ -77,6 +82,8 @@ def treatment(chattering: str | Treatment) -> Treatment:
     Certified(tolerance=1e-12)
     >>> treatment("velocity=1e-6")
     VelocityThreshold(threshold=1e-06)
+    >>> str(treatment("interval"))
+    'interval=1e-09'
     """
     if isinstance(chattering, Treatment):
         return chattering

@@ -19,9 +19,10 @@ from rocking.analysis.levels import described, several_motions, simulate_levels
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import require_finished
-from rocking.ensemble import Polarity, simulate_many
+from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
+from rocking.product import Polarity
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
 

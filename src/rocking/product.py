@@ -1,0 +1,233 @@
+"""The full product of blocks, motions, scales and polarities: what is simulated, and how its outcomes are labelled."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.block import Blocks
+from rocking.constants import VERSION
+from rocking.engine import Setup, Task, parts_of
+from rocking.errors import InvalidMotion, InvalidOption
+from rocking.motion import measures
+from rocking.motion.motion import Motion
+from rocking.problem import rules_of
+from rocking.treatment import Treatment
+from rocking.treatment.base import Model
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Polarity = Literal["+", "-", "both"]
+
+_SIGNS: Final[Mapping[str, tuple[int, ...]]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
+
+#: Outcomes that are kept of a simulation, from the fields of the engine's: units, and what each one means.
+VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
+    "overturned": ("1", "whether the rotation reached pi/2"),
+    "peak_rotation": ("rad", "largest rotation in size"),
+    "peak_time": ("s", "time of the peak rotation"),
+    "impacts": ("1", "impacts that were resolved"),
+    "uplifts": ("1", "uplifts from rest"),
+    "rests": ("1", "times the block came to rest"),
+    "time_at_rest": ("s", "time spent at rest"),
+    "unfinished": ("1", "whether the simulation was given up after too many steps; the rest is as far as it came"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """How motions are scaled: a measure and its values; without one, not at all.
+
+    Attributes
+    ----------
+    measure : {"factor", "pga", "pgv", "sa"} or None
+        What `values` are: factors, peak accelerations (m/s^2), peak velocities (m/s), spectral accelerations (m/s^2).
+    values : ndarray
+        Values of the measure.
+    options : mapping
+        period (s) and damping of "sa".
+    """
+
+    measure: str | None = None
+    values: Floats = field(default_factory=lambda: np.ones(1))
+    options: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, *, period: float | None, damping: float, **measures: ArrayLike | None) -> Scales:
+        """Scales from the one measure that is given.
+
+        Raises
+        ------
+        InvalidOption
+            If there are several, or an argument is out of place or range.
+        """
+        given = {name: values for name, values in measures.items() if values is not None}
+        if len(given) > 1:
+            raise InvalidOption(f"motions can be scaled to one measure only, not to {' and '.join(given)}")
+        if "sa" not in given and period is not None:
+            raise InvalidOption("period= belongs to sa=; give sa= as well, or neither")
+        if not given:
+            return cls()
+        ((name, target),) = given.items()
+        values = checks.positive_numbers(target, name, InvalidOption)
+        if name != "sa":
+            return cls(name, values)
+        if period is None:
+            raise InvalidOption("sa= needs period=, in s")
+        return cls(name, values, {"period": period, "damping": damping})
+
+    @property
+    def count(self) -> int:
+        """Number of scales."""
+        return len(self.values)
+
+    @property
+    def units(self) -> str:
+        """Units of the values."""
+        return {"factor": "1", "pgv": "m/s"}.get(self.measure or "factor", "m/s^2")
+
+    def factors(self, motion: Motion) -> Floats:
+        """Factors that bring a motion to the values of the measure.
+
+        Raises
+        ------
+        InvalidMotion
+            If the motion is zero throughout.
+        """
+        if self.measure is None or self.measure == "factor":
+            return self.values
+        now = measures.target(motion, self.measure, self.options.get("period"), self.options.get("damping", 0.0))
+        if now == 0.0:
+            raise InvalidMotion(f"{motion.name} is zero throughout and cannot be scaled to a {self.measure}")
+        return self.values / now
+
+
+@dataclass(frozen=True, eq=False)
+class Product:
+    """Every block under every motion at every scale and polarity.
+
+    Attributes
+    ----------
+    blocks : Blocks
+        n blocks.
+    motions : tuple of Motion
+        m motions.
+    scales : Scales
+        What the motions are scaled to.
+    polarity : {"+", "-", "both"}
+        Motions as they are, reversed, or both.
+    model, treatment, duration
+        As for `rocking.simulate`.
+
+    Raises
+    ------
+    InvalidOption
+        If a rule is out of its range.
+    """
+
+    blocks: Blocks
+    motions: tuple[Motion, ...]
+    scales: Scales
+    polarity: Polarity
+    model: Model
+    treatment: Treatment
+    duration: float | None
+
+    def __post_init__(self) -> None:
+        if self.polarity not in _SIGNS:
+            raise InvalidOption(f"polarity must be one of {', '.join(_SIGNS)}, not {self.polarity!r}")
+        rules_of(self.blocks, self.model, self.treatment, self.duration, record=False)  # checked before any work
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """Factors of the polarities."""
+        return _SIGNS[self.polarity]
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Numbers of motions, scales, polarities and blocks."""
+        return len(self.motions), self.scales.count, len(self.signs), len(self.blocks)
+
+    def setup(self, blocks: slice | None = None) -> Setup:
+        """Return how to simulate the blocks, or some of them."""
+        chosen = self.blocks if blocks is None else self.blocks.select(blocks)
+        return Setup(chosen, self.model, self.treatment, self.duration)
+
+    def tasks(self) -> Iterator[Task]:
+        """Cut the product into tasks for the engine; their keys are (motion, scale, polarity)."""
+        for m, motion in enumerate(self.motions):
+            for s, factor in enumerate(self.scales.factors(motion).tolist()):
+                for k, sign in enumerate(self.signs):
+                    for part in parts_of(len(self.blocks), motion):
+                        yield Task(part, motion, sign * factor, (m, s, k))
+
+    def dataset(self, outcomes: Mapping[str, Any]) -> xr.Dataset:
+        """Label outcomes, each of the product's shape; dimensions that were not asked for are dropped.
+
+        Parameters
+        ----------
+        outcomes : mapping
+            Arrays by the names of `VARIABLES`.
+        """
+        import xarray as xr
+
+        dimensions = ("motion", "scale", "polarity", "block")
+        gone = {"scale": self.scales.measure is None, "polarity": self.polarity != "both"}
+        attributes = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in VARIABLES.items()}
+        variables = {name: (dimensions, values, attributes.get(name, {})) for name, values in outcomes.items()}
+        whole = xr.Dataset(variables, self._coordinates(), self._attributes())
+        return whole.isel({name: 0 for name, is_gone in gone.items() if is_gone}, drop=True)
+
+    def _coordinates(self) -> dict[str, Any]:
+        about = {"measure": self.scales.measure or "factor", "units": self.scales.units, **self.scales.options}
+        return {
+            "motion": ("motion", _names(self.motions)),
+            "scale": ("scale", self.scales.values, about),
+            "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in self.signs]),
+            **_block_coordinates(self.blocks),
+        }
+
+    def _attributes(self) -> dict[str, Any]:
+        return {
+            "program": f"rocking {VERSION}",
+            "model": self.model,
+            "chattering": repr(self.treatment),
+            "polarity": self.polarity,
+            "gravity": self.blocks.gravity,
+            "motions": [f"{motion.name}: {motion.description.text}" for motion in self.motions],
+            "histories": ["; ".join(motion.history) for motion in self.motions],
+        }
+
+
+def _names(motions: Sequence[Motion]) -> list[str]:
+    """Names of motions, numbered where several share one: a row of a table must say which it is."""
+    shared = {name for name, count in Counter(motion.name for motion in motions).items() if count > 1}
+    seen: Counter[str] = Counter()
+    names = []
+    for motion in motions:
+        seen[motion.name] += 1
+        names.append(f"{motion.name} #{seen[motion.name]}" if motion.name in shared else motion.name)
+    return names
+
+
+def _block_coordinates(blocks: Blocks) -> dict[str, Any]:
+    columns: dict[str, tuple[NDArray[Any], str]] = {
+        "p": (blocks.p, "rad/s"),
+        "alpha": (blocks.alpha, "rad"),
+        "restitution": (blocks.restitution, "1"),
+    }
+    if blocks.is_symmetric:
+        return {name: ("block", values[:, 0], {"units": units}) for name, (values, units) in columns.items()}
+    return {
+        f"{name}_{side}": ("block", values[:, k], {"units": units})
+        for name, (values, units) in columns.items()
+        for k, side in enumerate(("plus", "minus"))
+    }

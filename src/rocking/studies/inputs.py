@@ -1,0 +1,156 @@
+"""What a study computes, as a file that needs no script: blocks, motions, scales and rules, each part with its hash."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.arrays import Floats
+from rocking.block import Blocks
+from rocking.motion.description import Description
+from rocking.motion.motion import Motion
+from rocking.product import Product, Scales
+from rocking.treatment import treatment
+
+#: A fixed time in archives, so that the same inputs make the same bytes.
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+
+
+def hashes(product: Product) -> dict[str, Any]:
+    """Hash of every part of the inputs by its name; those of the motions in a list."""
+    scales = product.scales
+    return {
+        "blocks": _hash(_block_arrays(product.blocks).values()),
+        "motions": [_hash(_motion_arrays(motion).values()) for motion in product.motions],
+        "scales": _hash([scales.values, _text(json.dumps([scales.measure, dict(scales.options)]))]),
+        "rules": _hash([_text(json.dumps(_rules(product)))]),
+    }
+
+
+def to_bytes(product: Product) -> bytes:
+    """Return all inputs as an archive of arrays (NPZ), whose bytes depend on them alone."""
+    arrays = {f"blocks/{name}": values for name, values in _block_arrays(product.blocks).items()}
+    for k, motion in enumerate(product.motions):
+        arrays |= {f"motions/{k}/{name}": values for name, values in _motion_arrays(motion).items()}
+    arrays["scales/values"] = product.scales.values
+    words = {"measure": product.scales.measure, "options": dict(product.scales.options)}
+    arrays["words"] = _text(json.dumps(words | {"motions": len(product.motions)} | _rules(product)))
+    return _archive(arrays)
+
+
+def from_bytes(data: bytes) -> Product:
+    """Read inputs from such an archive."""
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        words = json.loads(_words(arrays["words"]))
+        return Product(
+            blocks=_blocks(arrays),
+            motions=tuple(_motion(arrays, k) for k in range(words["motions"])),
+            scales=Scales(words["measure"], arrays["scales/values"], words["options"]),
+            polarity=words["polarity"],
+            model=words["model"],
+            treatment=treatment(words["treatment"]),
+            duration=words["duration"],
+        )
+
+
+def _rules(product: Product) -> dict[str, Any]:
+    return {
+        "polarity": product.polarity,
+        "model": product.model,
+        "treatment": str(product.treatment),
+        "duration": product.duration,
+    }
+
+
+def changes(now: Mapping[str, Any], then: Mapping[str, Any], motions: Sequence[Motion]) -> list[str]:
+    """Name the parts of a study's inputs whose hashes differ."""
+    found = [
+        {"blocks": "the blocks", "scales": "the scales", "rules": "the polarity, model, treatment or duration"}[part]
+        for part in ("blocks", "scales", "rules")
+        if now[part] != then[part]
+    ]
+    if len(now["motions"]) != len(then["motions"]):
+        return [*found, f"the number of motions ({len(then['motions'])} then, {len(now['motions'])} now)"]
+    pairs = enumerate(zip(now["motions"], then["motions"], strict=True))
+    different = [k for k, (new, old) in pairs if new != old]
+    return found + [f"motion {k} ({motions[k].name})" for k in different[:3]] + ["more motions"] * (len(different) > 3)
+
+
+def _hash(arrays: Iterable[NDArray[Any]]) -> str:
+    digest = hashlib.sha256()
+    for array in arrays:
+        values = np.asarray(array, order="C")
+        digest.update(f"{values.dtype.str}{values.shape}".encode())
+        digest.update(values.tobytes())
+    return digest.hexdigest()
+
+
+def _block_arrays(blocks: Blocks) -> dict[str, NDArray[Any]]:
+    return {
+        "p": blocks.p,
+        "alpha": blocks.alpha,
+        "restitution": blocks.restitution,
+        "gravity": np.array(blocks.gravity),
+    }
+
+
+def _blocks(arrays: Mapping[str, Floats]) -> Blocks:
+    p, alpha, restitution = (arrays[f"blocks/{name}"] for name in ("p", "alpha", "restitution"))
+    return Blocks(p, alpha, restitution, gravity=float(arrays["blocks/gravity"]))
+
+
+def _motion_arrays(motion: Motion) -> dict[str, NDArray[Any]]:
+    description = motion.description
+    words = {
+        "name": motion.name,
+        "family": description.family,
+        "parameters": dict(description.parameters),
+        "text": description.text,
+        "history": motion.history,
+        "error": motion.error,
+    }
+    return {
+        "breakpoints": motion.breakpoints,
+        "coefficients": motion.coefficients,
+        "words": _text(json.dumps(words)),
+    }
+
+
+def _motion(arrays: Mapping[str, NDArray[Any]], k: int) -> Motion:
+    words = json.loads(_words(arrays[f"motions/{k}/words"]))
+    return Motion(
+        arrays[f"motions/{k}/breakpoints"],
+        arrays[f"motions/{k}/coefficients"],
+        name=words["name"],
+        description=Description(words["family"], words["parameters"], words["text"]),
+        history=tuple(words["history"]),
+        error=words["error"],
+    )
+
+
+def _text(words: str) -> NDArray[np.uint8]:
+    return np.frombuffer(words.encode(), np.uint8)
+
+
+def _words(array: NDArray[Any]) -> str:
+    return bytes(array).decode()
+
+
+def _archive(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Archive of arrays whose bytes depend on the arrays alone."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, values in arrays.items():
+            entry = io.BytesIO()
+            np.lib.format.write_array(entry, np.asarray(values, order="C"), allow_pickle=False)
+            about = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
+            about.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(about, entry.getvalue())
+    return buffer.getvalue()

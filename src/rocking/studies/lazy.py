@@ -1,0 +1,79 @@
+"""Outcomes of a study as arrays that are read from its store when they are asked for."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from rocking.arrays import Floats
+from rocking.engine import OUTCOME
+from rocking.errors import StudyError
+from rocking.studies.store import Store
+from rocking.studies.units import OUTCOMES, exact, name_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class _Outcome(BackendArray):
+    """One outcome of a store; reads the units that a selection touches."""
+
+    def __init__(self, store: Store, name: str, complete: bool) -> None:
+        self._store, self._name, self._complete = store, name, complete
+        self.shape = store.grid.shape
+        self.dtype = OUTCOME[name] if complete else np.dtype(np.float64)
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
+        found: NDArray[Any] = indexing.explicit_indexing_adapter(
+            key, self.shape, indexing.IndexingSupport.OUTER, self._selected
+        )
+        return found
+
+    def _selected(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        axes = [np.arange(size)[part] for size, part in zip(self.shape, key, strict=True)]
+        grids = [np.atleast_1d(axis) for axis in axes]
+        found = np.full([len(grid) for grid in grids], np.nan)
+        units = grids[3] // self._store.grid.blocks
+        outer = (enumerate(grid.tolist()) for grid in grids[:3])
+        for (i, m), (j, s), (k, p) in itertools.product(*outer):
+            for unit in np.unique(units).tolist():
+                here = np.flatnonzero(units == unit)
+                values = self._unit((m, s, p, unit))
+                found[i, j, k, here] = values[grids[3][here] - unit * self._store.grid.blocks]
+        dropped = tuple(position for position, axis in enumerate(axes) if axis.ndim == 0)
+        return self._typed(found.squeeze(axis=dropped))
+
+    def _unit(self, key: tuple[int, int, int, int]) -> Floats:
+        outcomes = self._store.outcomes(key)
+        if outcomes is not None:
+            values: Floats = outcomes[OUTCOMES.index(self._name)]
+            return values
+        if self._complete:
+            raise StudyError(f"unit {name_of(key)} is gone since these results were opened: run the study again")
+        return np.full(self._store.grid.simulations(key), np.nan)
+
+    def _typed(self, values: NDArray[np.float64]) -> NDArray[Any]:
+        return exact(self._name, values) if self._complete else values
+
+
+def lazy(store: Store, name: str, complete: bool) -> xr.Variable:
+    """Outcome of a store over (motion, scale, polarity, block), read when it is needed.
+
+    Parameters
+    ----------
+    store : Store
+        Where it is kept.
+    name : str
+        Which outcome.
+    complete : bool
+        Whether all units are done, so that its own type holds every value.
+    """
+    import xarray as xr
+
+    values = indexing.LazilyIndexedArray(_Outcome(store, name, complete))
+    return xr.Variable(("motion", "scale", "polarity", "block"), values)

@@ -1,0 +1,179 @@
+"""The store of a study: an array of outcomes, one object a unit, with all that is needed to go on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from typing import Any, Final
+
+from rocking.arrays import Floats
+from rocking.constants import VERSION
+from rocking.errors import StudyError
+from rocking.kernels.compiled import fingerprint
+from rocking.product import Product
+from rocking.studies import inputs
+from rocking.studies.place import Place
+from rocking.studies.units import DamagedUnit, Grid, Key, decoded, key_of, name_of
+
+FORMAT: Final = 1
+_ARRAY: Final = "result"
+_GROUP: Final = json.dumps({"zarr_format": 3, "node_type": "group", "attributes": {}}, indent=2)
+
+
+class Store:
+    """Outcomes of a product, unit by unit. A unit is done when its object exists, and only then.
+
+    Parameters
+    ----------
+    place : Place
+        Where it is kept.
+    product : Product
+        What is simulated.
+    grid : Grid
+        How it is cut into units.
+    """
+
+    def __init__(self, place: Place, product: Product, grid: Grid) -> None:
+        self.place, self.product, self.grid = place, product, grid
+
+    @classmethod
+    def create(cls, place: Place, product: Product, unit_blocks: int) -> Store:
+        """Write an empty store; `study.json` last, so that half a store is none."""
+        grid = Grid(product.shape, unit_blocks)
+        archive = inputs.to_bytes(product)
+        place.put("inputs.npz", archive)
+        place.put("zarr.json", _GROUP.encode())
+        place.put(f"{_ARRAY}/zarr.json", grid.metadata().encode())
+        about = {
+            "format": FORMAT,
+            "version": VERSION,
+            "kernels": fingerprint(),
+            "unit_blocks": unit_blocks,
+            "shape": list(product.shape),
+            "inputs": hashlib.sha256(archive).hexdigest(),
+            "parts": inputs.hashes(product),
+        }
+        place.put("study.json", _sealed(about))
+        return cls(place, product, grid)
+
+    @classmethod
+    def open(cls, place: Place) -> Store:
+        """Open a store, checked.
+
+        Raises
+        ------
+        StudyError
+            If there is none, it is damaged, or it was made by another version.
+        """
+        about = described(place)
+        archive = place.get("inputs.npz")
+        if archive is None or hashlib.sha256(archive).hexdigest() != about["inputs"]:
+            raise StudyError("inputs.npz is missing or damaged; restore it, or create the study again elsewhere")
+        product = inputs.from_bytes(archive)
+        grid = Grid(product.shape, about["unit_blocks"])
+        for name, text in (("zarr.json", _GROUP), (f"{_ARRAY}/zarr.json", grid.metadata())):
+            if place.get(name) != text.encode():
+                place.put(name, text.encode())
+        return cls(place, product, grid)
+
+    def check_program(self) -> None:
+        """Check that this program computes what the store holds, to the last bit.
+
+        Raises
+        ------
+        StudyError
+            If it was made by another version or by other kernels.
+        """
+        about = described(self.place)
+        if (about["version"], about["kernels"]) != (VERSION, fingerprint()):
+            raise StudyError(
+                f"the study was made by rocking {about['version']} (kernels {about['kernels']}), this is {VERSION} "
+                f"(kernels {fingerprint()}): run it with that version, or create it again elsewhere"
+            )
+
+    def check_inputs(self, product: Product) -> None:
+        """Check that these inputs are those of the store.
+
+        Raises
+        ------
+        StudyError
+            If they differ; the message says in which parts.
+        """
+        changed = inputs.changes(inputs.hashes(product), described(self.place)["parts"], product.motions)
+        if changed:
+            raise StudyError(f"the study holds other inputs: {', '.join(changed)} changed; create it again elsewhere")
+
+    def done(self) -> set[Key]:
+        """Keys of the units that are done."""
+        found = (key_of(name) for name in self.place.names(_ARRAY))
+        cells = self.grid.cells
+        return {key for key in found if key is not None and all(k < n for k, n in zip(key, cells, strict=True))}
+
+    def missing(self) -> Iterator[Key]:
+        """Keys of the units that are not done, in order."""
+        done = self.done()
+        return (key for key in self.grid if key not in done)
+
+    def put(self, key: Key, data: bytes) -> None:
+        """Store a unit."""
+        self.place.put(f"{_ARRAY}/{name_of(key)}", data)
+
+    def raw(self, key: Key) -> bytes | None:
+        """Bytes of a unit; None where it is not done."""
+        return self.place.get(f"{_ARRAY}/{name_of(key)}")
+
+    def outcomes(self, key: Key) -> Floats | None:
+        """Outcomes of a unit, shape (outcomes, blocks); None where it is not done.
+
+        Raises
+        ------
+        StudyError
+            If it is damaged; the message names it.
+        """
+        data = self.raw(key)
+        if data is None:
+            return None
+        try:
+            return decoded(data, self.grid.simulations(key), self.grid.blocks)
+        except DamagedUnit as error:
+            raise StudyError(
+                f"unit {name_of(key)} is damaged, {error}: verify(repair=True) computes it again"
+            ) from None
+
+
+def exists(place: Place) -> bool:
+    """Whether there is a study in a place."""
+    return place.get("study.json") is not None
+
+
+def described(place: Place) -> dict[str, Any]:
+    """Read what `study.json` says.
+
+    Raises
+    ------
+    StudyError
+        If there is no study, it is damaged, or its format is another.
+    """
+    data = place.get("study.json")
+    if data is None:
+        raise StudyError("there is no study here: create it first")
+    try:
+        about: dict[str, Any] = json.loads(data)
+        seal = about.pop("seal")
+    except (ValueError, KeyError, AttributeError):
+        raise StudyError("study.json is damaged: restore it, or create the study again elsewhere") from None
+    if _sealed(about) != data or seal != _seal(about):
+        raise StudyError("study.json is damaged: restore it, or create the study again elsewhere")
+    if about["format"] != FORMAT:
+        raise StudyError(f"study.json is of format {about['format']}, this program knows {FORMAT}: use its version")
+    return about
+
+
+def _sealed(about: dict[str, Any]) -> bytes:
+    """Return the description with its own hash."""
+    return json.dumps(about | {"seal": _seal(about)}, indent=2).encode()
+
+
+def _seal(about: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
