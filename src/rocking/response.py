@@ -25,7 +25,10 @@ from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from rocking.plot import DrawnSequence, RotationUnits
 
 EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
 IMPACT = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
@@ -309,38 +312,55 @@ class Response:
         except OSError as error:
             raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
 
-    def plot(self) -> Figure:
-        """Figure of the rotation with impacts and rests, of the motion with thresholds, and of one chattering sequence.
+    def plot(self, ax: Axes | None = None, *, units: RotationUnits = "slenderness", chattering: bool = False) -> Figure:
+        """Figure of the rotation with impacts and rests, and of the motion with thresholds.
 
         Drawn from a little before the first event to a little after the last.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Draw the rotation here, without the other panels.
+        units : {"slenderness", "rad", "deg"}
+            What rotations are drawn in.
+        chattering : bool
+            Whether to show the longest chattering sequence, impact by impact, in a panel of its own.
         """
-        from rocking.plot import DrawnSequence, response_figure
+        from rocking.plot import response_figure
 
         start, end = self._active_span()
         times = self._drawing_times(start, end)
-        alpha = np.array([side.alpha for side in self.block.sides])
-        theta = self.rotation(times)
+        alpha = [side.alpha for side in self.block.sides]
         corners = self._motion_drawing_times(start, end)
         plus, minus = self.block.uplift_thresholds(self.model)
-        longest = max(self.chattering, key=lambda row: row["impacts"], default=None)
-        sequence = None
-        if longest is not None:
-            struck = self.impacts["time"]
-            within = struck[(struck >= longest["start"]) & (struck <= longest["end"])]
-            sequence = DrawnSequence(within, float(longest["lower"]), float(longest["upper"]))
         return response_figure(
             time=times,
-            rotation_over_slenderness=theta / np.where(theta >= 0.0, alpha[0], alpha[1]),
+            rotation=self.rotation(times),
+            slenderness=(alpha[0], alpha[1]),
             impact_times=self.impacts["time"],
-            rest_intervals=np.clip(self.rest_intervals, start, end),
+            rest_intervals=self.rest_intervals,
             uplift_times=self.events["time"][self.events["kind"] == "uplift"],
             overturn_time=self.overturn_time if self.overturned else None,
             motion_time=corners,
             motion_acceleration_g=self._ground(corners) / self.block.gravity,
             thresholds_g=(plus / self.block.gravity, minus / self.block.gravity),
-            chattering=sequence,
+            duration=self.duration,
+            chattering=self._longest_sequence() if chattering else None,
+            units=units,
+            ax=ax,
             title=f"{self.block.description} under {'no motion' if self.motion is None else self.motion.name}",
         )
+
+    def _longest_sequence(self) -> DrawnSequence | None:
+        """Chattering sequence with the most impacts, as it is drawn."""
+        from rocking.plot import DrawnSequence
+
+        longest = max(self.chattering, key=lambda row: row["impacts"], default=None)
+        if longest is None:
+            return None
+        struck = self.impacts["time"]
+        within = struck[(struck >= longest["start"]) & (struck <= longest["end"])]
+        return DrawnSequence(within, float(longest["lower"]), float(longest["upper"]))
 
     def _attributes(self) -> dict[str, Any]:
         sides = self.block.sides

@@ -160,7 +160,7 @@ def dynamic_figure(dataset: xr.Dataset, *, block: int = 0, title: str = "") -> F
     title : str
         Title; by default the model.
     """
-    from rocking.plot.analysis import ScaledMotion, scaling_figure
+    from rocking.plot.ida import ScaledMotion, ida_figure
 
     low, high = float(dataset.level[0]), float(dataset.level[-1])
     chosen = dataset.isel(block=block)
@@ -177,7 +177,7 @@ def dynamic_figure(dataset: xr.Dataset, *, block: int = 0, title: str = "") -> F
                 np.where(np.isnan(bands), open_ends, bands),
             )
         )
-    return scaling_figure(
+    return ida_figure(
         motions=motions, level_label=dataset.level.long_name, title=title or f"block {block}, {dataset.model} model"
     )
 

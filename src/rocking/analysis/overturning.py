@@ -168,7 +168,7 @@ def overturning_figure(dataset: xr.Dataset, *, title: str = "") -> Figure:
     title : str
         Title; by default the pulse and the block.
     """
-    from rocking.plot.analysis import regions_figure
+    from rocking.plot.regions import regions_figure
 
     modes = dataset.mode.values
     columns = [dataset.boundary_frequency.values == ratio for ratio in dataset.frequency.values]

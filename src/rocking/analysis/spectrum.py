@@ -149,8 +149,8 @@ def spectrum_figure(dataset: xr.Dataset, *, against: str = "p", title: str = "")
     InvalidOption
         If there are more combinations, or no such abscissa.
     """
-    from rocking.plot.analysis import SpectrumCurves
-    from rocking.plot.analysis import spectrum_figure as drawn
+    from rocking.plot.spectrum import SpectrumCurves
+    from rocking.plot.spectrum import spectrum_figure as drawn
 
     labels = {"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}
     if against not in labels:
@@ -170,6 +170,7 @@ def spectrum_figure(dataset: xr.Dataset, *, against: str = "p", title: str = "")
         x=dataset[against].values,
         curves=curves,
         fractiles=dataset.fractile.values.tolist(),
+        motions=[str(name) for name in dataset.motion.values],
         x_label=labels[against],
         title=title or f"{dataset.sizes['motion']} motion(s), {dataset.model} model",
     )

@@ -264,29 +264,29 @@ class Fragility:
 
     def plot(self, *, title: str = "") -> Figure:
         """Figure of the curves with their bands and the shares that were seen."""
-        from rocking.plot.analysis import FragilityLine, fragility_figure
+        from rocking.plot.fragility import FragilityLine, fragility_figure
 
         intensity = np.linspace(0.0, self.range[1], _POINTS)
         lines = []
         for curve in self.curves:
-            at, seen = _shares_seen(curve)
+            shares = _shares_seen(curve)
             text = f"{curve.limit_state}: median {curve.median:.4g}, dispersion {curve.dispersion:.3g}"
-            lines.append(FragilityLine(text, intensity, curve.probability(intensity), *curve.band(intensity), at, seen))
+            lines.append(FragilityLine(text, intensity, curve.probability(intensity), *curve.band(intensity), *shares))
         first = self.curves[0]
         how = "bootstrap" if isinstance(first.uncertainty, Resamples) else "likelihood"
         return fragility_figure(
             lines=lines,
             intensity_label=self.measure.label,
-            band_label=f"{100 * first.confidence:g} % confidence ({how})",
+            band_label=f"band: {100 * first.confidence:g} % confidence ({how})",
             title=title or self.description,
         )
 
 
-def _shares_seen(curve: FragilityCurve) -> tuple[Floats, Floats]:
-    """Mean intensities and shares of the groups that the fit is tested in."""
+def _shares_seen(curve: FragilityCurve) -> tuple[Floats, Floats, Floats]:
+    """Mean intensities, shares and numbers of outcomes of the groups that the fit is tested in."""
     group = lognormal.groups(np.log(curve.intensity), curve.trials)
-    held = np.bincount(group, curve.trials)
-    return np.bincount(group, curve.trials * curve.intensity) / held, np.bincount(group, curve.exceeded) / held
+    held = np.bincount(group, curve.trials).astype(np.float64)
+    return np.bincount(group, curve.trials * curve.intensity) / held, np.bincount(group, curve.exceeded) / held, held
 
 
 def _log_medians(fits: Probit) -> Floats:

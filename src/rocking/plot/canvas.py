@@ -1,0 +1,153 @@
+"""The one way to make a figure: where it is drawn and who knows of it, its title and its legend."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import sys
+import textwrap
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+from rocking.plot.style import STYLE
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
+
+#: A number with more decimals than anybody reads.
+_LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
+
+
+@contextmanager
+def figure_for(ax: Axes | None, figsize: tuple[float, float]) -> Iterator[Figure]:
+    """Yield the figure to draw in: that of `ax` where there is one, in its own style, else a new one in this package's.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes or None
+        Where the caller is asked to draw.
+    figsize : (float, float)
+        Width and height of a new figure, inches.
+
+    Notes
+    -----
+    A new figure is made through pyplot, so that `pyplot.show()` and `figure.show()` show it, if pyplot is loaded, in a
+    notebook, or where there is a display and nobody chose a backend without windows. Elsewhere no global state knows of
+    it, and it is forgotten with its last reference.
+    """
+    if ax is not None:
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        yield figure
+        return
+
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        figure = _new_figure(figsize)
+        yield figure
+        _make_ticks(figure)
+
+
+def add_title(axes: Axes, title: str) -> None:
+    """Put a title above axes, broken into lines where the figure ends; an empty one is none."""
+    if title:
+        axes.set_title(_LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title), loc="left", wrap=True)
+
+
+def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
+    """Name both axes, in lines that are broken where the figure ends."""
+    axes.set_xlabel(x_label, wrap=True)
+    axes.set_ylabel(y_label, wrap=True)
+
+
+def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> None:
+    """Put the legend below all panels of a figure of its own, where it covers no data; else into the caller's axes."""
+    if not handles:
+        return
+    if ax is not None:
+        ax.legend(handles=handles)
+        return
+    below: dict[str, Any] = {"handles": handles, "loc": "outside lower center"}
+    for rows in range(1, len(handles) + 1):
+        legend = figure.legend(ncols=math.ceil(len(handles) / rows), **below)
+        if _fits(legend, figure):
+            return
+        legend.remove()
+    _break_lines(figure.legend(**below), figure)
+
+
+def labelled(*panels: Axes) -> list[Artist]:
+    """Collect the handles of all that has a label in these panels, each label once."""
+    named: dict[str, Artist] = {}
+    for panel in panels:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    return [*named.values()]
+
+
+def _new_figure(figsize: tuple[float, float]) -> Figure:
+    if not _is_shown():
+        from matplotlib.figure import Figure
+
+        return Figure(figsize=figsize, layout="constrained")
+    import matplotlib.pyplot as plt
+
+    figure = plt.figure(figsize=figsize, layout="constrained")
+    if "inline" in plt.get_backend():
+        # The cell shows the figure as its value; what pyplot still holds is shown once more after it.
+        plt.close(figure)
+    return figure
+
+
+def _is_shown() -> bool:
+    """Whether there is a pyplot that somebody may ask to show the figure."""
+    return "matplotlib.pyplot" in sys.modules or _in_notebook() or (_has_display() and _may_open_windows())
+
+
+def _in_notebook() -> bool:
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
+def _has_display() -> bool:
+    return sys.platform in ("darwin", "win32") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+
+
+def _may_open_windows() -> bool:
+    """Whether the backend, if one is chosen already, has windows."""
+    import matplotlib as mpl
+    from matplotlib.backends.registry import BackendFilter, backend_registry
+
+    chosen = mpl.get_backend(auto_select=False)
+    registry: Any = backend_registry
+    without: list[str] = registry.list_builtin(BackendFilter.NON_INTERACTIVE)
+    return chosen is None or chosen.lower() not in without
+
+
+def _make_ticks(figure: Figure) -> None:
+    """Make the first tick of every axis: it takes the style of the moment, and all later ones are made after it."""
+    for axes in (one for panel in figure.axes for one in (panel, *panel.child_axes)):
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.get_major_ticks(1)
+            axis.get_minor_ticks(1)
+
+
+def _fits(legend: Legend, figure: Figure) -> bool:
+    return legend.get_window_extent().width <= figure.bbox.width
+
+
+def _break_lines(legend: Legend, figure: Figure) -> None:
+    """Break the texts of a legend until it fits into its figure, or words would have to be broken."""
+    texts = legend.get_texts()
+    width = max(len(text.get_text()) for text in texts)
+    longest_word = max(len(word) for text in texts for word in text.get_text().split())
+    while width > longest_word and not _fits(legend, figure):
+        width -= 1
+        for text in texts:
+            text.set_text(textwrap.fill(" ".join(text.get_text().split()), width))
