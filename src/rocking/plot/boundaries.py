@@ -69,7 +69,7 @@ class _Side:
     """
 
     def __init__(self, stack: Stack) -> None:
-        self.level, self.at = stack.level, stack.level.copy()
+        self.path, self.level, self.at = stack.path, stack.level, stack.level.copy()
         self.half = np.full(self.level.size, np.nan)
 
     def ends(self, part: slice) -> tuple[float, float]:
@@ -124,7 +124,16 @@ def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
 
 
 def _join(one: _Side, here: slice, other: _Side, there: slice) -> None:
-    """Lead the ends of a part to those of the other side's; where either has one boundary only, both to one point."""
+    """Lead the ends of a part to those of the other side's; where either has one boundary only, both to one point.
+
+    A region that both parts pass is common ground, on either side of which are two parts of their own.
+    """
+    for i in range(here.start + 1, here.stop):
+        for j in range(there.start + 1, there.stop):
+            if one.path[i] == other.path[j]:
+                _join(one, slice(here.start, i), other, slice(there.start, j))
+                _join(one, slice(i, here.stop), other, slice(j, there.stop))
+                return
     low, high = (0.5 * (mine + theirs) for mine, theirs in zip(one.ends(here), other.ends(there), strict=True))
     if 1 in (here.stop - here.start, there.stop - there.start):
         if here.start == 0:  # The frame's boundaries stay where they are.
