@@ -49,6 +49,15 @@ def test_pyplot_shows_figures_where_there_is_a_display_and_nobody_chose_a_backen
     assert printed(script, **{name: ":987"}, MPLBACKEND="agg") == "False"
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
+def test_the_command_line_writes_its_figures_without_windows(tmp_path):
+    block = ["--half-width", "0.12", "--half-height", "0.55"]
+    command = ["simulate", "ridgecrest-clc-090", *block, "--out", str(tmp_path / "out")]
+    script = f"from rocking.cli import main; main({command}); print('matplotlib.pyplot' in sys.modules)"
+    assert printed(script, DISPLAY=":987").endswith("False")
+    assert [*tmp_path.glob("out/*.png")]
+
+
 def images(*cells: str) -> list[int]:
     """Number of images that each cell of a notebook shows."""
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in (DRAW, *cells)])

@@ -129,11 +129,13 @@ def shown_boxes(figure):
             yield "an axis", box
 
 
+@pytest.mark.parametrize("dpi", [100.0, 200.0, 300.0])
 @pytest.mark.parametrize("width", [COLUMN, PAGE], ids=["column", "page"])
 @pytest.mark.parametrize("kind", FIGURES)
-def test_no_text_leaves_the_figure(kind, width):
+def test_no_text_leaves_the_figure(kind, width, dpi):
     draw, height = FIGURES[kind]
     figure = draw(title=LONG, figsize=(width, height))
+    figure.set_dpi(dpi)
     FigureCanvasAgg(figure).draw()
     frame = figure.bbox
     boxes = [*shown_boxes(figure)]

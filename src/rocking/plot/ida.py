@@ -28,6 +28,8 @@ _POINTS: Final = 200
 #: The frame ends this many times above what stands.
 _HEADROOM: Final = 1.2
 
+_OWN: Final[dict[str, Any]] = {"linewidth": 1.1, "markersize": 5.0}
+_ALIKE: Final[dict[str, Any]] = {"linewidth": 0.6, "markersize": 3.0}
 _STRIP: Final[dict[str, Any]] = {"linewidth": 5.0, "solid_capstyle": "butt"}
 
 #: Marker that looks like a kinked curve.
@@ -83,7 +85,7 @@ def ida_figure(
     with figure_for(ax, figsize) as figure:
         curves, *strips = figure.subplots(1, 2, sharey=True, width_ratios=(2.0, 1.0)).tolist() if ax is None else [ax]
         for motion, style in zip(motions, styles, strict=True):
-            _draw_motion(curves, motion, scale, style | {"linewidth": 1.1 if few else 0.6})
+            _draw_motion(curves, motion, scale, style | (_OWN if few else _ALIKE))
         if not few:
             _draw_fractiles(curves, motions, scale)
         curves.set_xlim(left=0.0)
@@ -121,7 +123,6 @@ def _draw_motion(axes: Axes, motion: ScaledMotion, scale: float, style: dict[str
         np.where(np.isfinite(motion.peak), motion.peak, np.nan),
         scale * motion.levels,
         marker=".",
-        markersize=3.0,
         markeredgewidth=0.0,
         label=motion.label,
         **style,
@@ -192,7 +193,7 @@ def _handles(named: Sequence[ScaledMotion], *, with_strips: bool) -> list[Line2D
     ]
     alone: dict[str, Any] = {"color": INK, "linestyle": ""}
     handles += [
-        Line2D([], [], marker=".", markersize=4.0, label="dot: a level; none where it overturns", **alone),
+        Line2D([], [], marker=".", markersize=5.0, label="dot: a level; none where it overturns", **alone),
         Line2D(
             [],
             [],

@@ -35,8 +35,8 @@ STYLE: Final[dict[Any, Any]] = {
     "grid.linewidth": 0.6,
     "hatch.linewidth": 0.4,
     "legend.fontsize": 7.5,
-    "legend.handlelength": 1.6,
-    "legend.handletextpad": 0.6,
-    "legend.columnspacing": 1.2,
+    "legend.handlelength": 1.5,
+    "legend.handletextpad": 0.5,
+    "legend.columnspacing": 1.0,
     "legend.frameon": False,
 }
