@@ -85,7 +85,7 @@ def test_axes_of_the_caller_keep_their_figure_and_its_style():
     assert drawn(ax=ax, title="A map") is figure
     assert figure.axes == [ax]
     assert not figure.legends
-    assert ax.get_title(loc="left") == "A map"
+    assert ax.get_title() == "A map"
     assert ax.xaxis.label.get_size() == size
     part = Figure().subfigures()
     assert drawn(ax=part.subplots()) is part.figure
@@ -99,4 +99,4 @@ def test_a_figure_keeps_its_style_when_it_is_drawn_later():
 
 def test_a_title_has_no_more_digits_than_anybody_reads():
     figure = drawn(title="alpha = 0.21481540040165858, e = 0.30000000000000004, 3.25 s, 1.23456789e-07")
-    assert figure.axes[0].get_title(loc="left") == "alpha = 0.2148, e = 0.3, 3.25 s, 1.235e-07"
+    assert figure.get_suptitle() == "alpha = 0.2148, e = 0.3, 3.25 s, 1.235e-07"

@@ -212,7 +212,7 @@ def test_no_text_covers_another_text():
     sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
     figure = figure_of(chattering=sequence, overturn_time=9.9)
     figure.savefig(io.BytesIO(), format="png")
-    boxes = []
+    boxes = [figure._suptitle.get_window_extent()]
     for axes in figure.axes:
         titles = [axes.title, axes._left_title, axes.xaxis.label, axes.yaxis.label]
         boxes += [text.get_window_extent() for text in titles if text.get_text()]

@@ -64,7 +64,7 @@ def duration_figure(
             )
         upper.set_ylim(0.0, 1.14)
         upper.set_ylabel(r"chattering time, $\tau_{ch}\,/\,(T/2)$")
-        add_title(upper, title)
+        add_title(figure, None, title)
         upper.legend(loc="lower right", bbox_to_anchor=(0.84, 0.02))
         exact, *others = durations.values()
         moves = exact > 0.0
@@ -158,7 +158,7 @@ def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: st
         _loosen(axes)
         axes.set_xlabel(r"frequency, $\omega = \omega_g / p$")
         axes.set_ylabel(r"critical amplitude, $a_{cr}$")
-        add_title(axes, title)
+        add_title(figure, ax, title)
         axes.legend(loc="lower right")
     return figure
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.arrays import Flags, Floats
 
 
 class Stack(NamedTuple):
@@ -39,14 +39,16 @@ def runs(x: Floats, stacks: Sequence[Stack]) -> Iterator[tuple[Floats, Floats, t
     A run begins and ends half way to its neighbours.
     """
     starts = [k for k in range(len(x)) if k == 0 or stacks[k].region != stacks[k - 1].region]
-    for start, end in zip(starts, [*starts[1:], len(x)], strict=True):
+    ends = [*starts[1:], len(x)]
+    met = [meeting(stacks[end - 1], stacks[end]) for end in ends[:-1]]
+    for run, (start, end) in enumerate(zip(starts, ends, strict=True)):
         at, levels = [*x[start:end]], [stack.level for stack in stacks[start:end]]
         if start > 0:
             at = [0.5 * (x[start - 1] + x[start]), *at]
-            levels = [meeting(stacks[start - 1], stacks[start])[1], *levels]
+            levels = [met[run - 1][1], *levels]
         if end < len(x):
             at = [*at, 0.5 * (x[end - 1] + x[end])]
-            levels = [*levels, meeting(stacks[end - 1], stacks[end])[0]]
+            levels = [*levels, met[run][0]]
         yield np.array(at), np.stack(levels, axis=1), stacks[start].region
 
 
@@ -150,18 +152,17 @@ def _shared(left: Stack, right: Stack) -> list[tuple[int, int]]:
     """Pairs of boundaries between the same regions: as many as there can be, and of those the nearest to each other."""
     if left.region == right.region:
         return [(k, k) for k in range(left.level.size)]
-    one, other = ([*pairwise(stack.path)] for stack in (left, right))
     # All distances together count for less than one pair.
-    weight = 1.0 / ((left.level[-1] - left.level[0]) * (len(one) + 1.0))
-    best = np.zeros((len(one) + 1, len(other) + 1))
-    for i in reversed(range(len(one))):
-        for j in reversed(range(len(other))):
-            best[i, j] = max(best[i + 1, j], best[i, j + 1])
-            if one[i] == other[j]:
-                gain = 1.0 - weight * abs(left.level[i] - right.level[j])
-                best[i, j] = max(best[i, j], gain + best[i + 1, j + 1])
+    weight = 1.0 / ((left.level[-1] - left.level[0]) * (left.level.size + 1.0))
+    gain = 1.0 - weight * np.abs(left.level[:, None] - right.level)
+    gain[~_alike(left, right)] = -np.inf
+    # What the boundaries from (i, j) on are worth: without i, without j, or with both.
+    best = np.zeros((left.level.size + 1, right.level.size + 1))
+    for i in reversed(range(left.level.size)):
+        best[i, :-1] = np.maximum(best[i + 1, :-1], gain[i] + best[i + 1, 1:])
+        best[i] = np.maximum.accumulate(best[i, ::-1])[::-1]
     pairs, i, j = [], 0, 0
-    while i < len(one) and j < len(other):
+    while i < left.level.size and j < right.level.size:
         if best[i, j] == best[i + 1, j]:
             i += 1
         elif best[i, j] == best[i, j + 1]:
@@ -170,3 +171,11 @@ def _shared(left: Stack, right: Stack) -> list[tuple[int, int]]:
             pairs.append((i, j))
             i, j = i + 1, j + 1
     return pairs
+
+
+def _alike(left: Stack, right: Stack) -> Flags:
+    """Whether a boundary of the left one is between the same regions as one of the right one, for all pairs of them."""
+    numbers = {kind: k for k, kind in enumerate({*pairwise(left.path), *pairwise(right.path)})}
+    one, other = (np.array([numbers[kind] for kind in pairwise(stack.path)]) for stack in (left, right))
+    same: Flags = one[:, None] == other
+    return same

@@ -22,8 +22,21 @@ if TYPE_CHECKING:
 #: A number with more decimals than anybody reads.
 _LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
 
+#: The space between a number or a name and its unit: (m/s), s.
+_BEFORE_UNIT: Final = re.compile(r" (?=\(|s\b)")
+
 #: Hinted letters are wider at most resolutions, and in vector graphics, than at that of the moment.
 _FITTING: Final = 0.93
+
+#: Mean width of a letter over the size of its font. Longest line of a label over its axis, of which the layout
+#: will make the upright one shorter for title and legend; and the least number of letters in a line.
+_LETTER: Final = 0.55
+_X_LINE: Final = 1.0
+_Y_LINE: Final = 0.85
+_FEWEST_LETTERS: Final = 12
+
+#: Where titles begin, in widths of the figure.
+_TITLE_AT: Final = 0.02
 
 
 @contextmanager
@@ -57,16 +70,22 @@ def figure_for(ax: Axes | None, figsize: tuple[float, float]) -> Iterator[Figure
         _make_ticks(figure)
 
 
-def add_title(axes: Axes, title: str) -> None:
-    """Put a title above axes, broken into lines where the figure ends; an empty one is none."""
-    if title:
-        axes.set_title(_LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title), loc="left", wrap=True)
+def add_title(figure: Figure, ax: Axes | None, title: str) -> None:
+    """Put a title above a figure of its own, broken into lines where the figure ends, or above the caller's axes."""
+    short = _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title)
+    if ax is not None:
+        ax.set_title(short, wrap=True)
+    elif short:
+        # From the figure's edge, not from that of axes: the lines do not depend on how the panels are laid out.
+        figure.suptitle(short, x=_TITLE_AT, ha="left", wrap=True)
 
 
 def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
-    """Name both axes, in lines that are broken where the figure ends."""
-    axes.set_xlabel(x_label, wrap=True)
-    axes.set_ylabel(y_label, wrap=True)
+    """Name both axes, in lines about as long as they are."""
+    lengths = _X_LINE * axes.bbox.width, _Y_LINE * axes.bbox.height
+    for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
+        letter = _LETTER * axes.figure.dpi * float(axis.label.get_fontsize()) / 72.0
+        axis.set_label_text(_in_lines(label, max(_FEWEST_LETTERS, int(length / letter))))
 
 
 def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> None:
@@ -92,6 +111,12 @@ def labelled(*panels: Axes) -> list[Artist]:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             named.setdefault(label, handle)
     return [*named.values()]
+
+
+def _in_lines(text: str, width: int) -> str:
+    """Break a text between words, but not before a unit."""
+    held = _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
+    return textwrap.fill(held, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def _new_figure(figsize: tuple[float, float]) -> Figure:

@@ -93,7 +93,7 @@ def fragility_figure(
         axes.set(xlim=(0.0, scale * float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid()
         add_labels(axes, intensity_label, "probability")
-        add_title(axes, title)
+        add_title(figure, ax, title)
         add_legend(figure, ax, labelled(axes))
     return figure
 

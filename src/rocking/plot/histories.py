@@ -75,7 +75,7 @@ def excitation_figure(
         axes.plot([rest, rest], [-0.75, 0.1], color=ABOVE, linewidth=0.9, linestyle=(0, (4, 2)))
         axes.annotate("at rest", (rest, -0.75), xytext=(-3, 0), textcoords="offset points", ha="right", color=ABOVE)
         axes.set_xlim(time[0], time[-1])
-        add_title(axes, title)
+        add_title(figure, ax, title)
         axes.set_xlabel("time over period, $t/T$")
         axes.legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.04))
     return figure
@@ -122,7 +122,7 @@ def history_figure(
         response.set_xlim(time[0], time[-1])
         response.set_ylim(*(1e3 * limit for limit in limits))
         response.set_ylabel(r"rotation, $10^3\,\theta/\alpha$")
-        add_title(response, title)
+        add_title(figure, None, title)
         highest = 1e3 * max(float(rotation.max()) for rotation in rotations.values())
         response.set_yticks([tick for tick in response.get_yticks() if 1e3 * limits[0] <= tick <= highest])
         response.plot([mark.time for mark in marks], [0.0] * len(marks), "^", **_MARK)

@@ -94,7 +94,7 @@ def ida_figure(
         add_labels(curves, "peak rotation / slenderness", level_label)
         for panel in strips:
             _draw_strips(panel, motions, scale, styles if few else [{"color": INK}] * len(motions), named=not few)
-        add_title(curves, title)
+        add_title(figure, ax, title)
         add_legend(figure, ax, _handles(motions if few else [], with_strips=ax is None))
     return figure
 

@@ -78,7 +78,7 @@ def outcome_figure(
             rasterized=True,
         )
         add_labels(axes, x_label, y_label)
-        add_title(axes, title)
+        add_title(figure, ax, title)
         present = sorted(set(np.unique(outcome).tolist()))
         handles = [Patch(facecolor=_COLOURS[k], edgecolor=INK, linewidth=0.5, label=meanings[k]) for k in present]
         add_legend(figure, ax, handles)

@@ -104,7 +104,7 @@ def regions_figure(
         axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.5, capstyle="round"))
         axes.set(xlim=(x[0], x[-1]), ylim=y_range)
         add_labels(axes, x_label, y_label)
-        add_title(axes, title)
+        add_title(figure, ax, title)
         add_legend(figure, ax, _patches(polygons, names, (x[-1] - x[0]) * (high - low)))
     return figure
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_legend, add_title, figure_for, labelled
+from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled
 from rocking.plot.style import ABOVE, GROUND, INK, REST
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ LARGEST_RATIO_SHOWN: Final = 2.0
 #: A figure at least so wide (inches) has room for the chattering sequence beside the histories.
 _WIDE: Final = 5.5
 
-_Y_LABELS: Final = {"slenderness": "rotation /\nslenderness", "rad": "rotation (rad)", "deg": "rotation (°)"}
+_Y_LABELS: Final = {"slenderness": "rotation / slenderness", "rad": "rotation (rad)", "deg": "rotation (°)"}
 
 
 class DrawnSequence(NamedTuple):
@@ -116,7 +116,7 @@ def response_figure(
     ...     rest_intervals=np.empty((0, 2)), uplift_times=np.array([0.0]), overturn_time=None,
     ...     motion_time=t, motion_acceleration_g=-0.4 * np.cos(t), thresholds_g=(0.2, 0.2), title="A block")
     >>> [axes.get_ylabel() for axes in figure.axes]
-    ['rotation /\nslenderness', 'ground\nacceleration (g)']
+    ['rotation / slenderness', 'ground\nacceleration (g)']
     """
     shown = float(time[0]), float(time[-1])
     scale = _scale(units, slenderness)
@@ -126,7 +126,7 @@ def response_figure(
         main, motion, sequence = _panels(figure, ax, shaken=motion_time.size > 0, zoomed=zoom is not None)
         _shade_rest(main, np.clip(rest_intervals, *shown))
         _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])))
-        _name_rotation(main, scale, units)
+        _add_degrees(main, scale, units)
         _mark_impacts(main, _within(impact_times, shown), _within(uplift_times, shown))
         if overturn_time is not None:
             _mark_overturning(main, time, drawn, overturn_time)
@@ -134,11 +134,12 @@ def response_figure(
         if motion is not None:
             _draw_motion(motion, motion_time, motion_acceleration_g, thresholds_g)
             main.tick_params(labelbottom=False)
-        (motion or main).set_xlabel(_time_label(shown, duration))
+            add_labels(motion, _time_label(shown, duration), "ground acceleration (g)")
+        add_labels(main, "" if motion else _time_label(shown, duration), _Y_LABELS[units])
         if zoom and sequence is not None:
             _mark_sequence(main, zoom)
             _draw_sequence(sequence, zoom)
-        add_title(main, title)
+        add_title(figure, ax, title)
         add_legend(figure, ax, labelled(main, *([motion] if motion else [])))
     return figure
 
@@ -195,8 +196,7 @@ def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats) -> 
         label = ""
 
 
-def _name_rotation(axes: Axes, scale: _Scale, units: RotationUnits) -> None:
-    axes.set_ylabel(_Y_LABELS[units])
+def _add_degrees(axes: Axes, scale: _Scale, units: RotationUnits) -> None:
     if units != "deg":
         to_degrees = (lambda y: np.degrees(scale.back(y)), lambda y: scale.of(np.radians(y)))
         axes.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
@@ -261,7 +261,6 @@ def _draw_motion(axes: Axes, time: Floats, acceleration: Floats, thresholds: tup
             label = ""
     axes.axhline(minus, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
     axes.axhline(-plus, color=INK, linewidth=0.8, linestyle=(0, (5, 2)))
-    axes.set_ylabel("ground\nacceleration (g)")
 
 
 def _time_label(shown: tuple[float, float], duration: float | None) -> str:
@@ -304,8 +303,7 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
         markeredgewidth=0.6,
     )
     axes.invert_xaxis()
-    axes.set_xlabel("time to rest (s)")
-    axes.set_ylabel("interval to\nnext impact (s)")
+    add_labels(axes, "time to rest (s)", "interval to next impact (s)")
     axes.grid()
     width = sequence.rest_upper - sequence.rest_lower
     axes.set_title(f"A: at rest at {rest:.6f} s, bracket {width:.0e} s wide", color=ABOVE, loc="left", wrap=True)

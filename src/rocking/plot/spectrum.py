@@ -100,8 +100,8 @@ def spectrum_figure(
         add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
         for panel in shares:
             panel.set_ylim(-0.03, 1.03)
-            add_labels(panel, x_label, "share\noverturned")
-        add_title(peaks, title)
+            add_labels(panel, x_label, "share overturned")
+        add_title(figure, ax, title)
         add_legend(figure, ax, _handles(curves, motions))
     return figure
 

@@ -22,7 +22,7 @@ STYLE: Final[dict[Any, Any]] = {
     "font.size": 8.5,
     "axes.titlesize": 8.5,
     "axes.labelsize": 8.5,
-    "figure.titlesize": 9.5,
+    "figure.titlesize": 9.0,
     "axes.linewidth": 0.7,
     "axes.spines.top": False,
     "axes.spines.right": False,
