@@ -30,7 +30,7 @@ _FITTING: Final = 0.93
 
 #: Mean width of a letter over the size of its font. Longest line of a label over its axis, of which the layout
 #: will make the upright one shorter for title and legend; and the least number of letters in a line.
-_LETTER: Final = 0.55
+_LETTER: Final = 0.52
 _X_LINE: Final = 1.0
 _Y_LINE: Final = 0.85
 _FEWEST_LETTERS: Final = 12

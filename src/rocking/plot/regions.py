@@ -101,7 +101,7 @@ def regions_figure(
             if hatch:
                 shape = PolyCollection(corners, facecolors="none", edgecolors=INK, linewidths=0.0, hatch=hatch)
                 axes.add_collection(shape)
-        axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.5, capstyle="round"))
+        axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.5, capstyle="round", snap=False))
         axes.set(xlim=(x[0], x[-1]), ylim=y_range)
         add_labels(axes, x_label, y_label)
         add_title(figure, ax, title)
