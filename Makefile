@@ -3,9 +3,10 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
+EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow doctest lint types docs bench clean distclean
+.PHONY: help demo test slow lowest latest .bounds doctest lint types docs bench clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -18,6 +19,18 @@ test: .venv/.all ## run the test suite (about five minutes on two cores)
 
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m slow
+
+lowest: ## install the oldest versions that pyproject.toml allows, and run a test of every part with them
+	$(PYTHON) scripts/lowest_versions.py > .lowest.txt
+	@$(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest CONSTRAINTS="-c .lowest.txt"
+
+latest: ## the same without constraints: with the versions of the day
+	@$(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-latest CONSTRAINTS=
+
+.bounds:
+	@test -x $(ENVIRONMENT)/bin/python || $(PYTHON) -m venv $(ENVIRONMENT)
+	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq $(CONSTRAINTS) ".[test]"
+	$(ENVIRONMENT)/bin/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m "not slow" $(EVERY_PART)
 
 doctest: .venv/.all ## run the examples in the docstrings
 	$(BIN)/python -m pytest --doctest-modules src/rocking
@@ -42,7 +55,7 @@ clean: ## remove what the other targets made, but not the environment
 	find src tests benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## remove the environment, too
-	rm -rf .venv
+	rm -rf .venv .venv-lowest .venv-latest .lowest.txt
 
 # A stamp per set of packages: installing again is needed only when the versions or the project's table change.
 .venv/.base: EXTRAS :=

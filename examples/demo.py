@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import rocking
-from rocking.cli.simulate import table
 
 OUT = Path("out")
 
@@ -13,7 +12,7 @@ def main() -> None:
     statue = rocking.Block(half_width=0.12, half_height=0.55)
     motion = rocking.records.load("ridgecrest-clc-090")
     response = rocking.simulate(statue, motion)
-    print(table(response, motion))
+    print(response.summary())
     OUT.mkdir(exist_ok=True)
     response.plot(chattering=True).savefig(OUT / "demo.png", dpi=160)
     print(f"\nfigure written to {OUT / 'demo.png'}")

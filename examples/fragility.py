@@ -7,7 +7,7 @@ import numpy as np
 
 import rocking
 from rocking.analysis.fragility import fragility
-from rocking.analysis.incremental import dynamic_figure, incremental_dynamic_analysis
+from rocking.analysis.incremental import incremental_dynamic_analysis
 
 OUT = Path("out")
 
@@ -28,7 +28,7 @@ def main() -> float:
     OUT.mkdir(exist_ok=True)
 
     scaled = incremental_dynamic_analysis(statue, motions[:4:3], measure="pgv", tolerance=1e-4)
-    dynamic_figure(scaled, title="Statue, two records scaled up").savefig(OUT / "ida.png", dpi=160)
+    scaled.plot(title="Statue, two records scaled up").savefig(OUT / "ida.png", dpi=160)
 
     result = fragility(
         statue,

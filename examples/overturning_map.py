@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import rocking
-from rocking.analysis.overturning import overturning_figure, overturning_map
+from rocking.analysis.overturning import overturning_map
 
 OUT = Path("out")
 
@@ -26,7 +26,7 @@ def main() -> float:
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     grid = {"amplitudes": np.linspace(0.5, 15.0, 59), "frequencies": np.linspace(0.4, 9.0, 87)}
     OUT.mkdir(exist_ok=True)
-    overturning_figure(overturning_map("one-sine", block, **grid)).savefig(OUT / "map.png", dpi=160)
+    overturning_map("one-sine", block, **grid).plot().savefig(OUT / "map.png", dpi=160)
 
     # So slender that pi/2, where a block has fallen, is too many times alpha to be reached before the pulse is over.
     slender = rocking.Block.from_parameters(p=2.0, alpha=1e-5, restitution=0.9)

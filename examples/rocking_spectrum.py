@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import rocking
-from rocking.analysis.spectrum import rocking_spectrum, spectrum_figure
+from rocking.analysis.spectrum import rocking_spectrum
 
 OUT = Path("out")
 
@@ -24,7 +24,7 @@ def main() -> float:
     motions = [rocking.records.load(name).scaled(pgv=0.5) for name in RECORDS]
     spectrum = rocking_spectrum(motions, alpha=[0.1, 0.2], size=np.geomspace(0.3, 60.0, 48))
     OUT.mkdir(exist_ok=True)
-    figure = spectrum_figure(spectrum, against="size", title="Six records scaled to a PGV of 0.5 m/s")
+    figure = spectrum.plot(against="size", title="Six records scaled to a PGV of 0.5 m/s")
     figure.savefig(OUT / "spectrum.png", dpi=160)
     overturned = spectrum["size"].where(spectrum.overturned_share > 0.0).max("p")
     for alpha in spectrum.alpha.values:

@@ -14,10 +14,10 @@ import numpy as np
 import rocking
 from rocking.chattering import critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
-from rocking.chattering.maps import chattering_map, map_figure
+from rocking.chattering.maps import chattering_map
 from rocking.chattering.paper import FIGURES, paper_figure
 from rocking.chattering.paper.case import excitation
-from rocking.chattering.schemes import compare_schemes, scheme_name
+from rocking.chattering.schemes import compare_schemes
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TABLES = DOCS / "_tables"
@@ -87,7 +87,7 @@ def table_of_comparison(comparison):
         worst = outcome.largest_error
         rows.append(
             (
-                scheme_name(outcome.treatment),
+                outcome.treatment.label,
                 len(outcome.rests),
                 outcome.false_rests.size,
                 outcome.missed.size,
@@ -95,7 +95,7 @@ def table_of_comparison(comparison):
                 outcome.verdict,
             )
         )
-    rows += [(scheme_name(scheme), "", "", "", "", "not applicable") for scheme, _ in comparison.not_applicable]
+    rows += [(scheme.label, "", "", "", "", "not applicable") for scheme, _ in comparison.not_applicable]
     return markdown(("scheme", "rests", "false", "missed", "worst error of a true rest, s", "verdict"), rows)
 
 
@@ -179,27 +179,24 @@ def images():
     amplitude = np.linspace(0.98, 1.12, 71)
     omega = np.linspace(0.5, 8.0, 61)
     labels = {"a": "amplitude over the threshold, $a$", "omega": r"frequency over $p$, $\omega$"}
-    sine = map_figure(
-        chattering_map(families.sine(PAPER_BLOCK, model="linear"), {"a": amplitude, "omega": omega}),
+    sine = chattering_map(families.sine(PAPER_BLOCK, model="linear"), {"a": amplitude, "omega": omega}).plot(
         labels=labels,
         title=r"sine, 2.5 cycles; $\eta$ = 0.92",
     )
     yield "map-sine.png", with_theory(sine, omega)
-    ricker = map_figure(
-        chattering_map(
-            families.ricker(PAPER_BLOCK, kind="antisymmetric", model="linear"), {"a": amplitude, "omega": omega}
-        ),
+    ricker = chattering_map(
+        families.ricker(PAPER_BLOCK, kind="antisymmetric", model="linear"), {"a": amplitude, "omega": omega}
+    ).plot(
         labels=labels,
         title=r"antisymmetric Ricker pulse; $\eta$ = 0.92",
     )
     yield "map-ricker.png", with_theory(ricker, omega)
     yield (
         "map-lobes.png",
-        map_figure(
-            chattering_map(
-                families.lobes(PAPER_BLOCK, model="linear"),
-                {"a": np.linspace(0.98, 1.3, 81), "ratio": np.linspace(0.6, 1.2, 61)},
-            ),
+        chattering_map(
+            families.lobes(PAPER_BLOCK, model="linear"),
+            {"a": np.linspace(0.98, 1.3, 81), "ratio": np.linspace(0.6, 1.2, 61)},
+        ).plot(
             labels=labels | {"ratio": "amplitude of a lobe over that of the lobe before"},
             title=r"five unequal lobes; $\omega$ = 2, $\eta$ = 0.92",
         ),
@@ -207,11 +204,10 @@ def images():
     record = rocking.records.load("ridgecrest-clc-090").processed(trim=(225.0, 245.0))
     yield (
         "map-record.png",
-        map_figure(
-            chattering_map(
-                families.record(record, alpha=0.2, restitution=0.92),
-                {"a": np.linspace(0.94, 2.99, 83), "p": np.linspace(1.0, 8.0, 57)},
-            ),
+        chattering_map(
+            families.record(record, alpha=0.2, restitution=0.92),
+            {"a": np.linspace(0.94, 2.99, 83), "p": np.linspace(1.0, 8.0, 57)},
+        ).plot(
             labels=labels | {"p": "frequency parameter of the block, $p$ (rad/s)"},
             title=r"ridgecrest-clc-090, scaled; $\alpha$ = 0.2, $\eta$ = 0.92",
         ),

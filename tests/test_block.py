@@ -1,6 +1,8 @@
 """Blocks: parameters from sizes, pivots and frames; thresholds; what cannot stand."""
 
 import math
+import re
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -189,3 +191,28 @@ def test_numbers_of_any_real_type_are_numbers(kind):
     blocks = Blocks(p=kind(2), alpha=[kind(1)], restitution=kind(1), gravity=kind(10))
     assert blocks.gravity == 10.0
     assert blocks[0] == block
+
+
+def test_a_block_shows_itself_in_one_short_line():
+    assert repr(Block(0.12, 0.55)) == (
+        "<Block: rectangular block, 0.24 m x 1.1 m; p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184>"
+    )
+    two_sided = repr(Block.from_parameters((2.0 / 3.0, 1.0), 0.2, 0.9))
+    assert "side +: p = 0.66667 rad/s" in two_sided and "side -: p = 1 rad/s" in two_sided
+    blocks = Blocks.grid(p=[1.0 / 3.0, 2.0], alpha=[0.1], restitution=[0.9])
+    assert repr(blocks) == "<Blocks: 2; p from 0.33333 to 2 rad/s, alpha 0.1 rad, restitution 0.9>"
+
+
+@pytest.mark.parametrize(
+    ("block", "corners", "ratio"),
+    [(Block(0.2, 1.0), 4, 0.2), (Block.from_pivots((0.2, 0.15), 0.7, 0.4), 3, 0.5)],
+)
+def test_a_notebook_shows_the_block_to_scale_in_the_colour_of_the_text(block, corners, ratio):
+    page = block._repr_html_()
+    ElementTree.fromstring(page)
+    assert "currentColor" in page and "#" not in page
+    points = re.search(r'<polygon points="([^"]*)"', page)[1].split()
+    drawn = np.array([[float(number) for number in point.split(",")] for point in points])
+    width, height = np.ptp(drawn, axis=0)
+    assert len(points) == corners
+    assert width / height == pytest.approx(ratio, abs=2e-3)

@@ -162,7 +162,7 @@ def test_the_summary_has_every_parameter_and_the_scores(found):
     text = found.summary()
     for name, estimate in found.estimates.items():
         assert name in text
-        assert f"{estimate.median:.4g}" in text
+        assert f"{estimate.median:.5g}" in text
     assert f"{100 * found.scores.accuracy:.1f} %" in text
 
 

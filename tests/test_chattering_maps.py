@@ -12,7 +12,7 @@ import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.families import Case
-from rocking.chattering.maps import Outcome, chattering_map, map_figure
+from rocking.chattering.maps import Outcome, chattering_map
 from rocking.motion.exceedance import exceedances
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
@@ -105,7 +105,7 @@ def test_a_map_tells_its_outcomes_and_units_and_can_be_stored(tmp_path):
     assert dataset.outcome.dims == ("a", "omega")
     assert dataset.outcome.attrs["flag_meanings"].split()[Outcome.COMPLETE] == "complete"
     assert dataset.rest.attrs["units"] == "s"
-    dataset.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
+    dataset.to_netcdf(tmp_path / "map.nc")
     import xarray as xr
 
     with xr.open_dataset(tmp_path / "map.nc", engine="h5netcdf") as stored:
@@ -130,7 +130,7 @@ def test_unusable_parameters_are_refused(parameters):
 
 def test_a_map_is_drawn_with_the_outcomes_that_it_has():
     dataset = chattering_map(families.sine(BLOCK, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
-    figure = map_figure(dataset, labels={"a": "amplitude"}, title="A map")
+    figure = dataset.plot(labels={"a": "amplitude"}, title="A map")
     (axes,) = figure.axes
     assert (axes.get_ylabel(), axes.get_xlabel()) == ("amplitude", "omega")
     there = sorted({Outcome(value).name.lower().replace("_", " ") for value in dataset.outcome.values.ravel()})

@@ -15,6 +15,8 @@ from oracles.sine_chattering import settle
 from rocking import chattering
 from rocking.chattering.theory import duration
 from rocking.errors import InvalidOption
+from rocking.kernels.sine import FOUND
+from rocking.kernels.sine.sequence import semianalytical_phases
 
 EPS_SERIES_C1 = 10.827447906757
 
@@ -93,12 +95,34 @@ def test_a_thousand_times_are_proven_in_ball_arithmetic():
 def test_a_hundred_thousand_verdicts_agree_with_the_semianalytical_scheme():
     a, omega, eta = random_parameters(100_000, seed=1)
     exact = chattering.chattering_time(a, omega, eta)
-    resolved = chattering.chattering_time(a, omega, eta, method="semianalytical", resolved=1000)
+    phases, statuses = np.zeros(a.size), np.zeros(a.size, np.int8)
+    semianalytical_phases((a, omega, eta), np.full(a.size, 1000), phases, statuses)
+    resolved = np.where(statuses == FOUND, phases / omega, np.nan)
     both = np.isfinite(exact) & np.isfinite(resolved)
     assert both.mean() > 0.5
     differ = np.flatnonzero(np.isnan(exact) != np.isnan(resolved))
     assert np.abs(a[differ] - chattering.critical_amplitude(omega[differ], eta[differ])).max(initial=0.0) < 1e-9
     assert np.abs(exact[both] / resolved[both] - 1.0).max() < 1e-8
+
+
+@pytest.mark.parametrize("resolved", [None, 5, 60])
+@pytest.mark.parametrize("eta", [0.5, 0.92, 0.99])
+def test_the_semianalytical_time_is_nan_where_chattering_is_incomplete_and_only_there(eta, resolved):
+    omega = np.array([0.5, 2.0, 8.0])
+    critical = chattering.critical_amplitude(omega, eta)
+    for share in (-1e-2, -1e-5, -1e-8, 1e-8, 1e-5, 1e-2):
+        a = critical + share * (critical - 1.0)
+        times = chattering.chattering_time(a, omega, eta, method="semianalytical", resolved=resolved)
+        np.testing.assert_array_equal(np.isnan(times), [share > 0.0] * 3)
+
+
+def test_near_restitution_one_the_semianalytical_scheme_resolves_more_impacts():
+    a = 1.0 + 0.5 * (chattering.critical_amplitude(2.0, 0.99) - 1.0)
+    exact = float(chattering.chattering_time(a, 2.0, 0.99))
+    by_default, by_sixty = (
+        float(chattering.chattering_time(a, 2.0, 0.99, method="semianalytical", resolved=n)) for n in (None, 60)
+    )
+    assert abs(by_default / exact - 1.0) < 1e-4 < 0.04 < abs(by_sixty / exact - 1.0)
 
 
 def test_semianalytical_scheme_converges_like_the_square_of_what_remains():

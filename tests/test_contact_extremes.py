@@ -1,4 +1,4 @@
-"""No instant of a response asks for more friction, or presses less on the ground, than the response says."""
+"""Until a block tips, no instant asks for more friction, or presses less on the ground, than the response says."""
 
 from functools import cache
 
@@ -40,6 +40,16 @@ def responses() -> list[tuple[int, Response]]:
     return found
 
 
+def end(response: Response) -> float:
+    """End of what counts: the last time, on a dense grid, at which a block that overturns is within its slenderness."""
+    if not response.overturned:
+        return response.duration
+    times = np.linspace(0.0, response.duration, 400_001)
+    theta = response.rotation(times)
+    plus, minus = (side.alpha for side in response.block.sides)
+    return float(times[np.flatnonzero((theta < plus) & (theta > -minus))[-1]])
+
+
 def instants(response: Response) -> NDArray[np.float64]:
     """Densely within every stretch without impact, event or corner of the motion, and just before its end."""
     assert response.motion is not None
@@ -48,17 +58,13 @@ def instants(response: Response) -> NDArray[np.float64]:
         response.impacts["time"],
         response.events["time"],
         response.motion.breakpoints,
-        [0.0, response.duration],
+        [0.0, end(response)],
     ]
     ends = np.unique(np.concatenate(corners))
-    ends = ends[(ends >= 0.0) & (ends <= response.duration)]
+    ends = ends[(ends >= 0.0) & (ends <= end(response))]
     dense = ends[:-1, None] + _WITHIN * np.diff(ends)[:, None]
     dense[:, -1] = np.nextafter(ends[1:], 0.0)
     return np.unique(np.maximum(dense, ends[:-1, None]))
-
-
-def between(one: float, other: float, tolerance: float) -> bool:
-    return one == other or abs(one - other) <= tolerance
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -109,3 +115,85 @@ def test_free_rocking_has_its_extremes_right_after_and_before_impacts() -> None:
     times = np.concatenate([struck, np.nextafter(struck, 0.0), np.linspace(0.0, response.duration, 40_001)])
     assert response.required_friction >= float(np.max(response.friction_demand(times))) - 1e-9
     assert response.minimum_normal_force <= float(np.min(response.normal_force(times))) + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("radius", "overturned", "force", "friction"),
+    [
+        (0.25, True, 0.8647, 0.2458),
+        (0.5, True, 0.885, 0.249),
+        (1.0, False, 0.901, 0.250),
+        (2.0, False, 0.909, 0.251),
+        (4.0, False, 0.911, 0.251),
+    ],
+)
+def test_forces_are_those_of_an_independent_program(radius, overturned, force, friction):
+    """Blocks of slenderness 0.2 under a sine pulse of 0.5 s and 2 g tan(0.2), up to |theta| = slenderness.
+
+    The table of "Under this pulse" in the public repository Numerics-in-Motion/blocks, and two digits more of its run.
+    """
+    block = Block(radius * np.sin(0.2), radius * np.cos(0.2))
+    response = simulate(block, rocking.pulses.one_sine(2.0 * GRAVITY * np.tan(0.2), 2.0))
+    assert response.overturned == overturned
+    # The last digit printed there.
+    assert response.minimum_normal_force == pytest.approx(force, abs=5e-5 if radius == 0.25 else 5e-4)
+    assert response.required_friction == pytest.approx(friction, abs=5e-5 if radius == 0.25 else 5e-4)
+
+
+def test_a_block_tips_where_it_last_passes_its_slenderness() -> None:
+    fallen = [response for _, response in responses() if response.overturned]
+    assert len(fallen) > 10
+    for response in fallen:
+        tipping = response.tipping_time
+        plus, minus = (side.alpha for side in response.block.sides)
+        theta = float(response.rotation(tipping))
+        assert abs(theta) == pytest.approx(plus if theta > 0.0 else minus, rel=1e-12)
+        after = np.abs(response.rotation(np.linspace(tipping, response.duration, 20_001)))
+        assert np.all(after >= abs(theta) * (1.0 - 1e-12))
+        assert tipping <= end(response) + response.duration / 400_000
+
+
+def test_what_does_not_overturn_does_not_tip_and_what_starts_beyond_its_slenderness_has_tipped() -> None:
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    assert np.isnan(simulate(block, None, initial_rotation=0.19).tipping_time)
+    beyond = simulate(block, None, initial_rotation=-0.25)
+    assert beyond.overturned
+    assert beyond.tipping_time == 0.0
+    assert beyond.required_friction == float(beyond.friction_demand(0.0))
+    assert beyond.minimum_normal_force == float(beyond.normal_force(0.0))
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_a_block_slides_first_where_a_dense_look_finds_it(part: int) -> None:
+    rng = np.random.default_rng(part)
+    for seed, response in responses()[part::4]:
+        times = instants(response)
+        demand = response.friction_demand(times)
+        most = response.required_friction
+        friction = float(rng.uniform(0.1, 0.99)) * min(most, 1.0)
+        found = response.sliding_time(friction)
+        over = np.flatnonzero(demand > friction)
+        first = float(times[over[0]])
+        assert found <= first, seed
+        # Before it, nothing that a dense look would see.
+        assert found >= (times[over[0] - 1] if over[0] else 0.0), seed
+        assert np.isnan(response.sliding_time(most * (1.0 + 1e-9))) or most == np.inf, seed
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_a_base_lifts_off_where_the_normal_force_ends(part: int) -> None:
+    for seed, response in responses()[part::4]:
+        found = response.lift_off_time
+        assert np.isnan(found) == (response.minimum_normal_force > 0.0), seed
+        if not np.isnan(found):
+            times = instants(response)
+            gone = times[response.normal_force(times) <= 0.0]
+            assert found <= gone[0] if len(gone) else found <= end(response), seed
+            assert np.all(response.normal_force(times[times < found]) > 0.0), seed
+
+
+@pytest.mark.parametrize("friction", [0.0, -0.3, np.nan, "0.3", True])
+def test_a_friction_coefficient_is_a_positive_number(friction) -> None:
+    response = simulate(Block(0.2, 1.0), None, initial_rotation=0.1)
+    with pytest.raises(rocking.InvalidOption, match="friction must be a positive number"):
+        response.sliding_time(friction)

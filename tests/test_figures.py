@@ -192,14 +192,6 @@ def test_few_scaled_motions_are_named_and_many_are_a_family_with_fractiles():
         assert {text.partition(":")[0] for text in entries(figure)} >= {"dot", "kink", "strip"}
 
 
-def test_the_levels_of_an_ida_are_drawn_in_the_units_asked_for():
-    plain, scaled_down = ida_of(12), ida_of(12, scale=0.1)
-    for one, other in zip(plain.axes, scaled_down.axes, strict=True):
-        for line, smaller in zip(one.lines, other.lines, strict=True):
-            np.testing.assert_allclose(smaller.get_ydata(), 0.1 * np.asarray(line.get_ydata()))
-    np.testing.assert_allclose(scaled_down.axes[0].get_ylim(), 0.1 * np.array(plain.axes[0].get_ylim()))
-
-
 def test_the_lowest_level_that_reaches_a_peak_is_on_the_curve_before_it_turns_back():
     levels = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     peak = np.array([0.1, 0.3, 0.2, 0.6, np.inf])
@@ -218,10 +210,10 @@ def test_the_frame_of_an_ida_ends_above_what_stands():
     assert stands < figure.axes[0].get_ylim()[1] < 1.3 * stands
 
 
-def test_dots_of_a_fragility_say_what_they_pool_and_intensities_have_a_scale():
-    figure = fragility_of(scale=0.1)
+def test_dots_of_a_fragility_say_what_they_pool():
+    figure = fragility_of()
     assert entries(figure)[-1] == "dot: share of 6 to 8 outcomes at about its intensity"
-    assert figure.axes[0].get_xlim() == pytest.approx((0.0, 0.8))
+    assert figure.axes[0].get_xlim() == pytest.approx((0.0, 8.0))
     marks = [line for line in figure.axes[0].lines if line.get_marker() != "None" and len(line.get_xdata())]
-    np.testing.assert_allclose(marks[0].get_xdata(), 0.1 * np.linspace(0.0, 8.0, 50)[[9, 19, 29]])
+    np.testing.assert_allclose(marks[0].get_xdata(), np.linspace(0.0, 8.0, 50)[[9, 19, 29]])
     assert len({mark.get_marker() for mark in marks}) == 2

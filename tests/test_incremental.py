@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.analysis.incremental import dynamic_figure, incremental_dynamic_analysis
+from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.block import Blocks
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -130,7 +130,7 @@ def test_the_larger_of_two_similar_blocks_is_safer_under_records():
 
 def test_the_figure_shows_peaks_and_bands(analysis):
     _, dataset = analysis
-    curves, strip = dynamic_figure(dataset, block=1).axes
+    curves, strip = dataset.plot(block=1).axes
     lines = curves.lines
     assert [line.get_label() for line in lines] == [str(name) for name in dataset.motion.values]
     peaks = dataset.peak_over_alpha.isel(motion=0, block=1).values

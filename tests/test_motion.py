@@ -1,10 +1,13 @@
 """Laws of the piecewise polynomial ground motion."""
 
 import pickle
+import re
 import subprocess
 import sys
 from fractions import Fraction
+from xml.etree import ElementTree
 
+import matplotlib.figure
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -166,17 +169,24 @@ def test_scaling_is_linear(motion, factor):
     )
 
 
-@pytest.mark.parametrize("target", ["pga", "pgv"])
-def test_scaling_to_a_target_reaches_it(target):
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [
+        ("pga", "to a peak ground acceleration of 1.7 m/s^2 (0.1734 g)"),
+        ("pgv", "to a peak ground velocity of 1.7 m/s"),
+    ],
+)
+def test_scaling_to_a_target_reaches_it_and_says_its_unit(target, said):
     motion = Motion.from_samples([0.0, 1.0, -3.0, 2.0], 0.3).scaled(**{target: 1.7})
     assert getattr(motion, target) == pytest.approx(1.7, rel=1e-15)
-    assert f"to a {target} of 1.7" in motion.history[-1]
+    assert motion.history[-1].endswith(said)
 
 
 def test_scaling_to_a_spectral_acceleration_reaches_it():
     motion = Motion.from_samples([0.0, 1.0, -3.0, 2.0], 0.3).scaled(sa=2.0, period=0.7, damping=0.02)
     assert motion.spectral_acceleration(0.7, 0.02) == pytest.approx(2.0, rel=1e-14)
-    assert motion.history == (f"scaled by {motion.coefficients[1, 0]:.6g} to a sa of 2 at 0.7 s, damping 0.02",)
+    factor, said = f"{motion.coefficients[1, 0]:.6g}", "a spectral acceleration of 2 m/s^2 (0.2039 g) at 0.7 s"
+    assert motion.history == (f"scaled by {factor} to {said}, damping 0.02",)
 
 
 def test_scaling_and_polarity_keep_the_description_true():
@@ -201,6 +211,11 @@ def test_scaling_and_polarity_keep_the_description_true():
         {"sa": 1.0},
         {"period": 1.0, "pga": 1.0},
         {"sa": 1.0, "period": 0.0},
+        {"sa": 1.0, "period": 1.0, "damping": 7.0},
+        {"pga": 1.0, "damping": 0.05},
+        {"factor": 2.0, "damping": 7.0},
+        {"factor": 2.0, "period": 1.0},
+        {"pga": "0.5"},
     ],
 )
 def test_unusable_targets_are_refused(arguments):
@@ -400,6 +415,63 @@ def test_descriptions_compare_by_value():
 def test_adding_something_else_is_a_type_error():
     with pytest.raises(TypeError):
         Motion.from_samples([0.0, 1.0], 1.0) + 1.0
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: Motion([0.0, 1.0], [[1.0]], name=3),
+        lambda: Motion([0.0, 1.0], [[1.0]], history="scaled"),
+        lambda: Motion([0.0, 1.0], [[1.0]], history=(1,)),
+        lambda: Motion([0.0, 1.0], [[1.0]], description="a record"),
+        lambda: Motion.from_samples([0.0, 1.0], 0.1, description="a record"),
+        lambda: Motion.from_samples([0.0, 1.0], 0.1, name=None),
+        lambda: Description(3),
+        lambda: Description("sine", {"amplitude": "large"}),
+        lambda: Motion([0.0, 1.0], [[1.0]]).acceleration("0.5"),
+        lambda: Motion([0.0, 1.0], [[1.0]]).velocity(["0.5"]),
+        lambda: Motion([0.0, 1.0], [[1.0]]).displacement(True),
+        lambda: Motion([0.0, 1.0], [[1.0]]).measures(["0.5"]),
+    ],
+)
+def test_what_is_no_text_and_no_number_is_refused(made):
+    with pytest.raises(InvalidMotion) as caught:
+        made()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_motion_shows_itself_in_one_short_line():
+    motion = Motion.from_samples(np.sin(np.arange(10_000.0)) / 3.0, 0.005, name="ramp")
+    assert repr(motion) == "<Motion: ramp, 49.995 s in steps of 0.005 s, peak 0.33333 m/s^2 (0.03399 g)>"
+    assert repr(motion.scaled(2.0)).endswith("; scaled by 2>")
+    pulse = pulses.sine(1.0 / 3.0, 2.0, cycles=1)
+    assert repr(pulse.description) == "<Description: sine, amplitude 0.33333, frequency 2, cycles 1, phase 0>"
+    assert "0.3333333" not in (pulse + pulse).description.text
+
+
+def test_a_notebook_shows_the_motion_with_its_peaks_in_the_colour_of_the_text():
+    samples = np.zeros(20_000)
+    samples[12_345] = -4.9033
+    page = Motion.from_samples(samples, 0.01, name="spike <&>")._repr_html_()
+    ElementTree.fromstring(page)
+    assert "spike &lt;&amp;&gt;" in page
+    assert "currentColor" in page and "#" not in page
+    line = max(re.findall(r'points="([^"]*)"', page), key=len).split()
+    heights = [float(point.split(",")[1]) for point in line]
+    assert len(line) <= 400
+    assert heights.index(max(heights)) == pytest.approx(len(line) * 12_345 / 20_000, abs=3)
+    assert "-0.5" in page
+
+
+def test_a_motion_draws_itself_into_given_axes():
+    figure = matplotlib.figure.Figure()
+    one, other = figure.subplots(2)
+    motion = pulses.sine(9.80665, 1.0, cycles=1)
+    assert motion.plot(ax=other) is figure
+    assert not one.lines
+    drawn = other.lines[-1].get_xydata()
+    assert np.max(drawn[:, 1]) == pytest.approx(1.0, abs=1e-3)
+    assert " ".join(motion.plot().axes[0].get_ylabel().split()) == "ground acceleration (g)"
 
 
 def test_motions_import_without_slow_libraries():

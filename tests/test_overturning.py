@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import rocking
 from rocking.analysis.boundaries import boundaries
-from rocking.analysis.overturning import mode_name, overturning_figure, overturning_map
+from rocking.analysis.overturning import mode_name, overturning_map
 from rocking.block import Blocks
 from rocking.engine import Setup, simulate_each
 from rocking.treatment import Certified
@@ -237,7 +237,7 @@ def test_the_figure_names_every_mode_that_it_shows():
     dataset = overturning_map(
         "one-sine", BLOCK, amplitudes=np.linspace(0.5, 10.0, 20), frequencies=np.linspace(2, 6, 5)
     )
-    figure = overturning_figure(dataset)
+    figure = dataset.plot()
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {"no uplift", "rocks", "overturns after 1 impact", "overturns without impact"} <= set(texts)
     regions = [shape for shape in figure.axes[0].collections[:-1] if shape.get_hatch() is None]

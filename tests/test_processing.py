@@ -184,6 +184,8 @@ def test_processing_leaves_the_motion_itself_alone():
         {"resample": math.inf},
         {"resample": 100.0},
         {"resample": 1e-9},
+        {"resample": 0.02, "order": 2},
+        {"trim": "ab"},
     ],
 )
 def test_unusable_arguments_are_refused(arguments):

@@ -1,6 +1,7 @@
 """Every scheme that ends chattering against the certified response: right where it is, and shown wrong where not."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -10,13 +11,15 @@ from hypothesis import strategies as st
 import rocking
 from rocking.chattering import chattering_time
 from rocking.chattering.schemes import SCHEMES, compare_schemes
+from rocking.errors import OutsideFit
+from rocking.treatment import treatment
 
 BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
 THRESHOLD = BLOCK.gravity * 0.2
 
 
-def sine(a, omega=2.0, cycles=2.5):
-    return rocking.pulses.sine(a * THRESHOLD, omega / (2.0 * math.pi), cycles=cycles)
+def sine(a, omega=2.0, cycles=2.5, threshold=THRESHOLD):
+    return rocking.pulses.sine(a * threshold, omega / (2.0 * math.pi), cycles=cycles)
 
 
 def compared(a, *schemes, omega=2.0, cycles=2.5):
@@ -73,6 +76,48 @@ def test_where_eq_65_exceeds_the_true_time_the_rest_is_reported_as_stalled():
     assert outcome.response.stalled == 5
     assert "time no longer advanced" in outcome.verdict
     assert abs(outcome.largest_error) < 1e-12
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize(("a", "omega"), [(1.0386, 4.0), (1.05, 12.0)])
+def test_between_eq_76_and_the_critical_amplitude_the_scheme_rests_falsely(a, omega, model):
+    angle = THRESHOLD if model == "linear" else BLOCK.uplift_thresholds("nonlinear")[0]
+    motion = sine(a, omega, 2.5, angle)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        comparison = compare_schemes(
+            BLOCK, motion, schemes=[rocking.AsymptoticTime(), rocking.AsymptoticTime("exact")], model=model
+        )
+    by_eq76, by_exact = comparison.outcomes
+    assert by_eq76.false_rests.size == (4 if omega == 4.0 else 2)
+    assert by_exact.false_rests.size == by_exact.missed.size == 0
+    assert {warning.category for warning in caught} == ({OutsideFit} if omega == 12.0 else set())
+
+
+def test_eq_76_ends_chattering_by_stall_only_where_it_is_too_small():
+    comparison = compared(1.0375, rocking.AsymptoticTime("eq76"), rocking.AsymptoticTime("exact"))
+    assert [outcome.response.stalled for outcome in comparison.outcomes] == [5, 0]
+    assert all(outcome.is_right for outcome in comparison.outcomes)
+
+
+def test_the_asymptotic_time_counts_in_the_model_s_own_threshold():
+    block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
+    motion = sine(1.03, threshold=block.uplift_thresholds("nonlinear")[0])
+    response = rocking.simulate(block, motion, model="nonlinear", chattering="time")
+    assert response.stalled == 0
+    assert len(response.chattering) == 5
+
+
+def test_a_treatment_is_made_of_its_name_and_parameter():
+    assert treatment("time=exact") == rocking.AsymptoticTime("exact")
+    assert treatment("interval=1e-6") == rocking.IntervalThreshold(1e-6)
+    for wrong, sentence in (
+        ("time=eq78", "eq76, eq77, exact"),
+        ("velocity=x", "one number"),
+        ("none", "must be one of"),
+    ):
+        with pytest.raises(rocking.InvalidOption, match=sentence):
+            treatment(wrong)
 
 
 def test_a_coarse_threshold_hides_overturning():
@@ -156,10 +201,10 @@ def test_free_rocking_is_compared_too():
 
 
 def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
-    scheme = rocking.AsymptoticTime()
+    scheme = rocking.AsymptoticTime(critical="exact")
     sine = rocking.pulses.sine(4.0, 1.0, cycles=2)
     symmetric = rocking.Blocks([2.0], [0.2], [0.9])
-    assert scheme.limits(symmetric, sine).shape == (1, 2)
+    assert scheme.limits(symmetric, sine, "linear").shape == (1, 2)
     for different in (
         rocking.Blocks([[2.0, 2.5]], [0.2], [0.9]),
         rocking.Blocks([2.0], [[0.2, 0.25]], [0.9]),
@@ -167,9 +212,9 @@ def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
         rocking.Blocks([[2.0, 2.0], [2.0, 2.5]], [0.2], [0.9]),
     ):
         with pytest.raises(rocking.InvalidOption, match="symmetric blocks"):
-            scheme.limits(different, sine)
+            scheme.limits(different, sine, "linear")
     with pytest.raises(rocking.InvalidOption, match="sinusoidal"):
-        scheme.limits(symmetric, sine.delayed(1.0))
+        scheme.limits(symmetric, sine.delayed(1.0), "linear")
 
 
 @pytest.mark.parametrize("value", ["1e-9", True, np.nan, np.inf, 0.0, -1.0, None])

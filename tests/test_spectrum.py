@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import rocking
-from rocking.analysis.spectrum import fractiles_of, rocking_spectrum, spectrum_figure
+from rocking.analysis.spectrum import fractiles_of, rocking_spectrum
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "rocking_spectrum.py"
 PULSES = [rocking.pulses.one_sine(5.0, frequency) for frequency in (0.5, 0.8, 1.3, 2.0)]
@@ -93,8 +93,8 @@ def test_a_fractile_is_infinite_where_the_value_at_it_or_next_above_is(finite, i
 
 
 def test_the_figure_draws_fractiles_and_leaves_out_what_overturns(spectrum):
-    few = spectrum.sel(restitution=[0.9])
-    figure = spectrum_figure(few, against="size")
+    few = spectrum.select(restitution=0.9)
+    figure = few.plot(against="size")
     peaks, shares = figure.axes
     thick = [line for line in peaks.lines if line.get_linewidth() > 1.5]
     assert len(thick) == 2
@@ -131,9 +131,9 @@ def test_what_makes_no_spectrum_is_refused(changes, word):
 def test_a_figure_of_too_many_curves_is_refused(spectrum):
     more = rocking_spectrum(PULSES[0], alpha=[0.1, 0.15, 0.2, 0.25, 0.3], p=[2.0])
     with pytest.raises(rocking.InvalidOption, match="at most 4"):
-        spectrum_figure(more)
+        more.plot()
     with pytest.raises(rocking.InvalidOption, match="against"):
-        spectrum_figure(spectrum, against="height")
+        spectrum.plot(against="height")
 
 
 def test_the_example_ends_in_its_number(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ are not, though ``float`` takes them: "0.2" is more often a mistake than a wish.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from numbers import Integral, Real
 from typing import Any, Final
 
@@ -71,6 +71,20 @@ def whole(value: object, name: str, error: Error, least: int, most: int | None =
         bounds = f"of at least {least}" if most is None else f"from {least} to {most}"
         raise error(f"{name} must be a whole number {bounds}, not {_shown(value)}")
     return int(single)
+
+
+def text(value: object, name: str, error: Error) -> str:
+    """Return `value`, or raise `error` unless it is text."""
+    if not isinstance(value, str):
+        raise error(f"{name} must be text, not {_shown(value)}")
+    return value
+
+
+def one_of(value: object, name: str, error: Error, choices: Sequence[str]) -> str:
+    """Return `value`, or raise `error` unless it is one of the choices."""
+    if not isinstance(value, str) or value not in choices:
+        raise error(f"{name} must be one of {', '.join(choices)}, not {_shown(value)}")
+    return value
 
 
 def numbers(values: ArrayLike, name: str, error: Error) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,10 +18,12 @@ from rocking.constants import VERSION
 from rocking.engine import OUTCOME, Setup, Task, cores, parts_of, simulate_tasks
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import measures
+from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
-from rocking.problem import Model, rules_of
+from rocking.problem import rules_of
 from rocking.progress import Progress
 from rocking.treatment import Treatment, treatment
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -112,10 +115,7 @@ def simulate_many(
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    many = _blocks(blocks)
-    shaken = [motions] if isinstance(motions, Motion) else list(motions)
-    if not shaken:
-        raise InvalidOption("motions must hold at least one motion")
+    many, shaken = Blocks.of(blocks), several_motions(motions)
     how = treatment(chattering)
     rules_of(many, model, how, duration, record=False)  # checked before anything is computed
     scales = _scales(factor=factor, pga=pga, pgv=pgv, sa=sa, period=period, damping=damping)
@@ -172,12 +172,6 @@ def _scales(*, period: float | None, damping: float, **measures: ArrayLike | Non
     return _Scales(name, values, {"period": period, "damping": damping})
 
 
-def _blocks(blocks: Blocks | Block | Sequence[Block]) -> Blocks:
-    if isinstance(blocks, Blocks):
-        return blocks
-    return Blocks.of([blocks] if isinstance(blocks, Block) else blocks)
-
-
 def _threads(threads: int | None) -> int:
     return cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
 
@@ -208,7 +202,7 @@ def _dataset(
         name: (kept, results[name].squeeze(axis=tuple(dropped)), {"units": units, "long_name": meaning})
         for name, (units, meaning) in VARIABLES.items()
     }
-    coordinates: dict[str, Any] = {"motion": ("motion", [motion.name for motion in motions])}
+    coordinates: dict[str, Any] = {"motion": ("motion", _names(motions))}
     if scales.measure is not None:
         units = {"factor": "1", "pgv": "m/s"}.get(scales.measure, "m/s^2")
         coordinates["scale"] = ("scale", scales.values, {"measure": scales.measure, "units": units, **scales.options})
@@ -225,6 +219,17 @@ def _dataset(
         "histories": ["; ".join(motion.history) for motion in motions],
     }
     return xr.Dataset(variables, coordinates, attributes)
+
+
+def _names(motions: Sequence[Motion]) -> list[str]:
+    """Names of motions, numbered where several share one: a row of a table must say which it is."""
+    shared = {name for name, count in Counter(motion.name for motion in motions).items() if count > 1}
+    seen: Counter[str] = Counter()
+    names = []
+    for motion in motions:
+        seen[motion.name] += 1
+        names.append(f"{motion.name} #{seen[motion.name]}" if motion.name in shared else motion.name)
+    return names
 
 
 def _block_coordinates(blocks: Blocks) -> dict[str, Any]:

@@ -24,5 +24,13 @@ class InvalidOption(RockingError):
     """An argument of an analysis (model, chattering treatment, duration, ...) is not usable."""
 
 
+class Unfinished(RockingError):
+    """Simulations were given up after too many steps, so that an analysis has no answer."""
+
+
+class OutsideFit(UserWarning):
+    """A fitted formula was asked for values beyond those it was fitted to."""
+
+
 class OutputError(RockingError):
     """Results could not be written where they were asked for."""

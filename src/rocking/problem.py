@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -14,9 +14,8 @@ from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
 from rocking.kernels.ground import Ground
 from rocking.motion.motion import Motion
-from rocking.treatment import Certified, Treatment
-
-Model = Literal["nonlinear", "linear"]
+from rocking.treatment import Treatment
+from rocking.treatment.base import Model
 
 
 @functools.lru_cache(maxsize=8)
@@ -57,8 +56,7 @@ def rules_of(
     InvalidOption
         If the model is unknown, the duration is not positive, or it is not given where nothing comes to rest.
     """
-    if model not in get_args(Model):
-        raise InvalidOption(f"model must be one of {', '.join(get_args(Model))}, not {model!r}")
+    checks.one_of(model, "model", InvalidOption, get_args(Model))
     if duration is None:
         if np.any(np.prod(blocks.restitution, axis=1) == 1.0):
             raise InvalidOption("a block with restitution 1 never comes to rest; give duration= to say when to stop")
@@ -68,7 +66,7 @@ def rules_of(
         state.RULES,
         nonlinear=model == "nonlinear",
         treatment=treatment.code,
-        tolerance=treatment.tolerance if isinstance(treatment, Certified) else 0.0,
+        tolerance=treatment.bracket,
         stop=math.inf if duration is None else duration,
         endless=duration is None,
         record=record,

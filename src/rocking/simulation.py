@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 
 from rocking import checks
-from rocking.block import Block, Blocks
+from rocking.block import Block, Blocks, one_block
 from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state, status
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
+from rocking.motion.accepted import one_motion
 from rocking.motion.motion import Motion
-from rocking.problem import Model, ground_of, records_of, rules_of
+from rocking.problem import ground_of, records_of, rules_of
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
+from rocking.treatment.base import Model
 
 #: Rows of the first table per piece of the motion.
 _FIRST_ROWS = 1.25
@@ -60,6 +62,8 @@ def simulate(
 
     Raises
     ------
+    InvalidBlock, InvalidMotion
+        If the block is no `Block`, or the motion no `Motion`.
     InvalidOption
         If an argument is out of its range, or the block would never come to rest and no duration is given.
 
@@ -78,10 +82,13 @@ def simulate(
     >>> response.overturned, len(response.impacts) > 50, f"{response.events['time'][-1]:.6f}"
     (False, True, '4.235818')
     """
-    how, blocks = treatment(chattering), Blocks.of([block])
+    how, blocks, motion = treatment(chattering), Blocks.of([one_block(block)]), one_motion(motion)
     rules = rules_of(blocks, model, how, duration, record=True)
     trail = Trail(
-        ground_of(motion, block.gravity), records_of(blocks, model, how.limits(blocks, motion))[0], rules, NO_NODES
+        ground_of(motion, block.gravity),
+        records_of(blocks, model, how.limits(blocks, motion, model))[0],
+        rules,
+        NO_NODES,
     )
     start = state.new_states(1, 0)[0]
     start["side"], start["u"], start["v"] = _initial_state(initial_rotation, initial_velocity)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,22 +13,25 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.analysis.boundaries import Boundaries, boundaries
 from rocking.analysis.intensity import Measure, MeasureName
-from rocking.analysis.levels import several_blocks, several_motions, simulate_levels
+from rocking.analysis.levels import described, several_motions, simulate_levels
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
+from rocking.result import Result
+from rocking.tables import text_table
 from rocking.treatment import Certified
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Without levels each is this times the one before; they go on to twice the lowest that overturns, and end anyway.
+#: Without levels each is this times the one before; they go on to this times the lowest that overturns.
 _STEP: Final = 1.05
-_BEYOND: Final = 2.0
+_BEYOND: Final = 3.0
 _MOST: Final = 128
 #: Levels that are simulated at once.
 _CHUNK: Final = 16
@@ -47,7 +52,7 @@ def incremental_dynamic_analysis(
     tolerance: float = 1e-6,
     threads: int | None = None,
     progress: bool | None = None,
-) -> xr.Dataset:
+) -> IncrementalDynamicAnalysis:
     """Scale motions up until every block overturns and beyond, and find all bands of levels that overturn it.
 
     A rocking block may stand a motion that is stronger than one that overturns it, so there is no single level of
@@ -65,8 +70,8 @@ def incremental_dynamic_analysis(
     period, damping : float
         Oscillator of "sa": s, and fraction of critical.
     levels : array_like, optional
-        Increasing levels of the measure. By default from the lowest that lifts a block, in steps of 5 %, to twice the
-        lowest that overturns each block under each motion, and at most to 490 times the first.
+        Increasing levels of the measure. By default from the lowest that lifts a block, in steps of 5 %, to three
+        times the level by which every motion has overturned every block, and at most to 490 times the first.
     model : {"nonlinear", "linear"}
         Equation of motion.
     tolerance : float
@@ -76,12 +81,8 @@ def incremental_dynamic_analysis(
 
     Returns
     -------
-    xarray.Dataset
-        Over (motion, level, block): peak_rotation (rad; pi/2 where the block overturns), peak_over_alpha (over the
-        smaller slenderness; infinite where it overturns) and overturned. Over (motion, block): overturning_level, the
-        lowest; NaN where no level overturns, or the first one already does. Over (band): band_motion and band_block
-        (positions along these dimensions), band_start and band_end; NaN where the band goes on below or above the
-        levels.
+    IncrementalDynamicAnalysis
+        Peaks at every level, and all bands of levels that overturn.
 
     Raises
     ------
@@ -115,7 +116,7 @@ def incremental_dynamic_analysis(
     overturns from 2.9855 to 6.5019
     overturns from 7.2759 to nan
     """
-    many, how = several_blocks(blocks), Measure(measure, period, damping)
+    many, how = Blocks.of(blocks), Measure(measure, period, damping)
     shaken, values = several_motions(motions, how)
     if np.any(np.prod(many.restitution, axis=1) == 1.0):
         raise InvalidOption("a block with restitution 1 never comes to rest; scaling up needs one below 1")
@@ -145,41 +146,100 @@ def incremental_dynamic_analysis(
     grid = table.overturned.transpose("level", "motion", "block").values
     flat = grid.reshape(len(grid), -1).astype(np.int64)
     edges = boundaries(table.level.values, flat, overturned, tolerance=width, progress=progress)
-    return _dataset(table, _bands(flat, edges), many, how)
+    found = _dataset(table, _bands(flat, edges), many, how)
+    return IncrementalDynamicAnalysis(found.assign_attrs(blocks=described(blocks)))
 
 
-def dynamic_figure(dataset: xr.Dataset, *, block: int = 0, title: str = "") -> Figure:
-    """Draw what `incremental_dynamic_analysis` found for one block: level against peak rotation, bands that overturn.
+@dataclass(frozen=True, eq=False, repr=False)
+class IncrementalDynamicAnalysis(Result):
+    """Blocks under motions that are scaled up; from `incremental_dynamic_analysis`.
 
-    Parameters
+    Attributes
     ----------
-    dataset : xarray.Dataset
-        From `incremental_dynamic_analysis`.
-    block : int
-        Position of the block.
-    title : str
-        Title; by default the model.
+    data : xarray.Dataset
+        Over (motion, level, block): peak_rotation (rad; pi/2 where the block overturns), peak_over_alpha (over the
+        smaller slenderness; infinite where it overturns) and overturned. Over (motion, block): overturning_level, the
+        lowest; NaN where no level overturns, or the first one already does. Over (band): band_motion and band_block
+        (positions along these dimensions), band_start and band_end; NaN where the band goes on below or above the
+        levels.
     """
-    from rocking.plot.ida import ScaledMotion, ida_figure
 
-    low, high = float(dataset.level[0]), float(dataset.level[-1])
-    chosen = dataset.isel(block=block)
-    motions = []
-    for m in range(dataset.sizes["motion"]):
-        mine = (dataset.band_motion.values == m) & (dataset.band_block.values == block)
-        bands = np.column_stack([dataset.band_start.values[mine], dataset.band_end.values[mine]])
-        open_ends = np.array([low, high])
-        motions.append(
-            ScaledMotion(
-                str(dataset.motion.values[m]),
-                dataset.level.values,
-                chosen.peak_over_alpha.transpose("motion", "level").values[m],
-                np.where(np.isnan(bands), open_ends, bands),
-            )
+    def bands(self, motion: int, block: int = 0) -> list[tuple[float, float]]:
+        """Return the bands of levels that overturn a block under a motion, both by position.
+
+        Returns
+        -------
+        list of (float, float)
+            Start and end; NaN where the band goes on below or above the levels.
+        """
+        mine = (self.data.band_motion.values == motion) & (self.data.band_block.values == block)
+        starts, ends = self.data.band_start.values[mine], self.data.band_end.values[mine]
+        return list(zip(starts.tolist(), ends.tolist(), strict=True))
+
+    def summary(self) -> str:
+        """Levels that overturn each block under each motion."""
+        many = self.data.sizes["block"] > 1
+        rows = [
+            [
+                str(self.data.motion.values[m]),
+                *([b] if many else []),
+                _bands_text(self.bands(m, b), self.data.level.scale),
+            ]
+            for m in range(self.data.sizes["motion"])
+            for b in range(self.data.sizes["block"])
+        ]
+        what = self.data.blocks if not many else f"{self.data.sizes['block']} blocks"
+        head = f"{what}, {self.data.model} model; {self.data.level.label} that overturns"
+        return f"{head}\n\n{text_table(['motion', *(['block'] if many else []), 'overturns'], rows)}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Levels, peaks and bands by name."""
+        peaks = self.data.peak_over_alpha.transpose("motion", "block", "level").values
+        return {
+            "blocks": self.data.blocks,
+            "model": self.data.model,
+            "measure": self.data.level.long_name,
+            "level": self.data.level.values,
+            "motions": [
+                {
+                    "name": str(self.data.motion.values[m]),
+                    "block": b,
+                    "overturning_level": float(self.data.overturning_level.transpose("motion", "block")[m, b]),
+                    "overturns": [{"from": low, "to": high} for low, high in self.bands(m, b)],
+                    "peak_over_alpha": peaks[m, b],
+                }
+                for m in range(self.data.sizes["motion"])
+                for b in range(self.data.sizes["block"])
+            ],
+        }
+
+    def plot(self, ax: Axes | None = None, *, block: int = 0, title: str = "") -> Figure:
+        """Draw level against peak rotation for one block, and the bands of levels that overturn it.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default in a new figure.
+        block : int
+            Position of the block.
+        title : str
+            Title; by default the block and the model.
+        """
+        from rocking.plot import ScaledMotion, ida_figure
+
+        data = self.data
+        levels = data.level.scale * data.level.values
+        ends = np.array([levels[0], levels[-1]])
+        peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
+        motions = []
+        for m in range(data.sizes["motion"]):
+            bands = data.level.scale * np.array(self.bands(m, block)).reshape(-1, 2)
+            bands = np.where(np.isnan(bands), ends, bands)
+            motions.append(ScaledMotion(str(data.motion.values[m]), levels, peaks[m], bands))
+        what = data.blocks if data.sizes["block"] == 1 else f"block {block}"
+        return ida_figure(
+            motions=motions, level_label=data.level.label, title=title or f"{what}, {data.model} model", ax=ax
         )
-    return ida_figure(
-        motions=motions, level_label=dataset.level.long_name, title=title or f"block {block}, {dataset.model} model"
-    )
 
 
 def _lowest_uplift(blocks: Blocks, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
@@ -191,7 +251,7 @@ def _lowest_uplift(blocks: Blocks, motions: Sequence[Motion], values: Floats, me
 def _until_overturned(
     blocks: Blocks, motions: Sequence[Motion], measure: Measure, first: float, options: dict[str, Any]
 ) -> xr.Dataset:
-    """Levels in chunks, until each block has overturned under each motion, and on to twice that level."""
+    """Levels in chunks, until each block has overturned under each motion, and on to three times that level."""
     import xarray as xr
 
     whole: list[xr.Dataset] = []
@@ -199,10 +259,22 @@ def _until_overturned(
         levels = first * np.power(_STEP, np.arange(start, start + _CHUNK, dtype=np.float64))
         whole.append(simulate_levels(blocks, motions, measure, levels, **options))
         fell = xr.concat([part.overturned for part in whole], "level")
-        lowest = fell.level.where(fell).min("level")
-        if bool((_BEYOND * lowest <= levels[-1]).all()):
+        last = _BEYOND * fell.level.where(fell).min("level", skipna=True).max(skipna=False)
+        if last <= levels[-1]:
             break
-    return xr.concat(whole, "level", data_vars="all", coords="minimal", compat="override", join="override")
+    table = xr.concat(whole, "level", data_vars="all", coords="minimal", compat="override", join="override")
+    beyond = np.flatnonzero(table.level.values >= float(last))
+    return table.isel(level=slice(0, beyond[0] + 1 if beyond.size else None))
+
+
+def _bands_text(bands: Sequence[tuple[float, float]], scale: float) -> str:
+    return "; ".join(_band_text(scale * low, scale * high) for low, high in bands) or "never"
+
+
+def _band_text(low: float, high: float) -> str:
+    if math.isnan(low):
+        return "at every level" if math.isnan(high) else f"up to {high:.5g}"
+    return f"{low:.5g} and more" if math.isnan(high) else f"{low:.5g} to {high:.5g}"
 
 
 def _bands(flat: Integers, edges: Boundaries) -> NDArray[np.float64]:
@@ -225,15 +297,15 @@ def _dataset(table: xr.Dataset, bands: NDArray[np.float64], blocks: Blocks, meas
     lowest = np.full((table.sizes["motion"], len(blocks)), np.inf)
     np.minimum.at(lowest, (motion, block), start)
     lowest[np.isinf(lowest)] = np.nan
-    level = {"units": measure.units, "long_name": measure.label}
+    level = {"units": measure.units, "long_name": measure.quantity, "label": measure.label, "scale": measure.scale}
     table = table.assign_coords(level=("level", table.level.values, level))
     slenderness = xr.DataArray(blocks.alpha.min(axis=1), dims="block")
     over_alpha = (table.peak_rotation / slenderness).where(~table.overturned, np.inf)
     return table[["peak_rotation", "overturned"]].assign(
         peak_over_alpha=over_alpha.assign_attrs(units="1", long_name="peak rotation over slenderness"),
         overturning_level=(("motion", "block"), lowest, level),
-        band_motion=("band", motion),
-        band_block=("band", block),
+        band_motion=("band", motion, {"units": "1", "long_name": "position of the motion"}),
+        band_block=("band", block, {"units": "1", "long_name": "position of the block"}),
         band_start=("band", start, level),
         band_end=("band", end, level),
     )

@@ -10,9 +10,10 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 MeasureName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
 
@@ -62,19 +63,29 @@ class Measure:
     @property
     def column(self) -> str:
         """Name with units for a table."""
-        return {"pga": "pga_m_per_s2", "pgv": "pgv_m_per_s", "sa": "sa_m_per_s2"}.get(self.name, self.name)
+        return {"pga": "pga_m_s2", "pgv": "pgv_m_s", "sa": "sa_m_s2"}.get(self.name, self.name)
 
     @property
-    def label(self) -> str:
-        """Name and units for a figure."""
+    def scale(self) -> float:
+        """Factor from SI units to those for people: accelerations in g."""
+        return 1.0 / STANDARD_GRAVITY if self.units == "m/s^2" else 1.0
+
+    @property
+    def quantity(self) -> str:
+        """Name in words."""
         if self.name == "sa":
-            return f"spectral acceleration at {self.period:g} s (m/s²)"
+            return f"spectral acceleration at {self.period:g} s"
         return {
-            "pga": "peak ground acceleration (m/s²)",
-            "pgv": "peak ground velocity (m/s)",
+            "pga": "peak ground acceleration",
+            "pgv": "peak ground velocity",
             "pga_ratio": "PGA / (g tan α)",
             "pgv_ratio": "p PGV / (g tan α)",
         }[self.name]
+
+    @property
+    def label(self) -> str:
+        """Name and units for people."""
+        return self.quantity + {"m/s^2": " (g)", "m/s": " (m/s)", "1": ""}[self.units]
 
     @property
     def of_motion(self) -> Literal["pga", "pgv", "sa"]:

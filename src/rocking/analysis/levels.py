@@ -10,20 +10,29 @@ import numpy as np
 from rocking.analysis.intensity import Measure
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
+from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import InvalidMotion
+from rocking.motion import accepted
 from rocking.motion.motion import Motion
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def several_blocks(blocks: Blocks | Block | Sequence[Block]) -> Blocks:
-    """Blocks as a struct of arrays."""
-    if isinstance(blocks, Blocks):
-        return blocks
-    return Blocks.of([blocks] if isinstance(blocks, Block) else blocks)
+def described(blocks: Blocks | Block | Sequence[Block]) -> str:
+    """Name blocks in a few words: one by its sizes or parameters, several by their number."""
+    if isinstance(blocks, Block):
+        return blocks.description
+    many = Blocks.of(blocks)
+    if len(many) > 1:
+        return f"{len(many)} blocks"
+    return f"block with p = {_pair(many.p[0])} rad/s, alpha = {_pair(many.alpha[0])} rad"
+
+
+def _pair(sides: Floats) -> str:
+    return f"{sides[0]:.4g}" if sides[0] == sides[1] else f"({sides[0]:.4g}, {sides[1]:.4g})"
 
 
 def several_motions(motions: Motion | Sequence[Motion], measure: Measure) -> tuple[list[Motion], Floats]:
@@ -34,11 +43,9 @@ def several_motions(motions: Motion | Sequence[Motion], measure: Measure) -> tup
     InvalidOption
         If there is none.
     InvalidMotion
-        If one is zero throughout.
+        If one is no motion, or zero throughout.
     """
-    shaken = [motions] if isinstance(motions, Motion) else list(motions)
-    if not shaken:
-        raise InvalidOption("motions must hold at least one motion")
+    shaken = accepted.several_motions(motions)
     values = np.array([measure.of(motion) for motion in shaken])
     if not np.all(values > 0.0):
         raise InvalidMotion(f"{shaken[int(np.argmin(values))].name} is zero throughout and has no intensity")
@@ -69,4 +76,5 @@ def simulate_levels(
         parts.append(simulate_many(blocks.select(group), motions, model=model, **targets, **options))
         parts[-1] = parts[-1].assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units}))
     whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
+    require_finished(whole.unfinished.values)
     return whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")

@@ -20,13 +20,16 @@ from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.progress import Progress
+from rocking.result import Result, some
 from rocking.simulation import simulate
+from rocking.tables import text_table
 from rocking.treatment import Certified
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: A pulse from its amplitude (m/s^2) and frequency (Hz), proportional to its amplitude.
@@ -57,7 +60,7 @@ def overturning_map(
     tolerance: float = 1e-9,
     progress: bool | None = None,
     **parameters: Any,
-) -> xr.Dataset:
+) -> OverturningMap:
     """Map what a pulse does to a block, over amplitude and frequency, and find the boundaries between the outcomes.
 
     Parameters
@@ -84,14 +87,8 @@ def overturning_map(
 
     Returns
     -------
-    xarray.Dataset
-        Over (amplitude, frequency): mode, and peak_rotation (rad; pi/2 where the block overturns). Over (frequency):
-        overturning_amplitude, the lowest that overturns the block; NaN where none of the grid does, or its first
-        already does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and above it.
-
-        A mode is a whole number (`mode_name` says it in words). -3: no uplift. -2: rests, that is complete chattering
-        brings the block to rest at least once before the pulse is over. -1: rocks, that is it comes to rest only after
-        the pulse. n >= 0: overturns, after n impacts since it last uplifted.
+    OverturningMap
+        Modes, peaks and boundaries.
 
     Raises
     ------
@@ -142,7 +139,7 @@ def overturning_map(
         "pulse": f"{unit.name}: {unit.description.text}",
         "tolerance": width,
     }
-    return _dataset(levels, ratios, modes, peaks, edges, attributes)
+    return OverturningMap(_dataset(levels, ratios, modes, peaks, edges, attributes))
 
 
 def mode_name(mode: int) -> str:
@@ -158,30 +155,82 @@ def mode_name(mode: int) -> str:
     return f"overturns after {mode} impact{'s' if mode > 1 else ''}"
 
 
-def overturning_figure(dataset: xr.Dataset, *, title: str = "") -> Figure:
-    """Draw what `overturning_map` found: the modes as regions between the refined boundaries.
+@dataclass(frozen=True, eq=False, repr=False)
+class OverturningMap(Result):
+    """What a pulse does to a block, over amplitude and frequency; from `overturning_map`.
 
-    Parameters
+    Attributes
     ----------
-    dataset : xarray.Dataset
-        From `overturning_map`.
-    title : str
-        Title; by default the pulse and the block.
-    """
-    from rocking.plot.regions import regions_figure
+    data : xarray.Dataset
+        Over (amplitude, frequency): mode, and peak_rotation (rad; pi/2 where the block overturns). Over (frequency):
+        overturning_amplitude, the lowest that overturns the block; NaN where none of the grid does, or its first
+        already does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and above it.
 
-    modes = dataset.mode.values
-    columns = [dataset.boundary_frequency.values == ratio for ratio in dataset.frequency.values]
-    return regions_figure(
-        x=dataset.frequency.values,
-        y_range=(float(dataset.amplitude[0]), float(dataset.amplitude[-1])),
-        edges=[dataset.boundary_amplitude.values[here] for here in columns],
-        regions=[[modes[0, k], *dataset.mode_above.values[here]] for k, here in enumerate(columns)],
-        names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, dataset.mode_above.values)},
-        x_label="frequency of the pulse over p",
-        y_label="amplitude over the smallest that lifts the block",
-        title=title or f"{dataset.pulse.partition(':')[0]}, {dataset.block.rpartition(': ')[2]}, {dataset.model}",
-    )
+        A mode is a whole number (`mode_name` says it in words). -3: no uplift. -2: rests, that is complete chattering
+        brings the block to rest at least once before the pulse is over. -1: rocks, that is it comes to rest only after
+        the pulse. n >= 0: overturns, after n impacts since it last uplifted.
+    """
+
+    def summary(self) -> str:
+        """Shares of the map that each outcome takes, and the lowest amplitude that overturns at some frequencies."""
+        modes, counts = np.unique(self.data.mode, return_counts=True)
+        shares = [
+            (mode_name(int(mode)), f"{100 * count / self.data.mode.size:.1f} %")
+            for mode, count in zip(modes, counts, strict=True)
+        ]
+        lowest = self.data.overturning_amplitude.values
+        rows = [(float(self.data.frequency[k]), float(lowest[k])) for k in some(lowest.size)]
+        return "\n\n".join(
+            [
+                f"{self.data.pulse.partition(':')[0]} on a {self.data.block}; {self.data.model} model",
+                text_table(["outcome", "share of the map"], shares),
+                text_table(["frequency over p", "lowest amplitude that overturns"], rows),
+            ]
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Grid, modes and boundaries by name."""
+        names = ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above")
+        columns = (self.data[name].values for name in names)
+        return {
+            "pulse": self.data.pulse,
+            "block": self.data.block,
+            "model": self.data.model,
+            "tolerance": self.data.tolerance,
+            "modes": {str(mode): mode_name(int(mode)) for mode in np.unique(self.data.mode)},
+            "frequency": self.data.frequency.values,
+            "amplitude": self.data.amplitude.values,
+            "mode": self.data.mode.values,
+            "overturning_amplitude": self.data.overturning_amplitude.values,
+            "boundaries": [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)],
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "") -> Figure:
+        """Draw the modes as regions between the refined boundaries, in a new figure or in `ax`.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default in a new figure.
+        title : str
+            Title; by default the pulse and the block.
+        """
+        from rocking.plot import regions_figure
+
+        data = self.data
+        modes = data.mode.values
+        columns = [data.boundary_frequency.values == ratio for ratio in data.frequency.values]
+        return regions_figure(
+            x=data.frequency.values,
+            y_range=(float(data.amplitude[0]), float(data.amplitude[-1])),
+            edges=[data.boundary_amplitude.values[here] for here in columns],
+            regions=[[modes[0, k], *data.mode_above.values[here]] for k, here in enumerate(columns)],
+            names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, data.mode_above.values)},
+            x_label="frequency of the pulse over p",
+            y_label="amplitude over the smallest that lifts the block",
+            title=title or f"{data.pulse.partition(':')[0]}, {data.block}, {data.model}",
+            ax=ax,
+        )
 
 
 @dataclass(frozen=True)

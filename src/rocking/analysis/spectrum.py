@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,15 +13,21 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.constants import STANDARD_GRAVITY
+from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
+from rocking.result import Result, some
+from rocking.tables import text_table
 from rocking.treatment import Treatment
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+Abscissa = Literal["p", "period", "size"]
 
 #: Most curves that one figure shows.
 _MOST_CURVES = 4
@@ -39,7 +46,7 @@ def rocking_spectrum(
     gravity: float = STANDARD_GRAVITY,
     threads: int | None = None,
     progress: bool | None = None,
-) -> xr.Dataset:
+) -> RockingSpectrum:
     """Peak rotation against the frequency parameter or the size, for slendernesses and restitutions.
 
     Parameters
@@ -63,11 +70,8 @@ def rocking_spectrum(
 
     Returns
     -------
-    xarray.Dataset
-        Over (motion, alpha, restitution if given, p): peak_rotation (rad; pi/2 where the block
-        overturns), peak_over_alpha (infinite where it overturns) and overturned. Over (fractile, alpha, ..., p):
-        fractile_over_alpha. Over (alpha, ..., p): overturned_share. Coordinates besides: period 2 pi/p (s), and size R
-        (m) of the rectangular block.
+    RockingSpectrum
+        Peaks, fractiles and shares that overturn.
 
     Raises
     ------
@@ -105,7 +109,8 @@ def rocking_spectrum(
         axes["restitution"] = checks.positive_numbers(restitution, "restitution", InvalidOption)
     blocks = Blocks.grid(**axes, gravity=gravity)
     table = simulate_many(blocks, motions, model=model, chattering=chattering, threads=threads, progress=progress)
-    return _spectrum(table, axes, blocks, shares)
+    require_finished(table.unfinished.values)
+    return RockingSpectrum(_spectrum(table, axes, blocks, shares))
 
 
 def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
@@ -132,48 +137,108 @@ def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
     return between
 
 
-def spectrum_figure(dataset: xr.Dataset, *, against: str = "p", title: str = "") -> Figure:
-    """Draw what `rocking_spectrum` found: single motions thin, fractiles thick, and the share that overturns.
+@dataclass(frozen=True, eq=False, repr=False)
+class RockingSpectrum(Result):
+    """Peak rotation against the frequency parameter or the size; from `rocking_spectrum`.
 
-    Parameters
+    Attributes
     ----------
-    dataset : xarray.Dataset
-        From `rocking_spectrum`; at most four combinations of slenderness and restitution.
-    against : {"p", "period", "size"}
-        Abscissa.
-    title : str
-        Title; by default the model and the number of motions.
-
-    Raises
-    ------
-    InvalidOption
-        If there are more combinations, or no such abscissa.
+    data : xarray.Dataset
+        Over (motion, alpha, restitution if given, p): peak_rotation (rad; pi/2 where the block
+        overturns), peak_over_alpha (infinite where it overturns) and overturned. Over (fractile, alpha, ..., p):
+        fractile_over_alpha. Over (alpha, ..., p): overturned_share. Coordinates besides: period 2 pi/p (s), and size R
+        (m) of the rectangular block.
     """
-    from rocking.plot.spectrum import SpectrumCurves
-    from rocking.plot.spectrum import spectrum_figure as drawn
 
-    labels = {"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}
-    if against not in labels:
-        raise InvalidOption(f"against must be one of {', '.join(labels)}, not {against!r}")
-    combinations = [name for name in ("alpha", "restitution") if name in dataset.dims]
-    stacked = dataset.stack(curve=combinations)
-    if stacked.sizes["curve"] > _MOST_CURVES:
-        raise InvalidOption(f"a figure shows at most {_MOST_CURVES} curves, not {stacked.sizes['curve']}; select some")
-    curves = []
-    for k in range(stacked.sizes["curve"]):
-        one = stacked.isel(curve=k)
-        text = f"α = {float(one.alpha):g}" + (f", e = {float(one.restitution):g}" if len(combinations) > 1 else "")
-        singles = one.peak_over_alpha.transpose("motion", "p").values
-        fractile_lines = one.fractile_over_alpha.transpose("fractile", "p").values
-        curves.append(SpectrumCurves(text, singles, fractile_lines, one.overturned_share.values))
-    return drawn(
-        x=dataset[against].values,
-        curves=curves,
-        fractiles=dataset.fractile.values.tolist(),
-        motions=[str(name) for name in dataset.motion.values],
-        x_label=labels[against],
-        title=title or f"{dataset.sizes['motion']} motion(s), {dataset.model} model",
-    )
+    def summary(self) -> str:
+        """Fractiles of peak rotation over slenderness at some sizes, for each slenderness and restitution."""
+        header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
+        parts = [f"peak rotation over slenderness, {self.data.sizes['motion']} motion(s), {self.data.model} model"]
+        for title, one in self._curves():
+            fractiles = one.fractile_over_alpha.transpose("p", "fractile").values
+            rows = [
+                [
+                    float(one.p[j]),
+                    float(one["size"][j]),
+                    *("overturns" if np.isinf(value) else float(value) for value in fractiles[j]),
+                    f"{100 * float(one.overturned_share[j]):.0f} %",
+                ]
+                for j in some(self.data.sizes["p"])
+            ]
+            parts.append(f"{title}\n{text_table(header, rows)}")
+        return "\n\n".join(parts)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Axes, fractiles and shares by name."""
+        data = self.data
+        axes = [str(name) for name in data.overturned_share.dims]
+        return {
+            "motions": data.motion.values,
+            "model": data.model,
+            "chattering_treatment": data.chattering,
+            "p_rad_s": data.p.values,
+            "period_s": data.period.values,
+            "size_m": data["size"].values,
+            "alpha_rad": data.alpha.values,
+            **({"restitution": data.restitution.values} if "restitution" in data.dims else {}),
+            "fractile": data.fractile.values,
+            "axes": axes,
+            "fractile_over_alpha": data.fractile_over_alpha.transpose("fractile", *axes).values,
+            "overturned_share": data.overturned_share.values,
+        }
+
+    def plot(self, ax: Axes | None = None, *, against: Abscissa = "p", title: str = "") -> Figure:
+        """Draw single motions thin, fractiles thick, and the share that overturns.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default in a new figure.
+        against : {"p", "period", "size"}
+            Abscissa.
+        title : str
+            Title; by default the model and the number of motions.
+
+        Raises
+        ------
+        InvalidOption
+            If there are more than four combinations of slenderness and restitution, or no such abscissa.
+        """
+        from rocking.plot import SpectrumCurves, spectrum_figure
+
+        if against not in get_args(Abscissa):
+            raise InvalidOption(f"against must be one of {', '.join(get_args(Abscissa))}, not {against!r}")
+        named_curves = self._curves()
+        if len(named_curves) > _MOST_CURVES:
+            raise InvalidOption(f"a figure shows at most {_MOST_CURVES} curves, not {len(named_curves)}; select some")
+        curves = [
+            SpectrumCurves(
+                name,
+                one.peak_over_alpha.transpose("motion", "p").values,
+                one.fractile_over_alpha.transpose("fractile", "p").values,
+                one.overturned_share.values,
+            )
+            for name, one in named_curves
+        ]
+        return spectrum_figure(
+            x=self.data[against].values,
+            curves=curves,
+            fractiles=self.data.fractile.values.tolist(),
+            motions=[str(name) for name in self.data.motion.values],
+            x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
+            title=title or f"{self.data.sizes['motion']} motion(s), {self.data.model} model",
+            ax=ax,
+        )
+
+    def _curves(self) -> list[tuple[str, xr.Dataset]]:
+        """Name and select each combination of slenderness and restitution."""
+        stacked = self.data.stack(curve=[name for name in ("alpha", "restitution") if name in self.data.dims])
+        return [(_curve_name(one), one) for one in (stacked.isel(curve=k) for k in range(stacked.sizes["curve"]))]
+
+
+def _curve_name(one: xr.Dataset) -> str:
+    restitution = f", restitution {float(one.restitution):g}" if "restitution" in one.coords else ""
+    return f"α = {float(one.alpha):g}{restitution}"
 
 
 def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares: Floats) -> xr.Dataset:

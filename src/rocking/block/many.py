@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block.single import ALPHA, GRAVITY, RESTITUTION, Block, Limits, P, within
+from rocking.block.single import ALPHA, GRAVITY, RESTITUTION, Block, Limits, P, one_block, within
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
 
@@ -116,15 +117,23 @@ class Blocks:
         return cls(*columns, gravity=gravity)
 
     @classmethod
-    def of(cls, blocks: Iterable[Block]) -> Blocks:
-        """Gather single blocks, all under the same gravity.
+    def of(cls, blocks: Blocks | Block | Iterable[Block]) -> Blocks:
+        """Gather single blocks, all under the same gravity; what is gathered already stays as it is.
+
+        Raises
+        ------
+        InvalidBlock
+            If there is none, one is no block, or their gravities differ.
 
         Examples
         --------
         >>> Blocks.of([Block(0.2, 1.0), Block(0.1, 0.5)]).p.shape
         (2, 2)
         """
-        gathered = list(blocks)
+        if isinstance(blocks, Blocks):
+            return blocks
+        several = not isinstance(blocks, (Block, str)) and isinstance(blocks, Iterable)
+        gathered = [one_block(block) for block in cast("Iterable[Block]", blocks if several else [blocks])]
         gravities = {block.gravity for block in gathered}
         if len(gravities) != 1:
             raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same gravity")
@@ -137,10 +146,23 @@ class Blocks:
         """Whether both sides of every block are equal."""
         return all(np.array_equal(array[:, 0], array[:, 1]) for array in (self.p, self.alpha, self.restitution))
 
+    def __repr__(self) -> str:
+        ranges = [
+            f"{name} {_range_text(values)}{unit}"
+            for name, values, unit in (
+                ("p", self.p, " rad/s"),
+                ("alpha", self.alpha, " rad"),
+                ("restitution", self.restitution, ""),
+            )
+        ]
+        return f"<Blocks: {len(self)}; {', '.join(ranges)}>"
+
     def __len__(self) -> int:
         return len(self.p)
 
     def __getitem__(self, index: int) -> Block:
+        if isinstance(index, (slice, tuple, list, np.ndarray)):
+            raise InvalidBlock("blocks[index] takes one whole number; use blocks.select for slices, indices and masks")
         p, alpha, e = (array[index] for array in (self.p, self.alpha, self.restitution))
         return Block.from_parameters(tuple(p), tuple(alpha), tuple(e), gravity=self.gravity)
 
@@ -150,6 +172,11 @@ class Blocks:
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
         """Return some of the blocks: a slice, indices, or a mask."""
         return Blocks(self.p[index], self.alpha[index], self.restitution[index], gravity=self.gravity)
+
+
+def _range_text(values: Floats) -> str:
+    low, high = (float(extreme(values)) if values.size else np.nan for extreme in (np.min, np.max))
+    return f"{low:.5g}" if low == high else f"from {low:.5g} to {high:.5g}"
 
 
 def _columns(array: Floats) -> Floats:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from rocking import checks
+from rocking import checks, svg
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidBlock
+from rocking.errors import InvalidBlock, InvalidOption
 
 Number = float | int
 Sided = float | tuple[float, float]
@@ -32,6 +32,8 @@ RESTITUTION: Final = Limits(1e-9, 1.0)
 _LENGTH: Final = Limits(1e-20, 1e20)
 _MASS: Final = Limits(1e-30, 1e30)
 _HEAVIEST_BEAM: Final = 1e12
+#: Longer side of a block's picture, pixels.
+_PICTURED: Final = 120.0
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,10 @@ class Side:
     restitution: float
     radius: float
 
+    def __str__(self) -> str:
+        """Return the parameters as people read them."""
+        return f"p = {self.p:.5g} rad/s, alpha = {self.alpha:.5g} rad, restitution = {self.restitution:.5g}"
+
 
 @dataclass(frozen=True)
 class Block:
@@ -66,6 +72,8 @@ class Block:
     ----------
     half_width, half_height : float
         Half the width b and half the height h of a rectangular block, m.
+    width, height : float
+        The full sizes instead, m.
     restitution : float or pair, optional
         Factor on the angular speed at an impact, in (0, 1]; a pair is (on leaving side +, on leaving side -).
         By default Housner's, 1 - 1.5 sin(alpha)^2, which conserves angular momentum about the new pivot.
@@ -77,7 +85,8 @@ class Block:
     Raises
     ------
     InvalidBlock
-        If a size is not positive and finite, or the restitution is outside (0, 1], or Housner's is not positive.
+        If the sizes are neither two halves nor two full ones, one is not positive and finite, the restitution is
+        outside (0, 1], or Housner's is not positive.
 
     Notes
     -----
@@ -90,6 +99,8 @@ class Block:
     (0.197396, 2.685546, 0.942308)
     >>> round(block.minimum_acceleration, 6)
     1.96133
+    >>> Block(width=0.4, height=2.0)
+    <Block: rectangular block, 0.4 m x 2 m; p = 2.6855 rad/s, alpha = 0.1974 rad, restitution = 0.94231>
     """
 
     sides: tuple[Side, Side]
@@ -101,21 +112,22 @@ class Block:
 
     def __init__(
         self,
-        half_width: float,
-        half_height: float,
+        half_width: float | None = None,
+        half_height: float | None = None,
         *,
+        width: float | None = None,
+        height: float | None = None,
         restitution: Number | Sequence[Number] | None = None,
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        b = _length(half_width, "half_width")
-        h = _length(half_height, "half_height")
+        b, h = _half_sizes((half_width, half_height), (width, height))
         g = within(gravity, "gravity", GRAVITY, "m/s^2")
         alpha, radius = math.atan2(b, h), math.hypot(b, h)
         p = math.sqrt(0.75 * g / radius)
         e = _restitutions(restitution, (housner_restitution(alpha),) * 2)
         sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
-        _fill(self, sides, g, f"rectangular block, {2 * b:g} m x {2 * h:g} m", b, h, mass)
+        _fill(self, sides, g, f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m", b, h, mass)
 
     @classmethod
     def from_parameters(
@@ -222,7 +234,7 @@ class Block:
             Side(math.sqrt(g * radii[i] / inertias[i]), math.atan2((plus, minus)[i], h), e[i], radii[i])
             for i in range(2)
         )
-        text = f"body on pivots {plus:g} m and {minus:g} m from its centre of mass, {h:g} m high"
+        text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, {h:.5g} m high"
         return _made(cls, (sides[0], sides[1]), g, text, mass)
 
     @classmethod
@@ -274,7 +286,30 @@ class Block:
         e = _restitutions(restitution, (kept / (1.0 + 3.0 * gamma),) * 2)
         p = math.sqrt(0.75 * g / radius)
         sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
-        return _made(cls, sides, g, f"frame of columns {2 * b:g} m x {2 * h:g} m, mass ratio {gamma:g}")
+        return _made(cls, sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}")
+
+    def __str__(self) -> str:
+        """Return description and parameters in one line."""
+        sides = self.sides[:1] if self.is_symmetric else self.sides
+        names = ("",) if self.is_symmetric else ("side +: ", "side -: ")
+        return "; ".join([self.description, *(f"{name}{side}" for name, side in zip(names, sides, strict=True))])
+
+    def __repr__(self) -> str:
+        return f"<Block: {self}>"
+
+    def _repr_html_(self) -> str:
+        return svg.captioned(f"Block: {self}", self._picture())
+
+    def _picture(self) -> str:
+        """Block to scale: a rectangle, or the triangle of the pivots and the centre of mass."""
+        if self.half_width is not None and self.half_height is not None:
+            b, top = self.half_width, 2.0 * self.half_height
+            return svg.outline([(-b, 0.0), (b, 0.0), (b, top), (-b, top)], _PICTURED, f"{2.0 * b:.4g} m x {top:.4g} m")
+        (right, left), (up, _) = zip(
+            *((side.radius * math.sin(side.alpha), side.radius * math.cos(side.alpha)) for side in self.sides),
+            strict=True,
+        )
+        return svg.outline([(-left, 0.0), (right, 0.0), (0.0, up)], _PICTURED, "pivots and centre of mass")
 
     @property
     def p(self) -> Sided:
@@ -323,12 +358,17 @@ class Block:
         model : {"nonlinear", "linear"}
             g tan(alpha), or g alpha for the slender block.
 
+        Raises
+        ------
+        InvalidOption
+            If there is no such model.
+
         Examples
         --------
         >>> Block.from_parameters(p=1.0, alpha=0.2, restitution=0.9, gravity=10.0).uplift_thresholds("linear")
         (2.0, 2.0)
         """
-        steepness = math.tan if model == "nonlinear" else float
+        steepness = math.tan if _checked_model(model) == "nonlinear" else float
         return (
             self.gravity * steepness(self.sides[0].alpha),
             self.gravity * steepness(self.sides[1].alpha),
@@ -391,6 +431,46 @@ def within(value: object, name: str, limits: Limits, unit: str) -> float:
         If it is anything else.
     """
     return checks.within(checks.positive(value, name, InvalidBlock, unit), name, InvalidBlock, *limits, unit)
+
+
+def one_block(block: Block) -> Block:
+    """Return the block.
+
+    Raises
+    ------
+    InvalidBlock
+        If it is anything else.
+
+    Examples
+    --------
+    >>> one_block((0.2, 1.0))
+    Traceback (most recent call last):
+        ...
+    rocking.errors.InvalidBlock: a Block is needed, not a tuple: make one with Block(half_width, half_height), in m
+    """
+    if not isinstance(block, Block):
+        raise InvalidBlock(
+            f"a Block is needed, not a {type(block).__name__}: make one with Block(half_width, half_height), in m"
+        )
+    return block
+
+
+def _checked_model(model: str) -> str:
+    return checks.one_of(model, "model", InvalidOption, ("nonlinear", "linear"))
+
+
+def _half_sizes(
+    halves: tuple[float | None, float | None], full: tuple[float | None, float | None]
+) -> tuple[float, float]:
+    """Half width and half height from either pair of sizes, m."""
+    given = [size is not None for size in (*halves, *full)]
+    if given == [True, True, False, False]:
+        return _length(halves[0], "half_width"), _length(halves[1], "half_height")
+    if given == [False, False, True, True]:
+        return 0.5 * _length(full[0], "width"), 0.5 * _length(full[1], "height")
+    raise InvalidBlock(
+        "a block takes either half_width and half_height, or width and height (the full sizes), all in m"
+    )
 
 
 def _length(value: object, name: str) -> float:

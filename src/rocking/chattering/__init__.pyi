@@ -1,7 +1,7 @@
 from . import families
 from .amplitude import critical_amplitude_nonlinear
 from .episodes import ChatteringEpisodes, chattering_episodes
-from .maps import Outcome, chattering_map, map_figure
+from .maps import ChatteringMap, Outcome, chattering_map
 from .paper import paper_figure
 from .schemes import SchemeComparison, SchemeOutcome, compare_schemes
 from .theory.amplitude import critical_amplitude
@@ -17,6 +17,7 @@ from .theory.series import SeriesDiagnosis, series_coefficients, series_diagnosi
 
 __all__ = [
     "ChatteringEpisodes",
+    "ChatteringMap",
     "ChatteringSequence",
     "Outcome",
     "SchemeComparison",
@@ -34,7 +35,6 @@ __all__ = [
     "first_interval",
     "interval_ratios",
     "is_complete",
-    "map_figure",
     "paper_figure",
     "sequence",
     "series_coefficients",

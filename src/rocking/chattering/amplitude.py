@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.chattering.theory.parameters import broadcast, checked_frequency, checked_restitution, checked_slenderness
+from rocking.engine import require_finished
 from rocking.motion import pulses
 from rocking.simulation import simulate
 
@@ -87,4 +88,5 @@ def _comes_to_rest(block: Block, a: float, omega: float) -> bool:
     turn = 2.0 * math.pi
     motion = pulses.sine(amplitude, omega / turn, cycles=(math.pi + _LEAD) / turn, phase=math.asin(1.0 / a) - _LEAD)
     response = simulate(block, motion, model="nonlinear", duration=motion.duration)
+    require_finished(np.array([response.unfinished]))
     return bool((response.events["kind"] == "rest").any())

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 from rocking.block import Block
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 
 class Case(NamedTuple):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +16,12 @@ from rocking.arrays import Floats
 from rocking.chattering.families import Case, Family
 from rocking.errors import InvalidOption
 from rocking.motion.exceedance import exceedances
+from rocking.result import Result
 from rocking.simulation import simulate
+from rocking.tables import text_table
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -40,7 +43,7 @@ class Outcome(IntEnum):
         It overturns without ever coming to rest.
     UNPROVEN
         Its first rest is not proven: double precision does not resolve the impacts, as where the motion passes a
-        threshold by no more than rounding.
+        threshold by no more than rounding, or they are more than a simulation's budget of steps.
     """
 
     NO_UPLIFT = 0
@@ -63,7 +66,7 @@ class _Point(NamedTuple):
     overturned: bool
 
 
-def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> xr.Dataset:
+def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> ChatteringMap:
     """Simulate a family of cases over a grid, and tell where chattering after the first uplift is complete.
 
     Parameters
@@ -75,10 +78,8 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> xr.Da
 
     Returns
     -------
-    xarray.Dataset
-        Over the two parameters: outcome (see `Outcome`), complete (whether it is COMPLETE), uplift and rest (times of
-        the first uplift and the first rest, s), lower and upper (the bracket proven on that rest, s), rests (how many
-        in all), overturned (sooner or later).
+    ChatteringMap
+        Outcomes, times and brackets.
 
     Raises
     ------
@@ -114,6 +115,7 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> xr.Da
             "flag_meanings": " ".join(outcome.name.lower() for outcome in Outcome),
         },
         **{name: {"units": "s"} for name in ("uplift", "rest", "lower", "upper")},
+        "rests": {"units": "1", "long_name": "times the block comes to rest"},
     }
     dataset = xr.Dataset(
         {
@@ -122,38 +124,67 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> xr.Da
         },
         {first: x, second: y},
     )
-    return dataset.assign(complete=dataset.outcome == Outcome.COMPLETE)
+    return ChatteringMap(dataset.assign(complete=dataset.outcome == Outcome.COMPLETE))
 
 
-def map_figure(dataset: xr.Dataset, *, labels: Mapping[str, str] | None = None, title: str = "") -> Figure:
-    """Draw a map that `chattering_map` made: the first parameter upwards, the second to the right.
+@dataclass(frozen=True, eq=False, repr=False)
+class ChatteringMap(Result):
+    """Where chattering after the first uplift is complete, over two parameters; from `chattering_map`.
 
-    Parameters
+    Attributes
     ----------
-    dataset : xarray.Dataset
-        From `chattering_map`.
-    labels : mapping of str to str, optional
-        What to write at the axes in place of the parameters' names.
-    title : str
-        Title of the figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    data : xarray.Dataset
+        Over the two parameters: outcome (see `Outcome`), complete (whether it is COMPLETE), uplift and rest (times of
+        the first uplift and the first rest, s), lower and upper (the bracket proven on that rest, s), rests (how many
+        in all), overturned (sooner or later).
     """
-    from rocking.plot.maps import outcome_figure
 
-    first, second = dataset.outcome.dims
-    written = labels or {}
-    return outcome_figure(
-        x=dataset[second].values,
-        y=dataset[first].values,
-        outcome=dataset.outcome.values,
-        meanings=[outcome.name.lower().replace("_", " ") for outcome in Outcome],
-        x_label=written.get(str(second), str(second)),
-        y_label=written.get(str(first), str(first)),
-        title=title,
-    )
+    def summary(self) -> str:
+        """Shares of the map that each outcome takes."""
+        values, counts = np.unique(self.data.outcome, return_counts=True)
+        rows = [
+            (_words(Outcome(value)), f"{100 * count / self.data.outcome.size:.1f} %")
+            for value, count in zip(values, counts, strict=True)
+        ]
+        first, second = self.data.outcome.dims
+        head = f"chattering after the first uplift, over {first} and {second}"
+        return f"{head}\n\n{text_table(['outcome', 'share of the map'], rows)}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Axes and variables by name."""
+        columns = {str(name): self.data[name].values for name in (*self.data.outcome.dims, *self.data.data_vars)}
+        return {"outcomes": {outcome.value: _words(outcome) for outcome in Outcome}, **columns}
+
+    def plot(self, ax: Axes | None = None, *, labels: Mapping[str, str] | None = None, title: str = "") -> Figure:
+        """Draw the outcomes, the first parameter upwards, the second to the right.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default in a new figure.
+        labels : mapping of str to str, optional
+            What to write at the axes in place of the parameters' names.
+        title : str
+            Title of the figure.
+        """
+        from rocking.plot.maps import outcome_figure
+
+        first, second = self.data.outcome.dims
+        written = labels or {}
+        return outcome_figure(
+            x=self.data[second].values,
+            y=self.data[first].values,
+            outcome=self.data.outcome.values,
+            meanings=[_words(outcome) for outcome in Outcome],
+            x_label=written.get(str(second), str(second)),
+            y_label=written.get(str(first), str(first)),
+            title=title,
+            ax=ax,
+        )
+
+
+def _words(outcome: Outcome) -> str:
+    return outcome.name.lower().replace("_", " ")
 
 
 def _followed(case: Case) -> _Point:
@@ -162,6 +193,8 @@ def _followed(case: Case) -> _Point:
     if not len(events):
         return _Point(Outcome.NO_UPLIFT, math.nan, math.nan, math.nan, math.nan, 0, False)
     uplift = float(events["time"][0])
+    if response.unfinished and not len(response.chattering):
+        return _Point(Outcome.UNPROVEN, uplift, math.nan, math.nan, math.nan, 0, False)
     if not len(response.chattering):
         return _Point(Outcome.OVERTURNS, uplift, math.nan, math.nan, math.nan, 0, response.overturned)
     first = response.chattering[0]

@@ -14,10 +14,10 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.response import Response
 from rocking.simulation import simulate
 from rocking.treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
+from rocking.treatment.base import Model
 
 #: Thresholds from harmless to harmful, the two of the paper's Figs 10 and 11 among them, and the paper's own scheme.
 SCHEMES: Final[tuple[Treatment, ...]] = (
@@ -127,7 +127,7 @@ class SchemeComparison:
             worst = outcome.largest_error
             rows.append(
                 (
-                    scheme_name(outcome.treatment),
+                    outcome.treatment.label,
                     str(len(outcome.rests)),
                     str(outcome.false_rests.size),
                     str(outcome.missed.size),
@@ -139,7 +139,7 @@ class SchemeComparison:
             )
         widths = [max(len(row[k]) for row in rows) for k in range(len(heading))]
         lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-        lines += [f"{scheme_name(scheme)}: not applicable, {reason}" for scheme, reason in self.not_applicable]
+        lines += [f"{scheme.label}: not applicable, {reason}" for scheme, reason in self.not_applicable]
         return "\n".join(lines)
 
 
@@ -212,18 +212,6 @@ def compare_schemes(
             # The certified run above has checked everything but the scheme itself.
             refused.append((scheme, str(error)))
     return SchemeComparison(certified, tuple(outcomes), tuple(refused))
-
-
-def scheme_name(treatment: Treatment) -> str:
-    """Short name with the parameter and its unit."""
-    match treatment:
-        case VelocityThreshold(threshold):
-            return f"velocity {threshold:g}"
-        case IntervalThreshold(threshold):
-            return f"interval {threshold:g} s"
-        case AsymptoticTime():
-            return "time (Eq. 65)"
-    return f"certified {treatment.tolerance:g} s"
 
 
 def _outcome(scheme: Treatment, response: Response, certified: Response) -> SchemeOutcome:

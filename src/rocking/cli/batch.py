@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,17 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.cli import options
 from rocking.errors import InvalidOption, OutputError
 from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
+from rocking.result import Result
+from rocking.tables import to_json
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
-
-#: Rows of a table for people.
-_SHOWN = 12
 
 
 def values(text: str, option: str) -> NDArray[np.float64]:
@@ -52,10 +48,8 @@ def motions_from(
     return [named_motion(name, channel=channel, dt=dt, units=units, scale=scale) for name in names]
 
 
-def write(
-    folder: Path, stem: str, *, figure: Figure, result: Mapping[str, Any], dataset: xr.Dataset | None = None
-) -> None:
-    """Write a figure (PNG and PDF), a result (JSON) and a dataset (NetCDF) into a folder.
+def write(folder: Path, stem: str, *, figure: Figure, result: Mapping[str, Any]) -> None:
+    """Write a figure (PNG and PDF) and a result (JSON) into a folder.
 
     Raises
     ------
@@ -65,36 +59,25 @@ def write(
     try:
         figure.savefig(folder / f"{stem}.png", dpi=160)
         figure.savefig(folder / f"{stem}.pdf")
-        (folder / "result.json").write_text(json.dumps(options.plain(result), indent=2) + "\n", "utf-8")
-        if dataset is not None:
-            dataset.to_netcdf(folder / f"{stem}.nc", engine="h5netcdf")
+        (folder / "result.json").write_text(to_json(result) + "\n", "utf-8")
     except OSError as error:
         raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
+
+
+def deliver(found: Result, stem: str, *, folder: Path | None, as_json: bool, **figure: Any) -> None:
+    """Write an analysis into a folder where there is one (figure, dataset, result), and print it."""
+    result = found.to_dict()
+    if folder is not None:
+        found.to_netcdf(folder / f"{stem}.nc")
+        write(folder, stem, figure=found.plot(**figure), result=result)
+    show(result, found.summary(), as_json=as_json, folder=folder)
 
 
 def show(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | None) -> None:
     """Print a result, for machines or for people, and what was written."""
     if as_json:
-        options.print_json(result)
+        print(to_json(result))
         return
     print(text)
     if folder is not None:
         print(f"\nwritten to {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
-
-
-def table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """Columns of numbers and texts, numbers to five digits."""
-    cells = [[*header], *([_cell(entry) for entry in row] for row in rows)]
-    widths = [max(len(row[k]) for row in cells) for k in range(len(header))]
-    return "\n".join("  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in cells)
-
-
-def some(count: int) -> list[int]:
-    """List at most a dozen positions, evenly from the first to the last."""
-    return sorted({round(k) for k in np.linspace(0, count - 1, min(count, _SHOWN))})
-
-
-def _cell(entry: Any) -> str:
-    if isinstance(entry, (float, np.floating)):
-        return "overturns" if np.isposinf(entry) else "-" if np.isnan(entry) else f"{entry:.5g}"
-    return str(entry)

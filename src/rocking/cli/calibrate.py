@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,9 +14,10 @@ from rocking.analysis.calibration.outcomes import Calibration
 from rocking.analysis.calibration.outcomes import calibrate as run
 from rocking.analysis.calibration.tables import Outcomes, read
 from rocking.cli import batch, options
-from rocking.errors import InvalidOption, OutputError
+from rocking.errors import InvalidOption
 from rocking.motion.named import named_motion
-from rocking.problem import Model
+from rocking.tables import text_table, to_json, write_text
+from rocking.treatment.base import Model
 
 
 def calibrate(
@@ -106,7 +106,7 @@ def calibrate(
 class _Results:
     numbers: dict[str, Any]
     text: str
-    ensemble: str | None = None
+    calibration: Calibration | None = None
 
 
 def _refuse(belong_to: str, **given: object) -> None:
@@ -121,53 +121,23 @@ def _range(text: str, option: str) -> float | tuple[float, ...]:
 
 
 def _outcomes_results(found: Calibration, table: Outcomes, folds: int, predicted: dict[str, np.float64]) -> _Results:
-    numbers = {
-        "model": found.model,
-        "motions": len(found.observed),
-        "overturned": int(found.observed.sum()),
-        "estimates": {name: asdict(one) for name, one in found.estimates.items()},
-        "fitted": asdict(found.scores),
-        "probabilities": found.probabilities,
-        "predicted": predicted,
-    }
+    numbers = {**found.to_dict(), "predicted": predicted}
     parts = [found.summary()]
     if folds:
         scores = found.cross_validate(groups=table.groups, folds=folds).scores
         numbers["cross_validated"] = asdict(scores)
-        parts.append(
-            f"left-out motions: accuracy {100 * scores.accuracy:.1f} %, log loss {scores.log_loss:.3f}, "
-            f"Brier score {scores.brier:.3f} ({folds} folds)"
-        )
+        parts.append(f"left-out motions: {scores} ({folds} folds)")
     if predicted:
         rows = [(name, float(chance)) for name, chance in predicted.items()]
-        parts.append("\n" + batch.table(["motion", "probability"], rows))
-    return _Results(numbers, "\n".join(parts), _ensemble(found))
+        parts.append("\n" + text_table(["motion", "probability"], rows))
+    return _Results(numbers, "\n".join(parts), found)
 
 
 def _history_results(found: HistoryCalibration) -> _Results:
-    numbers = {
-        "model": found.response.model,
-        "samples": len(found.residuals),
-        "estimates": {name: asdict(one) for name, one in found.estimates.items()},
-        "covariance_of_logarithms": found.covariance,
-        "misfit_rad": found.misfit,
-    }
-    return _Results(numbers, found.summary())
-
-
-def _ensemble(found: Calibration) -> str:
-    """Return the blocks and their weights as CSV."""
-    blocks = found.blocks
-    header = [f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus")]
-    table = np.hstack([blocks.p, blocks.alpha, blocks.restitution, found.weights[:, None]])
-    lines = [",".join([*header, "weight"]), *(",".join(f"{value:.10g}" for value in row) for row in table)]
-    return "\n".join(lines) + "\n"
+    return _Results(found.to_dict(), found.summary())
 
 
 def _write(folder: Path, results: _Results) -> None:
-    try:
-        (folder / "result.json").write_text(json.dumps(options.plain(results.numbers), indent=2) + "\n", "utf-8")
-        if results.ensemble is not None:
-            (folder / "ensemble.csv").write_text(results.ensemble, "utf-8")
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
+    write_text(folder / "result.json", to_json(results.numbers) + "\n")
+    if results.calibration is not None:
+        results.calibration.to_csv(folder / "ensemble.csv")

@@ -16,7 +16,7 @@ from rocking.chattering import (
     sequence,
     series_diagnosis,
 )
-from rocking.cli import options
+from rocking.tables import rows_of, to_json
 
 
 def chatter(
@@ -50,9 +50,9 @@ def chatter(
     """
     result = _result(a, omega, eta, order, resolved)
     if table:
-        result["asymptotic_table"] = options.rows(asymptotic_table(a, omega, eta))
+        result["asymptotic_table"] = rows_of(asymptotic_table(a, omega, eta))
     if as_json:
-        options.print_json(result)
+        print(to_json(result))
         return
     for name, text in _lines(result):
         print(f"{name:<30}{text}")

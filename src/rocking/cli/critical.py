@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from rocking.chattering import critical_amplitude
-from rocking.cli import options
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, OutsideFit
+from rocking.tables import to_json
 
 _METHODS = {
     "exact": "exact",
@@ -40,7 +41,7 @@ def critical(
     amplitudes |= {method: _amplitude(omega, eta, method) for method in _METHODS if method != "exact"}
     result: dict[str, Any] = {"omega": omega, "eta": eta, "critical_amplitude": amplitudes}
     if as_json:
-        options.print_json(result)
+        print(to_json(result))
         return
     for method, name in _METHODS.items():
         amplitude = amplitudes[method]
@@ -54,7 +55,9 @@ def critical(
 
 def _amplitude(omega: float, eta: float, method: str) -> float | None:
     """Amplitude by an approximation; None where it does not hold. The exact method has checked the parameters."""
-    try:
-        return float(critical_amplitude(omega, eta, method=method))
-    except InvalidOption:
-        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", OutsideFit)
+        try:
+            return float(critical_amplitude(omega, eta, method=method))
+        except (InvalidOption, OutsideFit):
+            return None

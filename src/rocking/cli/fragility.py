@@ -8,13 +8,13 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import fragility as run
 from rocking.analysis.intensity import MeasureName
 from rocking.cli import batch, options
 from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption
-from rocking.problem import Model
+from rocking.treatment import treatment
+from rocking.treatment.base import Model
 
 
 def fragility(
@@ -94,7 +94,8 @@ def fragility(
     scale
         Factor on the motions.
     out
-        Folder for fragility.png, .pdf, .csv, result.json, and fragility-continuous.xml and -discrete.xml (NRML 0.5).
+        Folder for fragility.png, .pdf, .csv, outcomes.csv (record, intensity, peak, outcome), result.json, and
+        fragility-continuous.xml and -discrete.xml (NRML 0.5).
     as_json
         Print the result as JSON.
     """
@@ -110,26 +111,19 @@ def fragility(
         limits=_limits(limits),
         polarity=polarity,
         model=model,
-        chattering=options.treatment_from(chattering),
+        chattering=treatment(chattering),
         confidence=confidence,
         band="bootstrap" if bootstrap != 0 else "likelihood",
         samples=bootstrap or 1,
         seed=seed,
     )
-    result = {
-        "block": block.description,
-        "description": fitted.description,
-        "measure": {"name": measure, "units": fitted.measure.units, **fitted.measure.options()},
-        "model": model,
-        "band": "bootstrap" if bootstrap else "likelihood",
-        "curves": [curve.summary() for curve in fitted.curves],
-    }
     if folder is not None:
         for form in ("continuous", "discrete"):
             fitted.to_nrml(folder / f"fragility-{form}.xml", taxonomy=taxonomy, format=form)
         fitted.to_csv(folder / "fragility.csv")
-        batch.write(folder, "fragility", figure=fitted.plot(), result=result)
-    batch.show(result, _text(fitted), as_json=as_json, folder=folder)
+        fitted.outcomes_to_csv(folder / "outcomes.csv")
+        batch.write(folder, "fragility", figure=fitted.plot(), result=fitted.to_dict())
+    batch.show(fitted.to_dict(), fitted.summary(), as_json=as_json, folder=folder)
 
 
 def _limits(text: str) -> dict[str, float]:
@@ -142,23 +136,3 @@ def _limits(text: str) -> dict[str, float]:
         assert isinstance(limit, float)
         limits[name] = limit
     return limits
-
-
-def _text(fitted: Fragility) -> str:
-    rows = []
-    for curve in fitted.curves:
-        share = f"{curve.exceeded.sum():.0f} of {curve.trials.sum():.0f}"
-        rows.append(
-            [
-                curve.limit_state,
-                share,
-                curve.median,
-                "{:.4g} to {:.4g}".format(*curve.median_interval),
-                curve.dispersion,
-                "{:.3g} to {:.3g}".format(*curve.dispersion_interval),
-                curve.goodness.p_value,
-            ]
-        )
-    between = f"{100 * fitted.curves[0].confidence:g} % between"
-    header = ["limit state", "exceeded", "median", between, "dispersion", between, "p of fit"]
-    return f"{fitted.description}; intensity: {fitted.measure.label}\n\n{batch.table(header, rows)}"

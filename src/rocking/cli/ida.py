@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from rocking.analysis.incremental import dynamic_figure, incremental_dynamic_analysis
+from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.intensity import MeasureName
 from rocking.cli import batch, options
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 
 def ida(
@@ -60,7 +60,8 @@ def ida(
     damping
         Its fraction of critical damping.
     levels
-        Levels in SI units, as 1,2,5 or START:STOP:COUNT; by default in steps of 5 % to twice the first that overturns.
+        Levels in SI units, as 1,2,5 or START:STOP:COUNT; by default in steps of 5 % to three times that by
+        which every motion has overturned the block.
     model
         Equation of motion.
     tolerance
@@ -78,7 +79,7 @@ def ida(
     """
     block = options.block_from(half_width, half_height, p, alpha, restitution)
     folder = None if out is None else options.output_folder(out)
-    dataset = incremental_dynamic_analysis(
+    found = incremental_dynamic_analysis(
         block,
         batch.motions_from(motions, channel=channel, dt=dt, units=units),
         measure=measure,
@@ -88,47 +89,4 @@ def ida(
         model=model,
         tolerance=tolerance,
     )
-    result = _result(dataset, block.description)
-    if folder is not None:
-        title = f"{block.description}, {model} model"
-        batch.write(folder, "ida", figure=dynamic_figure(dataset, title=title), result=result, dataset=dataset)
-    batch.show(result, _text(dataset, block.description), as_json=as_json, folder=folder)
-
-
-def _bands(dataset: xr.Dataset, motion: int) -> list[tuple[float, float]]:
-    mine = dataset.band_motion.values == motion
-    return list(zip(dataset.band_start.values[mine].tolist(), dataset.band_end.values[mine].tolist(), strict=True))
-
-
-def _result(dataset: xr.Dataset, block: str) -> dict[str, Any]:
-    chosen = dataset.isel(block=0)
-    return {
-        "block": block,
-        "model": dataset.model,
-        "measure": dataset.level.long_name,
-        "level": dataset.level.values,
-        "motions": [
-            {
-                "name": str(dataset.motion.values[m]),
-                "overturning_level": float(chosen.overturning_level[m]),
-                "overturns": [{"from": low, "to": high} for low, high in _bands(dataset, m)],
-                "peak_over_alpha": chosen.peak_over_alpha.transpose("motion", "level").values[m],
-            }
-            for m in range(dataset.sizes["motion"])
-        ],
-    }
-
-
-def _text(dataset: xr.Dataset, block: str) -> str:
-    rows = []
-    for m in range(dataset.sizes["motion"]):
-        bands = "; ".join(_band(low, high) for low, high in _bands(dataset, m)) or "never"
-        rows.append([str(dataset.motion.values[m]), bands])
-    shown = "\n".join(f"{name:<28}{text}" for name, text in rows)
-    return f"{block}, {dataset.model} model; {dataset.level.long_name} that overturns it\n\n{shown}"
-
-
-def _band(low: float, high: float) -> str:
-    if low != low:
-        return f"up to {high:.5g}" if high == high else "at every level"
-    return f"{low:.5g} to {high:.5g}" if high == high else f"{low:.5g} and more"
+    batch.deliver(found, "ida", folder=folder, as_json=as_json)

@@ -5,17 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
-from rocking.analysis.overturning import mode_name, overturning_figure, overturning_map
+from rocking.analysis.overturning import overturning_map
 from rocking.block import Block
 from rocking.cli import batch, options
 from rocking.errors import InvalidBlock
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 
 def map(
@@ -77,7 +76,7 @@ def map(
     block = _block(half_width, half_height, alpha, restitution)
     folder = None if out is None else options.output_folder(out)
     given: dict[str, Any] = {"cycles": cycles, "phase": phase, "gamma": gamma, "kind": kind}
-    dataset = overturning_map(
+    found = overturning_map(
         pulse,
         block,
         amplitudes=batch.values(amplitudes, "--amplitudes"),
@@ -86,10 +85,7 @@ def map(
         tolerance=tolerance,
         **{name: value for name, value in given.items() if value is not None},
     )
-    result = _result(dataset)
-    if folder is not None:
-        batch.write(folder, "map", figure=overturning_figure(dataset), result=result, dataset=dataset)
-    batch.show(result, _text(dataset), as_json=as_json, folder=folder)
+    batch.deliver(found, "map", folder=folder, as_json=as_json)
 
 
 def _block(half_width: float | None, half_height: float | None, alpha: str | None, restitution: str | None) -> Block:
@@ -97,36 +93,3 @@ def _block(half_width: float | None, half_height: float | None, alpha: str | Non
     if alpha is None and (half_width is None or half_height is None):
         raise InvalidBlock("a map needs --alpha (rad), or --half-width and --half-height (m)")
     return options.block_from(half_width, half_height, None if alpha is None else "1", alpha, restitution)
-
-
-def _result(dataset: xr.Dataset) -> dict[str, Any]:
-    names = ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above")
-    return {
-        "pulse": dataset.pulse,
-        "block": dataset.block,
-        "model": dataset.model,
-        "tolerance": dataset.tolerance,
-        "modes": {str(mode): mode_name(int(mode)) for mode in np.unique(dataset.mode)},
-        "frequency": dataset.frequency.values,
-        "amplitude": dataset.amplitude.values,
-        "mode": dataset.mode.values,
-        "overturning_amplitude": dataset.overturning_amplitude.values,
-        "boundaries": [
-            dict(zip(names, row, strict=True)) for row in zip(*(dataset[name].values for name in names), strict=True)
-        ],
-    }
-
-
-def _text(dataset: xr.Dataset) -> str:
-    modes, counts = np.unique(dataset.mode, return_counts=True)
-    total = dataset.mode.size
-    shares = [(mode_name(int(mode)), f"{100 * count / total:.1f} %") for mode, count in zip(modes, counts, strict=True)]
-    lowest = dataset.overturning_amplitude.values
-    rows = [(float(dataset.frequency[k]), float(lowest[k])) for k in batch.some(lowest.size)]
-    return "\n\n".join(
-        [
-            f"{dataset.pulse.partition(':')[0]} on a {dataset.block}; {dataset.model} model",
-            batch.table(["outcome", "share of the map"], shares),
-            batch.table(["frequency over p", "lowest amplitude that overturns"], rows),
-        ]
-    )

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from rocking.block import Block
 from rocking.errors import InvalidBlock, InvalidOption, OutputError
-from rocking.treatment import Certified, IntervalThreshold, Treatment, VelocityThreshold, treatment
 
 
 def block_from(
@@ -43,24 +36,6 @@ def numbers(text: str, option: str) -> float | list[float]:
     return values[0] if len(values) == 1 else values
 
 
-def treatment_from(text: str) -> Treatment:
-    """Treatment from its name, or from "certified=TOLERANCE", "velocity=THRESHOLD", "interval=SECONDS"."""
-    name, given, value = text.partition("=")
-    if not given:
-        return treatment(name)
-    with_parameter: dict[str, Callable[[float], Treatment]] = {
-        "certified": Certified,
-        "velocity": VelocityThreshold,
-        "interval": IntervalThreshold,
-    }
-    if name not in with_parameter:
-        raise InvalidOption(f"--chattering {name} takes no parameter; those that do are {', '.join(with_parameter)}")
-    parameter = numbers(value, f"--chattering {name}")
-    if not isinstance(parameter, float):
-        raise InvalidOption(f"--chattering {name} takes one number, not {value!r}")
-    return with_parameter[name](parameter)
-
-
 def output_folder(folder: Path) -> Path:
     """Folder for results, made if need be.
 
@@ -77,27 +52,3 @@ def output_folder(folder: Path) -> Path:
     except OSError as error:
         raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
     return folder
-
-
-def print_json(result: Mapping[str, Any]) -> None:
-    """Print a result for machines: plain JSON, NaN and infinity as null."""
-    print(json.dumps(plain(result), indent=2, allow_nan=False))
-
-
-def rows(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
-    """Rows of a structured array as mappings."""
-    names = table.dtype.names or ()
-    return [dict(zip(names, row.tolist(), strict=True)) for row in table]
-
-
-def plain(value: Any) -> Any:
-    """Value that JSON knows: no arrays, no NaN."""
-    if isinstance(value, Mapping):
-        return {key: plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -6,11 +6,11 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rocking.cli import options
 from rocking.constants import STANDARD_GRAVITY
 from rocking.motion import formats
 from rocking.motion import records as shipped
 from rocking.motion.motion import Motion
+from rocking.tables import to_json
 
 
 def records(
@@ -35,7 +35,7 @@ def records(
     """
     result = _shipped() if file is None else _content(file, dt, units)
     if as_json:
-        options.print_json(result)
+        print(to_json(result))
         return
     if file is not None:
         print(f"{file}: {result['format']}, since {result['reason']}\n")

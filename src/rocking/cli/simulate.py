@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
 from rocking.cli import options
 from rocking.errors import OutputError
-from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
-from rocking.problem import Model
 from rocking.response import Response
 from rocking.simulation import simulate as run
-
-#: Chattering sequences that the printed table lists.
-_LISTED = 12
+from rocking.tables import to_json, write_text
+from rocking.treatment import treatment
+from rocking.treatment.base import Model
 
 
 def simulate(
@@ -83,7 +79,7 @@ def simulate(
         Print the result as JSON.
     """
     block = options.block_from(half_width, half_height, p, alpha, restitution)
-    how = options.treatment_from(chattering)
+    how = treatment(chattering)
     folder = None if out is None else options.output_folder(out)
     shaking = named_motion(motion, channel=channel, dt=dt, units=units, scale=scale)
     response = run(
@@ -95,114 +91,15 @@ def simulate(
         initial_rotation=initial_rotation,
         initial_velocity=initial_velocity,
     )
-    result = summary(response, shaking)
+    result = response.to_dict()
     if folder is not None:
         write(response, result, folder)
     if as_json:
-        options.print_json(result)
+        print(to_json(result))
     else:
-        print(table(response, shaking))
+        print(response.summary())
         if folder is not None:
             print(f"\nwritten to {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
-
-
-def summary(response: Response, motion: Motion) -> dict[str, Any]:
-    """Return the result for machines; units are in the names."""
-    sides = response.block.sides
-    return {
-        "block": {
-            "description": response.block.description,
-            "p_rad_per_s": [side.p for side in sides],
-            "alpha_rad": [side.alpha for side in sides],
-            "restitution": [side.restitution for side in sides],
-        },
-        "motion": {
-            "name": motion.name,
-            "duration_s": motion.duration,
-            "pga_m_per_s2": motion.pga,
-            "history": motion.history,
-        },
-        "model": response.model,
-        "chattering_treatment": repr(response.treatment),
-        "overturned": response.overturned,
-        "overturn_time_s": response.overturn_time,
-        "peak_rotation_rad": response.peak_rotation,
-        "peak_over_slenderness": response.peak_over_slenderness,
-        "peak_time_s": response.peak_time,
-        "required_friction": response.required_friction,
-        "minimum_normal_force_over_weight": response.minimum_normal_force,
-        "impact_count": len(response.impacts),
-        "duration_s": response.duration,
-        "time_at_rest_s": response.time_at_rest,
-        "ambiguous": response.ambiguous,
-        "events": options.rows(response.events),
-        "chattering": options.rows(response.chattering),
-    }
-
-
-def table(response: Response, motion: Motion) -> str:
-    """Return the result for people."""
-    gravity = response.block.gravity
-    plus, minus = (threshold / gravity for threshold in response.block.uplift_thresholds(response.model))
-    lines = [
-        ("block", response.block.description),
-        ("parameters", "; ".join(_side_text(response, k) for k in range(1 if response.block.is_symmetric else 2))),
-        ("motion", f"{motion.name}, {motion.duration:.2f} s, peak {motion.pga / gravity:.4f} g"),
-        ("uplift above", f"{plus:.4f} g" if plus == minus else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"),
-        *_event_lines(response),
-        ("impacts", f"{len(response.impacts)}"),
-        (
-            "peak rotation",
-            f"{response.peak_rotation:.6g} rad at {response.peak_time:.4f} s, "
-            f"{response.peak_over_slenderness:.4f} of the slenderness",
-        ),
-        ("friction needed", f"{response.required_friction:.4f}"),
-        ("least normal force", f"{response.minimum_normal_force:.4f} of the weight"),
-        ("verdict", _verdict(response)),
-    ]
-    return "\n".join(f"{name:<20}{text}" for name, text in lines)
-
-
-def _side_text(response: Response, k: int) -> str:
-    side = response.block.sides[k]
-    return f"p = {side.p:.5g} rad/s, alpha = {side.alpha:.5g} rad, restitution = {side.restitution:.5g}"
-
-
-def _event_lines(response: Response) -> list[tuple[str, str]]:
-    sequences = {float(row["end"]): row for row in response.chattering}
-    lines = []
-    for event in response.events[:_LISTED]:
-        text = f"{event['time']:.9f} s"
-        if event["kind"] == "uplift":
-            text += f", to side {'+' if event['side'] > 0 else '-'}"
-        sequence = sequences.get(float(event["time"]))
-        if event["kind"] == "rest" and sequence is not None:
-            text += _bracket_text(sequence)
-        lines.append((str(event["kind"]), text))
-    if len(response.events) > _LISTED:
-        lines.append(("...", f"{len(response.events) - _LISTED} more events"))
-    return lines or [("uplift", "none")]
-
-
-def _bracket_text(sequence: np.void) -> str:
-    width = sequence["upper"] - sequence["lower"]
-    if not width >= 0.0:
-        return ", by the treatment, not proven"
-    return f", complete chattering proven from {sequence['start']:.6f} s on, rest known to {width:.1e} s"
-
-
-def _verdict(response: Response) -> str:
-    if response.overturned:
-        verdict = f"overturns at {response.overturn_time:.4f} s"
-    elif len(response.events) == 0 and len(response.impacts) == 0:
-        verdict = "does not move"
-    else:
-        verdict = "rocks and does not overturn"
-    if response.stalled:
-        verdict += f"; {response.stalled} rest(s) not proven"
-    if response.ambiguous:
-        verdict += "; AMBIGUOUS: one unit in the last place of the motion changes this response"
-    return verdict
 
 
 def write(response: Response, result: dict[str, Any], folder: Path) -> None:
@@ -211,16 +108,9 @@ def write(response: Response, result: dict[str, Any], folder: Path) -> None:
     try:
         figure.savefig(folder / "response.png", dpi=160)
         figure.savefig(folder / "response.pdf")
-        np.savetxt(
-            folder / "events.csv",
-            response.events,
-            fmt=["%.15g", "%s", "%d"],
-            delimiter=",",
-            header="time_s,kind,side",
-            comments="",
-        )
-        (folder / "result.json").write_text(json.dumps(options.plain(result), indent=2) + "\n", "utf-8")
     except OSError as error:
         raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
+    write_text(folder / "result.json", f"{to_json(result)}\n")
     response.to_csv(folder / "response.csv")
+    response.to_csv(folder / "events.csv", "events")
     response.to_netcdf(folder / "response.nc")

@@ -1,4 +1,5 @@
 from . import formats, pulses, records
-from .motion import Description, Motion
+from .description import Description
+from .motion import Motion
 
 __all__ = ["Description", "Motion", "formats", "pulses", "records"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +14,44 @@ from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
+from rocking.motion.piecewise import Piecewise
+from rocking.tables import named
 
-if TYPE_CHECKING:
-    from rocking.motion.motion import Motion
+#: Damping of a spectral acceleration, if none is named.
+DAMPING: Final = 0.05
 
 
-def arias_intensity(motion: Motion) -> float:
+def peak_acceleration(motion: Piecewise) -> float:
+    """Peak ground acceleration, m/s^2: the exact extremum of the pieces."""
+    return piecewise.largest_magnitude(np.diff(motion.breakpoints), motion.coefficients)
+
+
+def peak_velocity(motion: Piecewise) -> float:
+    """Peak ground velocity, m/s: the exact extremum of the exact integral, from rest."""
+    return piecewise.largest_magnitude(np.diff(motion.breakpoints), velocity_pieces(motion))
+
+
+def peak_displacement(motion: Piecewise) -> float:
+    """Peak ground displacement up to the motion's end, m: the exact extremum of the exact integral."""
+    return piecewise.largest_magnitude(np.diff(motion.breakpoints), displacement_pieces(motion))
+
+
+def velocity_pieces(motion: Piecewise) -> Floats:
+    """Coefficients of the ground velocity on each piece."""
+    return piecewise.antiderivative(np.diff(motion.breakpoints), motion.coefficients)
+
+
+def displacement_pieces(motion: Piecewise) -> Floats:
+    """Coefficients of the ground displacement on each piece."""
+    return piecewise.antiderivative(np.diff(motion.breakpoints), velocity_pieces(motion))
+
+
+def arias_intensity(motion: Piecewise) -> float:
     """Arias intensity, m/s."""
     return math.pi / (2.0 * STANDARD_GRAVITY) * float(np.sum(_energies(motion)))
 
 
-def cumulative_absolute_velocity(motion: Motion) -> float:
+def cumulative_absolute_velocity(motion: Piecewise) -> float:
     """Integral of the absolute acceleration, m/s."""
     widths = np.diff(motion.breakpoints)
     integral = piecewise.antiderivative(widths, motion.coefficients)[:, np.newaxis, :]
@@ -35,11 +62,11 @@ def cumulative_absolute_velocity(motion: Motion) -> float:
     return float(np.sum(np.abs(np.diff(piecewise.value(integral, cuts), axis=1))))
 
 
-def significant_duration(motion: Motion, start: float, end: float) -> float:
+def significant_duration(motion: Piecewise, start: float, end: float) -> float:
     """Time between two fractions of the Arias intensity, s."""
     start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
     if not 0.0 <= start < end <= 1.0:
-        raise InvalidMotion(f"a significant duration needs 0 <= start < end <= 1, not {start} and {end}")
+        raise InvalidMotion(f"a significant duration needs 0 <= start < end <= 1, not {start:g} and {end:g}")
     cumulated = np.append(0.0, np.cumsum(_energies(motion)))
     if cumulated[-1] == 0.0:
         return math.nan
@@ -47,7 +74,7 @@ def significant_duration(motion: Motion, start: float, end: float) -> float:
 
 
 def spectral_acceleration(
-    motion: Motion, period: float | Sequence[float] | NDArray[Any], damping: float
+    motion: Piecewise, period: float | Sequence[float] | NDArray[Any], damping: float
 ) -> float | Floats:
     """Pseudo-spectral acceleration, m/s^2."""
     from rocking.kernels import oscillator  # numba: loaded only where it is used
@@ -55,12 +82,11 @@ def spectral_acceleration(
     periods = checks.numbers(period, "period of a spectral acceleration", InvalidMotion)
     if not np.all(np.isfinite(periods) & (periods > 0.0)):
         raise InvalidMotion("the period of a spectral acceleration must be a positive number of seconds")
-    if np.any(periods < 1e-6 * motion.duration):
-        raise InvalidMotion(
-            f"a period below a millionth of the duration, {motion.duration:.6g} s, takes too long: use pga"
-        )
+    duration = float(motion.breakpoints[-1])
+    if np.any(periods < 1e-6 * duration):
+        raise InvalidMotion(f"a period below a millionth of the duration, {duration:.6g} s, takes too long: use pga")
     if not 0.0 <= checks.finite(damping, "damping", InvalidMotion) < 1.0:
-        raise InvalidMotion(f"the damping must be a fraction of critical from 0 to below 1, not {damping}")
+        raise InvalidMotion(f"the damping must be a fraction of critical from 0 to below 1, not {damping:g}")
     frequencies = np.ravel(2.0 * np.pi / periods)
     peaks = np.empty_like(frequencies)
     work = np.empty(2 * motion.coefficients.shape[1] + oscillator.TERMS)
@@ -69,31 +95,32 @@ def spectral_acceleration(
     return result if result.ndim else float(result)
 
 
-def target(motion: Motion, what: str, period: float | None, damping: float) -> float:
+def target(motion: Piecewise, what: str, period: float | None, damping: float) -> float:
     """Present value of the measure `what` ("pga", "pgv", "sa") that the motion is to be scaled to."""
     if what == "sa":
         return float(spectral_acceleration(motion, checks.positive(period, "period", InvalidMotion, "s"), damping))
-    return motion.pga if what == "pga" else motion.pgv
+    return peak_acceleration(motion) if what == "pga" else peak_velocity(motion)
 
 
-def table(motion: Motion, periods: Sequence[float]) -> dict[str, float]:
+def table(motion: Piecewise, periods: Sequence[float]) -> dict[str, float]:
     """All measures by name, each name ending in its unit."""
     measures = {
-        "duration_s": motion.duration,
-        "pga_m_s2": motion.pga,
-        "pgv_m_s": motion.pgv,
-        "pgd_m": motion.pgd,
-        "arias_intensity_m_s": arias_intensity(motion),
-        "cumulative_absolute_velocity_m_s": cumulative_absolute_velocity(motion),
-        "significant_duration_5_75_s": significant_duration(motion, 0.05, 0.75),
-        "significant_duration_5_95_s": significant_duration(motion, 0.05, 0.95),
+        named("duration", "s"): float(motion.breakpoints[-1]),
+        named("pga", "m/s^2"): peak_acceleration(motion),
+        named("pgv", "m/s"): peak_velocity(motion),
+        named("pgd", "m"): peak_displacement(motion),
+        named("arias_intensity", "m/s"): arias_intensity(motion),
+        named("cumulative_absolute_velocity", "m/s"): cumulative_absolute_velocity(motion),
+        named("significant_duration_5_75", "s"): significant_duration(motion, 0.05, 0.75),
+        named("significant_duration_5_95", "s"): significant_duration(motion, 0.05, 0.95),
     }
-    for period in periods:
-        measures[f"spectral_acceleration_{period:g}s_m_s2"] = float(spectral_acceleration(motion, period, 0.05))
+    for period in np.ravel(checks.numbers(periods, "periods of a spectral acceleration", InvalidMotion)).tolist():
+        name = named(f"spectral_acceleration_{period:g}s", "m/s^2")
+        measures[name] = float(spectral_acceleration(motion, period, DAMPING))
     return measures
 
 
-def _energies(motion: Motion) -> Floats:
+def _energies(motion: Piecewise) -> Floats:
     return _energy(motion.coefficients, np.diff(motion.breakpoints))
 
 
@@ -105,7 +132,7 @@ def _energy(coefficients: Floats, span: Floats) -> Floats:
     return energy
 
 
-def _time_at(motion: Motion, cumulated: Floats, fraction: float) -> float:
+def _time_at(motion: Piecewise, cumulated: Floats, fraction: float) -> float:
     """First time at which the energy reaches a fraction of the whole, by bisection within its piece."""
     wanted = fraction * cumulated[-1]
     piece = max(int(np.searchsorted(cumulated, wanted, side="left")) - 1, 0)

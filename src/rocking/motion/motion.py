@@ -2,67 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
-from typing import Any, Final, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking import checks
+from rocking import checks, svg
 from rocking.arrays import Floats
-from rocking.constants import HIGHEST_DEGREE
+from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
-from rocking.motion import measures, piecewise, processing
+from rocking.motion import arguments, measures, piecewise, processing, scaling
+from rocking.motion.description import Description
 
-# Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take.
-_STRONGEST: Final = 1e50
-_LONGEST: Final = 1e15
-#: Far below any ground motion; pieces may be shorter, but must not change faster than over this time.
-_SHORTEST: Final = 1e-9
-#: Pieces that meet within this part of the peak acceleration do not jump.
-_JUMP: Final = 1e-12
-#: Even breakpoints are off their grid by no more than this part of the duration, some units in its last place.
-_ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-
-@dataclass(frozen=True)
-class Description:
-    """How a motion was made.
-
-    Attributes
-    ----------
-    family : str
-        Kind of motion: "record", "samples", "sine", "symmetric Ricker", ... After a delay or processing it says so
-        ("delayed sine", "processed record"), since the formula of `text` then no longer starts at time zero.
-    parameters : mapping of str to float
-        Numbers of the formula in SI units and radians, for instance amplitude, frequency, phase and cycles of
-        a sine. Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it
-        negative).
-    text : str
-        The formula, or the record's source and terms, in words.
-    """
-
-    family: str
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    text: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Description, (self.family, dict(self.parameters), self.text)
-
-    def scaled(self, factor: float) -> Description:
-        """Return the description of the motion times `factor`."""
-        parameters = {k: v * factor if k.startswith("amplitude") else v for k, v in self.parameters.items()}
-        return replace(self, parameters=parameters)
-
-    def changed(self, how: str) -> Description:
-        """Return the description of a motion that was `how` ("delayed", "processed") off its formula."""
-        family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
-        return replace(self, family=family)
+#: Times at which a motion is looked at between its breakpoints, for a picture.
+_DRAWN = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,39 +77,20 @@ class Motion:
     step: float | None = field(init=False)
 
     def __post_init__(self) -> None:
-        breakpoints = _frozen_floats(self.breakpoints, "breakpoints", 1)
-        coefficients = _frozen_floats(self.coefficients, "coefficients", 2)
-        if len(breakpoints) < 2 or coefficients.shape[0] != len(breakpoints) - 1 or coefficients.shape[1] == 0:
-            raise InvalidMotion(
-                f"a motion of n pieces needs n + 1 breakpoints and coefficients of shape (n, degree + 1), "
-                f"not {breakpoints.shape} and {coefficients.shape}"
-            )
-        if breakpoints[0] != 0.0 or not np.all(np.diff(breakpoints) > 0.0):
-            raise InvalidMotion("the breakpoints of a motion must start at 0 and increase strictly")
-        if coefficients.shape[1] > HIGHEST_DEGREE + 1:
-            raise InvalidMotion(
-                f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {coefficients.shape[1] - 1}: "
-                "split them into shorter ones of a lower degree"
-            )
-        if not _SHORTEST <= breakpoints[-1] <= _LONGEST:
-            raise InvalidMotion(
-                f"a motion must last from {_SHORTEST:g} to {_LONGEST:g} s, not {breakpoints[-1]:g} s: check its units"
-            )
-        with np.errstate(over="ignore"):
-            bounds = piecewise.value(np.abs(coefficients), np.maximum(np.diff(breakpoints), _SHORTEST))
-        if not np.all(bounds <= _STRONGEST):
-            raise InvalidMotion(
-                f"a motion must stay below {_STRONGEST:g} m/s^2 on all its pieces, and where they are shorter than "
-                f"{_SHORTEST:g} s so long: check its units"
-            )
-        error = checks.finite(self.error, "approximation error of a motion", InvalidMotion)
-        if error < 0.0:
-            raise InvalidMotion(f"approximation error of a motion must not be negative, not {error:g}")
-        object.__setattr__(self, "breakpoints", breakpoints)
-        object.__setattr__(self, "coefficients", coefficients)
-        object.__setattr__(self, "history", tuple(self.history))
-        object.__setattr__(self, "error", error)
-        object.__setattr__(self, "step", _even_step(breakpoints, coefficients))
+        breakpoints, coefficients = arguments.pieces(self.breakpoints, self.coefficients)
+        held = {
+            "breakpoints": breakpoints,
+            "coefficients": coefficients,
+            "name": checks.text(self.name, "name of a motion", InvalidMotion),
+            "description": arguments.description(self.description),
+            "history": arguments.history(self.history),
+            "error": checks.within(
+                self.error, "approximation error of a motion", InvalidMotion, 0.0, arguments.STRONGEST
+            ),
+        }
+        for name, value in held.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "step", piecewise.even_step(self))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Through the constructor, which makes the arrays read-only again.
@@ -197,14 +137,15 @@ class Motion:
         >>> motion.duration, motion.pga
         (0.06, 2.0)
         """
-        samples = _samples(acceleration)
-        step = _step(dt)
+        samples, step = arguments.samples(acceleration), arguments.step(dt)
         times = piecewise.even_times(len(samples), step)
         return cls(
             times,
             piecewise.linear(times, samples),
             name=name,
-            description=description or Description("samples", text="linear between even samples"),
+            description=Description("samples", text="linear between even samples")
+            if description is None
+            else description,
         )
 
     @classmethod
@@ -240,19 +181,17 @@ class Motion:
         >>> Motion.from_points([0.0, 1.0, 5.0], [0.0, 3.0, 0.0]).acceleration(3.0)
         1.5
         """
-        samples = _samples(acceleration)
-        instants = _floats(times, "times", 1)
-        if len(instants) != len(samples):
-            raise InvalidMotion(f"there are {len(instants)} times but {len(samples)} accelerations: give one for each")
-        if not np.all(np.isfinite(instants)) or not np.all(np.diff(instants) > 0.0):
-            raise InvalidMotion("the times of a motion must be finite and increase strictly")
+        samples = arguments.samples(acceleration)
+        instants = arguments.instants(times, len(samples))
         with np.errstate(over="ignore"):
             breakpoints = instants - instants[0]
         return cls(
             breakpoints,
             piecewise.linear(breakpoints, samples),
             name=name,
-            description=description or Description("points", text="linear between uneven points"),
+            description=Description("points", text="linear between uneven points")
+            if description is None
+            else description,
         )
 
     @property
@@ -263,30 +202,27 @@ class Motion:
     @property
     def samples(self) -> tuple[Floats, Floats]:
         """Times (s) and accelerations (m/s^2) at the breakpoints; at a jump, the acceleration after it."""
-        last = piecewise.value(self.coefficients[-1], np.diff(self.breakpoints)[-1])
-        return self.breakpoints, np.append(self.coefficients[:, 0], last)
+        return piecewise.samples(self)
 
     @property
     def jumps(self) -> bool:
         """Whether the acceleration jumps from a piece to the next, beyond rounding; ends of the motion do not count."""
-        ends = piecewise.value(self.coefficients, np.diff(self.breakpoints))
-        gaps = np.abs(self.coefficients[1:, 0] - ends[:-1])
-        return bool(np.any(gaps > _JUMP * self.pga))
+        return piecewise.jumps(self)
 
     @property
     def pga(self) -> float:
         """Peak ground acceleration, m/s^2: the exact extremum of the pieces."""
-        return piecewise.largest_magnitude(np.diff(self.breakpoints), self.coefficients)
+        return measures.peak_acceleration(self)
 
     @property
     def pgv(self) -> float:
         """Peak ground velocity, m/s: the exact extremum of the exact integral, from rest."""
-        return piecewise.largest_magnitude(np.diff(self.breakpoints), self._velocity_pieces())
+        return measures.peak_velocity(self)
 
     @property
     def pgd(self) -> float:
         """Peak ground displacement up to the motion's end, m: the exact extremum of the exact integral."""
-        return piecewise.largest_magnitude(np.diff(self.breakpoints), self._displacement_pieces())
+        return measures.peak_displacement(self)
 
     @overload
     def acceleration(self, t: float) -> float: ...
@@ -294,7 +230,7 @@ class Motion:
     def acceleration(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
     def acceleration(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
         """Ground acceleration, m/s^2, at the times `t` (s) and shaped like it; zero outside the motion."""
-        time = np.asarray(t, dtype=np.float64)
+        time = checks.numbers(t, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self.coefficients, time)
         result = np.where((time < 0.0) | (time > self.duration), 0.0, result)
         return result if result.ndim else float(result)
@@ -305,7 +241,8 @@ class Motion:
     def velocity(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
     def velocity(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
         """Ground velocity at the times `t` (s), m/s, from rest; constant after the end of the motion."""
-        result = piecewise.at(self.breakpoints, self._velocity_pieces(), np.asarray(t, dtype=np.float64))
+        time = checks.numbers(t, "time", InvalidMotion)
+        result = piecewise.at(self.breakpoints, measures.velocity_pieces(self), time)
         return result if result.ndim else float(result)
 
     @overload
@@ -314,8 +251,8 @@ class Motion:
     def displacement(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
     def displacement(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
         """Ground displacement at the times `t` (s), m, from rest; after the end at the last velocity."""
-        time = np.asarray(t, dtype=np.float64)
-        result = piecewise.at(self.breakpoints, self._displacement_pieces(), time)
+        time = checks.numbers(t, "time", InvalidMotion)
+        result = piecewise.at(self.breakpoints, measures.displacement_pieces(self), time)
         result = result + self.velocity(self.duration) * np.maximum(time - self.duration, 0.0)
         return result if result.ndim else float(result)
 
@@ -349,7 +286,7 @@ class Motion:
     @overload
     def spectral_acceleration(self, period: Sequence[float] | NDArray[Any], damping: float = ...) -> Floats: ...
     def spectral_acceleration(
-        self, period: float | Sequence[float] | NDArray[Any], damping: float = 0.05
+        self, period: float | Sequence[float] | NDArray[Any], damping: float = measures.DAMPING
     ) -> float | Floats:
         """Pseudo-spectral acceleration: ``(2 pi/period)**2`` times an oscillator's peak displacement, m/s^2.
 
@@ -395,7 +332,7 @@ class Motion:
         pgv: float | None = None,
         sa: float | None = None,
         period: float | None = None,
-        damping: float = 0.05,
+        damping: float | None = None,
     ) -> Motion:
         """Return the motion times a factor, or scaled to a target; give exactly one of the first four.
 
@@ -403,38 +340,31 @@ class Motion:
         ----------
         factor : float
             Factor on the acceleration; a negative one reverses the polarity.
-        pga, pgv : float
-            Wanted peak acceleration (m/s^2) or velocity (m/s).
+        pga : float
+            Wanted peak ground acceleration, m/s^2, not g: half a g is ``pga=0.5 * 9.80665``. `history` says both.
+        pgv : float
+            Wanted peak ground velocity, m/s.
         sa : float
-            Wanted spectral acceleration (m/s^2) at `period` (s) and `damping`.
-        period, damping : float
-            Oscillator for `sa`.
+            Wanted spectral acceleration, m/s^2, at `period` and `damping`.
+        period : float
+            Period of the oscillator for `sa`, s.
+        damping : float
+            Its fraction of critical damping, 0.05 by default.
 
         Raises
         ------
         InvalidMotion
-            If not exactly one target is given, a target is not positive, or the motion is zero throughout.
+            If not exactly one target is given, a target is not positive, `period` or `damping` is given without `sa`,
+            or the motion is zero throughout.
 
         Examples
         --------
-        >>> Motion([0.0, 2.0], [[1.0]]).scaled(pga=3.0).coefficients
-        array([[3.]])
+        >>> half = Motion([0.0, 2.0], [[1.0]]).scaled(pga=0.5 * 9.80665)
+        >>> half.coefficients.round(6), half.history
+        (array([[4.903325]]), ('scaled by 4.90332 to a peak ground acceleration of 4.90332 m/s^2 (0.5 g)',))
         """
         targets = {"factor": factor, "pga": pga, "pgv": pgv, "sa": sa}
-        given = [(what, target) for what, target in targets.items() if target is not None]
-        if len(given) != 1:
-            raise InvalidMotion("scale a motion by exactly one of factor, pga, pgv and sa (with period)")
-        if (sa is None) != (period is None):
-            raise InvalidMotion("scaling to a spectral acceleration needs both sa and period")
-        what, target = given[0]
-        if what == "factor":
-            return self._times(checks.finite(target, "scale factor", InvalidMotion), f"scaled by {target:.6g}")
-        now = measures.target(self, what, period, damping)
-        if now == 0.0:
-            raise InvalidMotion(f"{self.name} is zero throughout and cannot be scaled to a {what}")
-        ratio = checks.positive(target, f"target {what}", InvalidMotion, "m/s" if what == "pgv" else "m/s^2") / now
-        at_period = f" at {period:.6g} s, damping {damping:.6g}" if what == "sa" else ""
-        return self._times(ratio, f"scaled by {ratio:.6g} to a {what} of {target:.6g}{at_period}")
+        return self._times(*scaling.factor_to(self, targets, period, damping))
 
     def delayed(self, delay: float) -> Motion:
         """Return the motion after `delay` seconds of no acceleration.
@@ -464,7 +394,7 @@ class Motion:
         trim: tuple[float, float] | None = None,
         baseline: int | None = None,
         band_pass: tuple[float | None, float | None] | None = None,
-        order: int = 4,
+        order: int | None = None,
         resample: float | None = None,
     ) -> Motion:
         """Return a processed motion; the steps go in the order of the arguments, each noted in `history`.
@@ -479,7 +409,7 @@ class Motion:
             Corner frequencies of a Butterworth filter, Hz, run forwards and backwards (no phase shift) with
             zeros added before and after and removed again; None leaves that side open.
         order : int
-            Order of the filter in each direction.
+            Order of the filter in each direction, 4 by default; only with `band_pass`.
         resample : float
             New sampling step, s: the motion's values at its multiples, joined by straight lines; a jump becomes a
             slope of one step. To a coarser step, remove what lies above its Nyquist frequency with `band_pass`.
@@ -487,8 +417,8 @@ class Motion:
         Raises
         ------
         InvalidMotion
-            If nothing is asked for, an argument is not usable, or `baseline` or `band_pass` is asked of a
-            motion that is not linear between even samples, or jumps (resample it first, in a call of its own).
+            If nothing is asked for, an argument is not usable or out of place, or `baseline` or `band_pass` is asked
+            of a motion that is not linear between even samples, or jumps (resample it first, in a call of its own).
 
         Examples
         --------
@@ -499,7 +429,7 @@ class Motion:
         >>> done.history
         ('trimmed to 0.5-2 s', 'baseline of degree 0 removed')
         """
-        steps: list[Callable[[Motion], Motion]] = []
+        steps: list[Callable[[piecewise.Piecewise], processing.Processed]] = []
         if trim is not None:
             start, end = processing.pair(trim, "trim=(start, end)")
             steps.append(lambda motion: processing.trim(motion, start, end))
@@ -507,15 +437,75 @@ class Motion:
             steps.append(lambda motion: processing.baseline(motion, baseline))
         if band_pass is not None:
             low, high = processing.pair(band_pass, "band_pass=(low, high)")
-            steps.append(lambda motion: processing.band_pass(motion, low, high, order=order))
+            steps.append(lambda motion: processing.band_pass(motion, low, high, order=4 if order is None else order))
+        elif order is not None:
+            raise InvalidMotion("order= belongs to band_pass=; give that as well, or neither")
         if resample is not None:
             steps.append(lambda motion: processing.resample(motion, resample))
         if not steps:
             raise InvalidMotion("name what to do: trim, baseline, band_pass or resample")
-        motion = self
+        motion: piecewise.Piecewise = self
+        history = self.history
         for step in steps:
-            motion = step(motion)
-        return motion
+            motion = done = step(motion)
+            history = (*history, done.done)
+        # What is made of samples is the motion from then on: the lines between them are exact.
+        cut_only = baseline is None and band_pass is None and resample is None
+        return replace(
+            self,
+            breakpoints=motion.breakpoints,
+            coefficients=motion.coefficients,
+            description=self.description.changed("processed"),
+            history=history,
+            error=self.error if cut_only else 0.0,
+        )
+
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draw the ground acceleration in g over time.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default in a new figure.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Examples
+        --------
+        >>> import rocking
+        >>> figure = rocking.pulses.sine(3.0, 2.0, cycles=5).plot()
+        >>> figure.axes[0].get_xlabel(), figure.get_suptitle()
+        ('time (s)', 'sine')
+        """
+        from rocking.plot import motion_figure
+
+        times = self.drawing_times(0.0, self.duration)
+        return motion_figure(
+            time=times, acceleration_g=self.acceleration(times) / STANDARD_GRAVITY, title=self.name, ax=ax
+        )
+
+    def drawing_times(self, start: float, end: float) -> Floats:
+        """Return the ends of a stretch of time, breakpoints in it, and times between them where pieces are curved."""
+        corners = self.breakpoints
+        if self.coefficients.shape[1] > 2:
+            corners = (corners[:-1, None] + np.linspace(0.0, 1.0, _DRAWN) * np.diff(corners)[:, None]).ravel()
+        return np.union1d([start, end], corners[(corners > start) & (corners < end)])
+
+    def __repr__(self) -> str:
+        return f"<Motion: {self}>"
+
+    def _repr_html_(self) -> str:
+        times = self.drawing_times(0.0, self.duration)
+        picture = svg.history(times, self.acceleration(times) / STANDARD_GRAVITY, "ground acceleration (g)")
+        return svg.captioned(f"Motion: {self}", picture)
+
+    def __str__(self) -> str:
+        """Return name, duration, step, peak acceleration and what was done to the motion, in one line."""
+        step = "" if self.step is None else f" in steps of {self.step:.5g} s"
+        peak = f"peak {self.pga:.5g} m/s^2 ({self.pga / STANDARD_GRAVITY:.4g} g)"
+        return "; ".join((f"{self.name}, {self.duration:.5g} s{step}, {peak}", *self.history))
 
     def __neg__(self) -> Motion:
         """Return the motion with its polarity reversed."""
@@ -540,64 +530,16 @@ class Motion:
 
     def _origin(self) -> str:
         """Return name, parameters, formula and history in one line, for the description of a sum."""
-        numbers = ", ".join(f"{k} {v:.6g}" for k, v in self.description.parameters.items())
-        parts = (self.name, self.description.family, numbers, self.description.text, *self.history)
-        return ", ".join(part for part in parts if part)
+        described = (self.description.family, self.description.numbers, self.description.text)
+        return ", ".join(part for part in (self.name, *described, *self.history) if part)
 
-    def _times(self, factor: float, what: str) -> Motion:
+    def _times(self, factor: float, done: str) -> Motion:
         with np.errstate(over="ignore"):
             coefficients = self.coefficients * factor
         return replace(
             self,
             coefficients=coefficients,
             description=self.description.scaled(factor),
-            history=(*self.history, what),
+            history=(*self.history, done),
             error=self.error * abs(factor),
         )
-
-    def _velocity_pieces(self) -> Floats:
-        return piecewise.antiderivative(np.diff(self.breakpoints), self.coefficients)
-
-    def _displacement_pieces(self) -> Floats:
-        return piecewise.antiderivative(np.diff(self.breakpoints), self._velocity_pieces())
-
-
-def _even_step(breakpoints: Floats, coefficients: Floats) -> float | None:
-    """Length of the pieces if they are equally long and straight lines, else None."""
-    if coefficients.shape[1] < 2 or np.any(coefficients[:, 2:]):
-        return None
-    step = float(breakpoints[1])
-    off = np.abs(breakpoints - piecewise.even_times(len(breakpoints), step))
-    return step if np.all(off <= _ROUNDING * breakpoints[-1]) else None
-
-
-def _floats(values: ArrayLike, what: str, dimensions: int) -> Floats:
-    array = np.array(checks.numbers(values, f"{what} of a motion", InvalidMotion), order="C")
-    if array.ndim != dimensions:
-        raise InvalidMotion(f"the {what} of a motion must have {dimensions} dimension(s), not {array.ndim}")
-    return array
-
-
-def _frozen_floats(values: ArrayLike, what: str, dimensions: int) -> Floats:
-    array = _floats(values, what, dimensions)
-    if not np.all(np.isfinite(array)):
-        raise InvalidMotion(f"the {what} of a motion must be finite numbers")
-    array.setflags(write=False)
-    return array
-
-
-def _samples(acceleration: ArrayLike) -> Floats:
-    samples = _floats(acceleration, "accelerations", 1)
-    if len(samples) < 2:
-        raise InvalidMotion(f"a motion needs at least two samples, not {len(samples)}")
-    bad = np.flatnonzero(~np.isfinite(samples))
-    if len(bad):
-        raise InvalidMotion(f"sample {bad[0]} of the motion is {samples[bad[0]]}: every sample must be a finite number")
-    return samples
-
-
-def _step(dt: float) -> float:
-    if np.ndim(dt) != 0:
-        raise InvalidMotion("dt must be one number; for uneven times use Motion.from_points(times, acceleration)")
-    step = checks.positive(dt, "sampling step dt", InvalidMotion, "s")
-    return checks.within(step, "sampling step dt", InvalidMotion, _SHORTEST, 1.0 / _SHORTEST, "s: check its units")

@@ -4,10 +4,51 @@ Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, x count
 """
 
 import math
+from typing import Final, Protocol
 
 import numpy as np
 
 from rocking.arrays import Floats
+
+#: Pieces that meet within this part of the largest value do not jump.
+_JUMP: Final = 1e-12
+#: Even breakpoints are off their grid by no more than this part of the duration, some units in its last place.
+_ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
+
+
+class Piecewise(Protocol):
+    """What is a polynomial on each of its pieces: a motion, or what becomes one."""
+
+    @property
+    def breakpoints(self) -> Floats:
+        """Ends of the pieces, s, shape (n + 1,)."""
+
+    @property
+    def coefficients(self) -> Floats:
+        """Coefficients of each piece from its start, shape (n, degree + 1)."""
+
+
+def even_step(pieces: Piecewise) -> float | None:
+    """Length of the pieces if they are equally long and straight lines, else None."""
+    breakpoints, coefficients = pieces.breakpoints, pieces.coefficients
+    if coefficients.shape[1] < 2 or np.any(coefficients[:, 2:]):
+        return None
+    step = float(breakpoints[1])
+    off = np.abs(breakpoints - even_times(len(breakpoints), step))
+    return step if np.all(off <= _ROUNDING * breakpoints[-1]) else None
+
+
+def jumps(pieces: Piecewise) -> bool:
+    """Whether a piece starts off the end of the one before, beyond rounding."""
+    widths, coefficients = np.diff(pieces.breakpoints), pieces.coefficients
+    gaps = np.abs(coefficients[1:, 0] - value(coefficients, widths)[:-1])
+    return bool(np.any(gaps > _JUMP * largest_magnitude(widths, coefficients)))
+
+
+def samples(pieces: Piecewise) -> tuple[Floats, Floats]:
+    """Return times (s) and values at the breakpoints; at a jump, the value after it."""
+    last = value(pieces.coefficients[-1], np.diff(pieces.breakpoints)[-1])
+    return pieces.breakpoints, np.append(pieces.coefficients[:, 0], last)
 
 
 def value(coefficients: Floats, x: Floats) -> Floats:

@@ -1,10 +1,9 @@
-"""Processing of a ground motion: trim, baseline, band-pass, resample; each returns a new motion."""
+"""Processing of a ground motion: trim, baseline, band-pass, resample; each gives new pieces, and says what it did."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,13 +11,19 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-
-if TYPE_CHECKING:
-    from rocking.motion.motion import Motion
+from rocking.motion.piecewise import Piecewise
 
 T = TypeVar("T")
 
 _MOST_SAMPLES: Final = 50_000_000
+
+
+class Processed(NamedTuple):
+    """Pieces after one step of processing, and what was done, for the motion's history."""
+
+    breakpoints: Floats
+    coefficients: Floats
+    done: str
 
 
 def pair(values: tuple[T, T], what: str) -> tuple[T, T]:
@@ -30,45 +35,42 @@ def pair(values: tuple[T, T], what: str) -> tuple[T, T]:
     return first, second
 
 
-def trim(motion: Motion, start: float, end: float) -> Motion:
+def trim(motion: Piecewise, start: float, end: float) -> Processed:
     """Keep the part from `start` to `end` (s); even samples are cut at the nearest sample."""
-    first, last = (
-        checks.finite(start, "start of the part to keep", InvalidMotion),
-        checks.finite(end, "end of the part to keep", InvalidMotion),
-    )
-    if not 0.0 <= first < last <= motion.duration * (1.0 + 1e-12):
+    first = checks.finite(start, "start of the part to keep", InvalidMotion)
+    last = checks.finite(end, "end of the part to keep", InvalidMotion)
+    duration = float(motion.breakpoints[-1])
+    if not 0.0 <= first < last <= duration * (1.0 + 1e-12):
         raise InvalidMotion(
-            f"trim needs 0 <= start < end <= {motion.duration:.6g} s, the motion's duration, "
-            f"not {first:.6g} and {last:.6g}"
+            f"trim needs 0 <= start < end <= {duration:.6g} s, the motion's duration, not {first:.6g} and {last:.6g}"
         )
-    if motion.step is not None:
-        return _trimmed_samples(motion, motion.step, round(first / motion.step), round(last / motion.step))
+    step = piecewise.even_step(motion)
+    if step is not None:
+        return _trimmed_samples(motion, step, round(first / step), round(last / step))
     breakpoints = motion.breakpoints
     inside = breakpoints[(breakpoints > first) & (breakpoints < last)]
-    kept = np.concatenate([[first], inside, [min(last, motion.duration)]])
+    kept = np.concatenate([[first], inside, [min(last, duration)]])
     coefficients = piecewise.refined(breakpoints, motion.coefficients, kept, motion.coefficients.shape[1])
-    changed = replace(motion, breakpoints=kept - first, coefficients=coefficients)
-    return _noted(changed, f"trimmed to {first:.6g}-{last:.6g} s")
+    return Processed(kept - first, coefficients, f"trimmed to {first:.6g}-{last:.6g} s")
 
 
-def _trimmed_samples(motion: Motion, step: float, first: int, last: int) -> Motion:
+def _trimmed_samples(motion: Piecewise, step: float, first: int, last: int) -> Processed:
     if last <= first:
         raise InvalidMotion(f"trim must keep at least two samples, {step:.6g} s apart")
     times = piecewise.even_times(last - first + 1, step)
-    kept = replace(motion, breakpoints=times, coefficients=motion.coefficients[first:last])
-    return _noted(kept, f"trimmed to {first * step:.6g}-{last * step:.6g} s")
+    return Processed(times, motion.coefficients[first:last], f"trimmed to {first * step:.6g}-{last * step:.6g} s")
 
 
-def baseline(motion: Motion, degree: int) -> Motion:
+def baseline(motion: Piecewise, degree: int) -> Processed:
     """Subtract the polynomial of the given degree that fits the samples best (least squares)."""
     step = _step(motion, "baseline")
-    times, samples = motion.samples
+    times, samples = piecewise.samples(motion)
     degree = checks.whole(degree, "degree of a baseline", InvalidMotion, 0, min(10, len(samples) - 1))
     fitted = np.polynomial.Legendre.fit(times, samples, degree)(times)
-    return _noted(_with_samples(motion, samples - fitted, step), f"baseline of degree {degree} removed")
+    return _joined(samples - fitted, step, f"baseline of degree {degree} removed")
 
 
-def band_pass(motion: Motion, low: float | None, high: float | None, *, order: int) -> Motion:
+def band_pass(motion: Piecewise, low: float | None, high: float | None, *, order: int) -> Processed:
     """Filter with a Butterworth band-pass, forwards and backwards, zeros added at both ends meanwhile.
 
     The zeros last ``1.5 order / low`` on each side (Converse and Brady 1992); without `low`, ``1.5 order / high``.
@@ -77,63 +79,59 @@ def band_pass(motion: Motion, low: float | None, high: float | None, *, order: i
     from scipy import signal  # half a second: loaded only where it is used
 
     step = _step(motion, "band_pass")
-    corners = _corners(motion, low, high)
+    corners = _corners(motion, step, low, high)
     order = checks.whole(order, "order of a filter", InvalidMotion, 1, 12)
     kind: Final = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
     at = corners if kind == "bandpass" else corners[0]
     sections = signal.butter(order, at, btype=kind, output="sos", fs=1.0 / step)
     pad = math.ceil(1.5 * order / corners[0] / step)
-    padded = np.pad(motion.samples[1], pad)
+    padded = np.pad(piecewise.samples(motion)[1], pad)
     filtered: Floats = signal.sosfiltfilt(sections, padded, padtype=None)[pad:-pad]
     span = f"{'0' if low is None else f'{low:.6g}'}-{'inf' if high is None else f'{high:.6g}'} Hz"
-    return _noted(_with_samples(motion, filtered, step), f"band-passed {span}, order {order} forwards and backwards")
+    return _joined(filtered, step, f"band-passed {span}, order {order} forwards and backwards")
 
 
-def _corners(motion: Motion, low: float | None, high: float | None) -> list[float]:
+def _corners(motion: Piecewise, step: float, low: float | None, high: float | None) -> list[float]:
     corners = [
         checks.positive(corner, "corner frequency", InvalidMotion, "Hz") for corner in (low, high) if corner is not None
     ]
-    nyquist = 0.5 / _step(motion, "band_pass")
+    nyquist, duration = 0.5 / step, float(motion.breakpoints[-1])
     if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
         raise InvalidMotion(
             f"band_pass needs (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; "
             "one of them may be None"
         )
-    if corners[0] * motion.duration < 0.1:
-        raise InvalidMotion(
-            f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {motion.duration:.6g} s"
-        )
+    if corners[0] * duration < 0.1:
+        raise InvalidMotion(f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s")
     return corners
 
 
-def resample(motion: Motion, step: float) -> Motion:
+def resample(motion: Piecewise, step: float) -> Processed:
     """Take the motion's values at the multiples of `step` (s) up to its end, joined by straight lines."""
     new = checks.positive(step, "new sampling step", InvalidMotion, "s")
-    count = math.floor(motion.duration / new * (1.0 + 1e-12)) + 1
+    duration = float(motion.breakpoints[-1])
+    count = math.floor(duration / new * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MOST_SAMPLES:
         raise InvalidMotion(
-            f"a step of {new:.6g} s gives {count} samples of a motion of {motion.duration:.6g} s: "
+            f"a step of {new:.6g} s gives {count} samples of a motion of {duration:.6g} s: "
             f"it needs from 2 to {_MOST_SAMPLES}"
         )
-    times = np.minimum(new * np.arange(count), motion.duration)
-    return _noted(_with_samples(motion, motion.acceleration(times), new), f"resampled to a step of {new:.6g} s")
+    times = np.minimum(new * np.arange(count), duration)
+    samples = piecewise.at(motion.breakpoints, motion.coefficients, times)
+    return _joined(samples, new, f"resampled to a step of {new:.6g} s")
 
 
-def _step(motion: Motion, what: str) -> float:
-    if motion.step is None:
-        raise InvalidMotion(f"{what} needs even samples: call processed(resample=...) on {motion.name} first")
-    if motion.jumps:
+def _step(motion: Piecewise, what: str) -> float:
+    step = piecewise.even_step(motion)
+    if step is None:
+        raise InvalidMotion(f"{what} needs even samples: call processed(resample=...) on the motion first")
+    if piecewise.jumps(motion):
         raise InvalidMotion(
-            f"{what} needs samples joined by lines, but {motion.name} jumps: call processed(resample=...) on it first"
+            f"{what} needs samples joined by lines, but the motion jumps: call processed(resample=...) on it first"
         )
-    return motion.step
+    return step
 
 
-def _with_samples(motion: Motion, samples: Floats, step: float) -> Motion:
+def _joined(samples: Floats, step: float, done: str) -> Processed:
     times = piecewise.even_times(len(samples), step)
-    # The samples are the motion from here on: whatever they approximate, the lines between them are exact.
-    return replace(motion, breakpoints=times, coefficients=piecewise.linear(times, samples), error=0.0)
-
-
-def _noted(motion: Motion, what: str) -> Motion:
-    return replace(motion, description=motion.description.changed("processed"), history=(*motion.history, what))
+    return Processed(times, piecewise.linear(times, samples), done)

@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from rocking.errors import UnreadableRecord
+from rocking.motion.description import Description
 from rocking.motion.formats.units import choose_unit
-from rocking.motion.motion import Description, Motion
+from rocking.motion.motion import Motion
 
 
 @dataclass(frozen=True)

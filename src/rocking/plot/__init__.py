@@ -5,6 +5,7 @@ from rocking.plot.fragility import FragilityLine, fragility_figure
 from rocking.plot.histories import Detail, Mark, excitation_figure, history_figure
 from rocking.plot.ida import ScaledMotion, ida_figure
 from rocking.plot.maps import outcome_figure
+from rocking.plot.motion import motion_figure
 from rocking.plot.regions import regions_figure
 from rocking.plot.response import DrawnSequence, RotationUnits, response_figure
 from rocking.plot.sequences import Ratios, chattering_figure, ratio_figure
@@ -26,6 +27,7 @@ __all__ = [
     "frequency_figure",
     "history_figure",
     "ida_figure",
+    "motion_figure",
     "outcome_figure",
     "ratio_figure",
     "regions_figure",

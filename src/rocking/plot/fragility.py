@@ -38,7 +38,6 @@ def fragility_figure(
     lines: Sequence[FragilityLine],
     intensity_label: str,
     band_label: str,
-    scale: float = 1.0,
     title: str = "",
     ax: Axes | None = None,
     figsize: tuple[float, float] = (5.6, 4.2),
@@ -51,8 +50,6 @@ def fragility_figure(
         One for every limit state.
     intensity_label, band_label : str
         Texts; `band_label` says what the bands are.
-    scale : float
-        Factor on all intensities, for an axis in other units: 1/9.80665 from m/s^2 to g.
     title : str
         Title of the figure.
     ax : matplotlib.axes.Axes, optional
@@ -75,12 +72,11 @@ def fragility_figure(
         axes = ax or figure.add_subplot()
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
-            at = scale * line.intensity
-            axes.fill_between(at, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
-            axes.plot(at, line.probability, linewidth=1.5, label=line.label, **style)
+            axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
+            axes.plot(line.intensity, line.probability, linewidth=1.5, label=line.label, **style)
             # Every limit state has a mark of its own.
             axes.plot(
-                scale * line.seen_at,
+                line.seen_at,
                 line.seen,
                 "os^D"[k % 4],
                 color=style["color"],
@@ -90,7 +86,7 @@ def fragility_figure(
             )
         axes.fill_between([], [], [], color=GROUND, alpha=0.4, linewidth=0.0, label=band_label)
         axes.plot([], [], "o", color=GROUND, markersize=4.0, markerfacecolor="none", label=_dots(lines))
-        axes.set(xlim=(0.0, scale * float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
+        axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid()
         add_labels(axes, intensity_label, "probability")
         add_title(figure, ax, title)

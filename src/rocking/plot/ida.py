@@ -49,7 +49,6 @@ def ida_figure(
     *,
     motions: Sequence[ScaledMotion],
     level_label: str,
-    scale: float = 1.0,
     title: str = "",
     ax: Axes | None = None,
     figsize: tuple[float, float] = (7.0, 4.2),
@@ -63,8 +62,6 @@ def ida_figure(
         are drawn alike, with the fractiles (16, 50, 84 %) of the lowest level at which each reaches a peak rotation.
     level_label : str
         Measure of intensity and its units.
-    scale : float
-        Factor on all levels, for an axis in other units: 1/9.80665 from m/s^2 to g.
     title : str
         Title of the figure.
     ax : matplotlib.axes.Axes, optional
@@ -85,15 +82,15 @@ def ida_figure(
     with figure_for(ax, figsize) as figure:
         curves, *strips = figure.subplots(1, 2, sharey=True, width_ratios=(2.0, 1.0)).tolist() if ax is None else [ax]
         for motion, style in zip(motions, styles, strict=True):
-            _draw_motion(curves, motion, scale, style | (_OWN if few else _ALIKE))
+            _draw_motion(curves, motion, style | (_OWN if few else _ALIKE))
         if not few:
-            _draw_fractiles(curves, motions, scale)
+            _draw_fractiles(curves, motions)
         curves.set_xlim(left=0.0)
-        curves.set_ylim(0.0, scale * _highest_shown(motions))
+        curves.set_ylim(0.0, _highest_shown(motions))
         curves.grid()
         add_labels(curves, "peak rotation / slenderness", level_label)
         for panel in strips:
-            _draw_strips(panel, motions, scale, styles if few else [{"color": INK}] * len(motions), named=not few)
+            _draw_strips(panel, motions, styles if few else [{"color": INK}] * len(motions), named=not few)
         add_title(figure, ax, title)
         add_legend(figure, ax, _handles(motions if few else [], with_strips=ax is None))
     return figure
@@ -118,10 +115,10 @@ def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
     return np.where(first < level.size, between, overturns)
 
 
-def _draw_motion(axes: Axes, motion: ScaledMotion, scale: float, style: dict[str, Any]) -> None:
+def _draw_motion(axes: Axes, motion: ScaledMotion, style: dict[str, Any]) -> None:
     axes.plot(
         np.where(np.isfinite(motion.peak), motion.peak, np.nan),
-        scale * motion.levels,
+        motion.levels,
         marker=".",
         markeredgewidth=0.0,
         label=motion.label,
@@ -129,7 +126,7 @@ def _draw_motion(axes: Axes, motion: ScaledMotion, scale: float, style: dict[str
     )
 
 
-def _draw_fractiles(axes: Axes, motions: Sequence[ScaledMotion], scale: float) -> None:
+def _draw_fractiles(axes: Axes, motions: Sequence[ScaledMotion]) -> None:
     finite = np.concatenate([motion.peak[np.isfinite(motion.peak)] for motion in motions])
     peaks = np.linspace(0.0, float(np.max(finite, initial=0.0)), _POINTS)[1:]
     reached = np.sort([levels_reaching(motion, peaks) for motion in motions], axis=0)
@@ -139,7 +136,7 @@ def _draw_fractiles(axes: Axes, motions: Sequence[ScaledMotion], scale: float) -
         shown = np.isfinite(level)
         axes.plot(
             peaks[shown],
-            scale * level[shown],
+            level[shown],
             color=ABOVE,
             linewidth=1.8 if share == 0.5 else 1.1,
             linestyle="-" if share == 0.5 else (0, (5, 1.5)),
@@ -151,7 +148,7 @@ def _draw_fractiles(axes: Axes, motions: Sequence[ScaledMotion], scale: float) -
             at = int(place * (np.count_nonzero(shown) - 1))
             axes.annotate(
                 "median" if share == 0.5 else f"{100 * share:g} %",
-                (peaks[shown][at], scale * level[shown][at]),
+                (peaks[shown][at], level[shown][at]),
                 xytext=(0, 2 if above else -2),
                 textcoords="offset points",
                 ha="right",
@@ -168,12 +165,10 @@ def _highest_shown(motions: Sequence[ScaledMotion]) -> float:
     return min(_HEADROOM * float(np.max(np.concatenate(stands), initial=0.0)) or last, last)
 
 
-def _draw_strips(
-    axes: Axes, motions: Sequence[ScaledMotion], scale: float, styles: Sequence[dict[str, Any]], *, named: bool
-) -> None:
+def _draw_strips(axes: Axes, motions: Sequence[ScaledMotion], styles: Sequence[dict[str, Any]], *, named: bool) -> None:
     for k, (motion, style) in enumerate(zip(motions, styles, strict=True)):
         for low, high in motion.bands:
-            axes.plot([k, k], [scale * low, scale * high], color=style["color"], **_STRIP)
+            axes.plot([k, k], [low, high], color=style["color"], **_STRIP)
     axes.set(xlabel="overturns", xlim=(-0.7, len(motions) - 0.3), xticks=[])
     if named:
         axes.set_xticks(range(len(motions)), [motion.label for motion in motions], rotation=90, fontsize="x-small")

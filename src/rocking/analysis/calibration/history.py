@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.calibration.space import HIGHEST, PARAMETERS, Range, even_fractions, value_range
+from rocking.analysis.calibration.space import HIGHEST, PARAMETERS, Range, value_range
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.response import Response
 from rocking.simulation import simulate
+from rocking.tables import text_table
+from rocking.treatment.base import Model
 
 #: Blocks that the search starts from.
 _CANDIDATES: Final = 2048
@@ -67,7 +68,7 @@ class Measured:
     at_bound: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class HistoryCalibration:
     """The block that explains a rotation history best.
 
@@ -101,12 +102,29 @@ class HistoryCalibration:
 
     def summary(self) -> str:
         """Return the estimates as a table for people."""
-        lines = [f"{'parameter':<20}{'value':>10}{'std. error':>12}"]
-        for name, one in self.estimates.items():
-            note = "  at its bound" if one.at_bound else ""
-            lines.append(f"{name:<20}{one.value:>10.5g}{one.deviation:>12.2g}{note}")
-        lines += ["", f"misfit {self.misfit:.3g} rad (root mean square) over {len(self.residuals)} samples"]
-        return "\n".join(lines)
+        rows = [
+            [name, one.value, float(f"{one.deviation:.2g}"), "at its bound" if one.at_bound else ""]
+            for name, one in self.estimates.items()
+        ]
+        table = text_table(["parameter", "value", "std. error", ""], rows)
+        return f"{table}\n\n{self._misfit_text()}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Estimates and misfit by name."""
+        return {
+            "model": self.response.model,
+            "samples": len(self.residuals),
+            "estimates": {name: asdict(one) for name, one in self.estimates.items()},
+            "covariance_of_logarithms": self.covariance,
+            "misfit_rad": self.misfit,
+        }
+
+    def __repr__(self) -> str:
+        estimates = ", ".join(f"{name} = {one.value:.4g}" for name, one in self.estimates.items())
+        return f"<HistoryCalibration: {estimates}; {self._misfit_text()}>"
+
+    def _misfit_text(self) -> str:
+        return f"misfit {self.misfit:.3g} rad (root mean square) over {len(self.residuals)} samples"
 
 
 def calibrate_history(
@@ -293,8 +311,10 @@ def _released_from(history: _History) -> _Unknown:
 
 def _best(problem: _HistoryProblem, rng: np.random.Generator) -> Floats:
     """Logarithms of the unknowns at the least sum of squares over the whole history."""
+    from scipy.stats import qmc
+
     low, high = problem.bounds
-    survivors = low + even_fractions(rng.random(len(low)), 0, _CANDIDATES) * (high - low)
+    survivors = qmc.scale(qmc.Halton(len(low), rng=rng).random(_CANDIDATES), low, high)
     for share, kept in _STAGES:
         count = min(max(problem.history.first(share), 2 * len(low)), len(problem.history.times))
         errors = [problem.error(one, count) for one in survivors]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,10 +18,12 @@ from rocking.analysis.calibration.scores import Scores
 from rocking.analysis.calibration.space import PARAMETERS, Candidates, Range, Space
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
+from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
+from rocking.tables import named, text_table, write_text
+from rocking.treatment.base import Model
 
 #: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
 _LAPSE: Final = 0.005
@@ -77,7 +80,7 @@ class Validation:
         return Scores.mean(self.repeats)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """Blocks that explain which motions overturned a specimen, and what they predict.
 
@@ -177,7 +180,7 @@ class Calibration:
 
         See Also
         --------
-        rocking.analysis.Scores : accuracy, log loss and Brier score.
+        rocking.analysis.calibration.Scores : accuracy, log loss and Brier score.
         """
         labels = _labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
@@ -192,23 +195,49 @@ class Calibration:
 
     def summary(self) -> str:
         """Return the estimates and scores as a table for people."""
-        units = {"p": "rad/s", "alpha": "rad", "restitution": ""}
-        scores = self.scores
+        units = {"p": "rad/s", "alpha": "rad", "restitution": "1"}
+        rows = [
+            [name, one.median, one.lower, one.upper, f"{100 * one.dispersion:.0f} %", units[name.partition("_")[0]]]
+            for name, one in self.estimates.items()
+        ]
         lines = [
             f"{len(self.observed)} motions, {int(self.observed.sum())} overturned the specimen; {self.model} model",
             "",
-            f"{'parameter':<20}{'median':>9}{'5 %':>9}{'95 %':>9}  dispersion",
-            *(
-                f"{name:<20}{one.median:>9.4g}{one.lower:>9.4g}{one.upper:>9.4g}  {100 * one.dispersion:.0f} %"
-                + f"  {units[name.rpartition('_')[0] or name]}".rstrip()
-                for name, one in self.estimates.items()
-            ),
+            text_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows),
             "",
             f"ensemble of {len(self.blocks)} blocks, equivalent to {1 / (self.weights**2).sum():.0f} of equal weight",
-            f"fitted motions: accuracy {100 * scores.accuracy:.1f} %, log loss {scores.log_loss:.3f}, "
-            f"Brier score {scores.brier:.3f}",
+            f"fitted motions: {self.scores}",
         ]
         return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Estimates, scores and probabilities by name."""
+        return {
+            "model": self.model,
+            "motions": len(self.observed),
+            "overturned": int(self.observed.sum()),
+            "estimates": {name: asdict(one) for name, one in self.estimates.items()},
+            "fitted": asdict(self.scores),
+            "probabilities": self.probabilities,
+        }
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the ensemble: parameters of both sides and weight, one row for each block.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        names = [f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus")]
+        units = ["rad/s", "rad/s", "rad", "rad", "1", "1"]
+        columns = [named(name, unit) for name, unit in zip(names, units, strict=True)]
+        table = np.hstack([self.blocks.p, self.blocks.alpha, self.blocks.restitution, self.weights[:, None]])
+        rows = [",".join(f"{value:.10g}" for value in row) for row in table]
+        write_text(path, "\n".join([",".join([*columns, "weight"]), *rows]) + "\n")
+
+    def __repr__(self) -> str:
+        return f"<Calibration: {self.summary().splitlines()[0]}; fitted: {self.scores}>"
 
 
 def calibrate(
@@ -338,6 +367,7 @@ def _outcomes(
 ) -> NDArray[np.float32]:
     """1 where a block overturns under a motion, else 0; shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
+    require_finished(simulated.unfinished.values)
     return np.asarray(simulated.overturned.transpose("block", "motion").values, dtype=np.float32)
 
 

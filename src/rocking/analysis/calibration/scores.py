@@ -29,6 +29,10 @@ class Scores:
     log_loss: float
     brier: float
 
+    def __str__(self) -> str:
+        """Write the three in one line."""
+        return f"accuracy {100 * self.accuracy:.1f} %, log loss {self.log_loss:.3f}, Brier score {self.brier:.3f}"
+
     @classmethod
     def of(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
         """Measure probabilities against outcomes of the same number.

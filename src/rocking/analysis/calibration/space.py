@@ -58,8 +58,10 @@ class Space:
         """
         given = zip(PARAMETERS, (p, alpha, restitution), strict=True)
         bounds = np.array([value_range(pair, name, HIGHEST[name]) for name, pair in given])
-        ratios = [LARGEST_RATIOS[name] for name in PARAMETERS] if two_sided else []
-        return cls(np.log(bounds[:, 0]), np.log(bounds[:, 1]), np.log(ratios))
+        lower, upper = np.log(bounds.T)
+        largest = np.log([LARGEST_RATIOS[name] for name in PARAMETERS])
+        # No wider than the bounds of a side let them be: else a box around narrow bounds would be all but empty.
+        return cls(lower, upper, np.minimum(largest, upper - lower) if two_sided else np.empty(0))
 
     @property
     def box(self) -> tuple[Floats, Floats]:
@@ -67,19 +69,24 @@ class Space:
         return np.concatenate([self.lower, -self.ratios]), np.concatenate([self.upper, self.ratios])
 
     def spread_evenly(self, count: int, rng: np.random.Generator) -> Floats:
-        """Points that fill the space evenly: an additive recurrence with irrational steps, randomly shifted."""
-        start = rng.random(len(self.box[0]))
-        found, tried = np.empty((0, len(start))), 0
+        """Points that fill the space evenly: those of a scrambled Halton sequence that lie in it."""
+        from scipy.stats import qmc
+
+        low, high = self.box
+        sequence = qmc.Halton(len(low), rng=rng)
+        found = np.empty((0, len(low)))
         while len(found) < count:
-            points = self._recurrence(start, tried, count)
-            found, tried = np.concatenate([found, points[self.contains(points)]]), tried + count
+            points = qmc.scale(sequence.random(count), low, high)
+            found = np.concatenate([found, points[self.contains(points)]])
         return found[:count]
 
     def volume(self) -> float:
         """Volume of the space, from the share of its box that it fills."""
+        from scipy.stats import qmc
+
         low, high = self.box
-        share = np.mean(self.contains(self._recurrence(np.zeros(len(low)), 1, _VOLUME_POINTS)))
-        return float(share * np.prod(high - low))
+        points = qmc.scale(qmc.Halton(len(low), scramble=False).random(_VOLUME_POINTS), low, high)
+        return float(np.mean(self.contains(points)) * np.prod(high - low))
 
     def contains(self, points: Floats) -> NDArray[np.bool_]:
         """Whether points lie in the box and each of their sides keeps to its bounds."""
@@ -97,10 +104,6 @@ class Space:
         sides = self.sides(points)
         # exp(log(1)) may be one unit in the last place above 1.
         return Blocks(sides[:, :, 0], sides[:, :, 1], np.minimum(sides[:, :, 2], 1.0))
-
-    def _recurrence(self, start: Floats, first: int, count: int) -> Floats:
-        low, high = self.box
-        return low + even_fractions(start, first, count) * (high - low)
 
     def _log_sides(self, points: Floats) -> Floats:
         half = 0.5 * points[:, 3:] if len(self.ratios) else np.zeros((len(points), 3))
@@ -127,19 +130,6 @@ class Candidates:
     points: Floats
     overturned: NDArray[np.float32]
     log_weights: Floats = field(repr=False)
-
-
-def even_fractions(start: Floats, first: int, count: int) -> Floats:
-    """Members of an additive recurrence that fills the unit cube evenly, shape (count, d).
-
-    Its steps are powers of the root of x^(d + 1) = x + 1, the golden ratio for d = 1 (Roberts 2018).
-    """
-    dimensions = len(start)
-    root = 1.5
-    for _ in range(60):
-        root = (1.0 + root) ** (1.0 / (dimensions + 1))
-    steps = root ** -np.arange(1.0, dimensions + 1)
-    return np.asarray((start + np.outer(np.arange(first, first + count), steps)) % 1.0)
 
 
 def value_range(pair: Sequence[float], name: str, highest: float) -> Range:

@@ -19,9 +19,12 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, OutputError
-from rocking.problem import Model
+from rocking.tables import text_table, write_text
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Points of a curve in a table or a figure.
@@ -128,7 +131,7 @@ class FragilityCurve:
         low, high = (np.asarray(ndtr(end)).reshape(at.shape) for end in ends)
         return low, high
 
-    def summary(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Parameters, intervals and tests by name."""
         return {
             "limit_state": self.limit_state,
@@ -149,7 +152,7 @@ class FragilityCurve:
         }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fragility:
     """Fragility curves of one or several limit states against one intensity measure.
 
@@ -165,6 +168,10 @@ class Fragility:
         The block, where there is one.
     model : str
         Equation of motion, which says how a block's own unit counts.
+    outcomes : pandas.DataFrame or None
+        What was simulated, one row each, so that the fit can be audited: motion, block (position), polarity, intensity
+        (SI), peak_rotation_rad, peak_over_alpha (infinite where it overturned), overturned, and whether each limit
+        state was exceeded; None where the outcomes were given.
     """
 
     curves: tuple[FragilityCurve, ...]
@@ -172,6 +179,51 @@ class Fragility:
     description: str
     block: Block | None
     model: Model
+    outcomes: pd.DataFrame | None
+
+    def summary(self) -> str:
+        """Median and dispersion of each limit state with their intervals, in a table."""
+        rows = []
+        for curve in self.curves:
+            between = (f"{scale * end:.4g}" for end in curve.median_interval for scale in [self.measure.scale])
+            rows.append(
+                [
+                    curve.limit_state,
+                    f"{curve.exceeded.sum():.0f} of {curve.trials.sum():.0f}",
+                    self.measure.scale * curve.median,
+                    " to ".join(between),
+                    curve.dispersion,
+                    "{:.3g} to {:.3g}".format(*curve.dispersion_interval),
+                    curve.goodness.p_value,
+                ]
+            )
+        between_text = f"{100 * self.curves[0].confidence:g} % between"
+        header = ["limit state", "exceeded", "median", between_text, "dispersion", between_text, "p of fit"]
+        return f"{self.description}; intensity: {self.measure.label}\n\n{text_table(header, rows)}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Curves by name; intensities in SI units."""
+        return {
+            "block": None if self.block is None else self.block.description,
+            "description": self.description,
+            "measure": {"name": self.measure.name, "units": self.measure.units, **self.measure.options()},
+            "model": self.model,
+            "band": self.band_kind,
+            "curves": [curve.to_dict() for curve in self.curves],
+            "outcomes": None if self.outcomes is None else self.outcomes.to_dict("records"),
+        }
+
+    @property
+    def band_kind(self) -> str:
+        """Where intervals and bands come from: "likelihood" or "bootstrap"."""
+        return "bootstrap" if isinstance(self.curves[0].uncertainty, Resamples) else "likelihood"
+
+    def __repr__(self) -> str:
+        curves = ", ".join(
+            f"{one.limit_state}: median {self.measure.scale * one.median:.4g}, dispersion {one.dispersion:.3g}"
+            for one in self.curves
+        )
+        return f"<Fragility: {self.description}; {self.measure.label}; {curves}>"
 
     def curve(self, limit_state: str) -> FragilityCurve:
         """Curve of a limit state.
@@ -211,6 +263,20 @@ class Fragility:
                     table.writerows([curve.limit_state, *(f"{value:.10g}" for value in row)] for row in columns)
         except OSError as error:
             raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
+
+    def outcomes_to_csv(self, path: str | Path) -> None:
+        """Write `outcomes`, one row for each simulation.
+
+        Raises
+        ------
+        InvalidOption
+            If the outcomes were given, not simulated.
+        OutputError
+            If the file cannot be written.
+        """
+        if self.outcomes is None:
+            raise InvalidOption("this fragility was fitted to given outcomes: there are no simulations to write")
+        write_text(path, self.outcomes.to_csv(index=False, float_format="%.10g", lineterminator="\n"))
 
     def to_nrml(
         self,
@@ -262,23 +328,23 @@ class Fragility:
         states = [curve.limit_state for curve in self.curves]
         nrml.write(path, function, states, nrml.Header(model_id, asset_category, loss_category, self.description))
 
-    def plot(self, *, title: str = "") -> Figure:
-        """Figure of the curves with their bands and the shares that were seen."""
-        from rocking.plot.fragility import FragilityLine, fragility_figure
+    def plot(self, ax: Axes | None = None, *, title: str = "") -> Figure:
+        """Draw the curves with their bands and the shares that were seen, in a new figure or in `ax`."""
+        from rocking.plot import FragilityLine, fragility_figure
 
-        intensity = np.linspace(0.0, self.range[1], _POINTS)
+        intensity, scale = np.linspace(0.0, self.range[1], _POINTS), self.measure.scale
         lines = []
         for curve in self.curves:
-            shares = _shares_seen(curve)
-            text = f"{curve.limit_state}: median {curve.median:.4g}, dispersion {curve.dispersion:.3g}"
-            lines.append(FragilityLine(text, intensity, curve.probability(intensity), *curve.band(intensity), *shares))
-        first = self.curves[0]
-        how = "bootstrap" if isinstance(first.uncertainty, Resamples) else "likelihood"
+            at, seen, outcomes = _shares_seen(curve)
+            text = f"{curve.limit_state}: median {scale * curve.median:.4g}, dispersion {curve.dispersion:.3g}"
+            chance, band = curve.probability(intensity), curve.band(intensity)
+            lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, outcomes))
         return fragility_figure(
             lines=lines,
             intensity_label=self.measure.label,
-            band_label=f"band: {100 * first.confidence:g} % confidence ({how})",
+            band_label=f"band: {100 * self.curves[0].confidence:g} % confidence ({self.band_kind})",
             title=title or self.description,
+            ax=ax,
         )
 
 

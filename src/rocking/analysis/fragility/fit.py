@@ -5,24 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.analysis.fragility import lognormal
 from rocking.analysis.fragility.confidence import Confidence, LikelyRegion, Resamples
 from rocking.analysis.fragility.curve import Fragility, FragilityCurve
 from rocking.analysis.intensity import Measure, MeasureName
-from rocking.analysis.levels import several_blocks, several_motions, simulate_levels
+from rocking.analysis.levels import described, several_motions, simulate_levels
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
+from rocking.engine import require_finished
 from rocking.ensemble import Polarity, simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.problem import Model
 from rocking.treatment import Treatment
+from rocking.treatment.base import Model
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 Band = Literal["likelihood", "bootstrap"]
 
@@ -101,7 +106,7 @@ def fragility(
     >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
     median 1.443, dispersion 0.524
     """
-    many, how = several_blocks(blocks), Measure(measure, period, damping)
+    many, how = Blocks.of(blocks), Measure(measure, period, damping)
     bands = _Bands(confidence, band, samples, seed)
     if not limits:
         raise InvalidOption("limits must name at least one limit state")
@@ -114,6 +119,7 @@ def fragility(
     }
     if levels is None:
         table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
+        require_finished(table.unfinished.values)
         intensity = (values[:, None] / how.unit_of(many, model)[None, :])[None, :, :, None]
     else:
         stripes = checks.increasing_numbers(levels, "levels", InvalidOption)
@@ -130,8 +136,35 @@ def fragility(
         _curve(name, x, _passed(ratio, limit, name).ravel(), np.ones(x.size), clusters.ravel(), bands)
         for name, limit in limits.items()
     ]
-    described = _described(many, shaken, None if levels is None else len(intensity))
-    return Fragility(tuple(curves), how, described, many[0] if len(many) == 1 else None, model)
+    text = _described(described(blocks), len(shaken), None if levels is None else len(intensity))
+    only = many[0] if len(many) == 1 else None
+    return Fragility(tuple(curves), how, text, only, model, _outcomes(table, x, ratio, limits))
+
+
+def _outcomes(table: xr.Dataset, intensity: Floats, ratio: Floats, limits: Mapping[str, float]) -> pd.DataFrame:
+    """Every simulation: motion, block, polarity, intensity, peak and what it exceeded."""
+    import pandas as pd
+
+    motion, block, polarity = (np.broadcast_to(axis, ratio.shape).ravel() for axis in _axes(table))
+    passed = {f"exceeded_{name}": _passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()}
+    return pd.DataFrame(
+        {
+            "motion": motion,
+            "block": block,
+            "polarity": polarity,
+            "intensity": intensity,
+            "peak_rotation_rad": table.peak_rotation.values.ravel(),
+            "peak_over_alpha": ratio.ravel(),
+            "overturned": table.overturned.values.ravel(),
+            **passed,
+        }
+    )
+
+
+def _axes(table: xr.Dataset) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Motions, blocks and polarities along their axes of (level, motion, block, polarity)."""
+    signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
+    return table.motion.values[:, None, None], np.arange(table.sizes["block"])[:, None], signs
 
 
 def fit_fragility(
@@ -220,7 +253,7 @@ def fit_fragility(
         _curve(name, x, _whole(values, "exceeded", x.size, 0.0, count), count, groups, bands)
         for name, values in outcomes.items()
     ]
-    return Fragility(tuple(curves), how, description, block, "nonlinear")
+    return Fragility(tuple(curves), how, description, block, "nonlinear", None)
 
 
 @dataclass(frozen=True)
@@ -303,13 +336,6 @@ def _clusters(clusters: ArrayLike, size: int) -> Integers:
     return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
 
 
-def _described(blocks: Blocks, motions: Sequence[Motion], stripes: int | None) -> str:
-    what = "1 block" if len(blocks) == 1 else f"{len(blocks)} blocks"
-    if len(blocks) == 1:
-        what = f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
+def _described(blocks: str, motions: int, stripes: int | None) -> str:
     how = "cloud" if stripes is None else f"{stripes} stripes"
-    return f"{what}, {len(motions)} motion{'s' if len(motions) > 1 else ''}, {how}"
-
-
-def _pair(sides: Floats) -> str:
-    return f"{sides[0]:.4g}" if sides[0] == sides[1] else f"({sides[0]:.4g}, {sides[1]:.4g})"
+    return f"{blocks}, {motions} motion{'s' if motions > 1 else ''}, {how}"

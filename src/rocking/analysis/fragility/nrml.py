@@ -20,7 +20,7 @@ from rocking.analysis.intensity import Measure
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, OutputError
-from rocking.problem import Model
+from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     from rocking.analysis.fragility.curve import FragilityCurve

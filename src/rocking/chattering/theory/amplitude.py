@@ -13,6 +13,7 @@ from rocking.chattering.theory.parameters import broadcast, checked_frequency, c
 from rocking.errors import InvalidOption
 from rocking.kernels.paper import fitted_amplitudes
 from rocking.kernels.sine.critical import critical_amplitudes
+from rocking.treatment.asymptotic_time import warn_outside_fit
 
 
 def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact") -> Floats:
@@ -39,6 +40,11 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     ------
     InvalidOption
         If a parameter is NaN, infinite or out of range, or the method is not one of these.
+
+    Warns
+    -----
+    OutsideFit
+        Where "eq76" or "eq77" is asked for omega or eta beyond those ranges: there they mean nothing.
 
     Notes
     -----
@@ -74,14 +80,17 @@ def _exact(omega: Floats, eta: Floats) -> Floats:
 
 
 def _eq76(omega: Floats, eta: Floats) -> Floats:
-    amplitudes = np.zeros(omega.size)
-    fitted_amplitudes(omega, eta, True, amplitudes)
-    return amplitudes
+    return _fitted("eq76", omega, eta)
 
 
 def _eq77(omega: Floats, eta: Floats) -> Floats:
+    return _fitted("eq77", omega, eta)
+
+
+def _fitted(fit: str, omega: Floats, eta: Floats) -> Floats:
+    warn_outside_fit(fit, omega, eta)
     amplitudes = np.zeros(omega.size)
-    fitted_amplitudes(omega, eta, False, amplitudes)
+    fitted_amplitudes(omega, eta, fit == "eq76", amplitudes)
     return amplitudes
 
 

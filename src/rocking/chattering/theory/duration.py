@@ -36,6 +36,10 @@ _PART: Final = 1 << 14
 #: Classes of eta, and of the excess of a over one as a share of 1 - eta, by which sequences are sorted.
 _CLASSES: Final = 255
 
+#: Impacts that the paper resolves, and at which restitution.
+_PAPER_IMPACTS: Final = 60
+_PAPER_RESTITUTION: Final = 0.92
+
 #: Two ulp: what adding to a phase and dividing by omega may lose of the bracket.
 _ROUNDING: Final = 2.0**-51
 
@@ -54,7 +58,7 @@ def chattering_time(
     *,
     method: str = "exact",
     order: int = 4,
-    resolved: int = 60,
+    resolved: int | None = None,
 ) -> Floats:
     """Dimensionless time from uplift to rest of a slender block under a sine.
 
@@ -73,11 +77,13 @@ def chattering_time(
     method : {"exact", "asymptotic", "series", "semianalytical"}
         "exact": every impact to a few ulp, completeness proven by certificate, the infinite rest of the sequence
         extrapolated with its known ratios; 1e-13 relative except within 1e-9 of the critical amplitude. "asymptotic":
-        the paper's Eq. 65. "series": the consistent expansion in a - 1. "semianalytical": the paper's Eq. 75.
+        the paper's Eq. 65. "series": the consistent expansion in a - 1. "semianalytical": the paper's Eq. 75, which
+        says nothing of completeness: that is decided by the certificate of "exact".
     order : int
         Terms of "series", 1 to 40.
-    resolved : int
-        Impacts that "semianalytical" resolves before its geometric sum.
+    resolved : int, optional
+        Impacts that "semianalytical" resolves before its geometric sum; by default 60, and above eta = 0.92 so many
+        that the speed has fallen as far as after 60 there.
 
     Returns
     -------
@@ -107,7 +113,8 @@ def chattering_time(
     0.573426
     """
     order = checked_count(order, "order", 1, 40)
-    resolved = checked_count(resolved, "resolved", 1, 1_000_000)
+    if resolved is not None:
+        resolved = checked_count(resolved, "resolved", 1, 1_000_000)
     parameters = checked_amplitude(a), checked_frequency(omega), checked_restitution(eta)
     methods: dict[str, Callable[[], Floats]] = {
         "exact": lambda: _exact_times(*parameters),
@@ -338,12 +345,23 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
-def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int) -> Floats:
+def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int | None) -> Floats:
     shape, (amplitudes, frequencies, restitutions) = broadcast(a, omega, eta)
-    times = np.where(amplitudes == 1.0, 0.0, math.nan)
-    rocks = np.flatnonzero((amplitudes > 1.0) & (restitutions < 1.0))
-    phases = np.zeros(rocks.size)
-    statuses = np.full(rocks.size, UNRESOLVED, np.int8)
-    semianalytical_phases((amplitudes[rocks], frequencies[rocks], restitutions[rocks]), resolved, phases, statuses)
-    times[rocks] = _told(phases, statuses) / frequencies[rocks]
+    exact = np.atleast_1d(_exact_times(amplitudes, frequencies, restitutions))
+    times = np.where(amplitudes == 1.0, 0.0, exact)
+    complete = np.flatnonzero(np.isfinite(exact) & (amplitudes > 1.0))
+    sequences = amplitudes[complete], frequencies[complete], restitutions[complete]
+    impacts = _enough(sequences[2]) if resolved is None else np.full(complete.size, resolved)
+    phases = np.zeros(complete.size)
+    statuses = np.full(complete.size, UNRESOLVED, np.int8)
+    semianalytical_phases(sequences, impacts, phases, statuses)
+    # Complete by proof: an estimate beyond half a period is a bad one, not a verdict.
+    phases[statuses == UNRESOLVED] = math.inf
+    times[complete] = phases / sequences[1]
     return times.reshape(shape)[()]
+
+
+def _enough(eta: Floats) -> NDArray[np.int64]:
+    """Impacts after which the speed has fallen as far as after 60 with the paper's restitution."""
+    count = np.ceil(_PAPER_IMPACTS * math.log(_PAPER_RESTITUTION) / np.log(eta))
+    return np.maximum(count, _PAPER_IMPACTS).astype(np.int64)

@@ -99,7 +99,7 @@ def resolve(
 @kernel
 def semianalytical_phases(
     sequences: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    resolved: int,
+    resolved: NDArray[np.int64],
     phases: NDArray[np.float64],
     statuses: NDArray[np.int8],
 ) -> None:
@@ -107,7 +107,7 @@ def semianalytical_phases(
     a, omega, eta = sequences
     for i in range(phases.size):
         delta = 1.0 / (omega[i] * omega[i])
-        statuses[i], phases[i] = semianalytical_phase(a[i] - 1.0, delta, eta[i], resolved)
+        statuses[i], phases[i] = semianalytical_phase(a[i] - 1.0, delta, eta[i], resolved[i])
 
 
 @shared

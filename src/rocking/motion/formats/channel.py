@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.errors import InvalidMotion
+from rocking.motion.description import Description
 from rocking.motion.formats.source import Source
 from rocking.motion.formats.units import Unit
-from rocking.motion.motion import Description, Motion
+from rocking.motion.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,113 @@
+"""What a motion is made from: arrays, samples, times and steps, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.constants import HIGHEST_DEGREE
+from rocking.errors import InvalidMotion
+from rocking.motion import piecewise
+from rocking.motion.description import Description
+
+#: Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take.
+STRONGEST: Final = 1e50
+_LONGEST: Final = 1e15
+#: Far below any ground motion; pieces may be shorter, but must not change faster than over this time.
+_SHORTEST: Final = 1e-9
+
+
+def pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
+    """Breakpoints and coefficients of a motion as own, read-only arrays."""
+    ends = _finite(breakpoints, "breakpoints", 1)
+    rows = _finite(coefficients, "coefficients", 2)
+    if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
+        raise InvalidMotion(
+            f"a motion of n pieces needs n + 1 breakpoints and coefficients of shape (n, degree + 1), "
+            f"not {ends.shape} and {rows.shape}"
+        )
+    if ends[0] != 0.0 or not np.all(np.diff(ends) > 0.0):
+        raise InvalidMotion("the breakpoints of a motion must start at 0 and increase strictly")
+    if rows.shape[1] > HIGHEST_DEGREE + 1:
+        raise InvalidMotion(
+            f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}: "
+            "split them into shorter ones of a lower degree"
+        )
+    if not _SHORTEST <= ends[-1] <= _LONGEST:
+        raise InvalidMotion(
+            f"a motion must last from {_SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
+        )
+    with np.errstate(over="ignore"):
+        bounds = piecewise.value(np.abs(rows), np.maximum(np.diff(ends), _SHORTEST))
+    if not np.all(bounds <= STRONGEST):
+        raise InvalidMotion(
+            f"a motion must stay below {STRONGEST:g} m/s^2 on all its pieces, and where they are shorter than "
+            f"{_SHORTEST:g} s so long: check its units"
+        )
+    for array in (ends, rows):
+        array.setflags(write=False)
+    return ends, rows
+
+
+def samples(acceleration: ArrayLike) -> Floats:
+    """Accelerations, at least two and all finite."""
+    values = _floats(acceleration, "accelerations", 1)
+    if len(values) < 2:
+        raise InvalidMotion(f"a motion needs at least two samples, not {len(values)}")
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        raise InvalidMotion(f"sample {bad[0]} of the motion is {values[bad[0]]}: every sample must be a finite number")
+    return values
+
+
+def step(dt: float) -> float:
+    """Return a sampling step, s."""
+    if np.ndim(dt) != 0:
+        raise InvalidMotion("dt must be one number; for uneven times use Motion.from_points(times, acceleration)")
+    positive = checks.positive(dt, "sampling step dt", InvalidMotion, "s")
+    return checks.within(positive, "sampling step dt", InvalidMotion, _SHORTEST, 1.0 / _SHORTEST, "s: check its units")
+
+
+def instants(times: ArrayLike, count: int) -> Floats:
+    """Return the times of so many samples, s."""
+    values = _floats(times, "times", 1)
+    if len(values) != count:
+        raise InvalidMotion(f"there are {len(values)} times but {count} accelerations: give one for each")
+    if not np.all(np.isfinite(values)) or not np.all(np.diff(values) > 0.0):
+        raise InvalidMotion("the times of a motion must be finite and increase strictly")
+    return values
+
+
+def description(given: Description) -> Description:
+    """Return the description, or refuse what is none."""
+    if not isinstance(given, Description):
+        raise InvalidMotion(
+            f"the description of a motion must be a Description(family, parameters, text), not a {type(given).__name__}"
+        )
+    return given
+
+
+def history(given: Iterable[str]) -> tuple[str, ...]:
+    """Sentences on what was done to a motion."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise InvalidMotion(f"the history of a motion must be a sequence of sentences, not {given!r}")
+    return tuple(checks.text(sentence, "sentence of a motion's history", InvalidMotion) for sentence in given)
+
+
+def _floats(values: ArrayLike, what: str, dimensions: int) -> Floats:
+    array = np.array(checks.numbers(values, f"{what} of a motion", InvalidMotion), order="C")
+    if array.ndim != dimensions:
+        raise InvalidMotion(f"the {what} of a motion must have {dimensions} dimension(s), not {array.ndim}")
+    return array
+
+
+def _finite(values: ArrayLike, what: str, dimensions: int) -> Floats:
+    array = _floats(values, what, dimensions)
+    if not np.all(np.isfinite(array)):
+        raise InvalidMotion(f"the {what} of a motion must be finite numbers")
+    return array

@@ -1,0 +1,74 @@
+"""How a motion was made: its family, its formula's numbers, its source."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+from rocking import checks
+from rocking.errors import InvalidMotion
+
+
+@dataclass(frozen=True)
+class Description:
+    """How a motion was made.
+
+    Attributes
+    ----------
+    family : str
+        Kind of motion: "record", "samples", "sine", "symmetric Ricker", ... After a delay or processing it says so
+        ("delayed sine", "processed record"), since the formula of `text` then no longer starts at time zero.
+    parameters : mapping of str to float
+        Numbers of the formula in SI units and radians, for instance amplitude, frequency, phase and cycles of
+        a sine. Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it
+        negative).
+    text : str
+        The formula, or the record's source and terms, in words.
+
+    Raises
+    ------
+    InvalidMotion
+        If family or text is no text, or a parameter is not a number.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> rocking.pulses.sine(1.0 / 3.0, 2.0, cycles=5).description
+    <Description: sine, amplitude 0.33333, frequency 2, cycles 5, phase 0>
+    """
+
+    family: str
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    text: str = ""
+
+    def __post_init__(self) -> None:
+        checks.text(self.family, "family of a description", InvalidMotion)
+        checks.text(self.text, "text of a description", InvalidMotion)
+        numbers = {
+            name: checks.number(value, f"{name} of a description", InvalidMotion)
+            for name, value in self.parameters.items()
+        }
+        object.__setattr__(self, "parameters", MappingProxyType(numbers))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Description, (self.family, dict(self.parameters), self.text)
+
+    def __repr__(self) -> str:
+        return f"<Description: {', '.join(part for part in (self.family, self.numbers) if part)}>"
+
+    @property
+    def numbers(self) -> str:
+        """Parameters as people read them: "amplitude 3, frequency 2"."""
+        return ", ".join(f"{name} {value:.5g}" for name, value in self.parameters.items())
+
+    def scaled(self, factor: float) -> Description:
+        """Return the description of the motion times `factor`."""
+        parameters = {k: v * factor if k.startswith("amplitude") else v for k, v in self.parameters.items()}
+        return replace(self, parameters=parameters)
+
+    def changed(self, how: str) -> Description:
+        """Return the description of a motion that was `how` ("delayed", "processed") off its formula."""
+        family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
+        return replace(self, family=family)

@@ -1,0 +1,133 @@
+"""Contact forces along a response: at any time, their extremes, and the first time that they pass a level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.arrays import Flags, Floats, Integers
+from rocking.block import Block
+from rocking.contact import contact_forces
+from rocking.errors import InvalidOption
+from rocking.kernels import state
+from rocking.motion import piecewise
+from rocking.response.history import History, bisected
+
+#: Samples per step, rounds, and steps that are looked at again, when the forces' extremes are searched.
+_SAMPLES: Final = 9
+_REFINEMENTS: Final = 10
+_MOST_REFINED: Final = 64
+
+#: What is asked of the horizontal and the vertical force over the weight.
+Measure = Callable[[Floats, Floats], Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Horizontal and vertical force of the ground over the weight, up to the time `until` (s).
+
+    Within a step the forces are smooth; both limits at every impact and at every jump of the motion are looked at. The
+    impulses at impacts are not part of it.
+    """
+
+    history: History
+    block: Block
+    until: float
+
+    def forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
+        """Both forces at times of any shape; NaN outside the response."""
+        times = checks.numbers(time, "time", InvalidOption)
+        flat = times.ravel()
+        horizontal, vertical = self._forces_in(flat, self.history.rows(flat))
+        horizontal[self.history.outside(flat)] = vertical[self.history.outside(flat)] = np.nan
+        return horizontal.reshape(times.shape), vertical.reshape(times.shape)
+
+    def largest(self, measure: Measure) -> float:
+        """Largest value of a measure: steps whose samples come near it are sampled again, around their best."""
+        times, rows = self._samples()
+        values = self._measured(measure, times, rows)
+        kept = np.argsort(values.max(axis=1))[-_MOST_REFINED:]
+        return float(max(values.max(), self._peaks(measure, times[kept], rows[kept])[1].max()))
+
+    def first(self, measure: Measure, is_beyond: Callable[[Floats], Flags]) -> float:
+        """First time, s, at which a measure is beyond a level, as then all greater values are; NaN if it never is."""
+        times, rows = self._samples()
+        values = self._measured(measure, times, rows)
+        highest = values.max(axis=1)
+        with np.errstate(invalid="ignore"):
+            # Between its samples, a smooth step rises above them by less than they span.
+            reach = np.where(np.isfinite(highest), 2.0 * highest - values.min(axis=1), highest)
+        near = np.flatnonzero(is_beyond(reach))
+        if not len(near):
+            return math.nan
+        at, peaks = self._peaks(measure, times[near], rows[near])
+        passing = np.flatnonzero(is_beyond(peaks))
+        if not len(passing):
+            return math.nan
+        step = near[passing[0]]
+        looks = np.append(times[step], at[passing[0]])
+        beyond = is_beyond(np.append(values[step], peaks[passing[0]]))
+        high = float(looks[beyond].min())
+        before = looks[~beyond & (looks < high)]
+        if not len(before):
+            return high  # at once: a jump
+
+        def passes(time: float) -> bool:
+            return bool(is_beyond(self._measured(measure, np.array([time]), rows[step, :1]))[0])
+
+        return bisected(float(before.max()), high, passes)
+
+    def _peaks(self, measure: Measure, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
+        """Where each of some steps has its largest value, and that value."""
+        at, best = times[:, 0], np.full(len(times), -np.inf)
+        for _ in range(_REFINEMENTS):
+            values = self._measured(measure, times, rows)
+            place = values.argmax(axis=1)[:, None]
+            value, where = (np.take_along_axis(array, place, axis=1)[:, 0] for array in (values, times))
+            at, best = np.where(value > best, where, at), np.maximum(value, best)
+            low = np.take_along_axis(times, np.maximum(place - 1, 0), axis=1)
+            high = np.take_along_axis(times, np.minimum(place + 1, times.shape[1] - 1), axis=1)
+            times = low + (high - low) * np.linspace(0.0, 1.0, times.shape[1])
+        return at, best
+
+    def _measured(self, measure: Measure, times: Floats, rows: Integers) -> Floats:
+        return measure(*self._forces_in(times.ravel(), rows.ravel())).reshape(times.shape)
+
+    def _forces_in(self, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
+        """Compute the forces in the steps that start at these rows: on the side and under the piece of each."""
+        nodes = self.history.trail.nodes[rows]
+        theta, rate, acceleration = self.history.states_in(times, rows).T
+        side = np.maximum(nodes["side"], 0)
+        alpha = np.array([s.alpha for s in self.block.sides])[side]
+        radius = np.array([s.radius for s in self.block.sides])[side]
+        sign = np.where(nodes["side"] == state.AT_REST, 0.0, 1.0 - 2.0 * side)
+        ground = self._ground_in(times, nodes)
+        return contact_forces((theta, rate, acceleration), ground, sign, alpha, radius / self.block.gravity)
+
+    def _ground_in(self, times: Floats, nodes: state.Records) -> Floats:
+        """Ground acceleration in g: in the piece where a step starts; at rest, which may span many, wherever it is."""
+        pieces = self.history.trail.ground.pieces
+        anywhere = np.maximum(np.searchsorted(pieces[:, 0], times, side="right") - 1, 0)
+        piece = np.where(nodes["side"] == state.AT_REST, anywhere, nodes["piece"])
+        return piecewise.value(pieces[piece, 2:], np.maximum(times - pieces[piece, 0], 0.0))
+
+    def _samples(self) -> tuple[Floats, Integers]:
+        """Sample every step, and at rest every piece of the motion, ends included and in order; with their steps."""
+        nodes = self.history.trail.nodes
+        corners = self.history.trail.ground.pieces[:, 0]
+        corners = corners[nodes["side"][self.history.rows(corners)] == state.AT_REST]
+        starts = np.unique(np.concatenate([nodes["time"], corners]))
+        starts = starts[(starts < self.until) | (starts == starts[0])]
+        ends = np.append(starts[1:], max(self.until, starts[-1]))
+        rows = self.history.rows(starts)
+        fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES))
+        times = starts[:, None] + fractions * (ends - starts)[:, None]
+        resting = nodes["side"][rows] == state.AT_REST  # what the motion is before a jump
+        times[resting, -1] = np.maximum(np.nextafter(times[resting, -1], 0.0), times[resting, 0])
+        return times, np.repeat(rows[:, None], _SAMPLES, axis=1)

@@ -1,0 +1,214 @@
+"""A response in words, as data and in files: short lines, honest digits, units in every name."""
+
+import json
+import math
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import rocking
+from rocking import Block, InvalidOption, OutputError, simulate
+from rocking.response import Sensitivity
+from rocking.response.summary import time_text
+
+TABLES = {
+    "events": ["time_s", "kind", "side"],
+    "impacts": ["time_s", "side", "speed_before_rad_s", "speed_after_rad_s"],
+    "chattering": ["start_s", "end_s", "lower_s", "upper_s", "impacts"],
+}
+
+
+@pytest.fixture(scope="module")
+def record():
+    return rocking.records.load("el-centro-meloland-270")
+
+
+@pytest.fixture(scope="module")
+def shaken(record):
+    return simulate(Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), record)
+
+
+@pytest.fixture(scope="module")
+def fallen(record):
+    return simulate(Block.from_parameters(p=4.0, alpha=0.05, restitution=0.9), record)
+
+
+@pytest.fixture(scope="module")
+def ambiguous():
+    return simulate(Block(half_width=0.12, half_height=0.75), rocking.records.load("ridgecrest-clc-090"))
+
+
+def test_a_response_and_its_sensitivity_show_themselves_in_one_short_line(shaken, fallen):
+    for shown in (repr(shaken), repr(fallen), repr(shaken.sensitivity)):
+        assert len(shown) < 250 and "\n" not in shown
+        assert not re.search(r"\d\.\d{7}", shown)
+    assert f"peak {shaken.peak_over_slenderness:.4f} of the slenderness" in repr(shaken)
+    assert "overturns at" in repr(fallen)
+
+
+def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(shaken, fallen):
+    for response in (shaken, fallen, simulate(Block(0.2, 1.0), None)):
+        page = response._repr_html_()
+        ElementTree.fromstring(page)
+        assert "currentColor" in page and "#" not in page
+        assert len(max(re.findall(r'points="([^"]*)"', page), key=len).split()) <= 400
+    extreme = np.max(np.abs([float(text) for text in re.findall(r">(-?[\d.]+)</text>", shaken._repr_html_())[:2]]))
+    assert extreme == pytest.approx(shaken.peak_over_slenderness, rel=2e-3)
+
+
+def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatch):
+    """A sensitivity is a pass along all steps."""
+    monkeypatch.setattr(Sensitivity, "along", None)
+    assert "rocks" in repr(shaken)
+    assert "rocks" in shaken._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("time", "change", "text"),
+    [
+        (230.7262443771, 0.0, "230.726244377 s"),
+        (230.7262443771, 0.9e-3, "230.726244377 s"),
+        (230.7262443771, 0.02, "230.7262444 s"),
+        (230.7262443771, 3.0, "230.72624 s"),
+        (230.7262443771, 1e9, "231 s"),
+        (230.7262443771, math.nan, "231 s"),
+    ],
+)
+def test_a_time_has_the_digits_that_a_millionth_of_the_motion_leaves(time, change, text):
+    assert time_text(time, change) == text
+
+
+def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():
+    block, record = Block(half_width=0.12, half_height=0.55), rocking.records.load("ridgecrest-clc-090")
+    texts = [simulate(block, motion).summary() for motion in (record, record.scaled(1.0 + 1e-6))]
+    shown, other = (re.findall(r"^(uplift|rest) +([\d.]+) s", text, re.MULTILINE) for text in texts)
+    assert len(shown) == 12
+    for (kind, time), (same, nudged_time) in zip(shown, other, strict=True):
+        assert kind == same
+        decimals = len(time.partition(".")[2])
+        assert abs(float(time) - float(nudged_time)) <= 1.01 * 10.0**-decimals
+
+
+def test_a_summary_says_what_was_resolved_and_until_when_forces_count(shaken, fallen):
+    assert f"impacts resolved    {len(shaken.impacts)}" in shaken.summary()
+    assert "until it tips" not in shaken.summary()
+    assert f"until it tips at {fallen.tipping_time:.4f} s" in fallen.summary()
+
+
+def test_an_ambiguous_response_says_what_is_affected_and_what_to_do(ambiguous, shaken):
+    assert ambiguous.ambiguities == ("events",)
+    assert shaken.ambiguities == ()
+    verdict = ambiguous.summary().splitlines()[-1]
+    assert "changes times of events: scale the motion" in verdict
+    assert "spread" in verdict
+    assert "AMBIGUOUS" not in shaken.summary()
+
+
+def test_the_dictionary_is_plain_and_names_its_units(shaken, fallen):
+    for response in (shaken, fallen, simulate(Block(0.2, 1.0), None, initial_rotation=0.05)):
+        result = response.to_dict()
+        assert json.loads(json.dumps(result, allow_nan=False)) == result
+        assert "_per_" not in json.dumps(result)
+        assert result["block"]["p_rad_s"][0] == response.block.sides[0].p
+        assert result["impacts_resolved"] == len(response.impacts)
+        assert [event["time_s"] for event in result["events"]] == response.events["time"].tolist()
+        assert [row["lower_s"] for row in result["chattering"]] == response.chattering["lower"].tolist()
+    assert shaken.to_dict()["motion"]["pga_m_s2"] == shaken.motion.pga
+    assert shaken.to_dict()["tipping_time_s"] is None
+    assert fallen.to_dict()["tipping_time_s"] == fallen.tipping_time
+    assert simulate(Block(0.2, 1.0), None).to_dict()["motion"] is None
+
+
+def test_histories_are_a_data_frame_over_time(shaken):
+    frame = shaken.to_dataframe(dt=0.02)
+    assert frame.index.name == "time_s"
+    assert list(frame.columns) == ["rotation_rad", "angular_velocity_rad_s", "ground_acceleration_m_s2"]
+    assert np.array_equal(frame["rotation_rad"], shaken.rotation(frame.index.to_numpy()))
+    assert np.diff(frame.index).max() == pytest.approx(0.02)
+    assert len(shaken.to_dataframe()) == round(shaken.duration / shaken.motion.step) + 1
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_every_table_is_a_data_frame_and_a_file_with_units(shaken, tmp_path, table):
+    frame = shaken.to_dataframe(table)
+    rows = getattr(shaken, table)
+    assert list(frame.columns) == TABLES[table]
+    for column, name in zip(frame.columns, rows.dtype.names, strict=True):
+        assert list(frame[column]) == list(rows[name])
+    shaken.to_csv(tmp_path / "table.csv", table)
+    back = pd.read_csv(tmp_path / "table.csv")
+    assert list(back.columns) == TABLES[table]
+    assert np.allclose(back.select_dtypes("number"), frame.select_dtypes("number"), rtol=1e-14)
+
+
+def test_tables_that_are_none_and_steps_that_mean_nothing_are_refused(shaken, tmp_path):
+    with pytest.raises(InvalidOption, match="table must be one of histories, events, impacts, chattering, not 'nodes'"):
+        shaken.to_dataframe("nodes")
+    with pytest.raises(InvalidOption, match="dt= is the step of the histories"):
+        shaken.to_csv(tmp_path / "impacts.csv", "impacts", dt=0.01)
+    with pytest.raises(InvalidOption, match="dt"):
+        shaken.to_dataframe(dt=-1.0)
+    with pytest.raises(OutputError, match="nowhere"):
+        shaken.to_csv(tmp_path / "nowhere" / "r.csv", "impacts")
+
+
+def test_every_variable_of_the_dataset_has_a_unit_in_the_file_too(shaken, tmp_path):
+    shaken.to_netcdf(tmp_path / "r.nc", dt=0.02)
+    with xr.open_dataset(tmp_path / "r.nc") as dataset:
+        units = {name: variable.attrs.get("units") for name, variable in dataset.variables.items()}
+        assert None not in units.values()
+        assert units["impact_speed_after"] == "rad/s"
+        assert units["sequence_lower"] == units["event_time"] == "s"
+        assert units["ground_acceleration"] == "m/s^2"
+        assert {"p_rad_s", "alpha_rad", "gravity_m_s2"} <= set(dataset.attrs)
+        assert not [name for name in dataset.attrs if "_per_" in name]
+
+
+@pytest.mark.parametrize(("units", "factor"), [("slenderness", 5.0), ("rad", 1.0), ("deg", 180.0 / math.pi)])
+def test_rotations_are_drawn_in_the_unit_that_is_asked_for(shaken, units, factor):
+    axes = shaken.plot(units=units).axes[0]
+    line = max(axes.lines, key=lambda line: len(line.get_xdata()))
+    assert np.max(np.abs(line.get_ydata())) == pytest.approx(shaken.peak_rotation * factor, rel=1e-4)
+    assert units in axes.get_ylabel() or (units == "deg" and "°" in axes.get_ylabel())
+
+
+def test_a_response_draws_its_rotation_into_axes_of_the_caller(shaken):
+    axes = shaken.plot().axes[0]
+    ax = type(axes.figure)().subplots()
+    assert shaken.plot(ax) is ax.figure
+    assert ax.figure.axes == [ax]
+    assert len(ax.lines) == len(axes.lines)
+
+
+def test_a_window_is_all_that_is_drawn(shaken):
+    start, end = shaken.events["time"][0] + 0.5, shaken.events["time"][0] + 2.0
+    figure = shaken.plot(window=(start, end))
+    assert figure.axes[0].get_xlim() == (start, end)
+    for line in figure.axes[0].lines + figure.axes[1].lines:
+        times = np.asarray(line.get_xdata())
+        if len(times) > 2:
+            assert times.min() >= start and times.max() <= end
+    struck = shaken.impacts["time"]
+    count = int(np.sum((struck >= start) & (struck <= end)))
+    assert 0 < count < len(struck)
+    assert f"impacts ({count})" in figure.axes[0].get_legend_handles_labels()[1]
+
+
+@pytest.mark.parametrize(
+    "window", [(3.0, 2.0), (-1.0, 2.0), (0.0, 1e9), 3.0, ("0", "1"), (0.0, 1.0, 2.0), (1.0, math.nan)]
+)
+def test_a_window_is_a_stretch_of_the_response(shaken, window):
+    with pytest.raises(InvalidOption, match="window"):
+        shaken.plot(window=window)
+
+
+def test_unknown_units_and_times_that_are_no_numbers_are_refused(shaken):
+    with pytest.raises(InvalidOption, match="units must be one of slenderness, rad, deg, not 'degrees'"):
+        shaken.plot(units="degrees")
+    for evaluate in (shaken.rotation, shaken.angular_velocity, shaken.normal_force, shaken.friction_demand):
+        with pytest.raises(InvalidOption, match="time"):
+            evaluate("1.0")

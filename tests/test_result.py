@@ -1,0 +1,162 @@
+"""What analyses return: results that say what they are, and none from simulations that were given up."""
+
+import copy
+import math
+import pickle
+
+import pytest
+from matplotlib.figure import Figure
+
+import rocking
+from rocking import engine
+from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
+from rocking.errors import Unfinished
+
+BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+PULSE = rocking.pulses.one_sine(6.0, 1.0)
+RESTLESS = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=1.0 - 1e-9)
+
+
+@pytest.fixture
+def small_budget(monkeypatch):
+    monkeypatch.setattr(engine, "BUDGET", 0)
+
+
+@pytest.mark.usefixtures("small_budget")
+@pytest.mark.parametrize(
+    "analysis",
+    [
+        lambda: rocking.rocking_spectrum(PULSE.scaled(0.4), alpha=[0.2], p=[2.0], restitution=[1.0 - 1e-9]),
+        lambda: rocking.overturning_map("one-sine", RESTLESS, amplitudes=[1.2, 1.4], frequencies=[3.0]),
+        lambda: rocking.incremental_dynamic_analysis(RESTLESS, PULSE, levels=[2.2, 2.4]),
+        lambda: rocking.fragility(RESTLESS, PULSE, levels=[2.2, 2.4]),
+        lambda: rocking.fragility(RESTLESS, PULSE.scaled(0.4)),
+        lambda: rocking.calibrate(
+            [PULSE.scaled(0.35), PULSE], [False, True], candidates=128, restitution=(1.0 - 2e-9, 1.0 - 1e-9)
+        ),
+    ],
+    ids=["spectrum", "map", "scaling", "stripes", "cloud", "calibration"],
+)
+def test_a_simulation_that_was_given_up_is_no_verdict(analysis):
+    with pytest.raises(Unfinished, match="were given up"):
+        analysis()
+
+
+@pytest.mark.usefixtures("small_budget")
+def test_a_map_of_chattering_calls_what_was_given_up_unproven():
+    found = chattering_map(families.sine(RESTLESS), {"a": [1.2], "omega": [3.0]})
+    assert found.outcome.values.tolist() == [[5]]
+
+
+def test_an_ensemble_marks_what_was_given_up_and_keeps_the_rest(monkeypatch):
+    monkeypatch.setattr(engine, "BUDGET", 0)
+    dataset = rocking.simulate_many([BLOCK, RESTLESS], PULSE.scaled(0.4))
+    assert dataset.unfinished.values.tolist() == [[False, True]]
+
+
+@pytest.fixture(scope="module")
+def spectrum():
+    return rocking.rocking_spectrum([PULSE, PULSE.scaled(0.5)], alpha=[0.15, 0.2], p=[1.0, 2.0, 3.0], restitution=[0.9])
+
+
+@pytest.fixture(scope="module")
+def results(spectrum):
+    return {
+        "RockingSpectrum": spectrum,
+        "OverturningMap": rocking.overturning_map("one-sine", BLOCK, amplitudes=[1.0, 4.0], frequencies=[2.0, 3.0]),
+        "IncrementalDynamicAnalysis": rocking.incremental_dynamic_analysis(BLOCK, PULSE),
+        "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
+    }
+
+
+def test_a_result_shows_itself_in_a_line(results):
+    for name, found in results.items():
+        assert repr(found).startswith(f"<{name}: ")
+        assert len(repr(found)) < 400
+        assert found.summary().splitlines()[0] in repr(found)
+        assert name in found._repr_html_()
+
+
+def test_a_result_has_the_variables_of_its_dataset(results, tmp_path):
+    for found in results.values():
+        for again in (copy.copy(found), pickle.loads(pickle.dumps(found))):
+            assert again.data.identical(found.data)
+            assert again.sizes == found.data.sizes
+            assert type(again) is type(found)
+        first = next(iter(found.data_vars))
+        assert found[first].identical(found.data[first])
+        assert str(first) in dir(found)
+        with pytest.raises(AttributeError):
+            _ = found.no_such_variable
+        found.to_netcdf(tmp_path / "result.nc")
+        with pytest.raises(rocking.OutputError, match="cannot be written"):
+            found.to_netcdf(tmp_path / "none" / "result.nc")
+
+
+def test_every_variable_of_a_result_has_units_or_a_meaning(results):
+    for name, found in results.items():
+        for variable in found.data.data_vars.values():
+            told = {"units", "long_name", "flag_meanings"} & set(variable.attrs)
+            assert told or variable.dtype == bool, (name, variable)
+
+
+def test_a_result_draws_itself_into_axes_of_the_caller(results):
+    for found in results.values():
+        figure = Figure()
+        ax, other = figure.subplots(1, 2)
+        assert found.plot(ax) is figure
+        assert ax.has_data()
+        assert not other.has_data()
+
+
+def test_a_part_of_a_result_is_a_result(spectrum):
+    part = spectrum.select(alpha=0.2, p=[1.0, 3.0])
+    assert dict(part.sizes) == {"motion": 2, "alpha": 1, "restitution": 1, "p": 2, "fractile": 3}
+    assert len(part.plot().axes[0].lines) > 0
+    with pytest.raises(rocking.InvalidOption, match="dimensions are"):
+        spectrum.select(height=1.0)
+
+
+def test_levels_go_on_to_three_times_the_first_that_overturns_and_no_further():
+    blocks = [BLOCK, rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)]
+    found = rocking.incremental_dynamic_analysis(blocks, PULSE)
+    first = found.overturned.isel(motion=0).transpose("block", "level").values.argmax(axis=1)
+    last = 3.0 * float(found.level[first.max()])
+    assert float(found.level[-2]) < last <= float(found.level[-1])
+
+
+def test_columns_of_the_table_of_bands_do_not_touch():
+    record = rocking.records.load("ridgecrest-clc-090")
+    text = rocking.incremental_dynamic_analysis(BLOCK, [record, PULSE], tolerance=1e-2).summary()
+    rows = text.splitlines()[3:]
+    starts = {row.index("  ") for row in rows}
+    assert len(rows) == 2
+    assert all("  " in row for row in rows)
+    assert starts
+
+
+def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
+    levels = [1.0, 2.0, 3.0, 4.0, 6.0]
+    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.2, 2.0)]
+    found = rocking.fragility(BLOCK, motions, levels=levels)
+    names = list(found.outcomes.motion.unique())
+    assert len(names) == len(motions)
+    assert len(found.outcomes) == len(levels) * len(motions)
+    for _, row in found.outcomes.iterrows():
+        motion = motions[names.index(row.motion)]
+        response = rocking.simulate(BLOCK, motion.scaled(pga=row.intensity))
+        assert response.overturned == row.overturned == row.exceeded_overturning
+        assert response.peak_rotation == pytest.approx(row.peak_rotation_rad, abs=1e-9)
+        assert math.isinf(row.peak_over_alpha) == row.overturned
+    found.outcomes_to_csv(tmp_path / "outcomes.csv")
+    header = (tmp_path / "outcomes.csv").read_text().splitlines()[0]
+    assert header.startswith("motion,block,polarity,intensity,peak_rotation_rad,peak_over_alpha,overturned")
+    given = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
+    with pytest.raises(rocking.InvalidOption, match="no simulations"):
+        given.outcomes_to_csv(tmp_path / "none.csv")
+
+
+def test_the_nonlinear_critical_amplitude_is_not_read_off_an_unfinished_simulation(monkeypatch):
+    monkeypatch.setattr(engine, "BUDGET", 0)
+    with pytest.raises(Unfinished):
+        critical_amplitude_nonlinear(2.0, 0.99999, 0.2)
