@@ -11,6 +11,9 @@ hypothesis.settings.register_profile("ci", derandomize=True)
 if os.environ.get("CI"):
     hypothesis.settings.load_profile("ci")
 
+# Figures are not looked at here, whatever display there is.
+os.environ["MPLBACKEND"] = "agg"
+
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 

@@ -1,14 +1,17 @@
-"""Figures: what is drawn is what was given, and nothing covers anything else."""
+"""Figures of one response: what is drawn is what was given, and nothing covers anything else."""
 
 import io
+import math
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from rocking.plot import DrawnSequence, response_figure
 
 NO_TIMES = np.array([])
 NO_INTERVALS = np.empty((0, 2))
+ALPHA = (0.2, 0.25)
 
 
 def bouncing_times(rest: float, first_interval: float, ratio: float, count: int) -> np.ndarray:
@@ -20,7 +23,8 @@ def figure_of(**changes):
     time = np.linspace(0.0, 10.0, 1001)
     arrays = {
         "time": time,
-        "rotation_over_slenderness": 0.4 * np.sin(time) * np.exp(-0.3 * time),
+        "rotation": 0.08 * np.sin(time) * np.exp(-0.3 * time),
+        "slenderness": ALPHA,
         "impact_times": np.pi * np.arange(1, 4),
         "rest_intervals": np.array([[0.0, 0.2], [9.8, 10.0]]),
         "uplift_times": np.array([0.2]),
@@ -28,7 +32,6 @@ def figure_of(**changes):
         "motion_time": time,
         "motion_acceleration_g": -0.3 * np.sin(time),
         "thresholds_g": (0.2, 0.25),
-        "chattering": None,
         "title": "A block",
     }
     return response_figure(**(arrays | changes))
@@ -39,12 +42,66 @@ def labelled(axes, label):
     return artist
 
 
-def test_the_rotation_and_the_motion_are_drawn_as_given():
-    figure = figure_of()
+def legend_of(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+@pytest.mark.parametrize(
+    ("units", "plus", "minus"),
+    [("slenderness", 1.0 / ALPHA[0], 1.0 / ALPHA[1]), ("rad", 1.0, 1.0), ("deg", 180.0 / math.pi, 180.0 / math.pi)],
+)
+def test_the_rotation_and_the_motion_are_drawn_as_given(units, plus, minus):
+    figure = figure_of(units=units)
     rotation, motion = figure.axes
     time = np.linspace(0.0, 10.0, 1001)
-    np.testing.assert_array_equal(labelled(rotation, "rotation").get_ydata(), 0.4 * np.sin(time) * np.exp(-0.3 * time))
-    np.testing.assert_array_equal(labelled(motion, "ground acceleration").get_ydata(), -0.3 * np.sin(time))
+    theta = 0.08 * np.sin(time) * np.exp(-0.3 * time)
+    drawn = labelled(rotation, "_rotation").get_ydata()
+    np.testing.assert_allclose(drawn, np.where(theta >= 0.0, plus * theta, minus * theta), rtol=1e-15)
+    np.testing.assert_array_equal(labelled(motion, "_ground acceleration").get_ydata(), -0.3 * np.sin(time))
+
+
+@pytest.mark.parametrize("units", ["slenderness", "rad"])
+def test_an_axis_in_degrees_stands_on_the_right(units):
+    figure = figure_of(units=units, rotation=np.linspace(-0.1, 0.15, 1001))
+    figure.draw_without_rendering()
+    (degrees,) = figure.axes[0].child_axes
+    assert degrees.get_ylabel() == "rotation (°)"
+    low, high = figure.axes[0].get_ylim()
+    plus, minus = ALPHA if units == "slenderness" else (1.0, 1.0)
+    np.testing.assert_allclose(degrees.get_ylim(), np.degrees([low * minus, high * plus]))
+    assert not figure_of(units="deg").axes[0].child_axes
+
+
+def test_the_angles_of_tipping_are_drawn_where_they_are_in_the_frame():
+    figure = figure_of(rotation=np.linspace(-0.3, 0.19, 1001), units="rad")
+    dashed = [line.get_ydata()[0] for line in figure.axes[0].lines if line.is_dashed()]
+    assert sorted(dashed) == [-ALPHA[1], ALPHA[0]]
+    assert legend_of(figure).count("tipping, θ = ±α") == 1
+    assert "tipping, θ = ±α" not in legend_of(figure_of())
+
+
+def test_a_part_of_a_response_says_that_it_is_one():
+    time = np.linspace(229.0, 241.0, 1001)
+    part = figure_of(time=time, motion_time=time, duration=318.7)
+    assert part.axes[1].get_xlabel() == "time (s); shown: 229–241 s of 319 s"
+    assert figure_of(duration=10.0).axes[1].get_xlabel() == "time (s)"
+    assert figure_of(duration=11.0).axes[1].get_xlabel() == "time (s); shown: 0–10 s of 11 s"
+
+
+def test_what_is_not_drawn_is_not_in_the_legend():
+    assert legend_of(figure_of()) == ["at rest", "impacts (3)", "uplift", "beyond a threshold", "uplift thresholds"]
+    outside = {"impact_times": np.array([12.0]), "uplift_times": np.array([11.0]), "rest_intervals": [[11.0, 12.0]]}
+    quiet = figure_of(motion_acceleration_g=np.full(1001, 0.1), **{k: np.array(v) for k, v in outside.items()})
+    assert legend_of(quiet) == ["uplift thresholds"]
+
+
+def test_axes_of_the_caller_take_the_rotation_alone():
+    mine = Figure()
+    ax = mine.subplots()
+    assert figure_of(ax=ax) is mine
+    assert mine.axes == [ax]
+    assert labelled(ax, "_rotation").get_xdata().size == 1001
+    assert "at rest" in [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def test_side_plus_is_uplifted_by_a_negative_acceleration():
@@ -69,12 +126,27 @@ def test_impacts_uplifts_and_rests_are_marked_at_their_times():
     np.testing.assert_allclose(spans, [[0.0, 0.2], [9.8, 10.0]], rtol=1e-15)
 
 
-def test_an_overturned_block_does_not_flatten_the_rocking_before():
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_an_overturned_block_leaves_the_frame_with_a_mark_and_its_time(side):
     time = np.linspace(0.0, 10.0, 1001)
-    figure = figure_of(rotation_over_slenderness=np.exp(time) * 1e-3, overturn_time=10.0)
-    low, high = figure.axes[0].get_ylim()
+    figure = figure_of(rotation=side * np.exp(time) * 1e-4, overturn_time=10.0)
+    axes = figure.axes[0]
+    low, high = axes.get_ylim()
     assert high - low < 5.0
-    assert labelled(figure.axes[0], "overturns, 10.000 s").get_xdata() == [10.0, 10.0]
+    mark = labelled(axes, "_overturning")
+    curve = labelled(axes, "_rotation").get_ydata()
+    assert mark.get_ydata()[0] == (high if side > 0.0 else low)
+    at = np.searchsorted(time, mark.get_xdata()[0])
+    assert low <= curve[at] <= high
+    assert not low <= curve[at + 1] <= high
+    assert [text.get_text() for text in axes.texts] == ["overturned at 10.000 s"]
+
+
+def test_a_fall_that_stays_in_the_frame_is_marked_at_its_end():
+    time = np.linspace(0.0, 10.0, 1001)
+    figure = figure_of(rotation=0.157 * time, slenderness=(1.2, 1.2), overturn_time=10.0)
+    mark = labelled(figure.axes[0], "_overturning")
+    np.testing.assert_allclose([mark.get_xdata()[0], mark.get_ydata()[0]], [10.0, 1.57 / 1.2])
 
 
 def test_the_zoom_shows_every_interval_against_the_time_to_rest():
@@ -86,6 +158,20 @@ def test_the_zoom_shows_every_interval_against_the_time_to_rest():
     np.testing.assert_allclose(intervals, 0.2 * to_rest, rtol=1e-6)
     assert zoom.get_xscale() == zoom.get_yscale() == "log"
     assert "9.800000" in zoom.get_title(loc="left")
+    assert len(figure_of().axes) == 2
+
+
+def test_a_narrow_figure_has_the_sequence_below_and_a_wide_one_beside():
+    sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
+    boxes = []
+    for width in (3.4, 7.0):
+        figure = figure_of(chattering=sequence, figsize=(width, 5.0))
+        figure.draw_without_rendering()
+        boxes.append([axes.get_position() for axes in figure.axes])
+    (_, motion, zoom), (_, beside, other) = boxes
+    assert zoom.y1 < motion.y0
+    assert beside.x1 < other.x0
+    assert other.width < 0.25
 
 
 def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
@@ -102,7 +188,7 @@ def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
         {},
         {"impact_times": NO_TIMES, "uplift_times": NO_TIMES, "rest_intervals": NO_INTERVALS},
         {"motion_time": NO_TIMES, "motion_acceleration_g": NO_TIMES},
-        {"rotation_over_slenderness": np.zeros(1001)},
+        {"rotation": np.zeros(1001)},
         {"chattering": DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)},
     ],
     ids=["full", "no events", "free rocking", "never moved", "chattering"],

@@ -176,6 +176,14 @@ def test_rotations_are_drawn_in_the_unit_that_is_asked_for(shaken, units, factor
     assert units in axes.get_ylabel() or (units == "deg" and "°" in axes.get_ylabel())
 
 
+def test_a_response_draws_its_rotation_into_axes_of_the_caller(shaken):
+    axes = shaken.plot().axes[0]
+    ax = type(axes.figure)().subplots()
+    assert shaken.plot(ax) is ax.figure
+    assert ax.figure.axes == [ax]
+    assert len(ax.lines) == len(axes.lines)
+
+
 def test_a_window_is_all_that_is_drawn(shaken):
     start, end = shaken.events["time"][0] + 0.5, shaken.events["time"][0] + 2.0
     figure = shaken.plot(window=(start, end))

@@ -5,6 +5,7 @@ import math
 import pickle
 
 import pytest
+from matplotlib.figure import Figure
 
 import rocking
 from rocking import engine
@@ -97,6 +98,15 @@ def test_every_variable_of_a_result_has_units_or_a_meaning(results):
         for variable in found.data.data_vars.values():
             told = {"units", "long_name", "flag_meanings"} & set(variable.attrs)
             assert told or variable.dtype == bool, (name, variable)
+
+
+def test_a_result_draws_itself_into_axes_of_the_caller(results):
+    for found in results.values():
+        figure = Figure()
+        ax, other = figure.subplots(1, 2)
+        assert found.plot(ax) is figure
+        assert ax.has_data()
+        assert not other.has_data()
 
 
 def test_a_part_of_a_result_is_a_result(spectrum):

@@ -225,7 +225,7 @@ class IncrementalDynamicAnalysis(Result):
         title : str
             Title; by default the block and the model.
         """
-        from rocking.plot.analysis import ScaledMotion, scaling_figure
+        from rocking.plot import ScaledMotion, ida_figure
 
         data = self.data
         levels = data.level.scale * data.level.values
@@ -237,8 +237,8 @@ class IncrementalDynamicAnalysis(Result):
             bands = np.where(np.isnan(bands), ends, bands)
             motions.append(ScaledMotion(str(data.motion.values[m]), levels, peaks[m], bands))
         what = data.blocks if data.sizes["block"] == 1 else f"block {block}"
-        return scaling_figure(
-            motions=motions, level_label=data.level.label, title=title or f"{what}, {data.model} model"
+        return ida_figure(
+            motions=motions, level_label=data.level.label, title=title or f"{what}, {data.model} model", ax=ax
         )
 
 

@@ -215,7 +215,7 @@ class OverturningMap(Result):
         title : str
             Title; by default the pulse and the block.
         """
-        from rocking.plot.analysis import regions_figure
+        from rocking.plot import regions_figure
 
         data = self.data
         modes = data.mode.values
@@ -229,6 +229,7 @@ class OverturningMap(Result):
             x_label="frequency of the pulse over p",
             y_label="amplitude over the smallest that lifts the block",
             title=title or f"{data.pulse.partition(':')[0]}, {data.block}, {data.model}",
+            ax=ax,
         )
 
 

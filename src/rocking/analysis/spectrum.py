@@ -204,7 +204,7 @@ class RockingSpectrum(Result):
         InvalidOption
             If there are more than four combinations of slenderness and restitution, or no such abscissa.
         """
-        from rocking.plot.analysis import SpectrumCurves, spectrum_figure
+        from rocking.plot import SpectrumCurves, spectrum_figure
 
         if against not in get_args(Abscissa):
             raise InvalidOption(f"against must be one of {', '.join(get_args(Abscissa))}, not {against!r}")
@@ -224,8 +224,10 @@ class RockingSpectrum(Result):
             x=self.data[against].values,
             curves=curves,
             fractiles=self.data.fractile.values.tolist(),
+            motions=[str(name) for name in self.data.motion.values],
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
             title=title or f"{self.data.sizes['motion']} motion(s), {self.data.model} model",
+            ax=ax,
         )
 
     def _curves(self) -> list[tuple[str, xr.Dataset]]:

@@ -179,6 +179,7 @@ class ChatteringMap(Result):
             x_label=written.get(str(second), str(second)),
             y_label=written.get(str(first), str(first)),
             title=title,
+            ax=ax,
         )
 
 

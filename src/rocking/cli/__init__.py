@@ -34,6 +34,8 @@ for _command, _help in {
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0 when done, 2 with one line on stderr for bad input, 130 when interrupted."""
+    # Figures are written to files here, so no toolkit of windows need be started for them.
+    os.environ.setdefault("MPLBACKEND", "agg")
     try:
         app(arguments, exit_on_error=False, print_error=False)
         sys.stdout.flush()

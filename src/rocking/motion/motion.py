@@ -18,6 +18,7 @@ from rocking.motion.description import Description
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 #: Times at which a motion is looked at between its breakpoints, for a picture.
 _DRAWN = 33
@@ -459,26 +460,26 @@ class Motion:
             error=self.error if cut_only else 0.0,
         )
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None) -> Figure:
         """Draw the ground acceleration in g over time.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure, ``.figure`` of what is returned.
+            Where to draw; by default in a new figure.
 
         Returns
         -------
-        matplotlib.axes.Axes
+        matplotlib.figure.Figure
 
         Examples
         --------
         >>> import rocking
-        >>> axes = rocking.pulses.sine(3.0, 2.0, cycles=5).plot()
-        >>> axes.get_xlabel(), axes.get_title()
+        >>> figure = rocking.pulses.sine(3.0, 2.0, cycles=5).plot()
+        >>> figure.axes[0].get_xlabel(), figure.get_suptitle()
         ('time (s)', 'sine')
         """
-        from rocking.plot.motion import motion_figure
+        from rocking.plot import motion_figure
 
         times = self.drawing_times(0.0, self.duration)
         return motion_figure(

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.style import ABOVE, GROUND, INK, REST, STYLE
+from rocking.plot.canvas import add_title, figure_for
+from rocking.plot.style import ABOVE, GROUND, INK, REST
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,11 +48,7 @@ def duration_figure(
     -------
     matplotlib.figure.Figure
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.2, 5.0), layout="constrained")
+    with figure_for(None, (5.2, 5.0)) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         for (name, values), style in zip(durations.items(), _CURVES, strict=False):
             upper.plot(amplitude, values, label=name, **style)
@@ -67,7 +64,7 @@ def duration_figure(
             )
         upper.set_ylim(0.0, 1.14)
         upper.set_ylabel(r"chattering time, $\tau_{ch}\,/\,(T/2)$")
-        upper.set_title(title, loc="left")
+        add_title(figure, None, title)
         upper.legend(loc="lower right", bbox_to_anchor=(0.84, 0.02))
         exact, *others = durations.values()
         moves = exact > 0.0
@@ -76,7 +73,7 @@ def duration_figure(
         lower.axvline(critical, color=INK, linewidth=0.6, linestyle=(0, (1, 2)))
         lower.set_ylabel("relative error")
         lower.set_xlabel(r"amplitude of the ground acceleration, $a = \ddot u_g / (g\alpha)$")
-        lower.grid(color=REST, linewidth=0.6)
+        lower.grid()
     return figure
 
 
@@ -94,12 +91,9 @@ def surface_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
     -------
     matplotlib.figure.Figure
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 3.3), layout="constrained")
+    with figure_for(None, (7.2, 3.3)) as figure:
         surface, error = figure.subplots(1, 2, sharex=True, sharey=True)
         levels = np.arange(1.01, 1.13, 0.01)
         lines = surface.contour(omega, eta, exact.T, levels=levels, colors=INK, linewidths=1.0)
@@ -129,7 +123,7 @@ def surface_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
     return figure
 
 
-def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: str) -> Figure:
+def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: str, ax: Axes | None = None) -> Figure:
     """Draw the critical amplitude against frequency by several methods, and its spread.
 
     Parameters
@@ -140,17 +134,15 @@ def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: st
         Critical amplitude by each method, the exact one first.
     title : str
         Title of the figure.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.2, 3.3), layout="constrained")
-        axes = figure.add_subplot()
+    with figure_for(ax, (5.2, 3.3)) as figure:
+        axes = ax or figure.add_subplot()
         exact = next(iter(critical.values()))
         low, high = float(exact.min()), float(exact.max())
         axes.axhspan(low, high, color=REST, linewidth=0.0)
@@ -166,7 +158,7 @@ def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: st
         _loosen(axes)
         axes.set_xlabel(r"frequency, $\omega = \omega_g / p$")
         axes.set_ylabel(r"critical amplitude, $a_{cr}$")
-        axes.set_title(title, loc="left")
+        add_title(figure, ax, title)
         axes.legend(loc="lower right")
     return figure
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from rocking.arrays import Floats
-from rocking.plot.style import ABOVE, GROUND, INK, STYLE
+from rocking.plot.canvas import add_title, figure_for
+from rocking.plot.style import ABOVE, GROUND, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,7 +41,7 @@ class Mark(NamedTuple):
 
 
 def excitation_figure(
-    *, time: Floats, acceleration: Floats, marks: tuple[Mark, ...], rest: float, title: str
+    *, time: Floats, acceleration: Floats, marks: tuple[Mark, ...], rest: float, title: str, ax: Axes | None = None
 ) -> Figure:
     """Draw a sine with the thresholds, its exceedances, the first two initiations and the time to the first rest.
 
@@ -54,17 +55,15 @@ def excitation_figure(
         Time of the first rest, over the period.
     title : str
         Title of the figure.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.0, 2.9), layout="constrained")
-        axes = figure.add_subplot()
+    with figure_for(ax, (7.0, 2.9)) as figure:
+        axes = ax or figure.add_subplot()
         _draw_excitation(axes, time, acceleration)
         _mark_initiations(axes, marks)
         first, second = (mark.time for mark in marks)
@@ -76,7 +75,7 @@ def excitation_figure(
         axes.plot([rest, rest], [-0.75, 0.1], color=ABOVE, linewidth=0.9, linestyle=(0, (4, 2)))
         axes.annotate("at rest", (rest, -0.75), xytext=(-3, 0), textcoords="offset points", ha="right", color=ABOVE)
         axes.set_xlim(time[0], time[-1])
-        axes.set_title(title, loc="left")
+        add_title(figure, ax, title)
         axes.set_xlabel("time over period, $t/T$")
         axes.legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.04))
     return figure
@@ -115,18 +114,15 @@ def history_figure(
     -------
     matplotlib.figure.Figure
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+    with figure_for(None, (7.0, 4.6)) as figure:
         response, excitation = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
         _draw_responses(response, time, rotations)
         response.set_xlim(time[0], time[-1])
         response.set_ylim(*(1e3 * limit for limit in limits))
         response.set_ylabel(r"rotation, $10^3\,\theta/\alpha$")
-        response.set_title(title, loc="left")
+        add_title(figure, None, title)
         highest = 1e3 * max(float(rotation.max()) for rotation in rotations.values())
         response.set_yticks([tick for tick in response.get_yticks() if 1e3 * limits[0] <= tick <= highest])
         response.plot([mark.time for mark in marks], [0.0] * len(marks), "^", **_MARK)

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Floats
-from rocking.plot.style import STYLE
+from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for
+from rocking.plot.style import INK
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: From harmless to the worst, each darker than the one before; the last stands out.
@@ -26,7 +28,9 @@ def outcome_figure(
     meanings: Sequence[str],
     x_label: str,
     y_label: str,
-    title: str,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] = (5.4, 4.2),
 ) -> Figure:
     """Draw which of up to six outcomes each point of a grid has.
 
@@ -40,6 +44,10 @@ def outcome_figure(
         What the outcomes 0, 1, ... mean, from the lightest colour to the darkest; the last stands out.
     x_label, y_label, title : str
         Texts.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw.
+    figsize : (float, float)
+        Width and height of a new figure, inches.
 
     Returns
     -------
@@ -54,15 +62,12 @@ def outcome_figure(
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
     ['stays', 'rocks']
     """
-    import matplotlib as mpl
     from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
     count = len(meanings)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.4, 4.2), layout="constrained")
-        axes = figure.add_subplot()
+    with figure_for(ax, figsize) as figure:
+        axes = ax or figure.add_subplot()
         axes.pcolormesh(
             x,
             y,
@@ -72,10 +77,9 @@ def outcome_figure(
             shading="nearest",
             rasterized=True,
         )
-        axes.set_xlabel(x_label)
-        axes.set_ylabel(y_label)
-        axes.set_title(title)
+        add_labels(axes, x_label, y_label)
+        add_title(figure, ax, title)
         present = sorted(set(np.unique(outcome).tolist()))
-        handles = [Patch(facecolor=_COLOURS[k], edgecolor="black", linewidth=0.5, label=meanings[k]) for k in present]
-        figure.legend(handles=handles, loc="outside lower center", ncols=3)
+        handles = [Patch(facecolor=_COLOURS[k], edgecolor=INK, linewidth=0.5, label=meanings[k]) for k in present]
+        add_legend(figure, ax, handles)
     return figure

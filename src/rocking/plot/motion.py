@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rocking.arrays import Floats
-from rocking.plot.style import GROUND, INK, STYLE
+from rocking.plot.canvas import add_labels, add_title, figure_for
+from rocking.plot.style import GROUND, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
-def motion_figure(*, time: Floats, acceleration_g: Floats, title: str, ax: Axes | None = None) -> Axes:
+def motion_figure(*, time: Floats, acceleration_g: Floats, title: str = "", ax: Axes | None = None) -> Figure:
     """Draw a ground acceleration over time.
 
     Parameters
@@ -21,25 +23,24 @@ def motion_figure(*, time: Floats, acceleration_g: Floats, title: str, ax: Axes 
     title : str
         Title of the axes.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; by default in a new figure, which no global state knows of.
+        Where to draw; by default in a new figure.
 
     Returns
     -------
-    matplotlib.axes.Axes
+    matplotlib.figure.Figure
 
     Examples
     --------
     >>> import numpy as np
-    >>> axes = motion_figure(time=np.array([0.0, 1.0]), acceleration_g=np.array([0.1, -0.2]), title="line")
-    >>> axes.get_ylabel(), axes.get_xlim()
-    ('ground acceleration (g)', (np.float64(0.0), np.float64(1.0)))
+    >>> figure = motion_figure(time=np.array([0.0, 1.0]), acceleration_g=np.array([0.1, -0.2]), title="line")
+    >>> figure.axes[0].get_xlabel(), figure.axes[0].get_xlim()
+    ('time (s)', (np.float64(0.0), np.float64(1.0)))
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        axes = Figure(figsize=(7.6, 2.4), layout="constrained").add_subplot() if ax is None else ax
+    with figure_for(ax, (7.0, 2.4)) as figure:
+        axes = ax or figure.add_subplot()
         axes.axhline(0.0, color=INK, linewidth=0.4)
         axes.plot(time, acceleration_g, color=GROUND, linewidth=0.8)
-        axes.set(xlabel="time (s)", ylabel="ground acceleration (g)", title=title, xlim=(time[0], time[-1]))
-    return axes
+        axes.set_xlim(time[0], time[-1])
+        add_labels(axes, "time (s)", "ground acceleration (g)")
+        add_title(figure, ax, title)
+    return figure

@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.style import ABOVE, GROUND, INK, REST, STYLE
+from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled
+from rocking.plot.style import ABOVE, GROUND, INK, REST
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Rotations beyond this multiple of the slenderness are cut: past it a block only falls.
+#: What rotations are drawn in.
+RotationUnits = Literal["slenderness", "rad", "deg"]
+
+#: Rotations beyond this multiple of the slenderness leave the frame: past it a block only falls.
 LARGEST_RATIO_SHOWN: Final = 2.0
+
+#: A figure at least so wide (inches) has room for the chattering sequence beside the histories.
+_WIDE: Final = 5.5
+
+_Y_LABELS: Final = {"slenderness": "rotation / slenderness", "rad": "rotation (rad)", "deg": "rotation (°)"}
 
 
 class DrawnSequence(NamedTuple):
@@ -26,10 +35,24 @@ class DrawnSequence(NamedTuple):
     rest_upper: float
 
 
+class _Scale(NamedTuple):
+    """From rotation (rad) to what is drawn: factors of the sides + and -."""
+
+    plus: float
+    minus: float
+
+    def of(self, rotation: Floats) -> Floats:
+        return np.where(rotation >= 0.0, rotation * self.plus, rotation * self.minus)
+
+    def back(self, drawn: Floats) -> Floats:
+        return np.where(drawn >= 0.0, drawn / self.plus, drawn / self.minus)
+
+
 def response_figure(
     *,
     time: Floats,
-    rotation_over_slenderness: Floats,
+    rotation: Floats,
+    slenderness: tuple[float, float],
     impact_times: Floats,
     rest_intervals: Floats,
     uplift_times: Floats,
@@ -37,36 +60,51 @@ def response_figure(
     motion_time: Floats,
     motion_acceleration_g: Floats,
     thresholds_g: tuple[float, float],
-    chattering: DrawnSequence | None,
-    title: str,
+    duration: float | None = None,
+    chattering: DrawnSequence | None = None,
+    units: RotationUnits = "slenderness",
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] = (7.0, 4.4),
 ) -> Figure:
-    """Draw a response above the ground motion that caused it.
+    r"""Draw a response above the ground motion that caused it.
 
     Parameters
     ----------
-    time, rotation_over_slenderness : ndarray, shape (n,)
-        Times (s) and signed rotation over slenderness; values beyond 2 are cut off by the axis.
+    time, rotation : ndarray, shape (n,)
+        Times (s) and signed rotation (rad), of the stretch to draw; beyond twice the slenderness the curve leaves the
+        frame.
+    slenderness : (float, float)
+        Angle at which the block stands on its edge, of side + and side -, rad.
     impact_times, uplift_times : ndarray
-        Times of the impacts and of the uplifts, s.
+        Times of the impacts and of the uplifts, s; those in the stretch are drawn.
     rest_intervals : ndarray, shape (k, 2)
         Start and end of each stretch at rest, s.
     overturn_time : float or None
         Time at which the block has fallen, s.
     motion_time, motion_acceleration_g : ndarray, shape (m,)
-        Times (s) and ground acceleration (g); both empty for free rocking.
-    thresholds_g : tuple of float
+        Times (s) and ground acceleration (g) of the stretch; both empty for free rocking, which has no panel of it.
+    thresholds_g : (float, float)
         Acceleration (g, a magnitude) that uplifts the block to side + and to side -; an acceleration
         of the opposite sign is needed, so the first is drawn below zero and the second above.
-    chattering : DrawnSequence or None
-        The sequence to zoom into: the interval to the next impact against the time to rest, both logarithmic.
-        There is no zoom where the time of rest is not bracketed (NaN) or the sequence has a single impact.
+    duration : float, optional
+        How long the whole response is, s; where the stretch is only a part of it, the figure says so.
+    chattering : DrawnSequence, optional
+        A sequence to show in a panel of its own: the interval to the next impact against the time to rest, both
+        logarithmic. There is none where the time of rest is not bracketed (NaN) or the sequence has a single impact.
+    units : {"slenderness", "rad", "deg"}
+        What rotations are drawn in: over the slenderness of their side, or as they are. Beside the first two stands an
+        axis in degrees.
     title : str
         Title of the figure.
+    ax : matplotlib.axes.Axes, optional
+        Draw the rotation here, without the other panels.
+    figsize : (float, float)
+        Width and height of a new figure, inches.
 
     Returns
     -------
     matplotlib.figure.Figure
-        A figure that no global state knows of; save it with ``figure.savefig(path)``.
 
     Examples
     --------
@@ -74,59 +112,97 @@ def response_figure(
     >>> from rocking.plot import response_figure
     >>> t = np.linspace(0.0, 2.0, 201)
     >>> figure = response_figure(
-    ...     time=t, rotation_over_slenderness=np.sin(t), impact_times=np.array([]),
+    ...     time=t, rotation=0.1 * np.sin(t), slenderness=(0.2, 0.2), impact_times=np.array([]),
     ...     rest_intervals=np.empty((0, 2)), uplift_times=np.array([0.0]), overturn_time=None,
-    ...     motion_time=t, motion_acceleration_g=-0.4 * np.cos(t), thresholds_g=(0.2, 0.2),
-    ...     chattering=None, title="A block")
+    ...     motion_time=t, motion_acceleration_g=-0.4 * np.cos(t), thresholds_g=(0.2, 0.2), title="A block")
     >>> [axes.get_ylabel() for axes in figure.axes]
-    ['rotation / slenderness', 'ground acceleration (g)']
+    ['rotation / slenderness', 'ground\nacceleration (g)']
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    zoom = chattering if chattering and _can_be_zoomed(chattering) else None
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 4.6), layout="constrained")
-        widths = (2.7, 1.0) if zoom else (1.0,)
-        grid = figure.add_gridspec(2, len(widths), height_ratios=(1.2, 1.0), width_ratios=widths)
-        rotation_axes = figure.add_subplot(grid[0, 0])
-        motion_axes = figure.add_subplot(grid[1, 0], sharex=rotation_axes)
-        figure.suptitle(title)
-
-        _shade_rest(rotation_axes, rest_intervals)
-        _draw_rotation(rotation_axes, time, rotation_over_slenderness)
-        _mark_events(rotation_axes, impact_times, uplift_times, overturn_time)
-        _draw_motion(motion_axes, motion_time, motion_acceleration_g, thresholds_g)
-        _limit_time(rotation_axes, time, motion_time)
-        if zoom:
-            _mark_sequence(rotation_axes, zoom)
-            _draw_sequence(figure.add_subplot(grid[:, 1]), zoom)
-        _add_legend(figure, rotation_axes, motion_axes)
+    shown = float(time[0]), float(time[-1])
+    scale = _scale(units, slenderness)
+    drawn = scale.of(rotation)
+    zoom = chattering if ax is None and chattering and _can_be_zoomed(chattering) else None
+    with figure_for(ax, figsize) as figure:
+        main, motion, sequence = _panels(figure, ax, shaken=motion_time.size > 0, zoomed=zoom is not None)
+        _shade_rest(main, np.clip(rest_intervals, *shown))
+        _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])))
+        _add_degrees(main, scale, units)
+        _mark_impacts(main, _within(impact_times, shown), _within(uplift_times, shown))
+        if overturn_time is not None:
+            _mark_overturning(main, time, drawn, overturn_time)
+        main.set_xlim(*shown)
+        if motion is not None:
+            _draw_motion(motion, motion_time, motion_acceleration_g, thresholds_g)
+            main.tick_params(labelbottom=False)
+            add_labels(motion, _time_label(shown, duration), "ground acceleration (g)")
+        add_labels(main, "" if motion else _time_label(shown, duration), _Y_LABELS[units])
+        if zoom and sequence is not None:
+            _mark_sequence(main, zoom)
+            _draw_sequence(sequence, zoom)
+        add_title(figure, ax, title)
+        add_legend(figure, ax, labelled(main, *([motion] if motion else [])))
     return figure
+
+
+def _panels(figure: Figure, ax: Axes | None, *, shaken: bool, zoomed: bool) -> tuple[Axes, Axes | None, Axes | None]:
+    """Panels of the rotation, of the motion, and of the chattering sequence: beside the others, or below them."""
+    if ax is not None:
+        return ax, None, None
+    histories = 2 if shaken else 1
+    beside = zoomed and figure.get_figwidth() >= _WIDE
+    below = zoomed and not beside
+    heights, widths = (1.3, 1.0, 1.0)[: histories + below], (3.0, 1.0)[: 1 + beside]
+    grid = figure.add_gridspec(len(heights), len(widths), height_ratios=heights, width_ratios=widths)
+    rotation = figure.add_subplot(grid[0, 0])
+    motion = figure.add_subplot(grid[1, 0], sharex=rotation) if shaken else None
+    sequence = figure.add_subplot(grid[:, 1] if beside else grid[-1, 0]) if zoomed else None
+    return rotation, motion, sequence
 
 
 def _can_be_zoomed(sequence: DrawnSequence) -> bool:
     return sequence.impact_times.size > 1 and math.isfinite(sequence.rest_upper - sequence.rest_lower)
 
 
+def _within(times: Floats, shown: tuple[float, float]) -> Floats:
+    return times[(times >= shown[0]) & (times <= shown[1])]
+
+
 def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
-    for number, (start, end) in enumerate(rest_intervals):
-        axes.axvspan(start, end, color=REST, linewidth=0.0, label="at rest" if number == 0 else None)
+    label = "at rest"
+    for start, end in rest_intervals[rest_intervals[:, 0] < rest_intervals[:, 1]]:
+        axes.axvspan(start, end, color=REST, linewidth=0.0, label=label)
+        label = ""
 
 
-def _draw_rotation(axes: Axes, time: Floats, ratio: Floats) -> None:
+def _scale(units: RotationUnits, slenderness: tuple[float, float]) -> _Scale:
+    if units == "slenderness":
+        return _Scale(1.0 / slenderness[0], 1.0 / slenderness[1])
+    factor = math.degrees(1.0) if units == "deg" else 1.0
+    return _Scale(factor, factor)
+
+
+def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats) -> None:
+    """Draw the rotation, in its units, and the angles, to side - and to side +, at which the block tips over."""
     axes.axhline(0.0, color=INK, linewidth=0.4)
-    axes.plot(time, ratio, color=INK, linewidth=0.9, label="rotation")
-    lowest = max(float(np.min(ratio, initial=0.0)), -LARGEST_RATIO_SHOWN)
-    highest = min(float(np.max(ratio, initial=0.0)), LARGEST_RATIO_SHOWN)
+    axes.plot(time, drawn, color=INK, linewidth=0.9, label="_rotation")
+    lowest = max(float(np.min(drawn, initial=0.0)), LARGEST_RATIO_SHOWN * float(tipping[0]))
+    highest = min(float(np.max(drawn, initial=0.0)), LARGEST_RATIO_SHOWN * float(tipping[1]))
     span = (highest - lowest) or 1.0
-    # Room below for the marks of the impacts and uplifts, above for the mark of the zoomed sequence.
-    axes.set_ylim(lowest - 0.28 * span, highest + 0.15 * span)
-    axes.set_ylabel("rotation / slenderness")
-    axes.tick_params(labelbottom=False)
+    # Room below for the marks of the impacts and uplifts.
+    low, high = axes.set_ylim(lowest - 0.28 * span, highest + 0.1 * span)
+    label = "tipping, θ = ±α"
+    for level in tipping[(tipping > low) & (tipping < high)]:
+        axes.axhline(level, color=ABOVE, linewidth=0.8, linestyle=(0, (6, 2, 1, 2)), label=label)
+        label = ""
 
 
-def _mark_events(axes: Axes, impact_times: Floats, uplift_times: Floats, overturn_time: float | None) -> None:
+def _add_degrees(axes: Axes, scale: _Scale, units: RotationUnits) -> None:
+    if units != "deg":
+        to_degrees = (lambda y: np.degrees(scale.back(y)), lambda y: scale.of(np.radians(y)))
+        axes.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
+
+
+def _mark_impacts(axes: Axes, impact_times: Floats, uplift_times: Floats) -> None:
     rug = axes.get_xaxis_transform()
     if impact_times.size:
         axes.plot(
@@ -150,27 +226,49 @@ def _mark_events(axes: Axes, impact_times: Floats, uplift_times: Floats, overtur
             transform=rug,
             label="uplift",
         )
-    if overturn_time is not None:
-        axes.axvline(
-            overturn_time,
-            color=ABOVE,
-            linewidth=1.1,
-            linestyle=(0, (1, 1)),
-            label=f"overturns, {overturn_time:.3f} s",
-        )
+
+
+def _mark_overturning(axes: Axes, time: Floats, drawn: Floats, overturn_time: float) -> None:
+    """Put an arrow where the curve leaves the frame for good, or at its end, and the time of the fall beside it."""
+    low, high = axes.get_ylim()
+    upwards = bool(drawn[-1] > 0.0)
+    last = int(np.flatnonzero((drawn >= low) & (drawn <= high))[-1])
+    at, level = float(time[last]), float(np.clip(drawn[-1], low, high))
+    axes.plot(at, level, "^" if upwards else "v", color=ABOVE, markersize=6, clip_on=False, label="_overturning")
+    left = at < 0.5 * (time[0] + time[-1])
+    axes.annotate(
+        f"overturned at {overturn_time:.3f} s",
+        # Above the marks of the impacts.
+        (at, 0.98 if upwards else 0.2),
+        xycoords=axes.get_xaxis_transform(),
+        xytext=(7 if left else -7, 0),
+        textcoords="offset points",
+        ha="left" if left else "right",
+        va="top" if upwards else "bottom",
+        color=ABOVE,
+    )
 
 
 def _draw_motion(axes: Axes, time: Floats, acceleration: Floats, thresholds: tuple[float, float]) -> None:
     plus, minus = thresholds
     axes.axhline(0.0, color=INK, linewidth=0.4)
-    axes.plot(time, acceleration, color=GROUND, linewidth=0.6, label="ground acceleration")
+    axes.plot(time, acceleration, color=GROUND, linewidth=0.6, label="_ground acceleration")
     above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
-    axes.fill_between(time, acceleration, minus, where=acceleration > minus, label="beyond a threshold", **above)
-    axes.fill_between(time, acceleration, -plus, where=acceleration < -plus, **above)
+    label = "beyond a threshold"
+    for threshold, beyond in ((minus, acceleration > minus), (-plus, acceleration < -plus)):
+        if np.any(beyond):
+            axes.fill_between(time, acceleration, threshold, where=beyond, label=label, **above)
+            label = ""
     axes.axhline(minus, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
     axes.axhline(-plus, color=INK, linewidth=0.8, linestyle=(0, (5, 2)))
-    axes.set_ylabel("ground acceleration (g)")
-    axes.set_xlabel("time (s)")
+
+
+def _time_label(shown: tuple[float, float], duration: float | None) -> str:
+    start, end = shown
+    if duration is None or (start <= 0.0 and end >= duration * (1.0 - 1e-9)):
+        return "time (s)"
+    digits = max(0, 1 - math.floor(math.log10(end - start)))
+    return f"time (s); shown: {start:.{digits}f}–{end:.{digits}f} s of {duration:.{digits}f} s"
 
 
 def _mark_sequence(axes: Axes, sequence: DrawnSequence) -> None:
@@ -205,25 +303,7 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
         markeredgewidth=0.6,
     )
     axes.invert_xaxis()
-    axes.set_xlabel("time to rest (s)")
-    axes.set_ylabel("interval to next impact (s)")
-    axes.grid(color=REST, linewidth=0.6)
-    axes.set_axisbelow(True)
+    add_labels(axes, "time to rest (s)", "interval to next impact (s)")
+    axes.grid()
     width = sequence.rest_upper - sequence.rest_lower
-    axes.set_title(f"A: at rest at {rest:.6f} s,\nbracket {width:.0e} s wide", color=ABOVE, loc="left")
-
-
-def _limit_time(axes: Axes, time: Floats, motion_time: Floats) -> None:
-    start = min(np.min(time), np.min(motion_time, initial=np.inf))
-    end = max(np.max(time), np.max(motion_time, initial=-np.inf))
-    axes.set_xlim(float(start), float(end))
-
-
-def _add_legend(figure: Figure, *panels: Axes) -> None:
-    """Put one legend for all panels below them, where it can cover no data."""
-    handles, labels = [], []
-    for panel in panels:
-        panel_handles, panel_labels = panel.get_legend_handles_labels()
-        handles += panel_handles
-        labels += panel_labels
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    axes.set_title(f"A: at rest at {rest:.6f} s, bracket {width:.0e} s wide", color=ABOVE, loc="left", wrap=True)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.style import ABOVE, GROUND, INK, STYLE
+from rocking.plot.canvas import figure_for
+from rocking.plot.style import ABOVE, GROUND, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,11 +46,7 @@ def chattering_figure(*, time: Floats, rotation: Floats, impact_times: Floats, r
     -------
     matplotlib.figure.Figure
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.0, 4.8), layout="constrained")
+    with figure_for(None, (7.0, 4.8)) as figure:
         grid = figure.add_gridspec(2, 2)
         whole, first, last = (figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1]))
         _draw_whole(whole, time, rotation, impact_times, rest)
@@ -133,11 +130,7 @@ def ratio_figure(panels: Sequence[Ratios]) -> Figure:
     >>> figure.axes[0].get_title(loc="left")
     '(a) a sequence'
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.0, 2.9), layout="constrained")
+    with figure_for(None, (7.0, 2.9)) as figure:
         for k, (panel, axes) in enumerate(zip(panels, figure.subplots(1, len(panels), squeeze=False)[0], strict=True)):
             n = np.arange(panel.values.size)
             for start, face, label in ((0, INK, "even $n$"), (1, "white", "odd $n$")):

@@ -3,54 +3,56 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
+from rocking.plot import RotationUnits
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rocking.response.response import Response
-
-#: What rotations are drawn in.
-RotationUnits = Literal["slenderness", "rad", "deg"]
-
-_LABELS: Final = {"slenderness": "rotation / slenderness", "rad": "rotation (rad)", "deg": "rotation (°)"}
 
 #: Even times of a line.
 _EVEN_TIMES: Final = 4001
 
 
-def figure(response: Response, units: RotationUnits, window: tuple[float, float] | None) -> Figure:
+def figure(
+    response: Response, units: RotationUnits, window: tuple[float, float] | None, chattering: bool, ax: Axes | None
+) -> Figure:
     """Draw the rotation over the ground motion, from the window's start to its end."""
     from rocking.plot import DrawnSequence, response_figure
 
-    checks.one_of(units, "units", InvalidOption, tuple(_LABELS))
+    checks.one_of(units, "units", InvalidOption, get_args(RotationUnits))
     start, end = active_span(response) if window is None else _checked(window, response.duration)
     times = drawing_times(response, start, end)
     motion, gravity = response.motion, response.block.gravity
     corners = np.empty(0) if motion is None else motion.drawing_times(start, end)
     plus, minus = (threshold / gravity for threshold in response.block.uplift_thresholds(response.model))
-    sequence = _longest_sequence(response, start, end)
-    drawn = response_figure(
+    alpha_plus, alpha_minus = (side.alpha for side in response.block.sides)
+    sequence = _longest_sequence(response, start, end) if chattering else None
+    return response_figure(
         time=times,
-        rotation_over_slenderness=_in_units(response, times, units),
-        impact_times=_within(response.impacts["time"], start, end),
-        rest_intervals=_clipped(response.rest_intervals, start, end),
-        uplift_times=_within(response.events["time"][response.events["kind"] == "uplift"], start, end),
+        rotation=response.rotation(times),
+        slenderness=(alpha_plus, alpha_minus),
+        impact_times=response.impacts["time"],
+        rest_intervals=response.rest_intervals,
+        uplift_times=response.events["time"][response.events["kind"] == "uplift"],
         overturn_time=response.overturn_time if response.overturned and response.overturn_time <= end else None,
         motion_time=corners,
         motion_acceleration_g=corners if motion is None else motion.acceleration(corners) / gravity,
         thresholds_g=(plus, minus),
+        duration=response.duration,
         chattering=None if sequence is None else DrawnSequence(*sequence),
+        units=units,
         title=f"{response.block.description} under {'no motion' if motion is None else motion.name}",
+        ax=ax,
     )
-    drawn.axes[0].set_ylabel(_LABELS[units])
-    return drawn
 
 
 def active_span(response: Response) -> tuple[float, float]:
@@ -78,14 +80,6 @@ def _checked(window: Sequence[float], duration: float) -> tuple[float, float]:
     return float(ends[0]), float(ends[1])
 
 
-def _in_units(response: Response, times: Floats, units: RotationUnits) -> Floats:
-    theta = response.rotation(times)
-    if units == "slenderness":
-        plus, minus = (side.alpha for side in response.block.sides)
-        return theta / np.where(theta >= 0.0, plus, minus)
-    return theta if units == "rad" else np.degrees(theta)
-
-
 def _longest_sequence(response: Response, start: float, end: float) -> tuple[Floats, float, float] | None:
     """Impact times of the chattering sequence with the most impacts in the stretch, and the bracket on its rest."""
     shown = response.chattering[(response.chattering["start"] >= start) & (response.chattering["end"] <= end)]
@@ -98,8 +92,3 @@ def _longest_sequence(response: Response, start: float, end: float) -> tuple[Flo
 
 def _within(times: Floats, start: float, end: float) -> Floats:
     return times[(times >= start) & (times <= end)]
-
-
-def _clipped(intervals: Floats, start: float, end: float) -> Floats:
-    clipped = np.clip(intervals, start, end)
-    return clipped[clipped[:, 1] > clipped[:, 0]]

@@ -18,6 +18,7 @@ from rocking.errors import InvalidOption
 from rocking.kernels import state, status
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
+from rocking.plot import RotationUnits
 from rocking.response import data, figure, summary
 from rocking.response.forces import Contact
 from rocking.response.history import History
@@ -28,6 +29,7 @@ from rocking.treatment.base import Model
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
@@ -388,22 +390,33 @@ class Response:
         """
         data.write_csv(self, path, table, dt)
 
-    def plot(self, *, units: figure.RotationUnits = "slenderness", window: tuple[float, float] | None = None) -> Figure:
-        """Figure of the rotation with impacts and rests, of the motion with thresholds, and of one chattering sequence.
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        units: RotationUnits = "slenderness",
+        window: tuple[float, float] | None = None,
+        chattering: bool = False,
+    ) -> Figure:
+        """Figure of the rotation with impacts and rests, and of the motion with thresholds.
 
         Parameters
         ----------
+        ax : matplotlib.axes.Axes, optional
+            Draw the rotation here, without the other panels.
         units : {"slenderness", "rad", "deg"}
             What rotations are drawn in: over the slenderness of their side, or as they are.
         window : (start, end), optional
             Stretch of time to draw, s; by default from a little before the first event to a little after the last.
+        chattering : bool
+            Whether to show the longest chattering sequence, impact by impact, in a panel of its own.
 
         Raises
         ------
         InvalidOption
             If there is no such unit, or the window is not a stretch of the response.
         """
-        return figure.figure(self, units, window)
+        return figure.figure(self, units, window, chattering, ax)
 
 
 def _pull(_: Floats, vertical: Floats) -> Floats:

@@ -330,28 +330,29 @@ class Fragility:
 
     def plot(self, ax: Axes | None = None, *, title: str = "") -> Figure:
         """Draw the curves with their bands and the shares that were seen, in a new figure or in `ax`."""
-        from rocking.plot.analysis import FragilityLine, fragility_figure
+        from rocking.plot import FragilityLine, fragility_figure
 
         intensity, scale = np.linspace(0.0, self.range[1], _POINTS), self.measure.scale
         lines = []
         for curve in self.curves:
-            at, seen = _shares_seen(curve)
+            at, seen, outcomes = _shares_seen(curve)
             text = f"{curve.limit_state}: median {scale * curve.median:.4g}, dispersion {curve.dispersion:.3g}"
             chance, band = curve.probability(intensity), curve.band(intensity)
-            lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen))
+            lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, outcomes))
         return fragility_figure(
             lines=lines,
             intensity_label=self.measure.label,
-            band_label=f"{100 * self.curves[0].confidence:g} % confidence ({self.band_kind})",
+            band_label=f"band: {100 * self.curves[0].confidence:g} % confidence ({self.band_kind})",
             title=title or self.description,
+            ax=ax,
         )
 
 
-def _shares_seen(curve: FragilityCurve) -> tuple[Floats, Floats]:
-    """Mean intensities and shares of the groups that the fit is tested in."""
+def _shares_seen(curve: FragilityCurve) -> tuple[Floats, Floats, Floats]:
+    """Mean intensities, shares and numbers of outcomes of the groups that the fit is tested in."""
     group = lognormal.groups(np.log(curve.intensity), curve.trials)
-    held = np.bincount(group, curve.trials)
-    return np.bincount(group, curve.trials * curve.intensity) / held, np.bincount(group, curve.exceeded) / held
+    held = np.bincount(group, curve.trials).astype(np.float64)
+    return np.bincount(group, curve.trials * curve.intensity) / held, np.bincount(group, curve.exceeded) / held, held
 
 
 def _log_medians(fits: Probit) -> Floats:

@@ -1,0 +1,181 @@
+"""The one way to make a figure: where it is drawn and who knows of it, its title and its legend."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import sys
+import textwrap
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+from rocking.plot.style import STYLE
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
+
+#: A number with more decimals than anybody reads.
+_LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
+
+#: The space between a number or a name and its unit: (m/s), s.
+_BEFORE_UNIT: Final = re.compile(r" (?=\(|s\b)")
+
+#: Hinted letters are wider at most resolutions, and in vector graphics, than at that of the moment.
+_FITTING: Final = 0.93
+
+#: Mean width of a letter over the size of its font. Longest line of a label over its axis, of which the layout
+#: will make the upright one shorter for title and legend; and the least number of letters in a line.
+_LETTER: Final = 0.52
+_X_LINE: Final = 1.0
+_Y_LINE: Final = 0.85
+_FEWEST_LETTERS: Final = 12
+
+#: Where titles begin, in widths of the figure.
+_TITLE_AT: Final = 0.02
+
+
+@contextmanager
+def figure_for(ax: Axes | None, figsize: tuple[float, float]) -> Iterator[Figure]:
+    """Yield the figure to draw in: that of `ax` where there is one, in its own style, else a new one in this package's.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes or None
+        Where the caller is asked to draw.
+    figsize : (float, float)
+        Width and height of a new figure, inches.
+
+    Notes
+    -----
+    A new figure is made through pyplot, so that `pyplot.show()` and `figure.show()` show it, if pyplot is loaded, in a
+    notebook, or where there is a display and nobody chose a backend without windows. Elsewhere no global state knows of
+    it, and it is forgotten with its last reference.
+    """
+    if ax is not None:
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        yield figure
+        return
+
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        figure = _new_figure(figsize)
+        yield figure
+        _make_ticks(figure)
+
+
+def add_title(figure: Figure, ax: Axes | None, title: str) -> None:
+    """Put a title above a figure of its own, broken into lines where the figure ends, or above the caller's axes."""
+    short = _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title)
+    if ax is not None:
+        ax.set_title(short, wrap=True)
+    elif short:
+        # From the figure's edge, not from that of axes: the lines do not depend on how the panels are laid out.
+        figure.suptitle(short, x=_TITLE_AT, ha="left", wrap=True)
+
+
+def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
+    """Name both axes, in lines about as long as they are."""
+    lengths = _X_LINE * axes.bbox.width, _Y_LINE * axes.bbox.height
+    for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
+        letter = _LETTER * axes.figure.dpi * float(axis.label.get_fontsize()) / 72.0
+        axis.set_label_text(_in_lines(label, max(_FEWEST_LETTERS, int(length / letter))))
+
+
+def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> None:
+    """Put the legend below all panels of a figure of its own, where it covers no data; else into the caller's axes."""
+    if not handles:
+        return
+    if ax is not None:
+        ax.legend(handles=handles)
+        return
+    below: dict[str, Any] = {"handles": handles, "loc": "outside lower center"}
+    for rows in range(1, len(handles) + 1):
+        legend = figure.legend(ncols=math.ceil(len(handles) / rows), **below)
+        if _fits(legend, figure):
+            return
+        legend.remove()
+    _break_lines(figure.legend(**below), figure)
+
+
+def labelled(*panels: Axes) -> list[Artist]:
+    """Collect the handles of all that has a label in these panels, each label once."""
+    named: dict[str, Artist] = {}
+    for panel in panels:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    return [*named.values()]
+
+
+def _in_lines(text: str, width: int) -> str:
+    """Break a text between words, but not before a unit."""
+    held = _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
+    return textwrap.fill(held, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def _new_figure(figsize: tuple[float, float]) -> Figure:
+    if not _is_shown():
+        from matplotlib.figure import Figure
+
+        return Figure(figsize=figsize, layout="constrained")
+    import matplotlib.pyplot as plt
+
+    figure = plt.figure(figsize=figsize, layout="constrained")
+    if "inline" in plt.get_backend():
+        # The cell shows the figure as its value; what pyplot still holds is shown once more after it.
+        plt.close(figure)
+    return figure
+
+
+def _is_shown() -> bool:
+    """Whether there is a pyplot that somebody may ask to show the figure."""
+    return "matplotlib.pyplot" in sys.modules or _in_notebook() or (_has_display() and _may_open_windows())
+
+
+def _in_notebook() -> bool:
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
+def _has_display() -> bool:
+    return sys.platform in ("darwin", "win32") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+
+
+def _may_open_windows() -> bool:
+    """Whether the backend, if one is chosen already, has windows."""
+    import matplotlib as mpl
+    from matplotlib.backends.registry import BackendFilter, backend_registry
+
+    chosen = mpl.get_backend(auto_select=False)
+    registry: Any = backend_registry
+    without: list[str] = registry.list_builtin(BackendFilter.NON_INTERACTIVE)
+    return chosen is None or chosen.lower() not in without
+
+
+def _make_ticks(figure: Figure) -> None:
+    """Make the first tick of every axis: it takes the style of the moment, and all later ones are made after it."""
+    for axes in (one for panel in figure.axes for one in (panel, *panel.child_axes)):
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.get_major_ticks(1)
+            axis.get_minor_ticks(1)
+
+
+def _fits(legend: Legend, figure: Figure) -> bool:
+    return legend.get_window_extent().width <= _FITTING * figure.bbox.width
+
+
+def _break_lines(legend: Legend, figure: Figure) -> None:
+    """Break the texts of a legend until it fits into its figure, or words would have to be broken."""
+    texts = legend.get_texts()
+    width = max(len(text.get_text()) for text in texts)
+    longest_word = max(len(word) for text in texts for word in text.get_text().split())
+    while width > longest_word and not _fits(legend, figure):
+        width -= 1
+        for text in texts:
+            text.set_text(textwrap.fill(" ".join(text.get_text().split()), width))

@@ -1,0 +1,102 @@
+"""Fragility curves: probability of exceeding a limit state against the intensity of the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from rocking.arrays import Floats
+from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled
+from rocking.plot.style import CURVES, GROUND
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+class FragilityLine(NamedTuple):
+    """A fitted curve with its confidence band, and the shares seen among outcomes of about one intensity.
+
+    seen_at, seen (groups,) : mean intensity of each group of outcomes, and the share of them that exceeds the limit
+    outcomes (groups,) : how many outcomes a group has
+    """
+
+    label: str
+    intensity: Floats
+    probability: Floats
+    lower: Floats
+    upper: Floats
+    seen_at: Floats
+    seen: Floats
+    outcomes: Floats
+
+
+def fragility_figure(
+    *,
+    lines: Sequence[FragilityLine],
+    intensity_label: str,
+    band_label: str,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] = (5.6, 4.2),
+) -> Figure:
+    """Draw fitted fragility curves with their confidence bands, and the shares that were seen.
+
+    Parameters
+    ----------
+    lines : sequence of FragilityLine
+        One for every limit state.
+    intensity_label, band_label : str
+        Texts; `band_label` says what the bands are.
+    title : str
+        Title of the figure.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw.
+    figsize : (float, float)
+        Width and height of a new figure, inches.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x = np.array([1.0, 2.0, 3.0])
+    >>> line = FragilityLine(
+    ...     "overturning", x, x / 4, x / 5, x / 3, np.array([2.0]), np.array([0.5]), np.array([12.0]))
+    >>> figure = fragility_figure(
+    ...     lines=[line], intensity_label="PGA", band_label="band: 90 % confidence", title="Fragile")
+    >>> [text.get_text() for text in figure.legends[0].get_texts()]
+    ['overturning', 'band: 90 % confidence', 'dot: share of 12 outcomes at about its intensity']
+    """
+    with figure_for(ax, figsize) as figure:
+        axes = ax or figure.add_subplot()
+        for k, line in enumerate(lines):
+            style = CURVES[k % len(CURVES)]
+            axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
+            axes.plot(line.intensity, line.probability, linewidth=1.5, label=line.label, **style)
+            # Every limit state has a mark of its own.
+            axes.plot(
+                line.seen_at,
+                line.seen,
+                "os^D"[k % 4],
+                color=style["color"],
+                markersize=4.0,
+                markerfacecolor="none",
+                clip_on=False,
+            )
+        axes.fill_between([], [], [], color=GROUND, alpha=0.4, linewidth=0.0, label=band_label)
+        axes.plot([], [], "o", color=GROUND, markersize=4.0, markerfacecolor="none", label=_dots(lines))
+        axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
+        axes.grid()
+        add_labels(axes, intensity_label, "probability")
+        add_title(figure, ax, title)
+        add_legend(figure, ax, labelled(axes))
+    return figure
+
+
+def _dots(lines: Sequence[FragilityLine]) -> str:
+    """Say what one dot pools."""
+    held = np.concatenate([line.outcomes for line in lines])
+    fewest, most = int(held.min()), int(held.max())
+    count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
+    return f"dot: share of {count} outcomes at about its intensity"

@@ -1,0 +1,204 @@
+"""Incremental dynamic analysis: motions scaled up, and the bands of levels that overturn the block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from rocking.arrays import Floats
+from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for
+from rocking.plot.style import ABOVE, CURVES, GROUND, INK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+#: Up to so many motions have a line style of their own; more are drawn alike, with the fractiles of their levels.
+_FEW: Final = len(CURVES)
+
+#: Shares of the motions that the fractiles are of.
+FRACTILES: Final = (0.16, 0.5, 0.84)
+
+#: Peak rotations at which the fractiles are taken.
+_POINTS: Final = 200
+
+#: The frame ends this many times above what stands.
+_HEADROOM: Final = 1.2
+
+_OWN: Final[dict[str, Any]] = {"linewidth": 1.1, "markersize": 5.0}
+_ALIKE: Final[dict[str, Any]] = {"linewidth": 0.6, "markersize": 3.0}
+_STRIP: Final[dict[str, Any]] = {"linewidth": 5.0, "solid_capstyle": "butt"}
+
+#: Marker that looks like a kinked curve.
+_KINK: Final = [(-4, -4), (2, -1), (0, 1), (4, 4)]
+
+
+class ScaledMotion(NamedTuple):
+    """One motion scaled up: levels, peak rotation over slenderness, and the bands (n, 2) of levels that overturn."""
+
+    label: str
+    levels: Floats
+    peak: Floats
+    bands: Floats
+
+
+def ida_figure(
+    *,
+    motions: Sequence[ScaledMotion],
+    level_label: str,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] = (7.0, 4.2),
+) -> Figure:
+    """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
+
+    Parameters
+    ----------
+    motions : sequence of ScaledMotion
+        One curve each; peaks are infinite where the block overturns. Up to four have a style of their own. More
+        are drawn alike, with the fractiles (16, 50, 84 %) of the lowest level at which each reaches a peak rotation.
+    level_label : str
+        Measure of intensity and its units.
+    title : str
+        Title of the figure.
+    ax : matplotlib.axes.Axes, optional
+        Draw the curves here, without the levels that overturn.
+    figsize : (float, float)
+        Width and height of a new figure, inches.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> motion = ScaledMotion("a", np.array([1.0, 2.0]), np.array([0.1, np.inf]), np.array([[1.5, 2.0]]))
+    >>> figure = ida_figure(motions=[motion], level_label="PGA (m/s^2)", title="Scaled up")
+    >>> [axes.get_xlabel() for axes in figure.axes]
+    ['peak rotation / slenderness', 'overturns']
+    """
+    few = len(motions) <= _FEW
+    styles = [*CURVES[: len(motions)]] if few else [{"color": GROUND, "linestyle": "-"}] * len(motions)
+    with figure_for(ax, figsize) as figure:
+        curves, *strips = figure.subplots(1, 2, sharey=True, width_ratios=(2.0, 1.0)).tolist() if ax is None else [ax]
+        for motion, style in zip(motions, styles, strict=True):
+            _draw_motion(curves, motion, style | (_OWN if few else _ALIKE))
+        if not few:
+            _draw_fractiles(curves, motions)
+        curves.set_xlim(left=0.0)
+        curves.set_ylim(0.0, _highest_shown(motions))
+        curves.grid()
+        add_labels(curves, "peak rotation / slenderness", level_label)
+        for panel in strips:
+            _draw_strips(panel, motions, styles if few else [{"color": INK}] * len(motions), named=not few)
+        add_title(figure, ax, title)
+        add_legend(figure, ax, _handles(motions if few else [], with_strips=ax is None))
+    return figure
+
+
+def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
+    """Lowest level at which a motion reaches each of these peak rotations; infinite where it never does.
+
+    Between two levels the peak is taken to change evenly; what no level below the lowest that overturns reaches is
+    reached there.
+    """
+    overturns = float(np.min(motion.bands[:, 0], initial=np.inf))
+    below = motion.levels < overturns
+    level, peak = motion.levels[below], motion.peak[below]
+    if not level.size:
+        return np.full(peaks.shape, overturns)
+    first = np.searchsorted(np.maximum.accumulate(peak), peaks)
+    after = np.minimum(first, level.size - 1)
+    before = np.maximum(after - 1, 0)
+    rise = np.where(after > before, peak[after] - peak[before], np.inf)
+    between = level[before] + (peaks - peak[before]) / rise * (level[after] - level[before])
+    return np.where(first < level.size, between, overturns)
+
+
+def _draw_motion(axes: Axes, motion: ScaledMotion, style: dict[str, Any]) -> None:
+    axes.plot(
+        np.where(np.isfinite(motion.peak), motion.peak, np.nan),
+        motion.levels,
+        marker=".",
+        markeredgewidth=0.0,
+        label=motion.label,
+        **style,
+    )
+
+
+def _draw_fractiles(axes: Axes, motions: Sequence[ScaledMotion]) -> None:
+    finite = np.concatenate([motion.peak[np.isfinite(motion.peak)] for motion in motions])
+    peaks = np.linspace(0.0, float(np.max(finite, initial=0.0)), _POINTS)[1:]
+    reached = np.sort([levels_reaching(motion, peaks) for motion in motions], axis=0)
+    for share in FRACTILES:
+        # The lowest level that is enough for this share of the motions.
+        level = reached[int(np.ceil(share * len(motions))) - 1]
+        shown = np.isfinite(level)
+        axes.plot(
+            peaks[shown],
+            level[shown],
+            color=ABOVE,
+            linewidth=1.8 if share == 0.5 else 1.1,
+            linestyle="-" if share == 0.5 else (0, (5, 1.5)),
+            label=f"{100 * share:g} %",
+        )
+        if shown.any():
+            # Where the curves lie close, each label still has a place of its own.
+            place, above = (0.6, True) if share == 0.5 else (1.0, share > 0.5)
+            at = int(place * (np.count_nonzero(shown) - 1))
+            axes.annotate(
+                "median" if share == 0.5 else f"{100 * share:g} %",
+                (peaks[shown][at], level[shown][at]),
+                xytext=(0, 2 if above else -2),
+                textcoords="offset points",
+                ha="right",
+                va="bottom" if above else "top",
+                color=ABOVE,
+                fontsize="small",
+            )
+
+
+def _highest_shown(motions: Sequence[ScaledMotion]) -> float:
+    """Return a level a little above the highest at which some motion leaves the block standing: all strips go on."""
+    stands = [motion.levels[np.isfinite(motion.peak)] for motion in motions]
+    last = max(float(motion.levels[-1]) for motion in motions)
+    return min(_HEADROOM * float(np.max(np.concatenate(stands), initial=0.0)) or last, last)
+
+
+def _draw_strips(axes: Axes, motions: Sequence[ScaledMotion], styles: Sequence[dict[str, Any]], *, named: bool) -> None:
+    for k, (motion, style) in enumerate(zip(motions, styles, strict=True)):
+        for low, high in motion.bands:
+            axes.plot([k, k], [low, high], color=style["color"], **_STRIP)
+    axes.set(xlabel="overturns", xlim=(-0.7, len(motions) - 0.3), xticks=[])
+    if named:
+        axes.set_xticks(range(len(motions)), [motion.label for motion in motions], rotation=90, fontsize="x-small")
+    axes.tick_params(axis="y", left=False, labelleft=False)
+    axes.grid(axis="y")
+
+
+def _handles(named: Sequence[ScaledMotion], *, with_strips: bool) -> list[Line2D]:
+    """Name the motions that have a style of their own, and say what else is drawn."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], linewidth=1.1, label=motion.label, **style) for motion, style in zip(named, CURVES, strict=False)
+    ] or [
+        Line2D([], [], color=GROUND, linewidth=0.6, label="each motion"),
+        Line2D([], [], color=ABOVE, linewidth=1.8, label="level that suffices for 16, 50, 84 % of them"),
+    ]
+    alone: dict[str, Any] = {"color": INK, "linestyle": ""}
+    handles += [
+        Line2D([], [], marker=".", markersize=5.0, label="dot: a level; none where it overturns", **alone),
+        Line2D(
+            [],
+            [],
+            marker=_KINK,
+            markersize=8.0,
+            markerfacecolor="none",
+            label="kink: another swing is the largest",
+            **alone,
+        ),
+    ]
+    if with_strips:
+        handles.append(Line2D([], [], color=INK, label="strip: levels that overturn", **_STRIP))
+    return handles

@@ -1,0 +1,139 @@
+"""A map of regions, such as what a pulse of any amplitude and frequency does to a block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from rocking.arrays import Floats
+from rocking.plot.boundaries import Stack, runs
+from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for
+from rocking.plot.style import INK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+#: Colour and hatch of regions in which the block stays, from lightest to darkest, and of those in which it overturns
+#: after 0, 1, ... impacts, from darkest to lightest: hatched, so that none is taken for one of the others in grey.
+_STAYS: Final = (("#ffffff", ""), ("#dde7f0", ""), ("#a9bfd6", ""))
+_OVERTURNS: Final = (
+    ("#7d2706", ""),
+    ("#d9692a", "////"),
+    ("#eda565", "\\\\\\\\"),
+    ("#f8cf9f", "xxxx"),
+    ("#fbe7cd", "...."),
+)
+
+#: Share of the frame below which nobody sees a region.
+_LEAST_SEEN: Final = 1e-4
+
+
+def regions_figure(
+    *,
+    x: Floats,
+    y_range: tuple[float, float],
+    edges: Sequence[Floats],
+    regions: Sequence[Sequence[int]],
+    names: Mapping[int, str],
+    x_label: str,
+    y_label: str,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] = (5.6, 4.6),
+) -> Figure:
+    """Draw regions between boundaries that are known at some abscissae.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Increasing abscissae.
+    y_range : (float, float)
+        Lowest and highest ordinate.
+    edges : sequence of ndarray
+        At each abscissa the ordinates of the boundaries, increasing.
+    regions : sequence of sequence of int
+        At each abscissa the regions below, between and above the boundaries; negative ones, from -3 on: the block
+        stays; the others: it overturns after so many impacts.
+    names : mapping of int to str
+        What the regions mean; those that can be seen are in the legend.
+    x_label, y_label, title : str
+        Texts.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw.
+    figsize : (float, float)
+        Width and height of a new figure, inches.
+
+    Notes
+    -----
+    A region that one abscissa has and the next one lacks ends in a tip half way between them: see
+    `rocking.plot.boundaries`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> figure = regions_figure(
+    ...     x=np.array([1.0, 2.0]), y_range=(0.0, 3.0), edges=[np.array([1.0]), np.array([2.0])],
+    ...     regions=[[-3, 0], [-3, 0]], names={-3: "stays", 0: "overturns"}, x_label="x", y_label="y", title="A map")
+    >>> [text.get_text() for text in figure.legends[0].get_texts()]
+    ['stays', 'overturns']
+    """
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    low, high = y_range
+    stacks = [Stack(np.array([low, *edge, high]), tuple(at)) for edge, at in zip(edges, regions, strict=True)]
+    polygons: dict[int, list[Floats]] = {}
+    lines: list[Floats] = []
+    for abscissae, levels, inside in runs(x, stacks):
+        curves = [np.column_stack([abscissae, level]) for level in levels]
+        for region, below, above in zip(inside, curves, curves[1:], strict=False):
+            polygons.setdefault(region, []).append(np.concatenate([below, above[::-1]]))
+        lines += curves[1:-1]
+    with figure_for(ax, figsize) as figure:
+        axes = ax or figure.add_subplot()
+        for region, corners in polygons.items():
+            colour, hatch = _look(region)
+            # An edge of the same colour closes the seams between polygons; a hatch takes the colour of its edge.
+            axes.add_collection(PolyCollection(corners, facecolors=colour, edgecolors=colour, linewidths=0.5))
+            if hatch:
+                shape = PolyCollection(corners, facecolors="none", edgecolors=INK, linewidths=0.0, hatch=hatch)
+                axes.add_collection(shape)
+        axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.5, capstyle="round", snap=False))
+        axes.set(xlim=(x[0], x[-1]), ylim=y_range)
+        add_labels(axes, x_label, y_label)
+        add_title(figure, ax, title)
+        add_legend(figure, ax, _patches(polygons, names, (x[-1] - x[0]) * (high - low)))
+    return figure
+
+
+def _look(region: int) -> tuple[str, str]:
+    return _STAYS[region + 3] if region < 0 else _OVERTURNS[min(region, len(_OVERTURNS) - 1)]
+
+
+def _patches(polygons: Mapping[int, Sequence[Floats]], names: Mapping[int, str], frame: float) -> list[Patch]:
+    """Make the handles of the legend for what can be seen; regions that look the same share one.
+
+    `frame` is the area of the whole.
+    """
+    from matplotlib.patches import Patch
+
+    looks: dict[tuple[str, str], list[int]] = {}
+    for region in sorted(polygons):
+        looks.setdefault(_look(region), []).append(region)
+    return [
+        Patch(facecolor=look[0], hatch=look[1], edgecolor=INK, linewidth=0.5, label=_name(alike, names))
+        for look, alike in looks.items()
+        if sum(_area(corners) for region in alike for corners in polygons[region]) > _LEAST_SEEN * frame
+    ]
+
+
+def _name(alike: Sequence[int], names: Mapping[int, str]) -> str:
+    return names[alike[0]] if len(alike) == 1 else f"overturns after {alike[0]} or more"
+
+
+def _area(corners: Floats) -> float:
+    x, y = corners.T
+    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))

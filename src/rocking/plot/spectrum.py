@@ -1,0 +1,177 @@
+"""A rocking spectrum: peak rotation against the size of the block, and the share of motions that overturn it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from rocking.arrays import Floats
+from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for
+from rocking.plot.style import CURVES, GROUND, INK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+#: Up to so many motions are named; of so few there is nothing to take fractiles of, either.
+_FEW: Final = 2
+
+#: So many curves leave room for all of their fractiles.
+_WITH_ALL_FRACTILES: Final = 2
+
+
+class SpectrumCurves(NamedTuple):
+    """Curves of one slenderness and restitution over the spectrum's abscissa; infinite where the block overturns.
+
+    singles (motions, points) : peak rotation over slenderness of every motion
+    fractiles (fractiles, points) : their fractiles, the middle one drawn thickest
+    overturned (points,) : share of the motions that overturn the block
+    """
+
+    label: str
+    singles: Floats
+    fractiles: Floats
+    overturned: Floats
+
+
+def spectrum_figure(
+    *,
+    x: Floats,
+    curves: Sequence[SpectrumCurves],
+    fractiles: Sequence[float],
+    motions: Sequence[str],
+    x_label: str,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] = (5.6, 4.8),
+) -> Figure:
+    r"""Draw peak rotations against the size of the block, and below them the share of motions that overturn it.
+
+    Parameters
+    ----------
+    x : ndarray, shape (points,)
+        Abscissa, drawn on a logarithmic axis.
+    curves : sequence of SpectrumCurves
+        At most four.
+    fractiles : sequence of float
+        What the fractiles are, in (0, 1). None of two motions or fewer is drawn, and only the middle one of three
+        curves or four.
+    motions : sequence of str
+        Names of the motions; two or fewer are told apart and named, more are counted.
+    x_label, title : str
+        Texts.
+    ax : matplotlib.axes.Axes, optional
+        Draw the peak rotations here, without the shares.
+    figsize : (float, float)
+        Width and height of a new figure, inches.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> peaks = np.array([[0.1, 0.4], [0.2, 0.5], [0.4, np.inf]])
+    >>> curves = [SpectrumCurves("tall", peaks, np.array([[0.2, 0.5]]), np.array([0.0, 1.0 / 3.0]))]
+    >>> figure = spectrum_figure(
+    ...     x=np.array([1.0, 2.0]), curves=curves, fractiles=[0.5], motions=["a", "b", "c"], x_label="p")
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['peak rotation / slenderness', 'share\noverturned']
+    >>> [text.get_text() for text in figure.legends[0].get_texts()]
+    ['tall', 'each of 3 motions', 'fractiles of all']
+    """
+    few = len(motions) <= _FEW
+    middle = min(fractiles, key=lambda share: abs(share - 0.5))
+    chosen = {share: k for k, share in enumerate(fractiles) if share == middle or len(curves) <= _WITH_ALL_FRACTILES}
+    with figure_for(ax, figsize) as figure:
+        panels = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0)).tolist() if ax is None else [ax]
+        peaks, *shares = panels
+        for style, curve in zip(CURVES, curves, strict=False):
+            if few:
+                _draw_named(peaks, x, curve, style)
+            else:
+                _draw_family(peaks, x, curve, chosen, style)
+            for panel in shares:
+                panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
+        for panel in panels:
+            panel.grid(which="both")
+        _scale_sizes(panels[-1])
+        peaks.set_ylim(bottom=0.0)
+        add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
+        for panel in shares:
+            panel.set_ylim(-0.03, 1.03)
+            add_labels(panel, x_label, "share overturned")
+        add_title(figure, ax, title)
+        add_legend(figure, ax, _handles(curves, motions))
+    return figure
+
+
+#: Widths of the lines of up to two motions.
+_WIDTHS: Final = (1.6, 0.7)
+
+
+def _draw_named(axes: Axes, x: Floats, curve: SpectrumCurves, style: dict[str, Any]) -> None:
+    for width, single in zip(_WIDTHS, curve.singles, strict=False):
+        axes.plot(x, _cut(single), linewidth=width, **style)
+
+
+def _draw_family(
+    axes: Axes, x: Floats, curve: SpectrumCurves, fractiles: Mapping[float, int], style: dict[str, Any]
+) -> None:
+    """Draw all motions thin, and the fractiles whose rows are given thicker."""
+    for single in curve.singles:
+        axes.plot(x, _cut(single), color=style["color"], linewidth=0.5, alpha=0.35)
+    for share, row in fractiles.items():
+        thick = share == min(fractiles, key=lambda one: abs(one - 0.5))
+        axes.plot(x, _cut(curve.fractiles[row]), linewidth=1.8 if thick else 0.9, **style)
+        _label_fractile(axes, x, curve.fractiles[row], share, style["color"])
+
+
+def _label_fractile(axes: Axes, x: Floats, fractile: Floats, share: float, colour: str) -> None:
+    """Name a fractile where its longest stretch begins: the smallest blocks, where fractiles are furthest apart."""
+    ends = np.flatnonzero(np.diff(np.isfinite(fractile), prepend=False, append=False))
+    if not ends.size:
+        return
+    starts, lengths = ends[::2], ends[1::2] - ends[::2]
+    top = starts[np.argmax(lengths)]
+    axes.annotate(
+        "median" if share == 0.5 else f"{100 * share:g} %",
+        (x[top], fractile[top]),
+        xytext=(0, 2),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        color=colour,
+        fontsize="small",
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.8},
+    )
+
+
+def _cut(values: Floats) -> Floats:
+    """Values with gaps where they are infinite."""
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _scale_sizes(axes: Axes) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str]) -> list[Line2D]:
+    from matplotlib.lines import Line2D
+
+    each = [
+        Line2D([], [], linewidth=1.4, label=curve.label, **style) for curve, style in zip(curves, CURVES, strict=False)
+    ]
+    if len(motions) <= _FEW:
+        named = zip(motions, _WIDTHS, strict=False)
+        return each + [Line2D([], [], color=INK, linewidth=width, label=name) for name, width in named]
+    return [
+        *each,
+        Line2D([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions"),
+        Line2D([], [], color=GROUND, linewidth=1.8, label="fractiles of all"),
+    ]

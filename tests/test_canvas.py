@@ -1,0 +1,102 @@
+"""Who knows of a figure: nobody where nobody can look at it, pyplot and notebooks where somebody can."""
+
+import os
+import subprocess
+import sys
+
+import nbformat
+import pytest
+from matplotlib.figure import Figure
+from nbclient import NotebookClient
+
+DRAW = """
+import sys
+import numpy as np
+from rocking.plot import regions_figure
+
+def draw(**options):
+    return regions_figure(
+        x=np.array([1.0, 2.0]), y_range=(0.0, 3.0), edges=[np.array([1.0]), np.array([2.0])],
+        regions=[[-3, 0], [-3, 0]], names={-3: "stays", 0: "overturns"}, x_label="x", y_label="y", **options)
+"""
+
+#: What a display and a backend are chosen by.
+CHOICES = ("DISPLAY", "WAYLAND_DISPLAY", "MPLBACKEND")
+
+
+def printed(script: str, **environment: str) -> str:
+    """Output of a fresh interpreter, with no display and no backend but those given."""
+    clean = {name: value for name, value in os.environ.items() if name not in CHOICES}
+    command = [sys.executable, "-W", "error", "-c", DRAW + script]
+    done = subprocess.run(command, env=clean | environment, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_a_script_without_a_display_loads_no_pyplot():
+    assert printed("draw(); print('matplotlib.pyplot' in sys.modules)") == "False"
+
+
+def test_pyplot_knows_the_figures_of_those_who_use_it():
+    script = "import matplotlib.pyplot as plt; figure = draw(); print(plt.get_fignums() == [figure.number])"
+    assert printed(script, MPLBACKEND="agg") == "True"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
+@pytest.mark.parametrize("name", ["DISPLAY", "WAYLAND_DISPLAY"])
+def test_pyplot_shows_figures_where_there_is_a_display_and_nobody_chose_a_backend_without_windows(name):
+    script = "draw(); print('matplotlib.pyplot' in sys.modules)"
+    assert printed(script, **{name: ":987"}) == "True"
+    assert printed(script, **{name: ":987"}, MPLBACKEND="agg") == "False"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
+def test_the_command_line_writes_its_figures_without_windows(tmp_path):
+    block = ["--half-width", "0.12", "--half-height", "0.55"]
+    command = ["simulate", "ridgecrest-clc-090", *block, "--out", str(tmp_path / "out")]
+    script = f"from rocking.cli import main; main({command}); print('matplotlib.pyplot' in sys.modules)"
+    assert printed(script, DISPLAY=":987").endswith("False")
+    assert [*tmp_path.glob("out/*.png")]
+
+
+def images(*cells: str) -> list[int]:
+    """Number of images that each cell of a notebook shows."""
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in (DRAW, *cells)])
+    NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
+    return [sum("image/png" in output.get("data", {}) for output in cell.outputs) for cell in notebook.cells[1:]]
+
+
+def test_a_notebook_shows_a_figure_once(monkeypatch):
+    for name in CHOICES:
+        monkeypatch.delenv(name, raising=False)
+    cells = ["draw()", "figure = draw()", "figure", "import matplotlib.pyplot as plt\ndraw(); draw()"]
+    assert images(*cells) == [1, 0, 1, 1]
+
+
+def drawn(**options) -> Figure:
+    scope: dict = {}
+    exec(DRAW, scope)
+    return scope["draw"](**options)
+
+
+def test_axes_of_the_caller_keep_their_figure_and_its_style():
+    figure = Figure()
+    ax = figure.subplots()
+    size = ax.xaxis.label.get_size()
+    assert drawn(ax=ax, title="A map") is figure
+    assert figure.axes == [ax]
+    assert not figure.legends
+    assert ax.get_title() == "A map"
+    assert ax.xaxis.label.get_size() == size
+    part = Figure().subfigures()
+    assert drawn(ax=part.subplots()) is part.figure
+
+
+def test_a_figure_keeps_its_style_when_it_is_drawn_later():
+    figure = drawn()
+    figure.draw_without_rendering()
+    assert {label.get_size() for label in figure.axes[0].get_xticklabels()} == {8.0}
+
+
+def test_a_title_has_no_more_digits_than_anybody_reads():
+    figure = drawn(title="alpha = 0.21481540040165858, e = 0.30000000000000004, 3.25 s, 1.23456789e-07")
+    assert figure.get_suptitle() == "alpha = 0.2148, e = 0.3, 3.25 s, 1.235e-07"

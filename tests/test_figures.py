@@ -1,0 +1,219 @@
+"""Figures of studies: what they show is explained, and no text leaves them at the widths that journals print."""
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from rocking.plot import (
+    DrawnSequence,
+    FragilityLine,
+    ScaledMotion,
+    SpectrumCurves,
+    fragility_figure,
+    ida_figure,
+    outcome_figure,
+    regions_figure,
+    response_figure,
+    spectrum_figure,
+)
+from rocking.plot.ida import levels_reaching
+
+COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
+LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"
+RECORDS = [f"some-earthquake-station-{k:02d}-090" for k in range(12)]
+
+
+def spectrum_of(count, curves=1, **options):
+    x = np.geomspace(0.3, 60.0, 25)
+    each = np.array([(1.0 + 0.3 * k) / (1.0 + x) for k in range(count)])
+    each[each > 1.0] = np.inf
+    fractiles = np.sort(each, axis=0)[[0, count // 2, -1]]
+    lines = [SpectrumCurves(f"α = {k}", each, fractiles, np.isinf(each).mean(axis=0)) for k in range(curves)]
+    chosen = {"fractiles": [0.16, 0.5, 0.84], "motions": RECORDS[:count], "x_label": "half diagonal R (m)"}
+    return spectrum_figure(x=x, curves=lines, **(chosen | options))
+
+
+def scaled(count):
+    levels = 1.05 ** np.arange(40)
+    peaks = [np.where(levels < 3.0 + 0.3 * k, 0.1 * levels, np.inf) for k in range(count)]
+    bands = [np.array([[3.0 + 0.3 * k, levels[-1]]]) for k in range(count)]
+    return [ScaledMotion(*each) for each in zip(RECORDS[:count], [levels] * count, peaks, bands, strict=True)]
+
+
+def ida_of(count, **options):
+    return ida_figure(motions=scaled(count), **({"level_label": "peak ground acceleration (m/s²)"} | options))
+
+
+def fragility_of(**options):
+    x = np.linspace(0.0, 8.0, 50)
+    p = x / 9.0
+    held = np.array([6.0, 7.0, 8.0])
+    line = FragilityLine("overturning: median 4.149", x, p, 0.8 * p, 1.1 * p, x[[9, 19, 29]], p[[9, 19, 29]], held)
+    texts = {"intensity_label": "peak ground acceleration (m/s²)", "band_label": "band: 90 % confidence (likelihood)"}
+    return fragility_figure(lines=[line, line._replace(label="half: median 3.6")], **(texts | options))
+
+
+def map_of(**options):
+    texts = {"x_label": "frequency of the pulse over p", "y_label": "amplitude over the smallest that lifts the block"}
+    return regions_figure(
+        x=np.array([0.4, 9.0]),
+        y_range=(0.5, 15.0),
+        edges=[np.arange(2.0, 14.0, 2.0)] * 2,
+        regions=[range(-3, 4)] * 2,
+        names={k: f"overturns after {k} impacts" for k in range(-3, 4)},
+        **(texts | options),
+    )
+
+
+def response_of(**options):
+    time = np.linspace(229.0, 241.0, 1201)
+    times = 239.0 - 2.5 * 0.8 ** np.arange(60)
+    arrays = {
+        "time": time,
+        "rotation": 0.25 * np.sin(4.0 * time),
+        "slenderness": (0.2, 0.2),
+        "impact_times": times,
+        "rest_intervals": np.array([[229.0, 230.0]]),
+        "uplift_times": np.array([230.0]),
+        "overturn_time": 241.0,
+        "motion_time": time,
+        "motion_acceleration_g": np.sin(9.0 * time),
+        "thresholds_g": (0.2, 0.2),
+        "duration": 319.0,
+        "chattering": DrawnSequence(times, 239.0 - 1e-9, 239.0),
+    }
+    return response_figure(**(arrays | options))
+
+
+def outcomes_of(**options):
+    return outcome_figure(
+        x=np.arange(3.0),
+        y=np.arange(3.0),
+        outcome=np.arange(9).reshape(3, 3) % 6,
+        meanings=[f"what becomes of the block, number {k}" for k in range(6)],
+        **(
+            {
+                "x_label": "amplitude of a lobe over that of the one before it, of which there are five unequal ones",
+                "y_label": "amplitude",
+            }
+            | options
+        ),
+    )
+
+
+FIGURES = {
+    "response": (response_of, 4.8),
+    "spectrum of two": (lambda **options: spectrum_of(2, 2, **options), 4.2),
+    "spectrum of twelve": (lambda **options: spectrum_of(12, 4, **options), 4.2),
+    "ida of two": (lambda **options: ida_of(2, **options), 4.2),
+    "ida of twelve": (lambda **options: ida_of(12, **options), 4.8),
+    "fragility": (fragility_of, 3.6),
+    "map": (map_of, 3.8),
+    "outcomes": (outcomes_of, 3.8),
+}
+
+
+def shown_boxes(figure):
+    """What is drawn of every text: all but ticks, of which those out of sight are there as well, and every axis."""
+    renderer = figure.canvas.get_renderer()
+    every = [axes for panel in figure.axes for axes in (panel, *panel.child_axes)]
+    axes_of_all = [axis for axes in every for axis in (axes.xaxis, axes.yaxis)]
+    ticks = {id(text) for axis in axes_of_all for text in axis.findobj(Text) if text is not axis.label}
+    for text in figure.findobj(Text):
+        if text.get_visible() and text.get_text() and id(text) not in ticks:
+            yield text.get_text(), text.get_window_extent(renderer)
+    for axis in axes_of_all:
+        if (box := axis.get_tightbbox(renderer)) is not None:
+            yield "an axis", box
+
+
+@pytest.mark.parametrize("dpi", [100.0, 200.0, 300.0])
+@pytest.mark.parametrize("width", [COLUMN, PAGE], ids=["column", "page"])
+@pytest.mark.parametrize("kind", FIGURES)
+def test_no_text_leaves_the_figure(kind, width, dpi):
+    draw, height = FIGURES[kind]
+    figure = draw(title=LONG, figsize=(width, height))
+    figure.set_dpi(dpi)
+    FigureCanvasAgg(figure).draw()
+    frame = figure.bbox
+    boxes = [*shown_boxes(figure)]
+    assert len(boxes) > 4
+    outside = [
+        text
+        for text, box in boxes
+        if box.x0 < frame.x0 - 0.5 or box.x1 > frame.x1 + 0.5 or box.y0 < frame.y0 - 0.5 or box.y1 > frame.y1 + 0.5
+    ]
+    assert not outside
+    assert not any("9318234567890123" in text for text, _ in boxes)
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+def test_axes_of_the_caller_take_the_main_panel(kind):
+    draw, _ = FIGURES[kind]
+    mine = Figure()
+    ax, other = mine.subplots(1, 2)
+    assert draw(ax=ax) is mine
+    assert mine.axes == [ax, other]
+    assert ax.get_xlabel()
+    assert not other.has_data()
+
+
+def entries(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_a_spectrum_of_two_motions_names_them_and_has_no_fractiles():
+    figure = spectrum_of(2)
+    assert len(figure.axes[0].lines) == 2
+    assert not figure.axes[0].texts
+    assert entries(figure) == ["α = 0", *RECORDS[:2]]
+
+
+def test_the_fractiles_of_a_spectrum_are_named_on_their_lines():
+    figure = spectrum_of(6)
+    labels = {text.get_text(): text.xy for text in figure.axes[0].texts}
+    assert list(labels) == ["16 %", "median", "84 %"]
+    lines = [[*zip(*line.get_data(), strict=True)] for line in figure.axes[0].lines[-3:]]
+    assert all(at in line for at, line in zip(labels.values(), lines, strict=True))
+    assert entries(figure)[1:] == ["each of 6 motions", "fractiles of all"]
+    assert [text.get_text() for text in spectrum_of(6, 3).axes[0].texts] == ["median"] * 3
+
+
+def test_few_scaled_motions_are_named_and_many_are_a_family_with_fractiles():
+    few, many = ida_of(4), ida_of(12)
+    assert entries(few)[:4] == RECORDS[:4]
+    assert len({line.get_color() for line in few.axes[0].lines}) == 4
+    assert entries(many)[0] == "each motion"
+    assert [text.get_text() for text in many.axes[0].texts] == ["16 %", "median", "84 %"]
+    assert [text.get_text() for text in many.axes[1].get_xticklabels()] == RECORDS
+    for figure in (few, many):
+        assert {text.partition(":")[0] for text in entries(figure)} >= {"dot", "kink", "strip"}
+
+
+def test_the_lowest_level_that_reaches_a_peak_is_on_the_curve_before_it_turns_back():
+    levels = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    peak = np.array([0.1, 0.3, 0.2, 0.6, np.inf])
+    motion = ScaledMotion("a", levels, peak, np.array([[4.5, 5.0]]))
+    reached = levels_reaching(motion, np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.7]))
+    np.testing.assert_allclose(reached, [1.0, 1.0, 1.5, 2.0, 3.5, 4.0, 4.5])
+    standing = motion._replace(peak=np.append(peak[:4], 0.65), bands=np.empty((0, 2)))
+    np.testing.assert_allclose(levels_reaching(standing, np.array([0.65, 0.7])), [5.0, np.inf])
+    always = motion._replace(bands=np.array([[1.0, 5.0]]))
+    np.testing.assert_allclose(levels_reaching(always, np.array([0.1, 0.9])), [1.0, 1.0])
+
+
+def test_the_frame_of_an_ida_ends_above_what_stands():
+    figure = ida_of(3)
+    stands = max(motion.levels[np.isfinite(motion.peak)].max() for motion in scaled(3))
+    assert stands < figure.axes[0].get_ylim()[1] < 1.3 * stands
+
+
+def test_dots_of_a_fragility_say_what_they_pool():
+    figure = fragility_of()
+    assert entries(figure)[-1] == "dot: share of 6 to 8 outcomes at about its intensity"
+    assert figure.axes[0].get_xlim() == pytest.approx((0.0, 8.0))
+    marks = [line for line in figure.axes[0].lines if line.get_marker() != "None" and len(line.get_xdata())]
+    np.testing.assert_allclose(marks[0].get_xdata(), np.linspace(0.0, 8.0, 50)[[9, 19, 29]])
+    assert len({mark.get_marker() for mark in marks}) == 2
