@@ -128,12 +128,13 @@ def _draw_family(
 
 
 def _label_fractile(axes: Axes, x: Floats, fractile: Floats, share: float, colour: str) -> None:
-    """Name a fractile where its longest stretch begins: the smallest blocks, where fractiles are furthest apart."""
+    """Name a fractile where its longest stretch ends: the smallest blocks, where fractiles are furthest apart."""
     ends = np.flatnonzero(np.diff(np.isfinite(fractile), prepend=False, append=False))
     if not ends.size:
         return
     starts, lengths = ends[::2], ends[1::2] - ends[::2]
-    top = starts[np.argmax(lengths)]
+    longest = np.argmax(lengths)
+    top = starts[longest] + lengths[longest] - 1
     axes.annotate(
         "median" if share == 0.5 else f"{100 * share:g} %",
         (x[top], fractile[top]),
