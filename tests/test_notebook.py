@@ -1,0 +1,55 @@
+"""The page of tasks in a notebook runs in one, and what should appear appears."""
+
+import re
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "howto" / "notebook.md"
+CELL = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+
+@pytest.fixture(scope="module")
+def cells(tmp_path_factory):
+    sources = [match[1].rstrip("\n") for match in CELL.finditer(PAGE.read_text("utf-8"))]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in sources])
+    folder = tmp_path_factory.mktemp("notebook")
+    with pytest.MonkeyPatch.context() as patched:
+        for name in ("DISPLAY", "WAYLAND_DISPLAY", "MPLBACKEND"):
+            patched.delenv(name, raising=False)
+        NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(folder)}}).execute()
+    return notebook.cells
+
+
+def test_there_are_twenty_tasks_and_more(cells):
+    assert len(cells) > 20
+
+
+def test_every_figure_appears_once(cells):
+    drawn = [cell for cell in cells if re.search(r"\.plot\(.*\)$", cell.source)]
+    assert len(drawn) >= 7
+    for cell in drawn:
+        images = [output for output in cell.outputs if "image/png" in output.get("data", {})]
+        assert len(images) == 1, cell.source
+
+
+@pytest.mark.parametrize("name", ["statue", "record", "response"])
+def test_what_is_named_at_the_end_of_a_cell_shows_a_picture(cells, name):
+    (cell,) = (one for one in cells if one.source.splitlines()[-1] == name)
+    (output,) = (one for one in cell.outputs if one.output_type == "execute_result")
+    assert "<svg" in output["data"]["text/html"]
+    assert len(output["data"]["text/plain"]) < 400
+
+
+def test_no_cell_warns_or_prints_to_stderr(cells):
+    for cell in cells:
+        assert not [output for output in cell.outputs if output.get("name") == "stderr"], cell.source
+
+
+def test_plain_text_of_every_result_is_short(cells):
+    for cell in cells:
+        for output in cell.outputs:
+            if output.output_type == "execute_result" and "simulate_many" not in cell.source:
+                assert len(output["data"]["text/plain"]) < 1500, cell.source
