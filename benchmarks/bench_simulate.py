@@ -1,4 +1,4 @@
-"""One response beside SciPy's, and a process from its start to its first response.
+"""One response beside SciPy's, and a process from its start to its first response, kernels compiled or not.
 
 Usage: python benchmarks/bench_simulate.py
 
@@ -6,8 +6,10 @@ The baseline (tests/oracles/scipy_events.py) is DOP853 restarted at each impact,
 of tolerances whose peak rotation, and that of the next tighter one, lies within 1e-6 of the response's.
 """
 
+import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -45,6 +47,7 @@ def main() -> None:
     for model, parameters in BLOCKS.items():
         print(compare(motion, samples, model, parameters))
     print(f"process to its first response  {1e3 * first_response():7.0f} ms")
+    print(f"the same, nothing compiled yet {1e3 * very_first_response():7.0f} ms")
     print(f"rocking --help                 {1e3 * command_help():7.0f} ms")
 
 
@@ -86,12 +89,19 @@ def first_response() -> float:
     return shortest(lambda: run([sys.executable, "-c", script]), 5)
 
 
+def very_first_response() -> float:
+    """Seconds of a new process from its start to its first response, with an empty cache."""
+    script = FIRST_RESPONSE.format(record=SHIPPED)
+    with tempfile.TemporaryDirectory() as cache:
+        return shortest(lambda: run([sys.executable, "-c", script], NUMBA_CACHE_DIR=cache), 1)
+
+
 def command_help() -> float:
     return shortest(lambda: run([str(Path(sys.executable).with_name("rocking")), "--help"]), 5)
 
 
-def run(command: list[str]) -> None:
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+def run(command: list[str], **environment: str) -> None:
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env={**os.environ, **environment})
 
 
 def shortest(action: Callable[[], object], repeats: int) -> float:

@@ -27,7 +27,8 @@ from rocking.kernels.ground import (
     local_series,
     start_of,
 )
-from rocking.kernels.remaining import Restoring, deviation, refined_bracket, remaining_time
+from rocking.kernels.remainder import deviation, refined_bracket
+from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.state import Floats, Record
 
 #: Window of the proof over the first estimate of the remaining time.

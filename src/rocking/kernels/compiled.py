@@ -11,6 +11,8 @@ from typing import TypeVar
 
 import numba
 
+from rocking.kernels.parts import KernelCompiler, part
+
 F = TypeVar("F", bound=Callable[..., object])
 
 _HERE = Path(__file__).parent
@@ -21,6 +23,11 @@ _HERE = Path(__file__).parent
 #   than a whole Taylor step) is switched off.
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
 
+# - forceinline is said of every function: numba hands an unsaid one down from the first caller, so that one inlined
+#   function would inline all that it calls, a march included.
+# - no_cfunc_wrapper: nobody calls a kernel from C.
+_KERNEL = {"forceinline": False, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
+
 
 def kernel(function: F) -> F:
     """Compile an entry point that Python calls: cached on disk, and free of Python's lock while it runs."""
@@ -28,31 +35,21 @@ def kernel(function: F) -> F:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder or "")
     try:
-        compiled: F = numba.njit(cache=folder is not None, nogil=True, **_OPTIONS)(function)
+        compiled: F = numba.njit(cache=folder is not None, nogil=True, **_KERNEL, **_OPTIONS)(function)
     finally:
         numba.config.CACHE_DIR = before
     return compiled
 
 
 def inlined(function: F) -> F:
-    """Compile a small part of a kernel, always inlined."""
-    compiled: F = numba.njit(forceinline=True, **_OPTIONS)(function)
-    return compiled
-
-
-def section(function: F) -> F:
-    """Paste a part of one kernel, or of one large function, into it before it is compiled.
-
-    For what has a name of its own but is used once: compiled by itself it would be optimised once more with all that it
-    calls, at every level of calls.
-    """
-    compiled: F = numba.njit(inline="always", **_OPTIONS)(function)
+    """Compile a part of a kernel that is small or called once, always inlined."""
+    compiled: F = part(function, forceinline=True, **_OPTIONS)
     return compiled
 
 
 def shared(function: F) -> F:
     """Compile a part that kernels call from several places, where inlining would only multiply code."""
-    compiled: F = numba.njit(**_OPTIONS)(function)
+    compiled: F = part(function, forceinline=False, **_OPTIONS)
     return compiled
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from rocking.kernels.arc import expand
 from rocking.kernels.certificate import unproven
-from rocking.kernels.compiled import kernel, section
+from rocking.kernels.compiled import inlined, kernel
 from rocking.kernels.ground import Ground, columns_of, last_piece, length_of, start_of
 from rocking.kernels.impact import Arrival, advance, strike
 from rocking.kernels.proven import pass_proven_impacts
@@ -56,7 +56,7 @@ def march(ground: Ground, block: Record, rules: Record, table: Records, scratch:
     return GOING
 
 
-@section
+@inlined
 def turn(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
     """One turn of a march: to the next uplift of a block at rest, or along an arc to its first event."""
     write_node(ground, rules, table, state)
@@ -74,7 +74,7 @@ def turn(ground: Ground, block: Record, rules: Record, table: Records, scratch: 
     return BALANCED if outcome == _STUCK else GOING
 
 
-@section
+@inlined
 def lift_off(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
     """Stay at rest until the motion passes a threshold; DONE when it never does, and the response is over."""
     found = next_uplift(ground, block, scratch, state.piece, state.offset, rules.stop)
@@ -96,7 +96,7 @@ def lift_off(ground: Ground, block: Record, rules: Record, table: Records, scrat
     return GOING
 
 
-@section
+@inlined
 def follow_arc(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record) -> int:
     """One Taylor step along the arc, or as much of it as its first event leaves."""
     left = time_left(ground, rules, state)
@@ -110,7 +110,7 @@ def follow_arc(ground: Ground, block: Record, rules: Record, scratch: Record, st
     return arrive(ground, rules, state, arrival, left)
 
 
-@section
+@inlined
 def long_step(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float) -> Arrival:
     """Step along the full series of the arc."""
     order, h, _ = expand(ground, block, rules, scratch, state, left)
@@ -122,7 +122,7 @@ def long_step(ground: Ground, block: Record, rules: Record, scratch: Record, sta
     return advance(state, scratch, order, h, block.fallen)
 
 
-@section
+@inlined
 def arrive(ground: Ground, rules: Record, state: Record, arrival: Arrival, left: float) -> int:
     """Take the state to the end of a step; returns what ended it."""
     if arrival.height > state.peak:
@@ -140,7 +140,7 @@ def arrive(ground: Ground, rules: Record, state: Record, arrival: Arrival, left:
     return arrival.outcome
 
 
-@section
+@inlined
 def pass_impact(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
     """Pass an impact, and come to rest where it is so decided; DONE when the march ends there."""
     settle(ground, state)
@@ -159,7 +159,7 @@ def pass_impact(ground: Ground, block: Record, rules: Record, table: Records, sc
     return come_to_rest(ground, rules, table, state, rest)
 
 
-@section
+@inlined
 def come_to_rest(ground: Ground, rules: Record, table: Records, state: Record, rest: Rest) -> int:
     """Close a sequence of impacts; DONE when the march stops before the block is at rest."""
     time = time_of(ground, state)
@@ -183,7 +183,7 @@ def come_to_rest(ground: Ground, rules: Record, table: Records, state: Record, r
     return GOING
 
 
-@section
+@inlined
 def fall(ground: Ground, block: Record, rules: Record, table: Records, state: Record) -> int:
     """End a march in overturning."""
     state.end = state.peak_time = time_of(ground, state)
@@ -193,7 +193,7 @@ def fall(ground: Ground, block: Record, rules: Record, table: Records, state: Re
     return FELL
 
 
-@section
+@inlined
 def stop(ground: Ground, rules: Record, table: Records, state: Record) -> int:
     """End a march where it was told to stop, in the middle of an arc."""
     state.end = rules.stop
@@ -201,21 +201,21 @@ def stop(ground: Ground, rules: Record, table: Records, state: Record) -> int:
     return DONE
 
 
-@section
+@inlined
 def time_left(ground: Ground, rules: Record, state: Record) -> float:
     """Time to the end of the piece, or of the response where that comes first."""
     until_stop = rules.stop - start_of(ground, state.piece) - state.offset
     return min(length_of(ground, state.piece) - state.offset, until_stop)
 
 
-@section
+@inlined
 def is_last(ground: Ground, rules: Record, state: Record) -> bool:
     """Whether the response ends within the piece."""
     until_stop = rules.stop - start_of(ground, state.piece) - state.offset
     return bool(until_stop <= length_of(ground, state.piece) - state.offset)
 
 
-@section
+@inlined
 def pass_time(state: Record, t: float) -> None:
     """Move on by t, and never by nothing, so that every march ends."""
     start = state.offset
@@ -224,7 +224,7 @@ def pass_time(state: Record, t: float) -> None:
         state.offset += ULP * start
 
 
-@section
+@inlined
 def enter_piece(ground: Ground, state: Record, over: bool) -> None:
     """After a step: the start of the next piece if this one is over, by the step's length or by rounding."""
     if over:
@@ -234,7 +234,7 @@ def enter_piece(ground: Ground, state: Record, over: bool) -> None:
         settle(ground, state)
 
 
-@section
+@inlined
 def settle(ground: Ground, state: Record) -> None:
     """Bring the offset inside its own piece."""
     while state.offset >= length_of(ground, state.piece):

@@ -1,0 +1,101 @@
+"""Parts of kernels: linked into the kernels that call them, and no kernels themselves."""
+
+import gc
+import math
+from collections.abc import Callable
+
+import pytest
+from numba import config
+
+from rocking.kernels import parts
+from rocking.kernels.compiled import inlined, kernel, shared
+
+pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
+
+Unary = Callable[[float], float]
+
+
+def chain(first: Callable[[Unary], Unary], second: Callable[[Unary], Unary]) -> tuple[Unary, Unary]:
+    """A part that calls another, and a kernel that calls the first."""
+
+    @second
+    def root(x: float) -> float:
+        return math.sqrt(x)
+
+    @first
+    def longer(x: float) -> float:
+        return 1.0 + root(x)
+
+    @kernel
+    def twice(x: float) -> float:
+        return 2.0 * longer(x)
+
+    return longer, twice
+
+
+@pytest.mark.parametrize("first", [inlined, shared])
+@pytest.mark.parametrize("second", [inlined, shared])
+def test_a_part_serves_kernels_and_python_in_any_order(
+    first: Callable[[Unary], Unary], second: Callable[[Unary], Unary]
+) -> None:
+    longer, twice = chain(first, second)
+    assert twice(9.0) == 8.0
+    assert longer(9.0) == 4.0
+    longer, twice = chain(first, second)
+    assert longer(9.0) == 4.0
+    assert twice(9.0) == 8.0
+
+
+def test_a_part_is_compiled_once_for_all_integers() -> None:
+    @shared
+    def plus(k: int, x: float) -> float:
+        return k + x
+
+    @kernel
+    def several(k: int, x: float) -> float:
+        return plus(1, x) + plus(2, x) + plus(k, x)
+
+    assert several(3, 0.5) == 7.5
+    assert len(plus.dispatcher.signatures) == 1
+
+
+def test_what_an_inlined_part_calls_is_not_inlined_for_that() -> None:
+    """numba hands a wish for inlining down from a caller to all that it calls."""
+
+    @shared
+    def inner(x: float) -> float:
+        return x + 1.0
+
+    @inlined
+    def outer(x: float) -> float:
+        return inner(x)
+
+    @kernel
+    def whole(x: float) -> float:
+        return outer(x)
+
+    assert whole(1.0) == 2.0
+    (compiled,) = inner.dispatcher.overloads.values()
+    assert not compiled.fndesc.inline
+    (compiled,) = outer.dispatcher.overloads.values()
+    assert compiled.fndesc.inline
+
+
+def test_parts_are_compiled_in_numbas_own_way_where_its_libraries_are_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parts, "_POSSIBLE", False)
+    longer, twice = chain(inlined, shared)
+    assert not isinstance(longer, parts.Part)
+    assert twice(9.0) == 8.0
+    assert longer(9.0) == 4.0
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_the_search_for_garbage_goes_on_as_it_was(collects: bool) -> None:
+    before = gc.isenabled()
+    try:
+        (gc.enable if collects else gc.disable)()
+        _, twice = chain(inlined, shared)
+        assert twice(9.0) == 8.0
+        assert gc.isenabled() == collects
+    finally:
+        (gc.enable if before else gc.disable)()
