@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
 
 import rocking
-from rocking.chattering import critical_amplitude, families
+from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.maps import chattering_map
 from rocking.chattering.paper import FIGURES, paper_figure
@@ -42,6 +43,15 @@ PULSES = {
 }
 FREQUENCIES = (1.0, 2.0, 4.0, 8.0)
 
+#: Frequencies and restitutions of the paper's Fig. 6.
+FIGURE_6 = np.linspace(0.5, 8.0, 76)[:, np.newaxis], np.linspace(0.5, 0.97, 48)
+
+#: Amplitude and frequency of the cases in which the paper's scheme is tried with each critical amplitude.
+SCHEME_CASES = ((1.03, 2.0), (1.0375, 2.0), (1.0386, 4.0), (1.05, 12.0))
+
+#: Amplitude and restitution of the cases above the critical amplitude, at omega = 2.
+LATER_CASES = ((1.03878, 0.92), (1.04049, 0.92), (1.05, 0.92), (1.09388, 0.75))
+
 
 def main() -> None:
     """Write all tables and images."""
@@ -61,6 +71,11 @@ def tables():
     made["schemes-record.txt"] = table_of_comparison(
         compare_schemes(STATUE, rocking.records.load("ridgecrest-clc-090"))
     )
+    made["paper-frequency.txt"] = frequency_table()
+    made["paper-excess.txt"] = excess_table()
+    made["paper-slow.txt"] = slow_table()
+    made["paper-later.txt"] = later_table()
+    made["paper-robust.txt"] = robust_table()
     made["critical-pulses.txt"] = pulses_table()
     made["episodes-records.txt"] = records_table()
     made["episodes-one.txt"] = episodes_table()
@@ -71,6 +86,91 @@ def paper_table(number):
     """Set what the paper states about a figure beside what is computed."""
     rows = [(s.claim, *s.cells()) for s in paper_figure(number).statements]
     return markdown(("", "paper", "here", "difference"), rows)
+
+
+def frequency_table():
+    """Chattering time over half a period at several frequencies, by Eqs 65 and 75 and exactly."""
+    omega = np.array([0.5, 1.0, 2.0, 5.0])
+    names = {"asymptotic": "Eq. 65", "semianalytical": "Eq. 75", "exact": "exact"}
+    times = {name: chattering_time(1.01, omega, 0.92, method=method) for method, name in names.items()}
+    rows = [(name, *(f"{value:.8f}" for value in times[name] * omega / math.pi)) for name in times]
+    return markdown(("tau_ch/(T/2)", *(f"omega = {value:g}" for value in omega)), rows)
+
+
+def excess_table():
+    """Spreads and errors as shares of the critical amplitude and of what it exceeds one by."""
+    omega, eta = FIGURE_6
+    exact = critical_amplitude(omega, eta)
+    lowest = exact.min(axis=0)
+    spread = exact.max(axis=0) - lowest
+    practical = eta >= 0.75
+    rows = [
+        shares("spread over omega, eta = 0.92", *spread_at(0.92)),
+        shares("spread over omega, eta from 0.75 on", spread[practical], lowest[practical]),
+    ]
+    for method in ("eq76", "eq77"):
+        error = np.abs(critical_amplitude(omega, eta, method=method) - exact)
+        rows.append(shares(f"error of Eq. {method[2:]}", error, exact))
+    return markdown(("", "largest, % of a_cr", "there, % of a_cr - 1", "largest, % of a_cr - 1"), rows)
+
+
+def spread_at(eta):
+    """Difference of the largest and the smallest critical amplitude over the frequencies, and the smallest."""
+    exact = critical_amplitude(FIGURE_6[0], eta)
+    return exact.max() - exact.min(), exact.min()
+
+
+def shares(what, difference, amplitude):
+    """One row: the largest share of the amplitude, the same as a share of its excess, and the largest of those."""
+    whole, excess = (np.ravel(100.0 * difference / base) for base in (amplitude, amplitude - 1.0))
+    worst = np.argmax(whole)
+    return (what, f"{whole[worst]:.2f}", f"{excess[worst]:.1f}", f"{excess.max():.1f}")
+
+
+def slow_table():
+    """Critical amplitude under slow forcing, and the bound that no restitution changes."""
+    omega = np.array([0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0])
+    rows = [
+        (f"{w:g}", *(f"{a:.6f}" for a in critical_amplitude(w, [0.92, 0.75, 0.5])), f"{math.hypot(1.0, w):.6f}")
+        for w in omega.tolist()
+    ]
+    return markdown(("omega", "eta = 0.92", "eta = 0.75", "eta = 0.5", "sqrt(1 + omega^2)"), rows)
+
+
+def later_table():
+    """Rests above the critical amplitude: within the paper's 2.5 periods and until the block is still, and under 12."""
+    rows = []
+    for a, eta in LATER_CASES:
+        block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=eta)
+        short, long, shifted = (
+            rests_in_periods(block, *case) for case in ((a, 2.5, None), (a, 12.0, 12.0), (a + 1e-6, 12.0, 12.0))
+        )
+        rows.append((f"{a:g}", f"{eta:g}", f"{critical_amplitude(2.0, eta):.5f}", short, long, shifted))
+    heading = ("a", "eta", "a_cr", "rests, T (2.5 cycles)", "first rests, T (12 cycles)", "the same at a + 1e-6")
+    return markdown(heading, rows)
+
+
+def rests_in_periods(block, a, cycles, until):
+    """Tell the first rests, in periods since the sine began; ``until``: how many periods are watched, None: all."""
+    case = families.sine(block, cycles=cycles, model="linear")(a, 2.0)
+    duration = None if until is None else until * math.pi
+    events = rocking.simulate(case.block, case.motion, model="linear", duration=duration).events
+    times = events["time"][events["kind"] == "rest"] / math.pi
+    return ", ".join(f"{time:.3f}" for time in times[:3]) or "none"
+
+
+def robust_table():
+    """Try the paper's scheme with each critical amplitude that it may trust."""
+    rows = []
+    for a, omega in SCHEME_CASES:
+        case = families.sine(PAPER_BLOCK, model="linear")(a, omega)
+        schemes = [rocking.AsymptoticTime(critical=name) for name in ("eq76", "eq77", "exact")]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", rocking.errors.OutsideFit)
+            outcomes = compare_schemes(case.block, case.motion, schemes=schemes, model="linear").outcomes
+        exact = float(critical_amplitude(omega, 0.92))
+        rows.append((f"{a:g}", f"{omega:g}", f"{exact:.5f}", *(outcome.verdict for outcome in outcomes)))
+    return markdown(("a", "omega", "a_cr", "with Eq. 76", "with Eq. 77", "with the exact a_cr"), rows)
 
 
 def schemes_table(a):

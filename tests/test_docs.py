@@ -43,6 +43,75 @@ def test_every_public_name_is_in_the_reference():
     assert set(rocking.__all__) - {"__version__"} <= names
 
 
+# The paper's equations and slips
+
+THEORY = ROOT / "docs" / "theory"
+CITATION = re.compile(r"\bEqs?\.? (\d+(?:(?:, (?:and |or )?| and | or | to )\d+)*)")
+
+
+def numbers(enumeration: str) -> set[int]:
+    """Read "6 to 9, 11 and 13"."""
+    found = set()
+    for part in re.split(r", (?:and |or )?| and | or ", enumeration):
+        first, _, last = part.partition(" to ")
+        found |= set(range(int(first), int(last or first) + 1))
+    return found
+
+
+def cited(text: str) -> set[int]:
+    return set().union(*(numbers(match[1]) for match in CITATION.finditer(text)))
+
+
+def equation_rows() -> list[tuple[set[int], set[int], str, str]]:
+    """Numbers of a row, those with a star, its page, and its remark."""
+    rows = []
+    for line in (THEORY / "equations.md").read_text("utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if cells[0][:1].isdigit():
+            starred = {int(number) for number in re.findall(r"(\d+)\*", cells[0])}
+            page = re.fullmatch(r"{doc}`([\w-]+)`", cells[1])
+            rows.append((numbers(cells[0].replace("*", "")), starred, page[1], cells[3]))
+    return rows
+
+
+def test_an_enumeration_of_equations_is_read():
+    assert cited("Eqs 6 to 8, 10 and 12; Eq. 20, where; (Eqs 57, 58, and 60)") == {6, 7, 8, 10, 12, 20, 57, 58, 60}
+    assert cited("{eq}`sine-eq65` and the paper's Fig. 5, 3") == set()
+
+
+def test_every_equation_of_the_paper_is_derived_on_the_page_that_is_named_or_not_needed():
+    rows = equation_rows()
+    assert sorted(number for row in rows for number in row[0]) == list(range(1, 78))
+    for found, _, page, _ in rows:
+        text = (THEORY / f"{page}.md").read_text("utf-8")
+        # What a page says that it covers is not yet covered.
+        derived = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("*Covers"))
+        assert found <= cited(derived), page
+
+
+def test_what_a_page_says_that_it_covers_is_on_it():
+    covered = {}
+    for page in THEORY.glob("*.md"):
+        text = page.read_text("utf-8")
+        for line in re.findall(r"^\*Covers .*$", text, re.MULTILINE):
+            covered[page.stem] = cited(line)
+            assert covered[page.stem] <= cited(text.replace(line, "")), page
+    assert set().union(*covered.values()) == set(range(1, 78))
+
+
+def test_the_equations_with_a_star_are_those_with_a_slip_and_every_slip_has_a_check():
+    _, *entries = re.split(r"^## ", (THEORY / "errata.md").read_text("utf-8"), flags=re.MULTILINE)
+    assert len(entries) > 20
+    for entry in entries:
+        assert EXAMPLE.search(entry), entry
+        assert "*Printed:*" in entry, entry
+        assert "*Right" in entry, entry
+    slips = set().union(*(cited(entry.splitlines()[0]) for entry in entries))
+    starred = set().union(*(row[1] for row in equation_rows()))
+    assert starred <= slips
+    assert slips - starred <= {44}
+
+
 def test_every_command_that_the_pages_name_exists():
     makefile = (ROOT / "Makefile").read_text("utf-8")
     targets = set(re.findall(r"^([a-z]+):", makefile, re.MULTILINE))
