@@ -20,7 +20,7 @@ from rocking.motion.formats.identification import Identification
 from rocking.motion.formats.request import Request
 from rocking.motion.formats.source import Line, Source
 from rocking.motion.formats.timing import even_step, first_fault
-from rocking.motion.formats.values import convert, not_a_number, parse
+from rocking.motion.formats.values import convert, not_a_number, parse, rows_of_numbers
 
 NAME = "text table"
 
@@ -135,7 +135,10 @@ def _delimiter(line: Line) -> tuple[bytes, str]:
 
 
 def _values(source: Source, shape: _Shape) -> Floats:
-    """Return all numbers, row by row."""
+    """Return all numbers, row by row: at once where there is nothing but rows, else one row after the other."""
+    plain = rows_of_numbers(source, shape.start, shape.columns, shape.translation, _ROW_LIMIT)
+    if plain is not None:
+        return plain
     parts = []
     for rows in _groups(_rows(source, shape), shape.columns):
         values = convert([token for row in rows for token in row.tokens])
