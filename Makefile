@@ -59,7 +59,7 @@ distclean: clean ## remove the environment, too
 
 # A stamp per set of packages: installing again is needed only when the versions or the project's table change.
 .venv/.base: EXTRAS :=
-.venv/.all: EXTRAS := [formats,test,lint,docs]
+.venv/.all: EXTRAS := [formats,excel,test,lint,docs]
 .venv/.base .venv/.all: pyproject.toml constraints.txt | .venv/bin/python
 	@echo "Installing rocking$(EXTRAS) into .venv (a few minutes the first time) ..."
 	@$(BIN)/python -m pip install --disable-pip-version-check -qq -c constraints.txt -e ".$(EXTRAS)"

@@ -1,6 +1,7 @@
 """Fixtures shared by all tests."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import hypothesis
@@ -15,6 +16,24 @@ if os.environ.get("CI"):
 os.environ["MPLBACKEND"] = "agg"
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run the command line: exit code, output, and errors but for the word that kernels are being compiled."""
+    from rocking.cli import main
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = 0
+        try:
+            main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        captured = capsys.readouterr()
+        said = [line for line in captured.err.splitlines(keepends=True) if "note: compiling" not in line]
+        return code, captured.out, "".join(said)
+
+    return call
 
 
 @pytest.fixture(scope="session")

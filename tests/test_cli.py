@@ -9,24 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rocking.cli import main
-
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
 RECORD = "el-centro-meloland-270"
-
-
-@pytest.fixture
-def run(capsys):
-    def call(*arguments):
-        code = 0
-        try:
-            main([str(argument) for argument in arguments])
-        except SystemExit as stop:
-            code = stop.code or 0
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
 
 
 def test_simulate_prints_a_verdict(run):
@@ -117,9 +101,9 @@ def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command)
         ([RECORD], "--half-width"),
         ([RECORD, "--half-width", "0.2"], "--half-height"),
         ([RECORD, *BLOCK, "--p", "2"], "either"),
-        ([RECORD, "--half-width", "0", "--half-height", "1"], "half_width"),
-        ([RECORD, "--half-width", "-1", "--half-height", "1"], "half_width"),
-        ([RECORD, "--half-width", "2", "--half-height", "1"], "restitution="),
+        ([RECORD, "--half-width", "0", "--half-height", "1"], "--half-width"),
+        ([RECORD, "--half-width", "-1", "--half-height", "1"], "--half-width"),
+        ([RECORD, "--half-width", "2", "--half-height", "1"], "give --restitution"),
         ([RECORD, *BLOCK, "--restitution", "1.5"], "restitution"),
         ([RECORD, *BLOCK, "--restitution", "high"], "--restitution"),
         ([RECORD, *BLOCK, "--model", "cubic"], "cubic"),
@@ -132,7 +116,8 @@ def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command)
         ([RECORD, *BLOCK, "--bogus"], "--bogus"),
         ([RECORD, *BLOCK, "--p"], "--p"),
         (["ridgecrest-clc-9", *BLOCK], "ridgecrest-clc-9"),
-        ([], "MOTION"),
+        ([], "a block needs"),
+        (BLOCK, "give one record or more"),
     ],
 )
 def test_a_mistake_is_one_line_and_exit_2(run, arguments, word):

@@ -7,25 +7,10 @@ import pytest
 
 import rocking
 from rocking import fragility, incremental_dynamic_analysis, overturning_map, rocking_spectrum
-from rocking.cli import main
 
 RECORD = "el-centro-meloland-270"
 OTHER = "el-centro-meloland-360"
 SIZES = ["--half-width", "0.12", "--half-height", "0.55"]
-
-
-@pytest.fixture
-def run(capsys):
-    def call(*arguments):
-        code = 0
-        try:
-            main([str(argument) for argument in arguments])
-        except SystemExit as stop:
-            code = stop.code or 0
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
 
 
 def test_spectrum_json_is_the_spectrum(run):

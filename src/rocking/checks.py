@@ -7,7 +7,7 @@ are not, though ``float`` takes them: "0.2" is more often a mistake than a wish.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral, Real
 from typing import Any, Final
 
@@ -85,6 +85,14 @@ def one_of(value: object, name: str, error: Error, choices: Sequence[str]) -> st
     if not isinstance(value, str) or value not in choices:
         raise error(f"{name} must be one of {', '.join(choices)}, not {_shown(value)}")
     return value
+
+
+def grid_size(sizes: Mapping[str, int], error: Error, most: int = 10_000_000) -> None:
+    """Raise `error` if the product of the sizes of a grid's axes, by name, is above `most`."""
+    points = math.prod(sizes.values())
+    if points > most:
+        axes = " x ".join(f"{size} {name}" for name, size in sizes.items())
+        raise error(f"{axes} make a grid of {points:,} points; at most {most:,} can be computed: take fewer")
 
 
 def numbers(values: ArrayLike, name: str, error: Error) -> Floats:

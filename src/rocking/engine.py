@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
+from rocking.compiling import announce
 from rocking.errors import Unfinished
 from rocking.kernels import state, status
 from rocking.kernels.ground import Ground
@@ -113,6 +114,7 @@ def simulate_tasks(
     What becomes of a block depends on the block and its motion alone, bit for bit, whatever shares its task. An
     interrupt leaves the rest undone.
     """
+    announce()
     if executor is not None:
         yield from _in_flight(setup, tasks, executor, _AHEAD * cores(), None)
         return

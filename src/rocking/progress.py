@@ -1,17 +1,52 @@
-"""A progress bar for work that takes long, drawn only where a person is watching."""
+"""What is said on stderr beside the result: a bar for work that takes long, and notes, each a line."""
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
+from collections.abc import Iterator
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     import rich.progress
 
 #: Work that is over sooner than this shows no bar, s.
 _PATIENCE = 1.0
+
+
+#: Who is told: a person at a terminal, everybody, nobody.
+Audience = Literal["terminal", "everybody", "nobody"]
+_audience: Audience = "terminal"
+
+
+def note(sentence: str) -> None:
+    """Say a sentence on stderr, on a line of its own, to whom `notes_for` has chosen.
+
+    Examples
+    --------
+    >>> note("nobody reads this where stderr is not a terminal")
+    """
+    if _audience == "everybody" or (_audience == "terminal" and sys.stderr.isatty()):
+        print(f"rocking: note: {' '.join(sentence.split())}", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def notes_for(audience: Audience) -> Iterator[None]:
+    """Choose who is told, while a command runs.
+
+    Examples
+    --------
+    >>> with notes_for("nobody"):
+    ...     note("not even a person at a terminal sees this")
+    """
+    global _audience
+    before, _audience = _audience, audience
+    try:
+        yield
+    finally:
+        _audience = before
 
 
 class Progress:
@@ -37,7 +72,7 @@ class Progress:
 
     def __init__(self, what: str, total: int, *, show: bool | None = None, done: int = 0) -> None:
         self._what, self._total = what, total
-        self._show = sys.stderr.isatty() if show is None else show
+        self._show = (_audience != "nobody" and sys.stderr.isatty()) if show is None else show
         self._start = time.monotonic()
         self._done = done
         self._bar: rich.progress.Progress | None = None

@@ -6,6 +6,7 @@ import math
 
 from rocking import checks
 from rocking.block import Block, Blocks, one_block
+from rocking.compiling import announce
 from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state, status
@@ -82,6 +83,7 @@ def simulate(
     >>> response.overturned, len(response.impacts) > 50, f"{response.events['time'][-1]:.6f}"
     (False, True, '4.235818')
     """
+    announce()
     how, blocks, motion = treatment(chattering), Blocks.of([one_block(block)]), one_motion(motion)
     rules = rules_of(blocks, model, how, duration, record=True)
     trail = Trail(

@@ -123,6 +123,7 @@ def overturning_map(
         checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption),
         checks.increasing_numbers(frequencies, "frequencies", InvalidOption),
     )
+    checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
     if all(side.restitution == 1.0 for side in block.sides):
         raise InvalidOption("a block with restitution 1 never comes to rest; an overturning map needs one below 1")

@@ -107,6 +107,8 @@ def rocking_spectrum(
     axes = {"p": rates, "alpha": checks.positive_numbers(alpha, "alpha", InvalidOption)}
     if restitution is not None:
         axes["restitution"] = checks.positive_numbers(restitution, "restitution", InvalidOption)
+    shaken = motions if isinstance(motions, Sequence) else [motions]
+    checks.grid_size({"motions": len(shaken)} | {name: len(axis) for name, axis in axes.items()}, InvalidOption)
     blocks = Blocks.grid(**axes, gravity=gravity)
     table = simulate_many(blocks, motions, model=model, chattering=chattering, threads=threads, progress=progress)
     require_finished(table.unfinished.values)

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from cyclopts import App, CycloptsError
 
 import rocking
-from rocking.errors import RockingError
+from rocking.cli import wording
+from rocking.errors import OutsideFit, RockingError
+from rocking.progress import note, notes_for
 
 app = App(
     name="rocking",
     help="Rocking, chattering, rest and overturning of free-standing rigid blocks under ground motion.",
     version=rocking.__version__,
+    version_flags=["--version", "-V"],
     result_action="return_value",
 )
 for _command, _help in {
-    "simulate": "Simulate one block under one record and say what happens to it.",
+    "simulate": "Simulate a block under a record, or under many, and say what happens to it.",
     "records": "List the shipped records, or show what a record file holds.",
     "chatter": "Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.",
     "critical": "Give the amplitude up to which chattering under a sine is complete, by every method.",
@@ -30,17 +36,21 @@ for _command, _help in {
     "calibrate": "Find the block behind observed outcomes, or behind a measured rotation history.",
 }.items():
     app.command(f"rocking.cli.{_command}:{_command}", name=_command, help=_help)
+app.register_install_completion_command(help="Install completion of commands and options for this shell.")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0 when done, 2 with one line on stderr for bad input, 130 when interrupted."""
     # Figures are written to files here, so no toolkit of windows need be started for them.
     os.environ.setdefault("MPLBACKEND", "agg")
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    _print_what_the_terminal_can_show()
     try:
-        app(arguments, exit_on_error=False, print_error=False)
+        _run(given)
         sys.stdout.flush()
     except (RockingError, CycloptsError) as error:
-        sys.exit(_refuse(error))
+        print(f"rocking: {wording.of(error, app, given)}", file=sys.stderr)
+        sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)
     except BrokenPipeError:
@@ -48,8 +58,33 @@ def main(arguments: Sequence[str] | None = None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _refuse(error: Exception) -> int:
-    hint = "; see rocking --help" if isinstance(error, CycloptsError) else ""
-    sentence = " ".join(str(error).split()).rstrip(".")
-    print(f"rocking: {sentence}{hint}", file=sys.stderr)
-    return 2
+def _run(arguments: list[str]) -> None:
+    wording.refuse_unknown_options(app, arguments)
+    command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
+    quiet = any(getattr(value, "quiet", False) for value in bound.arguments.values())
+    with notes_for("nobody" if quiet else "everybody"), _warnings_as_notes():
+        command(*bound.args, **bound.kwargs)
+
+
+def _print_what_the_terminal_can_show() -> None:
+    """Let characters that the locale cannot encode be question marks rather than errors."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+@contextlib.contextmanager
+def _warnings_as_notes() -> Iterator[None]:
+    """Turn the package's own warnings into notes."""
+
+    def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
+        if issubclass(category, OutsideFit):
+            note(str(message))
+        else:
+            shown(message, category, *place)
+
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+        warnings.simplefilter("always", OutsideFit)
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield

@@ -1,17 +1,12 @@
-"""What the commands with many simulations share: ranges of numbers, several records, and writing what came out."""
+"""What the commands share: whether there is one record, and delivering what came out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rocking.errors import InvalidOption, OutputError
-from rocking.motion.motion import Motion
-from rocking.motion.named import named_motion
+from rocking.errors import OutputError
 from rocking.result import Result
 from rocking.tables import to_json
 
@@ -19,33 +14,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def values(text: str, option: str) -> NDArray[np.float64]:
-    """Numbers from "1,2,5" or from "START:STOP:COUNT", with ":log" at the end for equal ratios."""
-    parts = text.split(":")
-    try:
-        if len(parts) == 1:
-            return np.array([float(part) for part in text.split(",")])
-        start, stop, count = float(parts[0]), float(parts[1]), int(parts[2])
-    except (ValueError, IndexError):
-        raise InvalidOption(
-            f"{option} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}"
-        ) from None
-    if len(parts) > 4 or (len(parts) == 4 and parts[3] != "log") or not 2 <= count <= 100_000:
-        raise InvalidOption(f"{option} takes a range as START:STOP:COUNT[:log], COUNT from 2 to 100000, not {text!r}")
-    if len(parts) == 3:
-        return np.linspace(start, stop, count)
-    if not (start > 0.0 and stop > 0.0):
-        raise InvalidOption(f"{option}: a range with :log needs positive ends, not {text!r}")
-    return np.geomspace(start, stop, count)
-
-
-def motions_from(
-    names: Sequence[str], *, channel: str | None, dt: float | None, units: str | None, scale: float = 1.0
-) -> list[Motion]:
-    """Motions of several record files or shipped records."""
-    if not names:
-        raise InvalidOption("give one record or more: files, or names of shipped records (see rocking records)")
-    return [named_motion(name, channel=channel, dt=dt, units=units, scale=scale) for name in names]
+def is_single(names: Sequence[str], records: Sized) -> bool:
+    """Whether one record is named by itself, and no folder or pattern that happens to hold one."""
+    return (
+        len(names) == len(records) == 1 and not any(sign in names[0] for sign in "*?[") and not Path(names[0]).is_dir()
+    )
 
 
 def write(folder: Path, stem: str, *, figure: Figure, result: Mapping[str, Any]) -> None:

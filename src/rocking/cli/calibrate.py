@@ -13,9 +13,10 @@ from rocking.analysis.calibration.history import HistoryCalibration, calibrate_h
 from rocking.analysis.calibration.outcomes import Calibration
 from rocking.analysis.calibration.outcomes import calibrate as run
 from rocking.analysis.calibration.tables import Outcomes, read
-from rocking.cli import batch, options
+from rocking.cli import batch
+from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledOptions
+from rocking.cli.quantities import Quantity, angle, number, sides
 from rocking.errors import InvalidOption
-from rocking.motion.named import named_motion
 from rocking.tables import text_table, to_json, write_text
 from rocking.treatment.base import Model
 
@@ -32,18 +33,16 @@ def calibrate(
     folds: int = 0,
     predict: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
     motion: str | None = None,
-    initial_rotation: float | None = None,
-    channel: str | None = None,
-    dt: float | None = None,
-    units: str | None = None,
+    initial_rotation: str | None = None,
     seed: int = 0,
-    out: Path | None = None,
-    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
+    file: Annotated[ScaledOptions, RECORDS] = ScaledOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Find the block behind observed outcomes (overturned or not), or behind a measured rotation history.
 
     DATA is a CSV table with a header. Outcomes: columns motion (a record file, or a shipped record) and overturned (1
     or 0), and where wanted scale, channel and group. A history: columns time_s and rotation_rad (or rotation_deg).
+    The records of --predict and --motion may be scaled. --out holds result.json and, of outcomes, ensemble.csv.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ def calibrate(
     p
         Lowest and highest thinkable frequency parameter, rad/s, with a comma between; for a history also a known value.
     alpha
-        Likewise the slenderness, rad.
+        Likewise the slenderness, as 5deg,20deg or 0.1,0.3 (rad).
     restitution
         Likewise the factor on the angular speed at an impact.
     two_sided
@@ -68,38 +67,35 @@ def calibrate(
     motion
         History: record of the base's motion; without it, the block was released and rocked freely.
     initial_rotation
-        History: rotation at time 0, rad; by default fitted in a release test, 0 under a motion.
-    channel
-        Channel of the records, by number or name, where there are several.
-    dt
-        Sampling step, s, of text files that do not give times.
-    units
-        Units of text files: g, m/s2, cm/s2, mm/s2.
+        History: rotation at time 0, 2deg or 0.03 (rad); by default fitted in a release test, 0 under a motion.
     seed
         The same seed gives the same result.
-    out
-        Folder for result.json and, of outcomes, ensemble.csv.
-    as_json
-        Print the result as JSON.
     """
-    folder = None if out is None else options.output_folder(out)
-    table = read(data, channel=channel, dt=dt, units=units)
-    ranges = {"p": p, "alpha": alpha, "restitution": restitution}
-    choices: dict[str, Any] = {name: _range(text, f"--{name}") for name, text in ranges.items() if text is not None}
-    choices |= {name: value for name, value in (("model", model), ("two_sided", two_sided)) if value is not None}
-    if isinstance(table, Outcomes):
-        _refuse("a history", motion=motion, initial_rotation=initial_rotation)
-        others = [named_motion(name, channel=channel, dt=dt, units=units) for name in predict]
-        found = run(table.motions, table.overturned, seed, candidates=candidates, **choices)
-        results = _outcomes_results(found, table, folds, dict(zip(predict, found.predict(others), strict=True)))
-    else:
-        _refuse("outcomes", predict=predict or None, folds=folds or None)
-        shaking = None if motion is None else named_motion(motion, channel=channel, dt=dt, units=units)
-        choices |= {"initial_rotation": initial_rotation, "seed": seed}
-        results = _history_results(calibrate_history(table.times, table.rotation, shaking, **choices))
-    if folder is not None:
-        _write(folder, results)
-    batch.show(results.numbers, results.text, as_json=as_json, folder=folder)
+    ranges = {
+        "p": None if p is None else _range(p, "--p", number),
+        "alpha": None if alpha is None else _range(alpha, "--alpha", angle),
+        "restitution": None if restitution is None else _range(restitution, "--restitution", number),
+    }
+    start = None if initial_rotation is None else angle(initial_rotation, "--initial-rotation")
+    given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
+    choices = {name: value for name, value in given.items() if value is not None}
+    with output.folder() as folder:
+        table = read(data, channel=file.channel, dt=file.dt, units=file.units)
+        if isinstance(table, Outcomes):
+            _refuse("a history", motion=motion, initial_rotation=initial_rotation)
+            others = [file.read(name) for name in predict]
+            found = run(table.motions, table.overturned, seed, candidates=candidates, **choices)
+            results = _outcomes_results(found, table, folds, dict(zip(predict, found.predict(others), strict=True)))
+        else:
+            _refuse("outcomes", predict=predict or None, folds=folds or None)
+            shaking = None if motion is None else file.read(motion)
+            history = calibrate_history(
+                table.times, table.rotation, shaking, **choices, initial_rotation=start, seed=seed
+            )
+            results = _history_results(history)
+        if folder is not None:
+            _write(folder, results)
+        batch.show(results.numbers, results.text, as_json=output.as_json, folder=folder)
 
 
 @dataclass(frozen=True)
@@ -115,9 +111,9 @@ def _refuse(belong_to: str, **given: object) -> None:
             raise InvalidOption(f"--{name.replace('_', '-')} is for {belong_to}; the columns of this table are not")
 
 
-def _range(text: str, option: str) -> float | tuple[float, ...]:
-    values = options.numbers(text, option)
-    return values if isinstance(values, float) else tuple(values)
+def _range(text: str, option: str, quantity: Quantity) -> float | tuple[float, ...]:
+    ends = sides(text, option, quantity)
+    return ends if isinstance(ends, float) else tuple(ends)
 
 
 def _outcomes_results(found: Calibration, table: Outcomes, folds: int, predicted: dict[str, np.float64]) -> _Results:

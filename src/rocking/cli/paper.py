@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 from rocking.chattering.paper import FIGURES, paper_figure
-from rocking.cli import options
+from rocking.cli.options import OUTPUT, QuietOptions, output_folder
 
 
-def paper(*, out: Path, figure: int | None = None) -> None:
+def paper(*, out: Path, figure: int | None = None, output: Annotated[QuietOptions, OUTPUT] = QuietOptions()) -> None:
     """Redraw the paper's figures from computation: PDF, PNG, the data as CSV, and what the paper states in numbers.
 
     Parameters
@@ -18,11 +19,11 @@ def paper(*, out: Path, figure: int | None = None) -> None:
     figure
         Number of one figure; all of them by default.
     """
-    folder = options.output_folder(out)
-    for number in FIGURES if figure is None else [figure]:
-        drawn = paper_figure(number)
-        print(f"Fig. {drawn.number}: {drawn.title}")
-        for statement in drawn.statements:
-            print(f"  {statement.claim}: {statement.shown()}")
-        for path in drawn.write(folder):
-            print(f"  {path}")
+    with output_folder(out) as folder:
+        for number in FIGURES if figure is None else [figure]:
+            drawn = paper_figure(number)
+            print(f"Fig. {drawn.number}: {drawn.title}")
+            for statement in drawn.statements:
+                print(f"  {statement.claim}: {statement.shown()}")
+            for path in drawn.write(folder):
+                print(f"  {path}")

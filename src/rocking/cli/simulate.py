@@ -1,108 +1,101 @@
-"""`rocking simulate`: one block under one record."""
+"""`rocking simulate`: one block under one record, or under many."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rocking.cli import options
-from rocking.errors import OutputError
-from rocking.motion.named import named_motion
+from rocking.analysis.survey import Survey, survey
+from rocking.cli import batch
+from rocking.cli.options import (
+    BLOCK,
+    MODEL,
+    OUTPUT,
+    RECORDS,
+    BlockOptions,
+    MotionOptions,
+    Names,
+    OutputOptions,
+    TreatmentOptions,
+)
+from rocking.cli.quantities import angle
+from rocking.errors import InvalidOption, OutputError
 from rocking.response import Response
 from rocking.simulation import simulate as run
 from rocking.tables import to_json, write_text
-from rocking.treatment import treatment
-from rocking.treatment.base import Model
+
+
+@dataclass(frozen=True)
+class _Start:
+    """How a simulation starts and ends."""
+
+    duration: Annotated[
+        float | None,
+        Parameter(help="Time to stop at, s; by default when the block is at rest after the motion, or has overturned."),
+    ] = None
+    initial_rotation: Annotated[str, Parameter(help="Rotation at the start, 2deg or 0.03 (rad).")] = "0"
+    initial_velocity: Annotated[float, Parameter(help="Angular velocity at the start, rad/s.")] = 0.0
 
 
 def simulate(
-    motion: str,
-    *,
-    half_width: float | None = None,
-    half_height: float | None = None,
-    p: str | None = None,
-    alpha: str | None = None,
-    restitution: str | None = None,
-    model: Model = "nonlinear",
-    channel: str | None = None,
-    dt: float | None = None,
-    units: str | None = None,
-    scale: float = 1.0,
-    chattering: str = "certified",
-    duration: float | None = None,
-    initial_rotation: float = 0.0,
-    initial_velocity: float = 0.0,
-    out: Path | None = None,
-    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
+    *names: Names,
+    each: Annotated[bool, Parameter(negative="")] = False,
+    start: Annotated[_Start, MODEL] = _Start(),
+    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
+    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
+    model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Simulate one block under one record and say what happens to it.
+    """Simulate one block under a record and say what happens to it; under several, with one line for each.
 
-    The block is a rectangle (--half-width, --half-height) or given by its parameters (--p, --alpha).
+    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Of one
+    record --out holds response.png, .pdf, .csv, .nc, events.csv and result.json; of several, summary.csv, summary.json
+    and (if openpyxl is installed) summary.xlsx.
 
     Parameters
     ----------
-    motion
-        Record file (its format is told from its content), or the name of a shipped record (see `rocking records`).
-    half_width
-        Half the width of a rectangular block, m.
-    half_height
-        Half its height, m.
-    p
-        Frequency parameter, rad/s; two numbers with a comma between are side + and side -.
-    alpha
-        Slenderness, rad; one number or two.
-    restitution
-        Factor on the angular speed at an impact, in (0, 1]; one number or two; Housner's by default.
-    model
-        Equation of motion.
-    channel
-        Channel of the record, by number or name, where there are several.
-    dt
-        Sampling step, s, of a text file that does not give times.
-    units
-        Units of a text file: g, m/s2, cm/s2, mm/s2.
-    scale
-        Factor on the motion.
-    chattering
-        certified, velocity, interval or time; certified=1e-9 (s), velocity=5e-10 (over p alpha), interval=1e-9 (s).
-    duration
-        Time to stop at, s; by default when the block is at rest after the motion, or has overturned.
-    initial_rotation
-        Rotation at the start, rad.
-    initial_velocity
-        Angular velocity at the start, rad/s.
-    out
-        Folder for response.png, .pdf, .csv, .nc, events.csv and result.json.
-    as_json
-        Print the result as JSON.
+    each
+        Of several records: write the files of each into a folder of its own below --out, too.
     """
-    block = options.block_from(half_width, half_height, p, alpha, restitution)
-    how = treatment(chattering)
-    folder = None if out is None else options.output_folder(out)
-    shaking = named_motion(motion, channel=channel, dt=dt, units=units, scale=scale)
-    response = run(
-        block,
-        shaking,
-        model=model,
-        chattering=how,
-        duration=duration,
-        initial_rotation=initial_rotation,
-        initial_velocity=initial_velocity,
-    )
+    body = block.block()
+    options: dict[str, Any] = {
+        **model.chosen(),
+        "duration": start.duration,
+        "initial_rotation": angle(start.initial_rotation, "--initial-rotation"),
+        "initial_velocity": start.initial_velocity,
+    }
+    if each and output.out is None:
+        raise InvalidOption("--each writes files; name the folder for them with --out")
+    with output.folder() as folder:
+        motions = motion.read_all(names)
+        if batch.is_single(names, motions):
+            (shaking,) = motions.values()
+            _deliver(run(body, shaking, **options), folder, as_json=output.as_json)
+        else:
+            _deliver_all(survey(body, motions, **options), folder, each=each, as_json=output.as_json)
+
+
+def _deliver(response: Response, folder: Path | None, *, as_json: bool) -> None:
     result = response.to_dict()
     if folder is not None:
-        write(response, result, folder)
-    if as_json:
-        print(to_json(result))
-    else:
-        print(response.summary())
-        if folder is not None:
-            print(f"\nwritten to {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+        _write(response, result, folder)
+    batch.show(result, response.summary(), as_json=as_json, folder=folder)
 
 
-def write(response: Response, result: dict[str, Any], folder: Path) -> None:
+def _deliver_all(found: Survey, folder: Path | None, *, each: bool, as_json: bool) -> None:
+    if folder is not None:
+        found.write(folder)
+    if folder is not None and each:
+        for name, response in zip(found.folders(), found.responses, strict=True):
+            (folder / name).mkdir(exist_ok=True)
+            _write(response, response.to_dict(), folder / name)
+    batch.show(found.to_dict(), found.summary(), as_json=as_json, folder=folder)
+
+
+def _write(response: Response, result: dict[str, Any], folder: Path) -> None:
     """Write figure, histories, events and result into a folder."""
     figure = response.plot()
     try:

@@ -2,47 +2,35 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import Annotated, Any
 
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
-from rocking.cli import batch, options
-from rocking.treatment import treatment
-from rocking.treatment.base import Model
-
-if TYPE_CHECKING:
-    pass
+from rocking.cli import batch
+from rocking.cli.options import MODEL, OUTPUT, RECORDS, MotionOptions, Names, OutputOptions, TreatmentOptions
+from rocking.cli.quantities import angle, values
 
 
 def spectrum(
-    *motions: str,
+    *names: Names,
     alpha: str,
     p: str | None = None,
     size: str | None = None,
     restitution: str | None = None,
     fractiles: str = "0.16,0.5,0.84",
-    model: Model = "nonlinear",
-    chattering: str = "certified",
     against: Abscissa = "p",
-    channel: str | None = None,
-    dt: float | None = None,
-    units: str | None = None,
-    scale: float = 1.0,
-    out: Path | None = None,
-    as_json: Annotated[bool, Parameter(name="--json", negative="")] = False,
+    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
+    model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.
 
-    Lists of numbers are 1,2,5 or START:STOP:COUNT, with :log at the end for equal ratios.
+    Lists of numbers are 1,2,5 or START:STOP:COUNT, with :log at the end for equal ratios. In the results, peaks are
+    null where the block overturns. --out holds spectrum.png, .pdf, .nc and result.json.
 
     Parameters
     ----------
-    motions
-        Record files, or names of shipped records (see `rocking records`).
     alpha
-        Slendernesses, rad.
+        Slendernesses, as 10deg,15deg or 0.1:0.3:5 (rad).
     p
         Frequency parameters, rad/s; or give --size.
     size
@@ -51,34 +39,17 @@ def spectrum(
         Restitutions; Housner's by default.
     fractiles
         Shares of the motions that stay below the fractile curves.
-    model
-        Equation of motion.
-    chattering
-        certified, velocity or interval; certified=1e-9 (s), velocity=5e-10 (over p alpha), interval=1e-9 (s).
     against
         Abscissa of the figure.
-    channel
-        Channel of the records, by number or name, where there are several.
-    dt
-        Sampling step, s, of text files that do not give times.
-    units
-        Units of text files: g, m/s2, cm/s2, mm/s2.
-    scale
-        Factor on the motions.
-    out
-        Folder for spectrum.png, .pdf, .nc and result.json.
-    as_json
-        Print the result as JSON; peaks are null where the block overturns.
     """
-    folder = None if out is None else options.output_folder(out)
-    found = rocking_spectrum(
-        batch.motions_from(motions, channel=channel, dt=dt, units=units, scale=scale),
-        alpha=batch.values(alpha, "--alpha"),
-        p=None if p is None else batch.values(p, "--p"),
-        size=None if size is None else batch.values(size, "--size"),
-        restitution=None if restitution is None else batch.values(restitution, "--restitution"),
-        fractiles=batch.values(fractiles, "--fractiles").tolist(),
-        model=model,
-        chattering=treatment(chattering),
-    )
-    batch.deliver(found, "spectrum", folder=folder, as_json=as_json, against=against)
+    with output.folder() as folder:
+        axes: dict[str, Any] = {
+            "alpha": values(alpha, "--alpha", angle),
+            "p": None if p is None else values(p, "--p"),
+            "size": None if size is None else values(size, "--size"),
+            "restitution": None if restitution is None else values(restitution, "--restitution"),
+        }
+        shares = values(fractiles, "--fractiles").tolist()
+        motions = list(motion.read_all(names).values())
+        found = rocking_spectrum(motions, **axes, fractiles=shares, **model.chosen())
+        batch.deliver(found, "spectrum", folder=folder, as_json=output.as_json, against=against)

@@ -1,11 +1,18 @@
-"""A motion by name: of a record file, or of a shipped record."""
+"""Motions by name: of record files, of shipped records, of whole folders."""
 
 from __future__ import annotations
 
+import glob
+import sys
+from collections.abc import Iterable
 from pathlib import Path
 
+from rocking.errors import UnreadableRecord
 from rocking.motion import formats, records
 from rocking.motion.motion import Motion
+
+#: The name of a record that is read from standard input.
+STANDARD_INPUT = "-"
 
 
 def named_motion(
@@ -21,7 +28,7 @@ def named_motion(
     Parameters
     ----------
     name : str
-        Path of a file, or name of a shipped record; where both exist, the file.
+        Path of a file, "-" for standard input, or name of a shipped record; where a file has that name too, the file.
     channel, dt, units
         As for `rocking.read`.
     scale : float
@@ -32,8 +39,62 @@ def named_motion(
     UnreadableRecord
         If there is neither, or the file cannot be read.
     """
-    if not Path(name).exists() and name in records.names():
+    if is_shipped(name):
         motion = records.load(name)
     else:
-        motion = formats.read(name, channel=channel, dt=dt, units=units)
+        file = sys.stdin.buffer if name == STANDARD_INPUT else name
+        motion = formats.read(file, channel=channel, dt=dt, units=units)
     return motion if scale == 1.0 else motion.scaled(scale)
+
+
+def is_shipped(name: str) -> bool:
+    """Whether a name is that of a shipped record, and not of a file.
+
+    Raises
+    ------
+    UnreadableRecord
+        If it is neither, but close to the name of a shipped record.
+    """
+    if name == STANDARD_INPUT or Path(name).exists():
+        return False
+    if name in records.names():
+        return True
+    close = records.closest(name)
+    if close is not None and not Path(name).suffix:
+        raise UnreadableRecord(f"{name}: there is no such file or shipped record; did you mean {close}?")
+    return False
+
+
+def expanded(names: Iterable[str]) -> list[str]:
+    """Return the names of records that files, folders, patterns and shipped records stand for, each once.
+
+    A folder stands for the files in it, by name, hidden ones left out; a pattern for the files that match it.
+
+    Raises
+    ------
+    UnreadableRecord
+        If a folder holds no file, or nothing matches a pattern.
+
+    Examples
+    --------
+    >>> expanded(["el-centro-meloland-270", "record.AT2", "record.AT2"])
+    ['el-centro-meloland-270', 'record.AT2']
+    """
+    found: dict[str, None] = {}
+    for name in names:
+        found.update(dict.fromkeys(_files(name)))
+    return list(found)
+
+
+def _files(name: str) -> list[str]:
+    if Path(name).is_dir():
+        files = sorted(str(path) for path in Path(name).iterdir() if path.is_file() and not path.name.startswith("."))
+        if not files:
+            raise UnreadableRecord(f"{name}: this folder holds no file; name one that holds records")
+        return files
+    if not glob.has_magic(name) or Path(name).exists():
+        return [name]
+    matching = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
+    if not matching:
+        raise UnreadableRecord(f"{name}: no file matches this pattern; check the folder and the pattern")
+    return matching

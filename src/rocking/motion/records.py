@@ -89,10 +89,22 @@ def info(name: str) -> Record:
     """
     catalogue = _catalogue()
     if name not in catalogue:
-        close = difflib.get_close_matches(str(name), catalogue, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(catalogue)}"
+        close = closest(name)
+        hint = f"did you mean {close!r}?" if close else f"there are {', '.join(catalogue)}"
         raise UnreadableRecord(f"no shipped record is named {name!r}: {hint}")
     return Record(name=name, **catalogue[name])
+
+
+def closest(name: str) -> str | None:
+    """Return the name of the shipped record that is most like `name`, or None if none is like it.
+
+    Examples
+    --------
+    >>> closest("ridgecrest-cls-090")
+    'ridgecrest-clc-090'
+    """
+    close = difflib.get_close_matches(str(name), _catalogue(), n=1)
+    return close[0] if close else None
 
 
 def load(name: str) -> Motion:

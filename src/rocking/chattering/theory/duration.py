@@ -24,6 +24,7 @@ from rocking.chattering.theory.parameters import (
     single,
 )
 from rocking.chattering.theory.series import series_times
+from rocking.compiling import announce
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED
 from rocking.kernels.sine.lanes import BLOCK, BLOCKS, LANES, Answers, rest_phases
@@ -112,6 +113,7 @@ def chattering_time(
     >>> round(float(chattering_time(1.01, 2.0, 0.92, method="asymptotic")), 6)
     0.573426
     """
+    announce()
     order = checked_count(order, "order", 1, 40)
     if resolved is not None:
         resolved = checked_count(resolved, "resolved", 1, 1_000_000)
@@ -211,6 +213,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     >>> bool(chattering.lower <= chattering.time <= chattering.upper)
     True
     """
+    announce()
     amplitude, frequency, restitution = _single_case(a, omega, eta)
     if checks.finite(tolerance, "tolerance", InvalidOption) < 1e-15:
         raise InvalidOption(f"tolerance must be at least 1e-15 and finite, not {tolerance!r}")

@@ -6,8 +6,9 @@ else is done to them: no filter, no baseline, no offset removed.
 
 from __future__ import annotations
 
+import difflib
 import os
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
 from rocking.errors import UnreadableRecord
 from rocking.motion.formats import at2, cosmos, csmip_v1, csmip_v2, esm, knet, smc, table, through_obspy
@@ -17,7 +18,7 @@ from rocking.motion.formats.request import Request
 from rocking.motion.formats.source import Source, open_source
 from rocking.motion.motion import Motion
 
-__all__ = ["Channel", "Identification", "channels", "identify", "read"]
+__all__ = ["Channel", "Identification", "channels", "content", "identify", "read"]
 
 
 class _Reader(Protocol):
@@ -34,7 +35,7 @@ _LISTED = 30
 
 
 def read(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | BinaryIO,
     *,
     channel: int | str | None = None,
     dt: float | None = None,
@@ -44,7 +45,7 @@ def read(
 
     Parameters
     ----------
-    path : str or path
+    path : str, path or binary file
         A file in PEER AT2, CSMIP V1 or V2, COSMOS, USGS SMC, K-NET/KiK-net or ESM format, a text table of one
         column (accelerations) or two (times, accelerations), or any file that ObsPy reads if the `formats` extra
         is installed. The format is told from the content.
@@ -79,8 +80,36 @@ def read(
     >>> motion.duration, motion.pga
     (0.02, 4.903325)
     """
-    source, reader, request = _prepare(path, dt, units)
+    request = Request.checked(dt, units)
+    source = open_source(path)
+    reader = _recognise(source)[0]
     return _choose(source, reader.read(source, request), channel).motion()
+
+
+def content(
+    path: str | os.PathLike[str] | BinaryIO,
+    *,
+    channel: int | str | None = None,
+    dt: float | None = None,
+    units: str | None = None,
+) -> tuple[Identification, tuple[Channel, ...]]:
+    """Return what format a file is taken for, and its acceleration channels, or the one that is named.
+
+    Parameters
+    ----------
+    path, channel, dt, units
+        As for `read`.
+
+    Raises
+    ------
+    UnreadableRecord, InvalidMotion
+        As for `read`.
+    """
+    request = Request.checked(dt, units)
+    source = open_source(path)
+    reader, identification = _recognise(source)
+    found = reader.read(source, request)
+    return identification, tuple(found if channel is None else [_choose(source, found, channel)])
 
 
 def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: str | None = None) -> tuple[Channel, ...]:
@@ -101,8 +130,7 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     UnreadableRecord, InvalidMotion
         As for `read`.
     """
-    source, reader, request = _prepare(path, dt, units)
-    return tuple(reader.read(source, request))
+    return content(path, dt=dt, units=units)[1]
 
 
 def identify(path: str | os.PathLike[str]) -> Identification:
@@ -123,12 +151,6 @@ def identify(path: str | os.PathLike[str]) -> Identification:
     Identification(format='text table', reason='from line 2 on each line holds one number')
     """
     return _recognise(open_source(path))[1]
-
-
-def _prepare(path: str | os.PathLike[str], dt: float | None, units: str | None) -> tuple[Source, _Reader, Request]:
-    request = Request.checked(dt, units)
-    source = open_source(path)
-    return source, _recognise(source)[0], request
 
 
 def _recognise(source: Source) -> tuple[_Reader, Identification]:
@@ -165,10 +187,16 @@ def _choose(source: Source, found: list[Channel], wanted: int | str | None) -> C
         raise source.error(f"the file holds {len(found)} channels; give channel= as one of {listed}")
     matching = found if wanted is None else _matching(found, wanted)
     if not matching:
-        raise source.error(f"there is no channel {wanted!r}; give one of {listed}")
+        raise source.error(f"there is no channel {wanted!r}; {_hint(found, wanted)}give one of {listed}")
     if len(matching) > 1:
         raise source.error(f"{len(matching)} channels are called {wanted!r}; give another name or number of {listed}")
     return matching[0]
+
+
+def _hint(found: list[Channel], wanted: int | str | None) -> str:
+    names = {channel.name.casefold(): channel.name for channel in found}
+    close = difflib.get_close_matches(str(wanted).casefold(), names, n=1)
+    return f"did you mean {names[close[0]]!r}? " if close else ""
 
 
 def _matching(found: list[Channel], wanted: int | str) -> list[Channel]:

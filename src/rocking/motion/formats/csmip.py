@@ -6,8 +6,9 @@ import itertools
 import re
 from typing import NamedTuple
 
+from rocking.motion.formats.aligned import Layout
 from rocking.motion.formats.source import Line, Source
-from rocking.motion.formats.values import Layout, bad_number, numeric_end
+from rocking.motion.formats.values import bad_number, numeric_end
 
 V1_TITLE = re.compile(r"^\s*uncorrected accelerogram", re.IGNORECASE)
 V2_TITLE = re.compile(r"^\s*corrected accelerogram", re.IGNORECASE)

@@ -11,13 +11,14 @@ import re
 
 from rocking.arrays import Floats
 from rocking.motion.formats import csmip
+from rocking.motion.formats.aligned import Layout
 from rocking.motion.formats.channel import Channel, to_acceleration
 from rocking.motion.formats.identification import Identification
 from rocking.motion.formats.request import Request
 from rocking.motion.formats.source import Line, Source
 from rocking.motion.formats.timing import even_step, first_fault
 from rocking.motion.formats.units import Unit, find_unit
-from rocking.motion.formats.values import Layout, expect, numeric_end, parse, read_values
+from rocking.motion.formats.values import expect, numeric_end, parse, read_values
 
 NAME = "CSMIP V1"
 

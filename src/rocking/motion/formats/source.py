@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import re
 import stat
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, BinaryIO
 
 from rocking.errors import UnreadableRecord
 
@@ -15,6 +17,12 @@ SIZE_LIMIT = 512 * 2**20
 
 #: Header lines are decoded up to this length, so that a file without line ends costs no more than any other.
 LINE_LIMIT = 512
+
+#: What a file that is already open is called in messages.
+_STREAM = "standard input"
+
+#: How alike the names of two files must be for the one to be a slip of the other.
+_ALIKE = 0.8
 
 _UTF8_MARK = b"\xef\xbb\xbf"
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
@@ -98,30 +106,44 @@ class Source:
         return UnreadableRecord(f"{self.path}, line {self.line_number(at)}: {message}")
 
 
-def open_source(path: str | os.PathLike[str]) -> Source:
-    """Read a file whole.
+def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
+    """Read a file whole, or what is left of one that is open.
 
     Raises
     ------
     UnreadableRecord
         If it is missing, not a regular file, not readable, empty or larger than SIZE_LIMIT.
     """
-    name = _name(path)
+    read = getattr(path, "read", None)
+    name = _name(path) if read is None else _STREAM
     try:
-        raw = _content(name)
+        raw = _content(name) if read is None else read(SIZE_LIMIT + 1)
     except FileNotFoundError as error:
-        raise UnreadableRecord(f"{name}: there is no such file; check the name and the folder") from error
+        raise UnreadableRecord(f"{name}: there is no such file; {_hint(name)}") from error
     except PermissionError as error:
         raise UnreadableRecord(f"{name}: this file may not be read; ask for permission to read it") from error
     except (OSError, ValueError) as error:
         raise UnreadableRecord(f"{name}: this file could not be read ({error}); check the name and the disk") from error
+    if len(raw) > SIZE_LIMIT:
+        limit = SIZE_LIMIT // 2**20
+        raise UnreadableRecord(f"{name}: this file is larger than {limit} MiB; cut the record into smaller files")
     data = _text(raw)
     if not data.strip():
         raise UnreadableRecord(f"{name}: this file is empty; get the record again")
     return Source(name, raw, data)
 
 
-def _name(path: str | os.PathLike[str]) -> str:
+def _hint(name: str) -> str:
+    """Return what may be meant by the name of a file that does not exist."""
+    try:
+        beside = [path.name for path in Path(name).parent.iterdir()]
+    except (OSError, ValueError):
+        beside = []
+    close = difflib.get_close_matches(Path(name).name, beside, n=1, cutoff=_ALIKE)
+    return f"did you mean {Path(name).with_name(close[0])}?" if close else "check the name and the folder"
+
+
+def _name(path: Any) -> str:
     try:
         return os.fsdecode(path)
     except TypeError as error:
@@ -139,9 +161,6 @@ def _content(name: str) -> bytes:
         raw = file.read(min(status.st_size, SIZE_LIMIT) + 1)
         if len(raw) > status.st_size:
             raw += file.read(SIZE_LIMIT + 1 - len(raw))
-    if len(raw) > SIZE_LIMIT:
-        limit = SIZE_LIMIT // 2**20
-        raise UnreadableRecord(f"{name}: this file is larger than {limit} MiB; cut the record into smaller files")
     return raw
 
 

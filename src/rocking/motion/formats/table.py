@@ -20,7 +20,8 @@ from rocking.motion.formats.identification import Identification
 from rocking.motion.formats.request import Request
 from rocking.motion.formats.source import Line, Source
 from rocking.motion.formats.timing import even_step, first_fault
-from rocking.motion.formats.values import convert, not_a_number, parse
+from rocking.motion.formats.units import Unit, find_unit
+from rocking.motion.formats.values import convert, not_a_number, parse, rows_of_numbers
 
 NAME = "text table"
 
@@ -28,6 +29,8 @@ _COMMA = "a comma"
 
 _HEADING_LINES = 64
 _LINES_AT_ONCE = 50_000
+_LONGEST_HEADING = 10_000
+_BRACKETS = re.compile(r"[(\[]\s*([A-Za-z][\w/^*. ]{0,20}?)\s*[)\]]")
 _COMMENT = re.compile(rb"[ \t]*(#|%|!|//)")
 
 #: No row of two numbers is longer; what is, is refused before it is split.
@@ -99,6 +102,12 @@ def read(source: Source, request: Request) -> list[Channel]:
         )
     if shape.columns == 1 and request.dt is None:
         raise source.error("the file does not say its sampling step; give dt= in seconds", shape.start)
+    heading = _heading_unit(source, shape.start)
+    if heading is not None and request.unit is None:
+        raise source.error(
+            f"the file does not state its units, but its heading says {heading.name}; give units={heading.name} if so",
+            shape.start,
+        )
     unit = request.units(source, None, shape.start)
     values = _values(source, shape)
     dt, times = request.dt, None
@@ -106,8 +115,15 @@ def read(source: Source, request: Request) -> list[Channel]:
         dt, times = _timing(source, request, shape, values[0::2])
         values = values[1::2]
     acceleration = to_acceleration(source, shape.start, values, unit)
-    facts = {"format": NAME, "file": source.file}
+    facts = {"format": NAME, "file": source.file} | ({"heading units": heading.name} if heading else {})
     return [Channel(source.stem, 1, acceleration, dt, times, units=unit.name, metadata=facts)]
+
+
+def _heading_unit(source: Source, start: int) -> Unit | None:
+    """Return the one unit of acceleration that the lines before the first row name in brackets, or None."""
+    words = _BRACKETS.findall(source.data[: min(start, _LONGEST_HEADING)].decode("latin-1"))
+    units = {unit for word in words if (unit := find_unit(word)) is not None}
+    return units.pop() if len(units) == 1 else None
 
 
 def _shape(source: Source) -> _Shape | None:
@@ -135,7 +151,10 @@ def _delimiter(line: Line) -> tuple[bytes, str]:
 
 
 def _values(source: Source, shape: _Shape) -> Floats:
-    """Return all numbers, row by row."""
+    """Return all numbers, row by row: at once where there is nothing but rows, else one row after the other."""
+    plain = rows_of_numbers(source, shape.start, shape.columns, shape.translation, _ROW_LIMIT)
+    if plain is not None:
+        return plain
     parts = []
     for rows in _groups(_rows(source, shape), shape.columns):
         values = convert([token for row in rows for token in row.tokens])

@@ -1,0 +1,167 @@
+"""One block under many records: what becomes of it under each, in a row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from rocking.block import Block
+from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import OutputError
+from rocking.motion.motion import Motion
+from rocking.progress import Progress
+from rocking.response import Response
+from rocking.simulation import simulate
+from rocking.tables import named, text_table, to_json, write_text
+
+#: Columns for people; files hold all.
+_SHOWN: Final = {
+    "record": "record",
+    named("pga", "g"): "PGA, g",
+    "peak_over_slenderness": "peak/slenderness",
+    "impacts_resolved": "impacts",
+    "rests": "rests",
+    "verdict": "verdict",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Responses of a block to several motions.
+
+    Attributes
+    ----------
+    block : Block
+        What rocks.
+    records : tuple of str
+        Name of each motion.
+    responses : tuple of Response
+        Response to each.
+    """
+
+    block: Block
+    records: tuple[str, ...]
+    responses: tuple[Response, ...]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return what became of the block under each record; units are in the names."""
+        return [_row(name, response) for name, response in zip(self.records, self.responses, strict=True)]
+
+    def summary(self) -> str:
+        """Return the table for people."""
+        rows = self.rows()
+        overturned = sum(row["overturned"] for row in rows)
+        table = text_table(list(_SHOWN.values()), [[row[name] for name in _SHOWN] for row in rows])
+        return f"{self.block.description}: {len(rows)} records, {overturned} overturn it\n\n{table}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table for machines."""
+        sides = self.block.sides
+        block = {
+            "description": self.block.description,
+            named("p", "rad/s"): [side.p for side in sides],
+            named("alpha", "rad"): [side.alpha for side in sides],
+            "restitution": [side.restitution for side in sides],
+        }
+        return {"block": block, "records": self.rows()}
+
+    def folders(self) -> list[str]:
+        """Return a name for a folder of each record, no two alike."""
+        names: dict[str, None] = {}
+        for record in self.records:
+            stem = Path(record).stem if record != "-" else "standard-input"
+            others = (f"{stem}-{k}" for k in range(2, len(self.records) + 2))
+            names[stem if stem not in names else next(name for name in others if name not in names)] = None
+        return list(names)
+
+    def write(self, folder: Path) -> None:
+        """Write summary.csv, summary.json and, if openpyxl is installed, summary.xlsx.
+
+        Raises
+        ------
+        OutputError
+            If they cannot be written.
+        """
+        import pandas
+
+        frame = pandas.DataFrame(self.rows())
+        write_text(folder / "summary.json", to_json(self.to_dict()) + "\n")
+        write_text(folder / "summary.csv", frame.to_csv(index=False, lineterminator="\n"))
+        try:
+            frame.to_excel(folder / "summary.xlsx", index=False)
+        except ImportError:
+            pass
+        except OSError as error:
+            raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another folder") from error
+
+
+def survey(block: Block, motions: Mapping[str, Motion], *, progress: bool | None = None, **options: Any) -> Survey:
+    """Simulate a block under many motions.
+
+    Parameters
+    ----------
+    block : Block
+        What rocks.
+    motions : mapping of str to Motion
+        Motions by the names that the table shows.
+    progress : bool, optional
+        Show a progress bar; by default if stderr is a terminal.
+    **options
+        As for `rocking.simulate`: model, chattering, duration, ...
+
+    Returns
+    -------
+    Survey
+
+    Raises
+    ------
+    InvalidOption
+        As for `rocking.simulate`.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(half_width=0.12, half_height=0.55)
+    >>> names = ["el-centro-meloland-270", "ridgecrest-clc-090"]
+    >>> found = survey(block, {name: rocking.records.load(name) for name in names})
+    >>> print(found.summary().splitlines()[0])
+    rectangular block, 0.24 m x 1.1 m: 2 records, 1 overturn it
+    """
+    responses = []
+    with Progress("simulating", total=len(motions), show=progress) as bar:
+        for motion in motions.values():
+            responses.append(simulate(block, motion, **options))
+            bar.advance()
+    return Survey(block, tuple(motions), tuple(responses))
+
+
+def _row(record: str, response: Response) -> dict[str, Any]:
+    motion = response.motion
+    assert motion is not None
+    return {
+        "record": record,
+        named("duration", "s"): motion.duration,
+        named("pga", "g"): motion.pga / STANDARD_GRAVITY,
+        named("pgv", "m/s"): motion.pgv,
+        "verdict": _verdict(response),
+        "overturned": response.overturned,
+        named("overturn_time", "s"): response.overturn_time,
+        "peak_over_slenderness": math.inf if response.overturned else response.peak_over_slenderness,
+        named("peak_rotation", "rad"): response.peak_rotation,
+        named("peak_time", "s"): response.peak_time,
+        "impacts_resolved": len(response.impacts),
+        "rests": int((response.events["kind"] == "rest").sum()),
+        named("time_at_rest", "s"): response.time_at_rest,
+        "required_friction": response.required_friction,
+    }
+
+
+def _verdict(response: Response) -> str:
+    if response.overturned:
+        return f"overturns at {response.overturn_time:.2f} s"
+    if response.unfinished:
+        return f"unfinished, given up at {response.duration:.2f} s"
+    return "rocks" if len(response.events) or len(response.impacts) else "does not move"

@@ -1,0 +1,310 @@
+"""One sequence, or one critical amplitude, by every method: in words and a table, or in plain values."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking import checks
+from rocking.chattering.theory.amplitude import critical_amplitude
+from rocking.chattering.theory.asymptotic import asymptotic_table, first_impact_speed, first_interval
+from rocking.chattering.theory.duration import chattering_time, sequence
+from rocking.chattering.theory.series import series_diagnosis
+from rocking.errors import InvalidOption, OutsideFit
+from rocking.tables import rows_of, text_table, to_json, write_text
+
+#: Rows of a table for people, of which the last is the last.
+_SHOWN: Final = 12
+
+_AMPLITUDES: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77", "approximation": "Chebyshev expansion"}
+
+
+@dataclass(frozen=True, eq=False)
+class ChatteringReport:
+    """What becomes of one chattering sequence of a slender block under a sine.
+
+    Attributes
+    ----------
+    values : dict
+        All numbers by name. Times are dimensionless, p t, unless the name ends in _s.
+    impacts : structured array
+        As in `ChatteringSequence`.
+    cycles : structured array or None
+        The paper's iterative procedure, as `asymptotic_table` gives it; None without loss at impacts.
+    p : float or None
+        The block's frequency parameter, rad/s, by which times are given in seconds, too.
+    """
+
+    values: dict[str, Any]
+    impacts: NDArray[np.void]
+    cycles: NDArray[np.void] | None
+    p: float | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all numbers by name."""
+        return self.values
+
+    def summary(self) -> str:
+        """Return the report for people."""
+        result = self.values
+        times, bracket, critical = result["chattering_time"], result["bracket"], result["critical_amplitude"]
+        lines = [
+            ("chattering", self._verdict()),
+            ("critical amplitude", f"{critical:.9g}"),
+            ("time of rest, exact", self._time(times["exact"])),
+            ("  proven bracket", self._bracket(bracket)),
+            (f"  by Eq. 75{_resolved(result['resolved'])}", self._time(times["semianalytical"])),
+            ("  by Eq. 65", self._time(times["asymptotic"])),
+            (
+                f"  by a series, {result['series']['order']} terms",
+                f"{self._time(times['series'])}{_trust(result['series'])}",
+            ),
+            ("first interval", self._pair(result["first_interval"], "eq32", time=True)),
+            ("speed at first impact", self._pair(result["first_impact_speed"], "eq34", time=False)),
+        ]
+        units = "times are p t, counted from uplift; speeds are theta'/(p alpha)"
+        return "\n".join(f"{name:<30}{text}" for name, text in lines) + f"\n\n{units}"
+
+    def cycle_rows(self) -> list[dict[str, Any]]:
+        """Return the cycles of the paper's iterative procedure.
+
+        Raises
+        ------
+        InvalidOption
+            Without loss at impacts, when there is no such procedure.
+        """
+        if self.cycles is None:
+            raise InvalidOption("eta must be below 1 for the iterative procedure: without loss at impacts nothing ends")
+        return rows_of(self.cycles)
+
+    def table(self) -> str:
+        """Return the first cycles of the paper's iterative procedure, and its last.
+
+        Raises
+        ------
+        InvalidOption
+            Without loss at impacts, when there is no such procedure.
+        """
+        cycles = self.cycle_rows()
+        shown = [*cycles[: _SHOWN - 1], cycles[-1]] if len(cycles) > _SHOWN else cycles
+        header = ["n", "sign", "term", "interval, p t", "time, p t"]
+        rows: list[list[Any]] = [
+            [
+                c["n"],
+                f"{c['sign']:+d}",
+                f"T_{c['n']};{c['order']} = {c['term']:.6g}",
+                f"{c['interval']:.6e}",
+                f"{c['time']:.9f}",
+            ]
+            for c in shown
+        ]
+        left_out = len(cycles) - len(shown)
+        if left_out:
+            rows.insert(-1, ["...", "", f"({left_out} more)", "", ""])
+        return text_table(header, rows)
+
+    def write(self, folder: Path) -> None:
+        """Write result.json, impacts.csv and, where there is such a procedure, cycles.csv.
+
+        Raises
+        ------
+        OutputError
+            If they cannot be written.
+        """
+        write_text(folder / "result.json", to_json(self.values) + "\n")
+        write_text(folder / "impacts.csv", _csv(self.impacts))
+        if self.cycles is not None:
+            write_text(folder / "cycles.csv", _csv(self.cycles))
+
+    def _verdict(self) -> str:
+        half_period = self._time(self.values["half_period"])
+        if self.values["complete"]:
+            return f"complete: proven to rest before half a period, {half_period}, is over"
+        return f"incomplete: the next half period, from {half_period} on, lifts the block before it rests"
+
+    def _time(self, time: float) -> str:
+        if math.isnan(time):
+            return "none"
+        return f"{time:.9g}" if self.p is None else f"{time:.9g} ({time / self.p:.6g} s)"
+
+    def _bracket(self, bracket: dict[str, Any]) -> str:
+        if math.isnan(bracket["upper"]):
+            return "none"
+        return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {bracket['impacts']} impacts"
+
+    def _pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
+        exact = self._time(values["exact"]) if time else f"{values['exact']:.9g}"
+        return f"{exact} exact, {values[equation]:.9g} by Eq. {equation[2:]}"
+
+
+def chattering_report(
+    a: float,
+    omega: float,
+    eta: float,
+    *,
+    order: int = 4,
+    resolved: int | None = None,
+    p: float | None = None,
+) -> ChatteringReport:
+    """Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.
+
+    Parameters
+    ----------
+    a, omega, eta
+        As in `chattering_time`, each one number.
+    order, resolved
+        As in `chattering_time`.
+    p : float, optional
+        The block's frequency parameter, rad/s: times are then given in seconds as well.
+
+    Returns
+    -------
+    ChatteringReport
+
+    Raises
+    ------
+    InvalidOption
+        If a parameter is out of its range.
+
+    Examples
+    --------
+    >>> report = chattering_report(1.03, 2.0, 0.92, p=2.0)
+    >>> print(report.summary().splitlines()[2])
+    time of rest, exact           1.12594768 (0.562974 s)
+    """
+    if p is not None:
+        p = checks.positive(p, "p", InvalidOption, "rad/s")
+    exact = sequence(a, omega, eta)
+    first = exact.impacts[0] if exact.impacts.size else {"interval": 0.0, "speed_before": 0.0}
+    values: dict[str, Any] = {
+        "a": a,
+        "omega": omega,
+        "eta": eta,
+        "complete": exact.complete,
+        "half_period": math.pi / omega,
+        "chattering_time": {
+            "exact": float(chattering_time(a, omega, eta)),
+            "asymptotic": float(chattering_time(a, omega, eta, method="asymptotic")),
+            "semianalytical": float(chattering_time(a, omega, eta, method="semianalytical", resolved=resolved)),
+            "series": float(chattering_time(a, omega, eta, method="series", order=order)),
+        },
+        "series": _series(a, omega, eta, order),
+        "resolved": resolved,
+        "bracket": {"lower": exact.lower, "upper": exact.upper, "impacts": int(exact.impacts.size)},
+        "critical_amplitude": float(critical_amplitude(omega, eta)),
+        "first_interval": {"exact": float(first["interval"]), "eq32": float(first_interval(a, omega))},
+        "first_impact_speed": {"exact": float(first["speed_before"]), "eq34": float(first_impact_speed(a, omega))},
+    }
+    if p is not None:
+        values["p_rad_s"] = p
+        values["chattering_time_s"] = {method: time / p for method, time in values["chattering_time"].items()}
+    cycles = None if eta == 1.0 else asymptotic_table(a, omega, eta)
+    return ChatteringReport(values, exact.impacts, cycles, p)
+
+
+@dataclass(frozen=True)
+class CriticalReport:
+    """The critical amplitude under a sine, by every method.
+
+    Attributes
+    ----------
+    omega, eta : float
+        Forcing frequency over p, and coefficient of restitution.
+    amplitudes : dict
+        By method; None where one does not hold.
+    """
+
+    omega: float
+    eta: float
+    amplitudes: dict[str, float | None]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all numbers by name."""
+        return {"omega": self.omega, "eta": self.eta, "critical_amplitude": self.amplitudes}
+
+    def summary(self) -> str:
+        """Return the report for people."""
+        exact = self.amplitudes["exact"]
+        assert exact is not None
+        lines = []
+        for method, name in _AMPLITUDES.items():
+            amplitude = self.amplitudes[method]
+            if amplitude is None:
+                lines.append(f"{name:<24}none here: it holds for fewer omega and eta")
+            elif method == "exact":
+                lines.append(f"{name:<24}{amplitude:.9g}")
+            else:
+                lines.append(f"{name:<24}{amplitude:<16.9g}off by {amplitude - exact:+.2e}")
+        return "\n".join([*lines, "", "amplitudes of the ground acceleration over g alpha"])
+
+    def write(self, folder: Path) -> None:
+        """Write result.json.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written.
+        """
+        write_text(folder / "result.json", to_json(self.to_dict()) + "\n")
+
+
+def critical_report(omega: float, eta: float) -> CriticalReport:
+    """Give the amplitude up to which chattering under a sine is complete, by every method.
+
+    Raises
+    ------
+    InvalidOption
+        If a parameter is out of its range.
+
+    Examples
+    --------
+    >>> critical_report(20.0, 0.92).amplitudes["eq76"] is None
+    True
+    """
+    exact = float(critical_amplitude(omega, eta))
+    others = {method: _amplitude(omega, eta, method) for method in _AMPLITUDES if method != "exact"}
+    return CriticalReport(omega, eta, {"exact": exact, **others})
+
+
+def _amplitude(omega: float, eta: float, method: str) -> float | None:
+    """Amplitude by an approximation; None where it does not hold. The exact method has checked the parameters."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", OutsideFit)
+        try:
+            return float(critical_amplitude(omega, eta, method=method))
+        except (InvalidOption, OutsideFit):
+            return None
+
+
+def _series(a: float, omega: float, eta: float, order: int) -> dict[str, float]:
+    """Return what is known of the expansion's error; without loss at impacts there is no expansion."""
+    if eta == 1.0:
+        return {"order": order, "error": math.inf, "radius": 0.0}
+    diagnosis = series_diagnosis(a, omega, eta, order=order)
+    return {"order": order, "error": float(diagnosis.error), "radius": float(diagnosis.radius)}
+
+
+def _trust(series: dict[str, float]) -> str:
+    if math.isfinite(series["error"]):
+        return f", the terms left out add about {series['error']:.1e}"
+    return f", worthless: it converges up to a = {1.0 + series['radius']:.5g} only"
+
+
+def _resolved(impacts: int | None) -> str:
+    return "" if impacts is None else f", {impacts} impacts"
+
+
+def _csv(table: NDArray[np.void]) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, table.dtype.names or (), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows_of(table))
+    return text.getvalue()

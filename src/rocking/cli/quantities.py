@@ -1,0 +1,81 @@
+"""Numbers as people write them on a command line: with a unit, in pairs, in lists and ranges."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from rocking.arrays import Floats
+from rocking.errors import InvalidOption
+from rocking.motion.formats.units import find_unit
+
+#: What reads one number of an option: its text and the option's name, to SI units.
+Quantity = Callable[[str, str], float]
+
+#: Numbers of one range.
+_MOST: Final = 100_000
+
+_WRITTEN: Final = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)\s*(\D.*?)?\s*", re.IGNORECASE
+)
+_DEGREES: Final = {"": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0}
+
+
+def number(text: str, option: str) -> float:
+    """Return a number without a unit."""
+    value, unit = _parts(text)
+    if value is None or unit:
+        raise InvalidOption(f"{option} takes a number, not {text.strip()!r}")
+    return value
+
+
+def acceleration(text: str, option: str) -> float:
+    """Return an acceleration, m/s^2, from "0.5g", "4.9m/s2", "490gal" or "4.9" (m/s^2)."""
+    value, spelling = _parts(text)
+    unit = find_unit(spelling or "m/s2")
+    if value is None or unit is None:
+        raise InvalidOption(f"{option} takes an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2), not {text.strip()!r}")
+    return value * unit.multiplier / unit.divisor
+
+
+def angle(text: str, option: str) -> float:
+    """Return an angle, rad, from "12deg", "0.2rad" or "0.2" (rad)."""
+    value, unit = _parts(text)
+    if value is None or unit.lower() not in _DEGREES:
+        raise InvalidOption(f"{option} takes an angle as 12deg or 0.2 (rad), not {text.strip()!r}")
+    return value * _DEGREES[unit.lower()]
+
+
+def sides(text: str, option: str, quantity: Quantity = number) -> float | list[float]:
+    """Return one number, or a list of two: side + and side -."""
+    found = [quantity(part, option) for part in text.split(",")]
+    if len(found) > 2:
+        raise InvalidOption(f"{option} takes a number, or two with a comma between (side +, side -), not {text!r}")
+    return found[0] if len(found) == 1 else found
+
+
+def values(text: str, option: str, quantity: Quantity = number) -> Floats:
+    """Return numbers from "1,2,5" or from "START:STOP:COUNT", with ":log" at the end for equal ratios."""
+    parts = text.split(":")
+    if len(parts) == 1:
+        return np.array([quantity(part, option) for part in text.split(",")])
+    if len(parts) not in (3, 4) or not parts[2].strip().isdecimal() or (len(parts) == 4 and parts[3] != "log"):
+        raise InvalidOption(f"{option} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}")
+    start, stop, count = quantity(parts[0], option), quantity(parts[1], option), int(parts[2])
+    if not 2 <= count <= _MOST:
+        raise InvalidOption(f"{option} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}")
+    if len(parts) == 3:
+        return np.linspace(start, stop, count)
+    if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
+        raise InvalidOption(f"{option}: a range with :log needs positive ends, not {text!r}")
+    return np.geomspace(start, stop, count)
+
+
+def _parts(text: str) -> tuple[float | None, str]:
+    """Return number and unit; None where there is no number."""
+    found = _WRITTEN.fullmatch(text)
+    return (None, "") if found is None else (float(found[1]), found[2] or "")

@@ -1,0 +1,89 @@
+"""Messages in the words of the command line: options in place of arguments, and the nearest name that is meant."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from cyclopts import App, CycloptsError, UnknownCommandError
+
+from rocking.errors import InvalidOption
+
+#: How alike two names must be for the one to be a slip of the other: a letter or two in a word of six.
+_ALIKE: Final = 0.8
+
+#: Names so short are too alike for a guess: a suggestion must not lead to another quantity.
+_SHORT: Final = len("--pga")
+
+_OPTION: Final = re.compile(r"--?[A-Za-z]")
+
+
+def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
+    """Return an error as one line that names options."""
+    sentence = " ".join(str(error).split()).rstrip(".")
+    if isinstance(error, UnknownCommandError):
+        return _unknown_command(app, arguments[0])
+    if isinstance(error, CycloptsError):
+        return f"{sentence}; see rocking{''.join(f' {name}' for name in _command(app, arguments))} --help"
+    return _with_options(sentence, _options(app, arguments))
+
+
+def refuse_unknown_options(app: App, arguments: Sequence[str]) -> None:
+    """Check that a command has the options that it is given.
+
+    Raises
+    ------
+    InvalidOption
+        Naming the one that it does not have, and the one that may be meant.
+    """
+    command = _command(app, arguments)
+    if not command:
+        return
+    known = _options(app, arguments)
+    for argument in arguments[1:]:
+        name = argument.partition("=")[0]
+        if argument == "--":
+            return
+        if _OPTION.match(argument) and name not in known:
+            raise InvalidOption(f"rocking {command[0]} has no option {name}{_meant(name, known)}")
+
+
+def _unknown_command(app: App, name: str) -> str:
+    commands = [each for each in app if not each.startswith("-")]
+    close = difflib.get_close_matches(name, commands, n=1)
+    hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(commands)}"
+    return f"there is no command {name}; {hint}"
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    words = {each.lstrip("-"): each for each in known if len(each) > _SHORT}
+    close = difflib.get_close_matches(name.lstrip("-"), words, n=1, cutoff=_ALIKE) if len(name) > _SHORT else []
+    return f"; did you mean {words[close[0]]}?" if close else "; see its --help"
+
+
+def _command(app: App, arguments: Sequence[str]) -> list[str]:
+    return [name for name in arguments[:1] if name in list(app) and not name.startswith("-")]
+
+
+def _options(app: App, arguments: Sequence[str]) -> set[str]:
+    """Return the options of the command that is called."""
+    command = _command(app, arguments)
+    if not command:
+        return set()
+    collection = app[command[0]].assemble_argument_collection()
+    own = {name for argument in collection for name in argument.names if name.startswith("-")}
+    return own | {"--help", "-h", "--version", "-V"}
+
+
+def _with_options(sentence: str, options: set[str]) -> str:
+    """Name options where a message names the arguments that they stand for."""
+    for option in sorted(options, key=len, reverse=True):
+        name = option.removeprefix("--").replace("-", "_")
+        if len(name) > 1 or name == "p":
+            sentence = re.sub(rf"(?<![\w./\\'\"-]){name} ?= ?(?=\s|[\w'\"]|$)", f"{option} ", sentence)
+            sentence = re.sub(rf"\bleave {name} out\b", f"leave {option} out", sentence)
+        if "_" in name:
+            sentence = re.sub(rf"(?<![\w./\\'\"-]){name}(?![\w./\\'\"-])", option, sentence)
+    return re.sub(r" +", " ", sentence)

@@ -1,0 +1,377 @@
+"""The command line and records: many at once, targets to scale to, units, names that are close, what looks wrong."""
+
+import importlib
+import io
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.cli import app, quantities, wording
+from rocking.errors import InvalidOption
+from rocking.motion.named import expanded
+from rocking.progress import note, notes_for
+
+RECORD = "el-centro-meloland-270"
+OTHER = "ridgecrest-clc-090"
+BLOCK = ["--width", "0.24", "--height", "1.1"]
+GRAVITY = 9.80665
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder of three small records and a hidden file."""
+    place = tmp_path / "records"
+    place.mkdir()
+    for k in range(3):
+        samples = (1.0 + k) * np.sin(np.linspace(0.0, 12.0, 120))
+        lines = "".join(f"{value:.5f}\n" for value in samples)
+        title = "Event, 1/1/2000, Station, 90"
+        text = f"PEER\n{title}\nACCELERATION IN UNITS OF G\nNPTS= 120, DT= .02 SEC,\n{lines}"
+        (place / f"r{k}.AT2").write_text(text)
+    (place / ".hidden").write_text("nothing")
+    return place
+
+
+def test_full_sizes_are_twice_the_half_sizes(run):
+    half = run("simulate", RECORD, "--half-width", 0.12, "--half-height", 0.55, "--json")
+    assert run("simulate", RECORD, *BLOCK, "--json")[1] == half[1]
+    code, _, err = run("simulate", RECORD, "--width", 0.24, "--half-height", 0.55)
+    assert code == 2
+    assert "--width and --height" in err
+
+
+@pytest.mark.parametrize("command", ["simulate", "spectrum", "fragility"])
+@pytest.mark.parametrize(
+    ("option", "value", "target"),
+    [
+        ("--pga", "0.5g", {"pga": 0.5 * GRAVITY}),
+        ("--pga", "490gal", {"pga": 4.9}),
+        ("--pga", "4.9", {"pga": 4.9}),
+        ("--pgv", "0.4", {"pgv": 0.4}),
+        ("--sa", "0.4g@1.0", {"sa": 0.4 * GRAVITY, "period": 1.0}),
+        ("--scale", "-2", {"factor": -2.0}),
+    ],
+)
+def test_records_are_scaled_to_a_target_by_every_command(monkeypatch, run, command, option, value, target):
+    seen = []
+    monkeypatch.setattr(rocking.Motion, "scaled", lambda motion, *_, **asked: seen.append(asked) or motion)
+    options = {"spectrum": ["--alpha", "0.2", "--p", "2"]}.get(command, BLOCK)
+    run(command, RECORD, *options, option, value)
+    assert seen[0] == pytest.approx(target)
+
+
+def test_one_target_at_most(run):
+    code, _, err = run("simulate", RECORD, *BLOCK, "--pga", "0.5g", "--scale", "2")
+    assert code == 2
+    assert "--scale and --pga" in err
+    assert "0.4g@1.0" in run("simulate", RECORD, *BLOCK, "--sa", "0.4g")[2]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("0.5g", 0.5 * GRAVITY), ("4.9m/s2", 4.9), ("4.9 m/s^2", 4.9), ("490 gal", 4.9), ("-1", -1.0)],
+)
+def test_accelerations_may_have_a_unit(text, expected):
+    assert quantities.acceleration(text, "--pga") == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize(("text", "expected"), [("12deg", np.radians(12.0)), ("0.2", 0.2), ("0.2 rad", 0.2)])
+def test_angles_may_have_a_unit(text, expected):
+    assert quantities.angle(text, "--alpha") == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize(("read", "text"), [("acceleration", "0.5ft"), ("angle", "12grad"), ("number", "3g")])
+def test_a_unit_of_another_quantity_is_refused(read, text):
+    with pytest.raises(InvalidOption, match="--x takes"):
+        getattr(quantities, read)(text, "--x")
+
+
+def test_ranges_have_units_at_their_ends():
+    assert quantities.values("0.1g:0.3g:3", "--levels", quantities.acceleration) == pytest.approx(
+        [0.1 * GRAVITY, 0.2 * GRAVITY, 0.3 * GRAVITY]
+    )
+    assert quantities.values("5deg,10deg", "--alpha", quantities.angle) == pytest.approx(np.radians([5.0, 10.0]))
+
+
+@pytest.mark.parametrize(("command", "analysis"), [("ida", "incremental_dynamic_analysis"), ("fragility", "run")])
+def test_levels_of_an_acceleration_may_be_in_g_and_those_of_a_velocity_may_not(run, monkeypatch, command, analysis):
+    def refuse(*_, levels, **__):
+        raise InvalidOption(f"{levels.round(6).tolist()}")
+
+    module = importlib.import_module(f"rocking.cli.{command}")
+    monkeypatch.setattr(module, analysis, refuse)
+    assert "[0.980665, 1.96133]" in run(command, RECORD, *BLOCK, "--levels", "0.1g,0.2g")[2]
+    assert "--levels takes a number" in run(command, RECORD, *BLOCK, "--measure", "pgv", "--levels", "0.1g,0.2g")[2]
+
+
+def test_files_folders_patterns_and_shipped_names_make_one_table(run, folder):
+    code, out, err = run("simulate", RECORD, folder, str(folder / "r*.AT2"), *BLOCK)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert "4 records" in lines[0]
+    assert [line.split()[0] for line in lines[3:]] == [RECORD, *(str(folder / f"r{k}.AT2") for k in range(3))]
+
+
+def test_the_table_is_what_simulate_finds(run, folder):
+    _, out, _ = run("simulate", RECORD, OTHER, *BLOCK, "--json")
+    rows = {row["record"]: row for row in json.loads(out)["records"]}
+    block = rocking.Block(width=0.24, height=1.1)
+    response = rocking.simulate(block, rocking.records.load(OTHER))
+    assert rows[OTHER]["peak_over_slenderness"] == response.peak_over_slenderness
+    assert rows[OTHER]["rests"] == int((response.events["kind"] == "rest").sum())
+    assert rows[RECORD]["verdict"].startswith("overturns at") == rows[RECORD]["overturned"]
+
+
+def test_the_table_is_written_and_each_record_only_on_request(run, folder, tmp_path):
+    out = tmp_path / "out"
+    assert run("simulate", folder, *BLOCK, "--out", out)[0] == 0
+    assert {"summary.csv", "summary.json"} <= {path.name for path in out.iterdir()}
+    assert not any(path.is_dir() for path in out.iterdir())
+    assert len((out / "summary.csv").read_text("utf-8").splitlines()) == 4
+    assert run("simulate", folder, *BLOCK, "--out", out, "--each")[0] == 0
+    assert {path.name for path in out.iterdir() if path.is_dir()} == {"r0", "r1", "r2"}
+    assert (out / "r1" / "response.csv").is_file()
+    assert "--out" in run("simulate", folder, *BLOCK, "--each")[2]
+
+
+def test_the_table_is_a_workbook_where_openpyxl_is_installed(run, folder, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    assert run("simulate", folder, *BLOCK, "--out", tmp_path)[0] == 0
+    sheet = openpyxl.load_workbook(tmp_path / "summary.xlsx").active
+    assert sheet.max_row == 4
+    assert sheet["A1"].value == "record"
+
+
+def test_an_unreadable_record_is_an_error_unless_one_keeps_going(run, folder):
+    (folder / "readme.txt").write_text("These are records.\n")
+    code, _, err = run("simulate", folder, *BLOCK)
+    assert code == 2
+    assert "readme.txt" in err
+    code, out, err = run("simulate", folder, *BLOCK, "--keep-going")
+    assert code == 0
+    assert "3 records" in out
+    assert err.startswith("rocking: note: skipped: ")
+    assert "readme.txt" in err
+    code, _, err = run("simulate", folder / "readme.txt", *BLOCK, "--keep-going")
+    assert code == 2
+    assert "none of 1 records" in err
+
+
+def test_each_record_counts_once(folder):
+    assert len(expanded([str(folder), str(folder / "*.AT2")])) == 3
+    with pytest.raises(rocking.UnreadableRecord, match="matches"):
+        expanded([str(folder / "*.xyz")])
+
+
+def test_a_record_is_read_from_standard_input(run, folder, monkeypatch):
+    content = (folder / "r1.AT2").read_bytes()
+    expected = json.loads(run("simulate", folder / "r1.AT2", *BLOCK, "--json")[1])
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
+    found = json.loads(run("simulate", "-", *BLOCK, "--json")[1])
+    assert found["peak_rotation_rad"] == expected["peak_rotation_rad"]
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
+    assert run("records", "-")[1].startswith("standard input: PEER AT2")
+
+
+def test_records_shows_a_shipped_record_by_its_name(run):
+    code, out, _ = run("records", RECORD, "--json")
+    assert code == 0
+    (entry,) = json.loads(out)["records"]
+    assert entry["name"] == RECORD
+
+
+@pytest.mark.parametrize(
+    ("arguments", "suggestion"),
+    [
+        (["simulat"], "did you mean simulate?"),
+        (["simulate", "ridgecrest-clc-91", *BLOCK], "did you mean ridgecrest-clc-090?"),
+        (["simulate", RECORD, "--restituton", "0.9"], "did you mean --restitution?"),
+        (["simulate", RECORD, "--hieght", "0.9"], "did you mean --height?"),
+    ],
+)
+def test_what_is_close_is_suggested(run, arguments, suggestion):
+    code, _, err = run(*arguments)
+    assert code == 2
+    assert suggestion in err
+    assert err.count("\n") == 1
+
+
+def test_a_file_and_a_channel_that_are_close_are_suggested(run, folder):
+    assert f"did you mean {folder / 'r1.AT2'}?" in run("simulate", folder / "r1.AT", *BLOCK)[2]
+    two = Path(__file__).parent / "data" / "formats" / "two.v1"
+    name = json.loads(run("records", two, "--json")[1])["channels"][0]["name"]
+    assert f"did you mean {name!r}?" in run("simulate", two, *BLOCK, "--channel", f"{name}g")[2]
+    assert len(json.loads(run("records", two, "--channel", name, "--json")[1])["channels"]) == 1
+
+
+@pytest.mark.parametrize("option", ["--pgd", "--p0", "--velocity", "--ph", "--rotation", "--mass", "--a"])
+def test_no_suggestion_leads_to_another_quantity(run, option):
+    code, _, err = run("simulate", RECORD, option, "0.4")
+    assert code == 2
+    assert option in err
+    assert "mean" not in err
+
+
+def test_errors_name_options(run, tmp_path):
+    column = tmp_path / "column.txt"
+    column.write_text("0.0\n0.1\n0.0\n")
+    assert "give --dt in seconds" in run("simulate", column, *BLOCK)[2]
+    assert "give --units as one of" in run("simulate", column, *BLOCK, "--dt", "0.01")[2]
+    assert "--half-width" in run("simulate", RECORD, "--half-width", "-1", "--half-height", "1")[2]
+    assert "half_width" not in run("simulate", RECORD, "--half-width", "-1", "--half-height", "1")[2]
+    assert "--initial-velocity" in run("simulate", RECORD, *BLOCK, "--initial-velocity", "1e9")[2]
+
+
+def test_a_path_is_not_taken_for_an_option(run, tmp_path):
+    path = tmp_path / "half_width" / "units=g.txt"
+    assert str(path) in run("simulate", path, *BLOCK)[2]
+
+
+@pytest.mark.parametrize("option", ["-V", "--version"])
+def test_the_version_is_shown(run, option):
+    assert run(option)[1].strip() == rocking.__version__
+
+
+def test_completion_can_be_installed(run):
+    assert "--install-completion" in run("--help")[1]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["map", "half-sine", "--alpha", "0.2", "--amplitudes", "1:9:100000", "--frequencies", "1:9:100000"],
+        ["spectrum", RECORD, "--alpha", "0.1:0.3:10000", "--p", "1:9:10000"],
+    ],
+)
+def test_a_grid_that_is_too_large_is_one_sentence(run, arguments):
+    code, _, err = run(*arguments)
+    assert code == 2
+    assert "can be computed: take fewer" in err
+    assert err.count("\n") == 1
+
+
+def test_a_failed_command_leaves_no_folder_that_it_made(run, tmp_path):
+    assert run("simulate", "nowhere.AT2", *BLOCK, "--out", tmp_path / "new" / "results")[0] == 2
+    assert not (tmp_path / "new").exists()
+    (tmp_path / "old").mkdir()
+    assert run("simulate", "nowhere.AT2", *BLOCK, "--out", tmp_path / "old")[0] == 2
+    assert (tmp_path / "old").exists()
+
+
+def test_an_ascii_locale_is_no_error(tmp_path):
+    record = tmp_path / "Kraków.txt"
+    record.write_text("".join(f"{0.01 * k:.2f} {np.sin(k):.4f}\n" for k in range(9)), "utf-8")
+    environment = {**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    for arguments in (["records", str(record), "--units", "g"], ["records", "Łódź.txt"], ["simulate", "--help"]):
+        command = [sys.executable, "-c", "import sys; from rocking.cli import main; main(sys.argv[1:])", *arguments]
+        done = subprocess.run(command, capture_output=True, env=environment, check=False)
+        assert b"Traceback" not in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["el-centro-meloland-up", *BLOCK], "looks vertical"),
+        ([RECORD, "--width", "2", "--height", "1", "--restitution", "0.5"], "sizes swapped"),
+        ([RECORD, "--width", "20", "--height", "100"], "in metres"),
+    ],
+)
+def test_what_looks_like_a_mistake_is_noted_and_computed(run, arguments, sentence):
+    code, out, err = run("simulate", *arguments)
+    assert code == 0
+    assert "verdict" in out
+    assert err.count("\n") == 1
+    assert err.startswith("rocking: note: ")
+    assert sentence in err
+    assert run("simulate", *arguments, "--quiet")[2] == ""
+
+
+@pytest.mark.parametrize(("unit", "sentence"), [("m/s2", "moves no block"), ("g", "are the units right")])
+def test_a_peak_of_another_order_is_noted(run, tmp_path, unit, sentence):
+    record = tmp_path / "record.txt"
+    record.write_text("0\n0.005\n-0.002\n" if unit == "m/s2" else "0\n300\n-200\n")
+    assert sentence in run("simulate", record, *BLOCK, "--units", unit, "--dt", "0.01")[2]
+
+
+def test_units_in_a_heading_are_offered_and_a_contradiction_is_noted(run, tmp_path):
+    record = tmp_path / "record.txt"
+    record.write_text("time (s), a (cm/s2)\n0.00,0.0\n0.01,120.5\n0.02,0.0\n")
+    code, _, err = run("simulate", record, *BLOCK)
+    assert code == 2
+    assert "its heading says cm/s2; give --units cm/s2" in err
+    assert run("simulate", record, *BLOCK, "--units", "cm/s2")[2] == ""
+    assert "heading says cm/s2, but the numbers are taken for g" in run("simulate", record, *BLOCK, "--units", "g")[2]
+
+
+def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
+    import warnings
+
+    from rocking.cli import critical as module
+    from rocking.errors import OutsideFit
+
+    def report(*_):
+        warnings.warn("beyond the fit", OutsideFit, stacklevel=1)
+        raise rocking.InvalidOption("enough")
+
+    monkeypatch.setattr(module, "critical_report", report)
+    assert run("critical", 2, 0.9)[2].splitlines() == ["rocking: note: beyond the fit", "rocking: enough"]
+    assert run("critical", 2, 0.9, "--quiet")[2].splitlines() == ["rocking: enough"]
+
+
+def test_compiling_is_said_once():
+    program = (
+        "from numba import njit\n"
+        "from rocking import compiling, progress\n"
+        "compiling.announce()\n"
+        "with progress.notes_for('everybody'):\n"
+        "    njit(lambda x: x + 1)(1)\n"
+        "    njit(lambda x: x + 2)(1)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr.count("compiling once") == 1
+
+
+def test_a_cold_cache_is_announced_by_the_command_line(tmp_path):
+    command = [sys.executable, "-c", "from rocking.cli import main; main(['critical', '2', '0.9'])"]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    for expected in (1, 0):
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+        assert done.stderr.count("compiling once") == expected
+
+
+def test_notes_go_to_those_who_want_them(capsys):
+    note("a terminal is not watching")
+    with notes_for("everybody"):
+        note("two\n lines")
+    with notes_for("nobody"):
+        note("silence")
+    assert capsys.readouterr().err == "rocking: note: two lines\n"
+
+
+def test_every_command_in_the_documentation_has_the_options_that_it_shows():
+    root = Path(__file__).resolve().parents[1]
+    pages = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+    commands = [
+        line for page in pages for line in re.findall(r"^\$ (?:.*\| )?rocking (.*)$", page.read_text("utf-8"), re.M)
+    ]
+    assert len(commands) > 20
+    for line in commands:
+        arguments = shlex.split(line, comments=True)
+        wording.refuse_unknown_options(app, arguments)
+        assert app.parse_args(arguments, exit_on_error=False, print_error=False)[0] is not None
+
+
+def test_a_history_s_motion_may_be_scaled(run, tmp_path):
+    table = tmp_path / "history.csv"
+    table.write_text("time_s,rotation_rad\n" + "".join(f"{0.05 * k},{0.01 * np.cos(k)}\n" for k in range(40)))
+    code, _, err = run("calibrate", table, "--motion", RECORD, "--scale", "2", "--pgv", "1")
+    assert code == 2
+    assert "--scale and --pgv" in err
