@@ -7,7 +7,7 @@ import functools
 from rocking.progress import note
 
 #: Processor time that the kernels of a simulation take to compile, s.
-_SECONDS = 15
+_SECONDS = 10
 
 
 @functools.cache
