@@ -375,3 +375,15 @@ def test_a_history_s_motion_may_be_scaled(run, tmp_path):
     code, _, err = run("calibrate", table, "--motion", RECORD, "--scale", "2", "--pgv", "1")
     assert code == 2
     assert "--scale and --pgv" in err
+
+
+def test_a_coefficient_of_friction_is_put_to_the_test(run):
+    out = run("simulate", "ridgecrest-clc-090", "--width", 0.24, "--height", 1.1, "--friction", 0.24)[1]
+    assert re.search(r"slides at 0.24 +yes, first at 23\d\.\d{4} s", out)
+    out = run("simulate", "ridgecrest-clc-090", "--width", 0.24, "--height", 1.1, "--friction", 0.3)[1]
+    assert re.search(r"slides at 0.3 +no", out)
+    both = "ridgecrest-clc-090", "el-centro-meloland-270"
+    out = run("simulate", *both, "--width", 0.24, "--height", 1.1, "--friction", 0.24, "--json")[1]
+    times = [row["sliding_time_s"] for row in json.loads(out)["records"]]
+    assert 230.0 < times[0] < 240.0
+    assert run("simulate", both[0], "--width", 0.24, "--height", 1.1, "--friction", -1)[0] == 2

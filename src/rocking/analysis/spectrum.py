@@ -240,7 +240,7 @@ class RockingSpectrum(Result):
 
 def _curve_name(one: xr.Dataset) -> str:
     restitution = f", restitution {float(one.restitution):g}" if "restitution" in one.coords else ""
-    return f"α = {float(one.alpha):g}{restitution}"
+    return f"alpha = {float(one.alpha):g}{restitution}"
 
 
 def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares: Floats) -> xr.Dataset:

@@ -27,6 +27,8 @@ _SHOWN: Final = {
     "verdict": "verdict",
 }
 
+_SLIDING: Final = named("sliding_time", "s")
+
 
 @dataclass(frozen=True, eq=False)
 class Survey:
@@ -40,21 +42,26 @@ class Survey:
         Name of each motion.
     responses : tuple of Response
         Response to each.
+    friction : float or None
+        Coefficient of friction at which sliding is looked for.
     """
 
     block: Block
     records: tuple[str, ...]
     responses: tuple[Response, ...]
+    friction: float | None = None
 
     def rows(self) -> list[dict[str, Any]]:
         """Return what became of the block under each record; units are in the names."""
-        return [_row(name, response) for name, response in zip(self.records, self.responses, strict=True)]
+        each = zip(self.records, self.responses, strict=True)
+        return [_row(name, response) | self._sliding(response) for name, response in each]
 
     def summary(self) -> str:
         """Return the table for people."""
         rows = self.rows()
         overturned = sum(row["overturned"] for row in rows)
-        table = text_table(list(_SHOWN.values()), [[row[name] for name in _SHOWN] for row in rows])
+        shown = _SHOWN if self.friction is None else _SHOWN | {_SLIDING: f"slides at {self.friction:g}, s"}
+        table = text_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
         return f"{self.block.description}: {len(rows)} records, {overturned} overturn it\n\n{table}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -67,6 +74,9 @@ class Survey:
             "restitution": [side.restitution for side in sides],
         }
         return {"block": block, "records": self.rows()}
+
+    def _sliding(self, response: Response) -> dict[str, float]:
+        return {} if self.friction is None else {_SLIDING: response.sliding_time(self.friction)}
 
     def folders(self) -> list[str]:
         """Return a name for a folder of each record, no two alike."""
@@ -98,7 +108,14 @@ class Survey:
             raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another folder") from error
 
 
-def survey(block: Block, motions: Mapping[str, Motion], *, progress: bool | None = None, **options: Any) -> Survey:
+def survey(
+    block: Block,
+    motions: Mapping[str, Motion],
+    *,
+    friction: float | None = None,
+    progress: bool | None = None,
+    **options: Any,
+) -> Survey:
     """Simulate a block under many motions.
 
     Parameters
@@ -107,6 +124,8 @@ def survey(block: Block, motions: Mapping[str, Motion], *, progress: bool | None
         What rocks.
     motions : mapping of str to Motion
         Motions by the names that the table shows.
+    friction : float, optional
+        Coefficient of friction at which to look for sliding.
     progress : bool, optional
         Show a progress bar; by default if stderr is a terminal.
     **options
@@ -135,7 +154,7 @@ def survey(block: Block, motions: Mapping[str, Motion], *, progress: bool | None
         for motion in motions.values():
             responses.append(simulate(block, motion, **options))
             bar.advance()
-    return Survey(block, tuple(motions), tuple(responses))
+    return Survey(block, tuple(motions), tuple(responses), friction)
 
 
 def _row(record: str, response: Response) -> dict[str, Any]:

@@ -30,7 +30,7 @@ from rocking.tables import to_json, write_text
 
 @dataclass(frozen=True)
 class _Start:
-    """How a simulation starts and ends."""
+    """How a simulation starts and ends, and what is asked of it."""
 
     duration: Annotated[
         float | None,
@@ -38,6 +38,9 @@ class _Start:
     ] = None
     initial_rotation: Annotated[str, Parameter(help="Rotation at the start, 2deg or 0.03 (rad).")] = "0"
     initial_velocity: Annotated[float, Parameter(help="Angular velocity at the start, rad/s.")] = 0.0
+    friction: Annotated[
+        float | None, Parameter(help="Coefficient of friction: say whether the block would slide, and when first.")
+    ] = None
 
 
 def simulate(
@@ -73,16 +76,18 @@ def simulate(
         motions = motion.read_all(names)
         if batch.is_single(names, motions):
             (shaking,) = motions.values()
-            _deliver(run(body, shaking, **options), folder, as_json=output.as_json)
+            _deliver(run(body, shaking, **options), folder, friction=start.friction, as_json=output.as_json)
         else:
-            _deliver_all(survey(body, motions, **options), folder, each=each, as_json=output.as_json)
+            _deliver_all(
+                survey(body, motions, friction=start.friction, **options), folder, each=each, as_json=output.as_json
+            )
 
 
-def _deliver(response: Response, folder: Path | None, *, as_json: bool) -> None:
-    result = response.to_dict()
+def _deliver(response: Response, folder: Path | None, *, friction: float | None, as_json: bool) -> None:
+    result = response.to_dict(friction)
     if folder is not None:
         _write(response, result, folder)
-    batch.show(result, response.summary(), as_json=as_json, folder=folder)
+    batch.show(result, response.summary(friction), as_json=as_json, folder=folder)
 
 
 def _deliver_all(found: Survey, folder: Path | None, *, each: bool, as_json: bool) -> None:

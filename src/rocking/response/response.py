@@ -275,8 +275,13 @@ class Response:
     def _contact(self) -> Contact:
         return Contact(self._history, self.block, self.tipping_time if self.overturned else self.duration)
 
-    def summary(self) -> str:
+    def summary(self, friction: float | None = None) -> str:
         """Return what happened in words, line by line, as ``rocking simulate`` prints it.
+
+        Parameters
+        ----------
+        friction : float, optional
+            Coefficient of friction: says whether the block would slide, and when first.
 
         Notes
         -----
@@ -301,12 +306,17 @@ class Response:
         least normal force  0.8919 of the weight, until it tips at 0.9319 s
         verdict             overturns at 1.532021 s
         """
-        return summary.text(self)
+        return summary.text(self, friction)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, friction: float | None = None) -> dict[str, Any]:
         """Return the result in plain values for machines, as ``rocking simulate --json`` prints it.
 
         Units are in the names; None stands for what is not a finite number.
+
+        Parameters
+        ----------
+        friction : float, optional
+            Coefficient of friction: says whether the block would slide, and when first.
 
         Examples
         --------
@@ -316,7 +326,7 @@ class Response:
         >>> result["overturned"], result["lift_off_time_s"], result["events"][0]["kind"]
         (True, None, 'uplift')
         """
-        return summary.values(self)
+        return summary.values(self, friction)
 
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
         """Time histories and events as a dataset.

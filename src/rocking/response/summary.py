@@ -23,8 +23,8 @@ _LISTED: Final = 12
 _MOST_DECIMALS, _MOST_DIGITS = 9, 6
 
 
-def text(response: Response) -> str:
-    """Return what happened, line by line."""
+def text(response: Response, friction: float | None) -> str:
+    """Return what happened, line by line; with a coefficient of friction, whether it is enough."""
     known, gravity = response.sensitivity, response.block.gravity
     plus, minus = (threshold / gravity for threshold in response.block.uplift_thresholds(response.model))
     lines = [
@@ -37,6 +37,7 @@ def text(response: Response) -> str:
         ("peak rotation", _peak_text(response, known)),
         ("friction needed", f"{response.required_friction:.4f}{_before_tipping(response)}"),
         ("least normal force", f"{response.minimum_normal_force:.4f} of the weight{_before_tipping(response)}"),
+        *_contact_lines(response, friction),
         ("verdict", _verdict(response, known)),
     ]
     return "\n".join(f"{name:<20}{entry}" for name, entry in lines)
@@ -52,7 +53,7 @@ def line(response: Response) -> str:
     )
 
 
-def values(response: Response) -> dict[str, Any]:
+def values(response: Response, friction: float | None) -> dict[str, Any]:
     """Return the result for machines: plain values, units in the names, null where there is no number."""
     sides, motion = response.block.sides, response.motion
     ambiguities = response.ambiguities
@@ -84,6 +85,7 @@ def values(response: Response) -> dict[str, Any]:
             "required_friction": response.required_friction,
             "minimum_normal_force_over_weight": response.minimum_normal_force,
             named("lift_off_time", "s"): response.lift_off_time,
+            **_sliding(response, friction),
             "impacts_resolved": len(response.impacts),
             named("duration", "s"): response.duration,
             named("time_at_rest", "s"): response.time_at_rest,
@@ -164,6 +166,24 @@ def _peak_text(response: Response, known: Sensitivity) -> str:
     return (
         f"{response.peak_rotation:.{digits}g} rad at {response.peak_time:.4f} s, "
         f"{response.peak_over_slenderness:.{min(digits, 4)}g} of the slenderness"
+    )
+
+
+def _contact_lines(response: Response, friction: float | None) -> list[tuple[str, str]]:
+    """Say whether the block slides at a coefficient of friction, and when its base leaves the ground if it does."""
+    lines = []
+    if friction is not None:
+        sliding = response.sliding_time(friction)
+        slides = "no" if math.isnan(sliding) else f"yes, first at {sliding:.4f} s; what follows is not this response"
+        lines.append((f"slides at {friction:g}", slides))
+    if not math.isnan(response.lift_off_time):
+        lines.append(("base lifts off", f"at {response.lift_off_time:.4f} s; what follows is not this response"))
+    return lines
+
+
+def _sliding(response: Response, friction: float | None) -> dict[str, Any]:
+    return (
+        {} if friction is None else {"friction": friction, named("sliding_time", "s"): response.sliding_time(friction)}
     )
 
 
