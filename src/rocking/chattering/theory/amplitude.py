@@ -28,7 +28,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
         Coefficient of restitution.
     method : {"exact", "eq76", "eq77", "approximation"}
         "exact": by root finding on certified sequences, to 1e-14. "eq76", "eq77": the paper's fits, off by up to 1.1
-        and 2.6 % in eta from 0.5 to 0.97, omega from 0.5 to 8. "approximation": a Chebyshev expansion with a largest
+        and 5.4 % in eta from 0.5 to 0.97, omega from 0.5 to 8. "approximation": a Chebyshev expansion with a largest
         error of 4e-8, for eta from 0.5 to 0.97 and omega from 0.4 to 10 only.
 
     Returns
@@ -50,7 +50,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     Notes
     -----
     Source: the paper's section 5.1, Eqs 76 and 77. As a approaches a_cr the time of rest approaches pi/omega like a
-    power of a_cr - a whose exponent depends on eta only: 0.600 at eta = 0.92 and above, 0.61 at 0.5.
+    power of a_cr - a whose exponent depends on eta only: 0.600 at eta = 0.92 and above, 0.612 at 0.5, and up to 1 towards 0.
 
     Examples
     --------
