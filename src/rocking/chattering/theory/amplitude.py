@@ -50,7 +50,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     Notes
     -----
     Source: the paper's section 5.1, Eqs 76 and 77. As a approaches a_cr the time of rest approaches pi/omega like a
-    power of a_cr - a whose exponent depends on eta only: 0.600 at eta = 0.92 and above, 0.612 at 0.5, and up to 1 towards 0.
+    power of a_cr - a whose exponent depends on eta only: 0.600 at eta = 0.92 and above, 0.612 at 0.5, to 1 towards 0.
 
     Examples
     --------
