@@ -55,7 +55,8 @@ class Survey:
         rows = self.rows()
         overturned = sum(row["overturned"] for row in rows)
         table = text_table(list(_SHOWN.values()), [[row[name] for name in _SHOWN] for row in rows])
-        return f"{self.block.description}: {len(rows)} records, {overturned} overturn it\n\n{table}"
+        count = "1 record" if len(rows) == 1 else f"{len(rows)} records"
+        return f"{self.block.description}: {count}, overturned by {overturned}\n\n{table}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for machines."""
@@ -128,7 +129,7 @@ def survey(block: Block, motions: Mapping[str, Motion], *, progress: bool | None
     >>> names = ["el-centro-meloland-270", "ridgecrest-clc-090"]
     >>> found = survey(block, {name: rocking.records.load(name) for name in names})
     >>> print(found.summary().splitlines()[0])
-    rectangular block, 0.24 m x 1.1 m: 2 records, 1 overturn it
+    rectangular block, 0.24 m x 1.1 m: 2 records, overturned by 1
     """
     responses = []
     with Progress("simulating", total=len(motions), show=progress) as bar:
