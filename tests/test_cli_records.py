@@ -165,6 +165,17 @@ def test_an_unreadable_record_is_an_error_unless_one_keeps_going(run, folder):
     assert "none of 1 records" in err
 
 
+def test_a_record_without_motion_cannot_be_scaled_and_is_skipped_as_well(run, folder):
+    zero = folder / "zero.txt"
+    zero.write_text("0\n0\n0\n")
+    arguments = ["simulate", zero, folder / "r1.AT2", *BLOCK, "--dt", "0.02", "--units", "g", "--pga", "0.3g"]
+    assert run(*arguments)[0] == 2
+    code, out, err = run(*arguments, "--keep-going")
+    assert code == 0
+    assert "1 record," in out
+    assert "zero throughout" in err
+
+
 def test_each_record_counts_once(folder):
     assert len(expanded([str(folder), str(folder / "*.AT2")])) == 3
     with pytest.raises(rocking.UnreadableRecord, match="matches"):

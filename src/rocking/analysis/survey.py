@@ -62,7 +62,8 @@ class Survey:
         overturned = sum(row["overturned"] for row in rows)
         shown = _SHOWN if self.friction is None else _SHOWN | {_SLIDING: f"slides at {self.friction:g}, s"}
         table = text_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
-        return f"{self.block.description}: {len(rows)} records, {overturned} overturn it\n\n{table}"
+        count = "1 record" if len(rows) == 1 else f"{len(rows)} records"
+        return f"{self.block.description}: {count}, overturned by {overturned}\n\n{table}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for machines."""
@@ -147,7 +148,7 @@ def survey(
     >>> names = ["el-centro-meloland-270", "ridgecrest-clc-090"]
     >>> found = survey(block, {name: rocking.records.load(name) for name in names})
     >>> print(found.summary().splitlines()[0])
-    rectangular block, 0.24 m x 1.1 m: 2 records, 1 overturn it
+    rectangular block, 0.24 m x 1.1 m: 2 records, overturned by 1
     """
     responses = []
     with Progress("simulating", total=len(motions), show=progress) as bar:

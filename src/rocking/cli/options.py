@@ -12,7 +12,7 @@ from cyclopts import Group, Parameter
 
 from rocking.analysis.intensity import MeasureName
 from rocking.cli.quantities import acceleration, angle, number, sides, values
-from rocking.errors import InvalidBlock, InvalidOption, OutputError, UnreadableRecord
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion
 from rocking.plausibility import block_notes, motion_notes
@@ -185,10 +185,10 @@ class RecordOptions(FileOptions):
             for name in records:
                 try:
                     motions[name] = self.read(name)
-                except UnreadableRecord as error:
+                except (UnreadableRecord, InvalidMotion) as error:
                     if not self.keep_going:
                         raise
-                    skipped.append(str(error))
+                    skipped.append(str(error) if name in str(error) else f"{name}: {error}")
                 progress.advance()
         if not motions:
             raise UnreadableRecord(f"none of {len(records)} records could be read; the first: {skipped[0]}")

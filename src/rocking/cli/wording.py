@@ -24,7 +24,7 @@ def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
     """Return an error as one line that names options."""
     sentence = " ".join(str(error).split()).rstrip(".")
     if isinstance(error, UnknownCommandError):
-        return _unknown_command(app, arguments[0])
+        return _unknown_command(app, (error.unused_tokens or arguments)[0])
     if isinstance(error, CycloptsError):
         return f"{sentence}; see rocking{''.join(f' {name}' for name in _command(app, arguments))} --help"
     return _with_options(sentence, _options(app, arguments))
