@@ -242,7 +242,7 @@ def test_the_chance_of_overturning_is_the_share_of_the_population(threshold_evid
     populations = np.array([[math.log(1.4), centre, math.log(0.7), 1.0, score, 1.0]])
     share = [0.5 * (1.0 + math.erf((threshold - centre) / dispersion / math.sqrt(2.0))) for threshold in thresholds]
     # 4096 candidates, of which some 150 stand within the population's reach.
-    np.testing.assert_allclose(evidence.chances(populations)[0], 0.01 + 0.98 * np.array(share), atol=0.03)
+    np.testing.assert_allclose(evidence.probabilities(populations)[0], 0.01 + 0.98 * np.array(share), atol=0.03)
 
 
 def test_the_posterior_is_that_of_brute_force(threshold_evidence):
@@ -251,7 +251,7 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
     drawn = population.posterior(evidence, tests, 512, np.random.default_rng(0))
     rng = np.random.default_rng(1)
     prior = np.hstack([evidence.candidates.space.spread_evenly(20_000, rng), rng.standard_normal((20_000, 3))])
-    likelihood = np.exp(evidence.log_likelihoods(evidence.chances(prior), tests))
+    likelihood = np.exp(evidence.log_likelihoods(evidence.probabilities(prior), tests))
     weights = likelihood / likelihood.sum()
     mean = weights @ prior
     deviation = np.sqrt(weights @ (prior - mean) ** 2)
@@ -281,8 +281,8 @@ def test_candidates_weigh_what_their_density_lacks(threshold_evidence):
         np.concatenate([np.where(doubled, -math.log(2.0), 0.0), np.full(doubled.sum(), -math.log(2.0))]),
     )
     populations = np.array([[math.log(1.4), math.log(0.16), math.log(0.7), 0.0, 0.0, 0.0]])
-    expected = evidence.chances(populations)
-    found = Evidence(twice, evidence.observed, evidence.lapse).chances(populations)
+    expected = evidence.probabilities(populations)
+    found = Evidence(twice, evidence.observed, evidence.lapse).probabilities(populations)
     np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
@@ -305,10 +305,10 @@ def test_scores_of_known_predictions():
     assert Scores.of([1.0], [0]).log_loss == math.inf
 
 
-@pytest.mark.parametrize("chances", [[0.5], [1.2, 0.1], [math.nan, 0.1], []])
-def test_scores_refuse_what_is_no_probability(chances):
+@pytest.mark.parametrize("probabilities", [[0.5], [1.2, 0.1], [math.nan, 0.1], []])
+def test_scores_refuse_what_is_no_probability(probabilities):
     with pytest.raises(rocking.InvalidOption):
-        Scores.of(chances, [True, False])
+        Scores.of(probabilities, [True, False])
 
 
 # Histories: release tests and forced rocking.

@@ -78,10 +78,10 @@ def check_discrete(function, imls, poes):
     assert np.all(np.diff(levels, prepend=float(imls.get("noDamageLimit", 0.0))) > 0.0)
     for entry in poes:
         assert entry.tag == tag("poes")
-        chances = np.array(entry.text.split(), dtype=float)
-        assert chances.shape == levels.shape
-        assert np.all((chances >= 0.0) & (chances <= 1.0))
-        assert np.all(np.diff(chances) >= 0.0)
+        probabilities = np.array(entry.text.split(), dtype=float)
+        assert probabilities.shape == levels.shape
+        assert np.all((probabilities >= 0.0) & (probabilities <= 1.0))
+        assert np.all(np.diff(probabilities) >= 0.0)
 
 
 def openquakes_probability(params, level):

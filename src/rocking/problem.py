@@ -9,6 +9,7 @@ from typing import get_args
 import numpy as np
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
@@ -30,7 +31,7 @@ def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Gro
     return ground.ground_of(motion.breakpoints, coefficients, 1.0 / gravity, motion.error * abs(factor))
 
 
-def records_of(blocks: Blocks, model: Model, limits: state.Floats) -> state.Records:
+def records_of(blocks: Blocks, model: Model, limits: Floats) -> state.Records:
     """Every block as the kernels take it (`state.BLOCK`), shape (n,)."""
     p, alpha = blocks.p, blocks.alpha
     made = state.records(len(blocks), state.BLOCK)
@@ -73,7 +74,7 @@ def rules_of(
     )
 
 
-def _frozen(array: state.Floats) -> state.Floats:
+def _frozen(array: Floats) -> Floats:
     array.flags.writeable = False
     return array
 

@@ -14,9 +14,10 @@ import math
 
 import numpy as np
 
+from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import Ground, acceleration, local_series
-from rocking.kernels.state import ORDER, Floats, Record
+from rocking.kernels.state import ORDER, Record
 
 #: Terms of the velocity below this fraction of the largest one no longer count. (Those of the rotation are no measure:
 #: over a step that is short beside 1/p they vanish beside u long before the velocity has converged.)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rocking.arrays import Floats
 from rocking.kernels.arc import restoring, sign_of
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import (
@@ -29,7 +30,7 @@ from rocking.kernels.ground import (
 )
 from rocking.kernels.remainder import deviation, refined_bracket
 from rocking.kernels.remaining import Restoring, remaining_time
-from rocking.kernels.state import Floats, Record
+from rocking.kernels.state import Record
 
 #: Window of the proof over the first estimate of the remaining time.
 _WINDOW = 1.5

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.state import Floats
 
 #: Relative allowance for rounding in bounds.
 ROUNDING = 2.0**-48

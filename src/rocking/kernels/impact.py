@@ -3,11 +3,12 @@
 import math
 from typing import NamedTuple
 
+from rocking.arrays import Floats
 from rocking.kernels.arc import evaluate
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import move
 from rocking.kernels.root import curvature_bound, first_root
-from rocking.kernels.state import Floats, Record
+from rocking.kernels.state import Record
 from rocking.kernels.status import IMPACT, OVERTURN, STEP
 
 

@@ -2,9 +2,7 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
 
 #: Length of the work array beyond the columns of the motion: 0.25**16 / 16! = 1e-23.
@@ -14,12 +12,12 @@ _RADIANS_PER_STEP = 0.25
 
 @kernel
 def peak_displacements(
-    breakpoints: NDArray[np.float64],
-    coefficients: NDArray[np.float64],
-    frequencies: NDArray[np.float64],
+    breakpoints: Floats,
+    coefficients: Floats,
+    frequencies: Floats,
     damping: float,
-    work: NDArray[np.float64],
-    peaks: NDArray[np.float64],
+    work: Floats,
+    peaks: Floats,
 ) -> None:
     """Put the largest ``|u|`` (m) of ``u'' + 2 z w u' + w^2 u = -a(t)`` from rest into `peaks`, for each w (rad/s).
 
@@ -34,12 +32,12 @@ def peak_displacements(
 
 @shared
 def _peak(
-    breakpoints: NDArray[np.float64],
-    coefficients: NDArray[np.float64],
+    breakpoints: Floats,
+    coefficients: Floats,
     frequency: float,
     damping: float,
-    force: NDArray[np.float64],
-    series: NDArray[np.float64],
+    force: Floats,
+    series: Floats,
 ) -> float:
     series[:] = 0.0
     peak = 0.0
@@ -59,9 +57,7 @@ def _peak(
 
 
 @shared
-def _advance(
-    series: NDArray[np.float64], force: NDArray[np.float64], h: float, frequency: float, damping: float
-) -> float:
+def _advance(series: Floats, force: Floats, h: float, frequency: float, damping: float) -> float:
     """Expand the solution about the start of a step, move ``series[:2]`` to its end and return its peak."""
     for k in range(len(series) - 2):
         drive = force[k] if k < len(force) else 0.0
@@ -78,7 +74,7 @@ def _advance(
 
 
 @shared
-def _extremum(series: NDArray[np.float64], h: float) -> float:
+def _extremum(series: Floats, h: float) -> float:
     """Root of the velocity between 0 and h, where it has opposite signs, by bisection.
 
     The displacement is stationary there, so half the digits of the time give all the digits of the peak.
@@ -94,7 +90,7 @@ def _extremum(series: NDArray[np.float64], h: float) -> float:
 
 
 @inlined
-def _value(series: NDArray[np.float64], x: float) -> float:
+def _value(series: Floats, x: float) -> float:
     result = 0.0
     for k in range(len(series) - 1, -1, -1):
         result = result * x + series[k]
@@ -102,7 +98,7 @@ def _value(series: NDArray[np.float64], x: float) -> float:
 
 
 @inlined
-def _slope(series: NDArray[np.float64], x: float) -> float:
+def _slope(series: Floats, x: float) -> float:
     result = 0.0
     for k in range(len(series) - 1, 0, -1):
         result = result * x + k * series[k]
@@ -110,7 +106,7 @@ def _slope(series: NDArray[np.float64], x: float) -> float:
 
 
 @shared
-def _move(force: NDArray[np.float64], shift: float) -> None:
+def _move(force: Floats, shift: float) -> None:
     """Re-expand a polynomial about `shift`, in place (repeated synthetic division)."""
     last = len(force) - 1
     for i in range(last):

@@ -7,9 +7,7 @@ eps^(3/2)/omega: with z = omega T_{n;1}, y = omega sigma_{n;1} and v = -omega Ph
 import math
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel
 
 _ROOT2: Final = math.sqrt(2.0)
@@ -48,7 +46,7 @@ def eq65_sums(eta: float) -> tuple[float, float]:
 
 
 @kernel
-def eq65_terms(eta: float, terms: NDArray[np.float64]) -> int:
+def eq65_terms(eta: float, terms: Floats) -> int:
     """Fill rows with omega T_{n;1} and omega T_{n+1;3} until they vanish; number of rows, all when they do not."""
     y = 0.0
     v = 0.0
@@ -122,9 +120,7 @@ def eq77(eta: float) -> float:
 
 
 @kernel
-def fitted_amplitudes(
-    omega: NDArray[np.float64], eta: NDArray[np.float64], with_frequency: bool, amplitudes: NDArray[np.float64]
-) -> None:
+def fitted_amplitudes(omega: Floats, eta: Floats, with_frequency: bool, amplitudes: Floats) -> None:
     """Eq. 76 (with the frequency) or Eq. 77 for each omega and eta."""
     for i in range(amplitudes.size):
         amplitudes[i] = eq76(omega[i], eta[i]) if with_frequency else eq77(eta[i])

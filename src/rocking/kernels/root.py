@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.state import Floats
 
 _EPSILON = 2.0**-53
 

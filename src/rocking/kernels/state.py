@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from rocking.kernels.status import GOING
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Records = NDArray[np.void]
 
 #: One record of the types below.

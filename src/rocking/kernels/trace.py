@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rocking.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate, expand, sign_of
 from rocking.kernels.compiled import kernel
 from rocking.kernels.ground import Ground, start_of
-from rocking.kernels.state import AT_REST, NODE_ROW, Floats, Integers, Record, Records, records
+from rocking.kernels.state import AT_REST, NODE_ROW, Record, Records, records
 
 #: Nodes of a response that has not begun.
 NO_NODES = records(0, NODE_ROW)

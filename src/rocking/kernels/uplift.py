@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import (
     Ground,
@@ -16,7 +17,7 @@ from rocking.kernels.ground import (
     start_of,
 )
 from rocking.kernels.root import first_root
-from rocking.kernels.state import AT_REST, Floats, Record
+from rocking.kernels.state import AT_REST, Record
 
 #: Accelerations closer to a threshold than this fraction of it are at the threshold.
 _ROUNDING = 2.0**-48

@@ -6,10 +6,11 @@ equation of motion, through an impact by the saltation that follows from its shi
 
 import numpy as np
 
+from rocking.arrays import Floats
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import acceleration, length_of, slope
-from rocking.kernels.state import AT_REST, ORDER, Floats, Record
+from rocking.kernels.state import AT_REST, ORDER, Record
 from rocking.kernels.trace import Trail
 
 #: What may be changed: the motion, the initial rotation and velocity, and p, slenderness and restitution of both sides.

@@ -184,14 +184,14 @@ class Calibration:
         """
         labels = _labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
-        chances = np.empty((repeats, len(self.observed)))
-        for row in chances:
+        probabilities = np.empty((repeats, len(self.observed)))
+        for row in probabilities:
             parts = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
             for part in range(folds):
                 left_out = parts == part
                 drawn = population.posterior(self._evidence, ~left_out, _ROUGH_DRAWS, rng, progress)
-                row[left_out] = self._evidence.chances(drawn).mean(axis=0)[left_out]
-        return Validation(chances, tuple(Scores.of(row, self.observed) for row in chances))
+                row[left_out] = self._evidence.probabilities(drawn).mean(axis=0)[left_out]
+        return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
     def summary(self) -> str:
         """Return the estimates and scores as a table for people."""
@@ -353,7 +353,7 @@ def calibrate(
         blocks=space.blocks(points[kept]),
         weights=times / ensemble,
         estimates=MappingProxyType(_estimates(space, final)),
-        probabilities=evidence.chances(final).mean(axis=0),
+        probabilities=evidence.probabilities(final).mean(axis=0),
         observed=observed,
         model=model,
         lapse=lapse,

@@ -66,21 +66,21 @@ class Evidence:
         parts = [self.weights(part).sum(axis=0) for part in _batches(populations)]
         return np.asarray(np.sum(parts, axis=0) / len(populations))
 
-    def chances(self, populations: Floats) -> Floats:
+    def probabilities(self, populations: Floats) -> Floats:
         """Probability of overturning for each population and motion, shape (c, m)."""
         overturned = self.candidates.overturned
         parts = [self.weights(part).astype(np.float32) @ overturned for part in _batches(populations)]
         return blurred(np.concatenate(parts).astype(np.float64), self.lapse)
 
-    def log_likelihoods(self, chances: Floats, tests: Flags) -> Floats:
+    def log_likelihoods(self, probabilities: Floats, tests: Flags) -> Floats:
         """Log-likelihood of each population on some of the tests, shape (c,)."""
         seen = self.observed[tests]
-        return np.asarray(np.log(np.where(seen, chances[:, tests], 1.0 - chances[:, tests])).sum(axis=1))
+        return np.asarray(np.log(np.where(seen, probabilities[:, tests], 1.0 - probabilities[:, tests])).sum(axis=1))
 
 
-def blurred(chances: Floats, lapse: float) -> Floats:
+def blurred(probabilities: Floats, lapse: float) -> Floats:
     """Probabilities of recorded outcomes, from those of the rocking block."""
-    return lapse + (1.0 - 2.0 * lapse) * chances
+    return lapse + (1.0 - 2.0 * lapse) * probabilities
 
 
 def unpacked(populations: Floats) -> tuple[Floats, Floats]:
@@ -188,7 +188,7 @@ def _log_prior(space: Space, populations: Floats) -> Floats:
 def _log_likelihoods(evidence: Evidence, tests: Flags, populations: Floats) -> Floats:
     if not len(populations):
         return np.zeros(0)
-    return evidence.log_likelihoods(evidence.chances(populations), tests)
+    return evidence.log_likelihoods(evidence.probabilities(populations), tests)
 
 
 def _tempered(likelihood: Floats, step: float) -> Floats:

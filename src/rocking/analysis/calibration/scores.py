@@ -47,17 +47,17 @@ class Scores:
         >>> Scores.of([0.9, 0.2, 0.6], [True, False, False])
         Scores(accuracy=0.6666666666666666, log_loss=0.41493..., brier=0.13666...)
         """
-        chances, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
-        if chances.shape != seen.shape or not chances.size:
-            raise InvalidOption(f"there must be one probability for each outcome, not {chances.shape} and {seen.shape}")
-        if not np.all((chances >= 0.0) & (chances <= 1.0)):
+        given, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
+        if given.shape != seen.shape or not given.size:
+            raise InvalidOption(f"there must be one probability for each outcome, not {given.shape} and {seen.shape}")
+        if not np.all((given >= 0.0) & (given <= 1.0)):
             raise InvalidOption("probabilities must lie between 0 and 1")
         with np.errstate(divide="ignore"):
-            losses = -np.log(np.where(seen, chances, 1.0 - chances))
+            losses = -np.log(np.where(seen, given, 1.0 - given))
         return cls(
-            accuracy=float(np.mean((chances > 0.5) == seen)),
+            accuracy=float(np.mean((given > 0.5) == seen)),
             log_loss=float(losses.mean()),
-            brier=float(np.mean((chances - seen) ** 2)),
+            brier=float(np.mean((given - seen) ** 2)),
         )
 
     @classmethod

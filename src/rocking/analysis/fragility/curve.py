@@ -320,11 +320,12 @@ class Fragility:
         is written as the limit of no damage of PGA.
         """
         chosen = self.block if block is None else block
+        lognormals = [nrml.Lognormal(one.limit_state, one.median, one.dispersion) for one in self.curves]
         scale = nrml.scale_of(self.measure, chosen, self.model)
         lifting = None
         if chosen is not None and scale.imt == "PGA":
             lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
-        function = nrml.fragility_function(self.curves, scale, self.range, lifting, taxonomy, format)
+        function = nrml.fragility_function(lognormals, scale, self.range, lifting, taxonomy, format)
         states = [curve.limit_state for curve in self.curves]
         nrml.write(path, function, states, nrml.Header(model_id, asset_category, loss_category, self.description))
 

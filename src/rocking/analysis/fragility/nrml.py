@@ -12,7 +12,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
+from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, OutputError
 from rocking.treatment.base import Model
-
-if TYPE_CHECKING:
-    from rocking.analysis.fragility.curve import FragilityCurve
 
 NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
 
@@ -44,6 +41,14 @@ class Header(NamedTuple):
     asset_category: str
     loss_category: LossCategory
     description: str
+
+
+class Lognormal(NamedTuple):
+    """A limit state's curve: median, in the measure's units, and dispersion."""
+
+    limit_state: str
+    median: float
+    dispersion: float
 
 
 class Scale(NamedTuple):
@@ -89,7 +94,7 @@ def write(path: str | Path, function: ET.Element, limit_states: Sequence[str], h
 
 
 def fragility_function(
-    curves: Sequence[FragilityCurve],
+    curves: Sequence[Lognormal],
     scale: Scale,
     valid: tuple[float, float],
     no_damage: float | None,
@@ -100,7 +105,7 @@ def fragility_function(
 
     Parameters
     ----------
-    curves : sequence of FragilityCurve
+    curves : sequence of Lognormal
         One for each limit state.
     scale : Scale
         From `scale_of`.
@@ -137,12 +142,14 @@ def fragility_function(
             moments = {"mean": f"{mean:.8g}", "stddev": f"{deviation:.8g}"}
             ET.SubElement(function, "params", {"ls": curve.limit_state} | moments)
         return function
+    from scipy.special import ndtr
+
     # The first level must lie above the limit of no damage.
     levels = np.geomspace(low, high, _LEVELS + 1)[1:]
     ET.SubElement(function, "imls", measure).text = _listed(levels)
     for curve in curves:
-        chances = curve.probability(levels / scale.factor)
-        ET.SubElement(function, "poes", {"ls": curve.limit_state}).text = _listed(chances)
+        probabilities = ndtr(np.log(levels / (scale.factor * curve.median)) / curve.dispersion)
+        ET.SubElement(function, "poes", {"ls": curve.limit_state}).text = _listed(probabilities)
     return function
 
 

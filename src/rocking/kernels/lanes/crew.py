@@ -5,9 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rocking.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined
 from rocking.kernels.ground import Ground, start_of
-from rocking.kernels.state import Floats, Integers, Record, Records, attributed, new_table, record, records
+from rocking.kernels.state import Record, Records, attributed, new_table, record, records
 
 #: Lanes that step together. A constant, so that their loops have a fixed length.
 WIDTH = 32

@@ -3,9 +3,7 @@
 import math
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.sine import FOUND
 from rocking.kernels.sine.arc import LARGEST_EXCESS
@@ -24,7 +22,7 @@ _MAXIMUM_STEPS: Final = 400
 
 
 @kernel
-def critical_amplitudes(omega: NDArray[np.float64], eta: NDArray[np.float64], amplitudes: NDArray[np.float64]) -> None:
+def critical_amplitudes(omega: Floats, eta: Floats, amplitudes: Floats) -> None:
     """Critical amplitude for each omega and eta < 1."""
     for i in range(amplitudes.size):
         amplitudes[i] = 1.0 + critical_excess(1.0 / (omega[i] * omega[i]), eta[i])

@@ -18,6 +18,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.sine import FOUND, UNRESOLVED
 from rocking.kernels.sine.arc import (
@@ -92,7 +93,7 @@ BLOCK: Final = np.dtype(
 Block = Any
 
 #: Amplitudes, frequencies and coefficients of restitution.
-Sequences = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+Sequences = tuple[Floats, Floats, Floats]
 
 _RUNNING: Final = 0
 _CLOSING: Final = 1
@@ -115,12 +116,12 @@ _MAXIMUM_PAIRS: Final = 400
 class Answers(NamedTuple):
     """Where the answers go: a phase means nothing unless its status is FOUND."""
 
-    phases: NDArray[np.float64]
+    phases: Floats
     statuses: NDArray[np.int8]
 
 
 @kernel
-def rest_phases(sequences: Sequences, order: NDArray[np.int64], pool: NDArray[np.record], answers: Answers) -> None:
+def rest_phases(sequences: Sequences, order: Integers, pool: NDArray[np.record], answers: Answers) -> None:
     """Phases of rest of the sequences (a > 1, omega, eta) that ``order`` picks.
 
     ``pool`` is scratch space: BLOCKS + 1 records of BLOCK.
@@ -132,7 +133,7 @@ def rest_phases(sequences: Sequences, order: NDArray[np.int64], pool: NDArray[np
 
 
 @shared
-def load(sequences: Sequences, some: NDArray[np.int64], pool: NDArray[np.record]) -> None:
+def load(sequences: Sequences, some: Integers, pool: NDArray[np.record]) -> None:
     """Lift some sequences off, and fill the last block up with copies that do not run."""
     a, omega, eta = sequences
     for b in range(blocks_of(some.size)):

@@ -6,6 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED
 from rocking.kernels.sine.arc import State, arc, bounced, first_arc, guess_landing
@@ -98,9 +99,9 @@ def resolve(
 
 @kernel
 def semianalytical_phases(
-    sequences: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    resolved: NDArray[np.int64],
-    phases: NDArray[np.float64],
+    sequences: tuple[Floats, Floats, Floats],
+    resolved: Integers,
+    phases: Floats,
     statuses: NDArray[np.int8],
 ) -> None:
     """Status and phase of rest by Eq. 75 with so many resolved intervals, for each (a > 1, omega, eta)."""

@@ -10,13 +10,13 @@ from typing import Final
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from rocking.arrays import Floats
 from rocking.kernels.paper import positive_root
 from rocking.kernels.sine.closure import LEVELS, remaining_series, richardson_weights
 from rocking.kernels.sine.power_series import PowerSeries
 
-Series = NDArray[np.float64]
+Series = Floats
 
 #: Relative size of the last extrapolation, coefficient by coefficient, at which it is taken.
 _CLOSED: Final = 1e-14
