@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.cli import app, quantities, wording
+from rocking import quantities
+from rocking.cli import app, wording
 from rocking.errors import InvalidOption
 from rocking.motion.named import expanded
 from rocking.progress import note, notes_for

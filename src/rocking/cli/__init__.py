@@ -34,6 +34,7 @@ for _command, _help in {
     "ida": "Scale motions up until the block overturns and beyond (incremental dynamic analysis).",
     "fragility": "Fit the probability that a block overturns against the intensity of the motions.",
     "calibrate": "Find the block behind observed outcomes, or behind a measured rotation history.",
+    "study": "Run a study too long for one sitting: created once, resumed after anything.",
 }.items():
     app.command(f"rocking.cli.{_command}:{_command}", name=_command, help=_help)
 app.register_install_completion_command(help="Install completion of commands and options for this shell.")

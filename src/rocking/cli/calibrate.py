@@ -15,8 +15,8 @@ from rocking.analysis.calibration.outcomes import calibrate as run
 from rocking.analysis.calibration.tables import Outcomes, read
 from rocking.cli import batch
 from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledOptions
-from rocking.cli.quantities import Quantity, angle, number, sides
 from rocking.errors import InvalidOption
+from rocking.quantities import Quantity, angle, number, sides
 from rocking.tables import text_table, to_json, write_text
 from rocking.treatment.base import Model
 

@@ -20,9 +20,9 @@ from rocking.cli.options import (
     OutputOptions,
     TreatmentOptions,
 )
-from rocking.cli.quantities import number
 from rocking.errors import InvalidOption
 from rocking.product import Polarity
+from rocking.quantities import number
 
 
 def fragility(

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from rocking.analysis.overturning import overturning_map
 from rocking.cli import batch
 from rocking.cli.options import BLOCK, MODEL, OUTPUT, ModelOptions, OutputOptions, SlendernessOptions
-from rocking.cli.quantities import angle, values
+from rocking.quantities import angle, values
 
 
 def map(

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from cyclopts import Group, Parameter
 
 from rocking.analysis.intensity import MeasureName
-from rocking.cli.quantities import acceleration, angle, number, sides, values
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion
 from rocking.plausibility import block_notes, motion_notes
 from rocking.progress import Progress, note
+from rocking.quantities import acceleration, angle, number, sides, values
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:

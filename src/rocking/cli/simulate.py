@@ -21,8 +21,8 @@ from rocking.cli.options import (
     OutputOptions,
     TreatmentOptions,
 )
-from rocking.cli.quantities import angle
 from rocking.errors import InvalidOption, OutputError
+from rocking.quantities import angle
 from rocking.response import Response
 from rocking.simulation import simulate as run
 from rocking.tables import to_json, write_text

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
 from rocking.cli import batch
 from rocking.cli.options import MODEL, OUTPUT, RECORDS, MotionOptions, Names, OutputOptions, TreatmentOptions
-from rocking.cli.quantities import angle, values
+from rocking.quantities import angle, values
 
 
 def spectrum(

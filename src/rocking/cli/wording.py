@@ -24,7 +24,7 @@ def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
     """Return an error as one line that names options."""
     sentence = " ".join(str(error).split()).rstrip(".")
     if isinstance(error, UnknownCommandError):
-        return _unknown_command(app, (error.unused_tokens or arguments)[0])
+        return _unknown_command(_called(app, arguments), (error.unused_tokens or arguments)[0])
     if isinstance(error, CycloptsError):
         return f"{sentence}; see rocking{''.join(f' {name}' for name in _command(app, arguments))} --help"
     return _with_options(sentence, _options(app, arguments))
@@ -42,12 +42,12 @@ def refuse_unknown_options(app: App, arguments: Sequence[str]) -> None:
     if not command:
         return
     known = _options(app, arguments)
-    for argument in arguments[1:]:
+    for argument in arguments[len(command) :]:
         name = argument.partition("=")[0]
         if argument == "--":
             return
         if _OPTION.match(argument) and name not in known:
-            raise InvalidOption(f"rocking {command[0]} has no option {name}{_meant(name, known)}")
+            raise InvalidOption(f"rocking {' '.join(command)} has no option {name}{_meant(name, known)}")
 
 
 def _unknown_command(app: App, name: str) -> str:
@@ -64,15 +64,28 @@ def _meant(name: str, known: Iterable[str]) -> str:
 
 
 def _command(app: App, arguments: Sequence[str]) -> list[str]:
-    return [name for name in arguments[:1] if name in list(app) and not name.startswith("-")]
+    """Names of the command that is called, and of its own command where it has several."""
+    names, here = [], app
+    for name in arguments:
+        if name.startswith("-") or name not in list(here):
+            break
+        names.append(name)
+        here = here[name]
+    return names
+
+
+def _called(app: App, arguments: Sequence[str]) -> App:
+    for name in _command(app, arguments):
+        app = app[name]
+    return app
 
 
 def _options(app: App, arguments: Sequence[str]) -> set[str]:
     """Return the options of the command that is called."""
-    command = _command(app, arguments)
-    if not command:
-        return set()
-    collection = app[command[0]].assemble_argument_collection()
+    called = _called(app, arguments)
+    if called.default_command is None:
+        return {"--help", "-h", "--version", "-V"}
+    collection = called.assemble_argument_collection()
     own = {name for argument in collection for name in argument.names if name.startswith("-")}
     return own | {"--help", "-h", "--version", "-V"}
 

@@ -324,6 +324,17 @@ def study(
         treatment(chattering),
         duration,
     )
+    return study_of(place, product, unit_blocks)
+
+
+def study_of(place: Place, product: Product, unit_blocks: int | None = None) -> Study:
+    """Create the study of a product in a place, or open the one that is there and check its inputs.
+
+    Raises
+    ------
+    StudyError
+        If there is one of other inputs, or it is damaged.
+    """
     if stores.exists(place):
         found = Store.open(place)
         found.check_inputs(product)

@@ -1,4 +1,4 @@
-"""Numbers as people write them on a command line: with a unit, in pairs, in lists and ranges."""
+"""Numbers as people write them: with a unit, in pairs, in lists and ranges."""
 
 from __future__ import annotations
 

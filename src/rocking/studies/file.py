@@ -1,0 +1,279 @@
+"""A study as a text file: blocks, motions, scales and rules in TOML, every mistake with its line."""
+
+from __future__ import annotations
+
+import csv
+import inspect
+import itertools
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from rocking import quantities
+from rocking.arrays import Floats
+from rocking.block import Blocks
+from rocking.errors import RockingError, StudyError, UnreadableRecord
+from rocking.motion import pulses
+from rocking.motion.motion import Motion
+from rocking.motion.named import expanded, named_motion
+from rocking.product import Product, Scales
+from rocking.treatment import treatment
+
+TEMPLATE: Final = """\
+# A study: every block under every motion at every scale. Numbers may be written 1.5, [1.0, 2.0], or as a
+# range "START:STOP:COUNT" with ":log" for equal ratios; accelerations as "0.5g", angles as "12deg".
+
+[blocks]                        # the full grid of these; or: csv = "blocks.csv" with these columns
+p = "1.5:6:20"                  # frequency parameter, rad/s
+alpha = "5deg:20deg:16"         # slenderness
+restitution = 0.9               # leave out for Housner's
+
+[motions]
+records = ["ridgecrest-clc-090", "el-centro-meloland-270"]   # files, folders, patterns, shipped records
+# channel = "1"
+# units = "g"
+# dt = 0.01
+skip_unreadable = false         # true: leave out records that cannot be read, and list them
+
+# [[motions.pulses]]            # any number of these; lists and ranges make one pulse each
+# family = "one_sine"
+# amplitude = 1.0
+# frequency = "0.5:5:10:log"
+
+[scales]                        # at most one of factor, pga, pgv, sa (with period, damping)
+pga = ["0.2g", "0.4g", "0.8g"]
+polarity = "+"                  # or "-", "both"
+
+[simulation]
+model = "nonlinear"             # or "linear"
+chattering = "certified"
+# duration = 40.0
+"""
+
+#: Keys of every table.
+_KEYS: Final[Mapping[str, frozenset[str]]] = {
+    "blocks": frozenset({"p", "alpha", "restitution", "csv"}),
+    "motions": frozenset({"records", "channel", "units", "dt", "skip_unreadable", "pulses"}),
+    "scales": frozenset({"factor", "pga", "pgv", "sa", "period", "damping", "polarity"}),
+    "simulation": frozenset({"model", "chattering", "duration"}),
+}
+
+_QUANTITIES: Final[Mapping[str, Callable[[str, str], float]]] = {
+    "alpha": quantities.angle,
+    "phase": quantities.angle,
+    "pga": quantities.acceleration,
+    "sa": quantities.acceleration,
+    "amplitude": quantities.acceleration,
+}
+
+
+@dataclass(frozen=True)
+class StudyFile:
+    """What a file describes.
+
+    Attributes
+    ----------
+    product : Product
+        Blocks, motions, scales and rules.
+    skipped : tuple of str
+        A sentence for each record that could not be read, where the file says to go on.
+    """
+
+    product: Product
+    skipped: tuple[str, ...]
+
+
+def read_study(path: str | Path) -> StudyFile:
+    """Read the description of a study; names of files in it are relative to it.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file; `TEMPLATE` is one with comments.
+
+    Returns
+    -------
+    StudyFile
+
+    Raises
+    ------
+    StudyError
+        If the file cannot be read, or a line of it is wrong; the message has the line.
+    UnreadableRecord
+        If a record cannot be read.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text("utf-8")
+        tables = tomllib.loads(text)
+    except OSError as error:
+        raise StudyError(f"{file} cannot be read: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise StudyError(f"{file} is no TOML file: {error}; correct it") from None
+    return _Reader(file, text, tables).study()
+
+
+class _Reader:
+    """Tables of a file, and where each key of them stands."""
+
+    def __init__(self, file: Path, text: str, tables: dict[str, Any]) -> None:
+        self.file, self.text, self.tables = file, text, tables
+
+    def study(self) -> StudyFile:
+        self._check_keys()
+        motions, skipped = self._motions()
+        scales = dict(self.tables.get("scales", {}))
+        polarity = scales.pop("polarity", "+")
+        measures = {
+            name: self._numbers("scales", name, value) for name, value in scales.items() if name not in _OSCILLATOR
+        }
+        rules = self.tables.get("simulation", {})
+        try:
+            product = Product(
+                self._blocks(),
+                tuple(motions),
+                Scales.of(period=scales.get("period"), damping=scales.get("damping", 0.05), **measures),
+                polarity,
+                rules.get("model", "nonlinear"),
+                treatment(rules.get("chattering", "certified")),
+                rules.get("duration"),
+            )
+        except StudyError:
+            raise
+        except RockingError as error:
+            raise StudyError(f"{self.file}: {error}") from error
+        return StudyFile(product, tuple(skipped))
+
+    def _check_keys(self) -> None:
+        for table, content in self.tables.items():
+            if table not in _KEYS:
+                raise self._wrong(table, None, f"there is no table [{table}]; there are {', '.join(_KEYS)}")
+            if not isinstance(content, dict):
+                raise self._wrong(None, table, f"{table} must be a table, [{table}]")
+            for key in content:
+                if key not in _KEYS[table]:
+                    known = ", ".join(sorted(_KEYS[table]))
+                    raise self._wrong(table, key, f"[{table}] has no {key}; it takes {known}")
+        for needed in ("blocks", "motions"):
+            if needed not in self.tables:
+                raise StudyError(f"{self.file}: the table [{needed}] is missing")
+
+    def _blocks(self) -> Blocks:
+        given = self.tables["blocks"]
+        if "csv" in given:
+            if len(given) > 1:
+                raise self._wrong("blocks", "csv", "csv goes without p, alpha and restitution")
+            return self._blocks_of_csv(self.file.parent / given["csv"])
+        missing = [name for name in ("p", "alpha") if name not in given]
+        if missing:
+            raise self._wrong("blocks", None, f"[blocks] needs {' and '.join(missing)}, or csv")
+        axes: dict[str, Any] = {name: self._numbers("blocks", name, value) for name, value in given.items()}
+        return Blocks.grid(**axes)
+
+    def _blocks_of_csv(self, table: Path) -> Blocks:
+        try:
+            with table.open(encoding="utf-8-sig", newline="") as file:
+                rows = list(csv.DictReader(file))
+        except OSError as error:
+            raise self._wrong("blocks", "csv", f"{table} cannot be read: {error.strerror}") from None
+        columns: dict[str, Any] = {}
+        for name in ("p", "alpha", "restitution"):
+            if rows and name in rows[0]:
+                cells = enumerate((row[name] or "" for row in rows), start=2)
+                columns[name] = np.array([_cell(table, line, name, text) for line, text in cells])
+        if not {"p", "alpha"} <= columns.keys():
+            raise self._wrong("blocks", "csv", f"{table} needs columns p (rad/s) and alpha (rad, or 12deg), and rows")
+        return Blocks(**columns)
+
+    def _motions(self) -> tuple[list[Motion], list[str]]:
+        given = self.tables["motions"]
+        motions, skipped = [], []
+        options = {name: given[name] for name in ("channel", "units", "dt") if name in given}
+        for name in self._records(given.get("records", [])):
+            try:
+                motions.append(named_motion(name, **options))
+            except UnreadableRecord as error:
+                if not given.get("skip_unreadable", False):
+                    raise
+                skipped.append(str(error))
+        for k, pulse in enumerate(given.get("pulses", [])):
+            motions += self._pulses(k, dict(pulse))
+        if not motions:
+            raise self._wrong("motions", None, "[motions] holds no motion that can be read: name records or pulses")
+        return motions, skipped
+
+    def _records(self, names: list[str]) -> list[str]:
+        """Names of records, those of files relative to the study's own file."""
+        beside = [str(self.file.parent / name) for name in names]
+        there = [
+            path if Path(path).exists() or any(mark in name for mark in "*?[") else name
+            for path, name in zip(beside, names, strict=True)
+        ]
+        return expanded(there)
+
+    def _pulses(self, k: int, pulse: dict[str, Any]) -> list[Motion]:
+        family = str(pulse.pop("family", "")).replace("-", "_").replace(" ", "_")
+        make = getattr(pulses, family, None) if family in pulses.__all__ else None
+        if make is None:
+            raise self._wrong("motions.pulses", "family", f"family must be one of {', '.join(pulses.__all__)}", k)
+        words = {name: value for name, value in pulse.items() if name in _WORDS}
+        axes = {
+            name: self._numbers("motions.pulses", name, value) for name, value in pulse.items() if name not in _WORDS
+        }
+        made = []
+        for values in itertools.product(*axes.values()):
+            numbers = dict(zip(axes, (float(value) for value in values), strict=True))
+            try:
+                inspect.signature(make).bind(**numbers, **words)
+                made.append(make(**numbers, **words))
+            except TypeError as error:
+                raise self._wrong(
+                    "motions.pulses", "family", f"the pulse {family} is not complete: {error}", k
+                ) from None
+        return made
+
+    def _numbers(self, table: str, key: str, value: Any) -> Floats:
+        """Numbers of a key: one, a list, or a range."""
+        quantity = _QUANTITIES.get(key, quantities.number)
+        try:
+            if isinstance(value, str):
+                return quantities.values(value, key, quantity)
+            each = value if isinstance(value, list) else [value]
+            return np.array([quantity(one if isinstance(one, str) else repr(one), key) for one in each])
+        except RockingError as error:
+            raise self._wrong(table, key, str(error)) from None
+
+    def _wrong(self, table: str | None, key: str | None, sentence: str, occurrence: int = 0) -> StudyError:
+        return StudyError(f"{self.file}, line {_line(self.text, table, key, occurrence)}: {sentence}")
+
+
+_OSCILLATOR: Final = ("period", "damping")
+_WORDS: Final = ("kind", "name")
+
+
+def _cell(table: Path, line: int, name: str, text: str) -> float:
+    try:
+        return (quantities.angle if name == "alpha" else quantities.number)(text, name)
+    except RockingError as error:
+        raise StudyError(f"{table}, line {line}: {error}") from None
+
+
+def _line(text: str, table: str | None, key: str | None, occurrence: int) -> int:
+    """Line of a key in a table, the occurrence-th of that name; of its heading where there is no key; 1 if unseen."""
+    here, seen, heading_line = None, -1, 1
+    for number, line in enumerate(text.splitlines(), start=1):
+        heading = re.match(r"\s*\[+\s*([\w.]+)\s*\]+", line)
+        if heading:
+            here = heading[1]
+            seen += here == table
+            if here == table and seen == occurrence:
+                heading_line = number
+        found = re.match(r"\s*([\w.-]+)\s*=", line)
+        if found and key is not None and here == table and max(seen, 0) == occurrence and found[1] == key:
+            return number
+    return heading_line

@@ -1,0 +1,180 @@
+"""A study from a text file, through the commands: the same as from Python, and every mistake with its line."""
+
+import json
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.cli import main
+from rocking.studies import TEMPLATE, read_study
+
+TEXT = """\
+[blocks]
+p = "1:6:5"
+alpha = ["10deg", 0.2]
+restitution = 0.9
+
+[motions]
+records = ["el-centro-meloland-270"]
+
+[[motions.pulses]]
+family = "one-sine"
+amplitude = ["0.3g", "0.5g"]
+frequency = [0.5, 1.0]
+
+[scales]
+factor = [0.5, 1.0]
+polarity = "both"
+
+[simulation]
+model = "linear"
+chattering = "certified=1e-9"
+"""
+
+
+@pytest.fixture
+def run(capsys):
+    def call(*arguments):
+        code = 0
+        try:
+            main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            code = stop.code or 0
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(TEXT)
+    return path
+
+
+def test_a_file_is_the_product_that_it_describes(file):
+    product = read_study(file).product
+    assert product.shape == (5, 2, 2, 10)
+    np.testing.assert_allclose(np.unique(product.blocks.alpha), [np.deg2rad(10.0), 0.2])
+    assert [round(motion.pga / 9.80665, 6) for motion in product.motions[1:]] == [0.3, 0.3, 0.5, 0.5]
+    assert product.model == "linear"
+    assert product.treatment == rocking.Certified(1e-9)
+    assert product.scales.values.tolist() == [0.5, 1.0]
+
+
+def test_the_template_describes_a_study(tmp_path):
+    path = tmp_path / "new.toml"
+    path.write_text(TEMPLATE)
+    assert read_study(path).product.shape == (2, 3, 1, 320)
+
+
+def test_blocks_come_from_a_table_as_well(tmp_path, file):
+    (tmp_path / "blocks.csv").write_text("p,alpha,restitution\n2.0,12deg,0.9\n3.0,0.2,0.85\n")
+    grid = 'p = "1:6:5"\nalpha = ["10deg", 0.2]\nrestitution = 0.9\n'
+    file.write_text(TEXT.replace(grid, 'csv = "blocks.csv"\n'))
+    blocks = read_study(file).product.blocks
+    np.testing.assert_allclose(blocks.alpha[:, 0], [np.deg2rad(12.0), 0.2])
+    assert blocks.restitution[:, 0].tolist() == [0.9, 0.85]
+    (tmp_path / "blocks.csv").write_text("p,alpha\n2.0,0.2\nfast,0.2\n")
+    with pytest.raises(rocking.StudyError, match=r"blocks\.csv, line 3: p takes a number"):
+        read_study(file)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "sentence"),
+    [
+        ('p = "1:6:5"', 'p = "fast"', 2, "p takes a number"),
+        ("restitution = 0.9", "restitutoin = 0.9", 4, "no restitutoin; it takes alpha, csv"),
+        ("[scales]", "[scale]", 14, "no table"),
+        ('family = "one-sine"', 'family = "two-sine"', 10, "family must be one of"),
+        ("frequency = [0.5, 1.0]", "cycles = 2", 10, "not complete"),
+        ('amplitude = ["0.3g", "0.5g"]', 'amplitude = "0.3h"', 11, "acceleration"),
+        ("factor = [0.5, 1.0]", "factor = []", None, "factor"),
+        ("factor = [0.5, 1.0]", "factor = 1\npga = 2", None, "one measure only"),
+        ('polarity = "both"', 'polarity = "up"', None, "polarity must be"),
+        ('model = "linear"', 'model = "cubic"', None, "model must be"),
+        ('chattering = "certified=1e-9"', 'chattering = "slow"', None, "chattering must be"),
+        ("[blocks]", "[blocks", 1, "no TOML file"),
+    ],
+)
+def test_a_mistake_is_a_sentence_with_its_line(file, old, new, line, sentence):
+    assert old in TEXT
+    file.write_text(TEXT.replace(old, new))
+    with pytest.raises(rocking.StudyError, match=sentence) as caught:
+        read_study(file)
+    assert str(file) in str(caught.value)
+    if line is not None:
+        assert f"line {line}" in str(caught.value)
+
+
+def test_unreadable_records_are_left_out_only_where_the_file_says_so(file, tmp_path):
+    (tmp_path / "broken.AT2").write_text("nothing of use\n")
+    records = 'records = ["el-centro-meloland-270", "broken.AT2"]'
+    file.write_text(TEXT.replace('records = ["el-centro-meloland-270"]', records))
+    with pytest.raises(rocking.UnreadableRecord, match=r"broken\.AT2"):
+        read_study(file)
+    file.write_text(file.read_text().replace(records, records + "\nskip_unreadable = true"))
+    found = read_study(file)
+    assert found.product.shape[0] == 5
+    assert len(found.skipped) == 1
+
+
+def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
+    folder, table = tmp_path / "kept", tmp_path / "all.csv"
+    code, out, err = run("study", "create", file, folder, "--unit-blocks", 512)
+    assert (code, err) == (0, "")
+    assert "0 of 20 units" in out
+    assert run("study", "run", folder)[0] == 0
+    assert json.loads(run("study", "status", folder, "--json")[1]) == {
+        "done": 20,
+        "units": 20,
+        "simulations": 200,
+        "failed": {},
+    }
+    assert "20 units are sound" in run("study", "verify", folder, "--recompute", 2)[1]
+    assert run("study", "export", folder, table)[0] == 0
+    product = read_study(file).product
+    reference = rocking.simulate_many(
+        product.blocks, product.motions, factor=[0.5, 1.0], polarity="both", model="linear", chattering="certified=1e-9"
+    )
+    np.testing.assert_array_equal(rocking.study(folder).results().peak_rotation.values, reference.peak_rotation.values)
+    unit = folder / "result" / "c.0.0.0.0.0"
+    unit.write_bytes(unit.read_bytes()[:-1])
+    code, out, err = run("study", "verify", folder)
+    assert code == 2
+    assert "c.0.0.0.0.0 is damaged" in out
+    assert err.count("\n") == 1
+    assert "1 of them repaired" in run("study", "verify", folder, "--repair")[1]
+
+
+def test_another_study_in_the_same_folder_is_refused(run, file, tmp_path):
+    run("study", "create", file, tmp_path / "kept", "--unit-blocks", 512)
+    file.write_text(TEXT.replace("factor = [0.5, 1.0]", "factor = [0.5, 1.5]"))
+    code, _, err = run("study", "create", file, tmp_path / "kept")
+    assert code == 2
+    assert "the scales changed" in err
+
+
+def test_a_file_that_is_there_is_not_overwritten(run, tmp_path):
+    assert run("study", "new", tmp_path / "new.toml")[0] == 0
+    code, _, err = run("study", "new", tmp_path / "new.toml")
+    assert code == 2
+    assert "is there already" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["study", "crate", "a"], "no command crate; did you mean create?"),
+        (["study", "run", "m", "--thread", "2"], "rocking study run has no option --thread; did you mean --threads?"),
+        (["study", "run", "nowhere"], "no study here"),
+    ],
+)
+def test_mistakes_in_the_commands_are_one_line(run, tmp_path, monkeypatch, arguments, sentence):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert sentence in err
+    assert err.count("\n") == 1
