@@ -169,11 +169,8 @@ def _results(
 
 def _submitted(store: Store, key: Key, pool: Executor) -> Future[bytes]:
     """Hand a unit to a worker, with all that it needs."""
-    product, blocks = store.product, store.grid.block_range(key)
-    motion = product.motions[key[0]]
-    factor = float(product.scales.factors(motion)[key[1]]) * product.signs[key[2]]
     try:
-        return pool.submit(compute, product.setup(blocks), motion, factor, store.grid.blocks)
+        return pool.submit(compute, *store.work(key))
     except RuntimeError as error:
         raise StudyError(f"the workers are gone: {error}; what was computed is kept, run the study again") from error
 

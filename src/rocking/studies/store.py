@@ -9,8 +9,10 @@ from typing import Any, Final
 
 from rocking.arrays import Floats
 from rocking.constants import VERSION
+from rocking.engine import Setup
 from rocking.errors import StudyError
 from rocking.kernels.compiled import fingerprint
+from rocking.motion.motion import Motion
 from rocking.product import Product
 from rocking.studies import inputs
 from rocking.studies.place import Place
@@ -114,6 +116,12 @@ class Store:
         """Keys of the units that are not done, in order."""
         done = self.done()
         return (key for key in self.grid if key not in done)
+
+    def work(self, key: Key) -> tuple[Setup, Motion, float, int]:
+        """Return all that `units.compute` needs for a unit."""
+        motion = self.product.motions[key[0]]
+        factor = float(self.product.scales.factors(motion)[key[1]]) * self.product.signs[key[2]]
+        return self.product.setup(self.grid.block_range(key)), motion, factor, self.grid.blocks
 
     def put(self, key: Key, data: bytes) -> None:
         """Store a unit."""

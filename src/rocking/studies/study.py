@@ -183,18 +183,25 @@ class Study:
         -------
         list of str
             A sentence for each unit that is damaged or differs; empty if all is well.
+
+        Raises
+        ------
+        StudyError
+            If units are to be computed again and the study was made by another version.
         """
+        if recompute or repair:
+            self.store.check_program()
         done = sorted(self.store.done())
         faults = {key: fault for key in done if (fault := self._fault(key))}
         sound = [key for key in done if key not in faults]
         rng = np.random.default_rng(seed)
         for k in rng.permutation(len(sound))[:recompute]:
-            if self._computed(sound[k]) != self.store.raw(sound[k]):
+            if compute(*self.store.work(sound[k])) != self.store.raw(sound[k]):
                 faults[sound[k]] = f"unit {name_of(sound[k])} is not what this program computes"
         if repair:
             with self.place.locked():
                 for key in faults:
-                    self.store.put(key, self._computed(key))
+                    self.store.put(key, compute(*self.store.work(key)))
         return list(faults.values())
 
     def export(self, path: str | Path) -> None:
@@ -232,12 +239,6 @@ class Study:
         except StudyError as error:
             return str(error)
         return ""
-
-    def _computed(self, key: Key) -> bytes:
-        product, blocks = self.product, self.store.grid.block_range(key)
-        motion = product.motions[key[0]]
-        factor = float(product.scales.factors(motion)[key[1]]) * product.signs[key[2]]
-        return compute(product.setup(blocks), motion, factor, self.store.grid.blocks)
 
     def _done_mask(self, done: set[Key]) -> np.ndarray[Any, np.dtype[np.bool_]]:
         mask = np.zeros(self.store.grid.shape, dtype=bool)
