@@ -3,10 +3,11 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
-EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py)
+PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2
+EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_guard.py explorer_server.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test slow lowest latest .bounds doctest lint types docs bench clean distclean
+.PHONY: help demo test browser slow lowest latest .bounds doctest lint types docs bench clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -14,8 +15,11 @@ help: ## list the targets
 demo: .venv/.base ## simulate a block under a shipped record; writes out/demo.png
 	@$(BIN)/python examples/demo.py
 
-test: .venv/.all ## run the test suite (about five minutes on two cores)
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m "not slow"
+test: .venv/.all ## run the test suite (some minutes on two cores)
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m "not slow and not browser"
+
+browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chromium, which must be installed
+	ROCKING_BROWSER_REQUIRED=1 $(BIN)/python -m pytest --benchmark-disable -m browser
 
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m slow
@@ -29,7 +33,7 @@ latest: ## the same without constraints: with the versions of the day
 
 .bounds:
 	@test -x $(ENVIRONMENT)/bin/python || $(PYTHON) -m venv $(ENVIRONMENT)
-	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq $(CONSTRAINTS) ".[test]"
+	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq $(CONSTRAINTS) ".[test,explorer]"
 	$(ENVIRONMENT)/bin/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m "not slow" $(EVERY_PART)
 
 doctest: .venv/.all ## run the examples in the docstrings
@@ -55,11 +59,18 @@ clean: ## remove what the other targets made, but not the environment
 	find src tests benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## remove the environment, too
-	rm -rf .venv .venv-lowest .venv-latest .lowest.txt
+	rm -rf .venv .venv-lowest .venv-latest .lowest.txt .page-tools
+
+# What checks the page: for barriers, and for types. Without npm those two tests are skipped.
+.page-tools/.installed: Makefile
+	@mkdir -p .page-tools
+	@command -v npm >/dev/null || echo "npm was not found: the page is not checked for barriers and types"
+	@! command -v npm >/dev/null || npm install --prefix .page-tools --no-save --silent --no-audit --no-fund $(PAGE_TOOLS)
+	@touch $@
 
 # A stamp per set of packages: installing again is needed only when the versions or the project's table change.
 .venv/.base: EXTRAS :=
-.venv/.all: EXTRAS := [formats,excel,test,lint,docs]
+.venv/.all: EXTRAS := [formats,excel,explorer,browser,cluster,objects,parquet,test,lint,docs]
 .venv/.base .venv/.all: pyproject.toml constraints.txt | .venv/bin/python
 	@echo "Installing rocking$(EXTRAS) into .venv (a few minutes the first time) ..."
 	@$(BIN)/python -m pip install --disable-pip-version-check -qq -c constraints.txt -e ".$(EXTRAS)"

@@ -154,7 +154,7 @@ def lane_steps(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     """Block-steps in which a block sits in a lane."""
     how = Certified()
     ground = ground_of(motion, blocks.gravity)
-    bodies = records_of(blocks, model, how.limits(blocks, motion))
+    bodies = records_of(blocks, model, how.limits(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
     width = motion.step * float(blocks.p.max())
     substeps = math.ceil(width / crew.LONGEST_SUBSTEP) if model == "nonlinear" else 0

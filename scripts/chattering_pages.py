@@ -17,7 +17,7 @@ from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.maps import chattering_map
 from rocking.chattering.paper import FIGURES, paper_figure
-from rocking.chattering.paper.case import excitation
+from rocking.chattering.paper.case import Case
 from rocking.chattering.schemes import compare_schemes
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -65,7 +65,8 @@ def main() -> None:
 
 def tables():
     """Make all tables, by file name."""
-    made = {f"paper-figure-{number}.txt": paper_table(number) for number in FIGURES}
+    figures = (paper_figure(number) for number in FIGURES)
+    made = {f"paper-figure-{figure.number}.txt": paper_table(figure) for figure in figures if figure.statements}
     made["schemes-complete.txt"] = schemes_table(1.03)
     made["schemes-incomplete.txt"] = schemes_table(1.05)
     made["schemes-record.txt"] = table_of_comparison(
@@ -82,9 +83,9 @@ def tables():
     return made
 
 
-def paper_table(number):
+def paper_table(figure):
     """Set what the paper states about a figure beside what is computed."""
-    rows = [(s.claim, *s.cells()) for s in paper_figure(number).statements]
+    rows = [(s.claim, *s.cells()) for s in figure.statements]
     return markdown(("", "paper", "here", "difference"), rows)
 
 
@@ -175,7 +176,7 @@ def robust_table():
 
 def schemes_table(a):
     """All schemes under the paper's sine of amplitude a."""
-    return table_of_comparison(compare_schemes(PAPER_BLOCK, excitation(a), model="linear"))
+    return table_of_comparison(compare_schemes(PAPER_BLOCK, Case(a).excitation(), model="linear"))
 
 
 def table_of_comparison(comparison):
@@ -275,7 +276,10 @@ def episodes_table():
 def images():
     """All images, with their file names."""
     for number in FIGURES:
-        yield f"paper-figure-{number}.png", paper_figure(number).draw()
+        figure = paper_figure(number)
+        yield f"paper-figure-{number}.png", figure.draw()
+        for drawing in [*figure.drawings][1:]:
+            yield f"paper-figure-{number}-{drawing}.png", figure.draw(drawing)
     amplitude = np.linspace(0.98, 1.12, 71)
     omega = np.linspace(0.5, 8.0, 61)
     labels = {"a": "amplitude over the threshold, $a$", "omega": r"frequency over $p$, $\omega$"}

@@ -12,10 +12,10 @@ PROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
 
 
 def lowest(requirements: list[str]) -> list[str]:
-    """Constraints from requirements as ``name>=version``."""
-    parsed = [re.fullmatch(r"([\w.-]+)>=([\w.]+)", requirement) for requirement in requirements]
+    """Constraints from requirements as ``name>=version`` or ``name>=version,<version``."""
+    parsed = [re.fullmatch(r"([\w.-]+)>=([\w.]+)(?:,<[\w.]+)?", requirement) for requirement in requirements]
     if None in parsed:
-        raise SystemExit(f"{PROJECT.name}: every requirement must be NAME>=VERSION")
+        raise SystemExit(f"{PROJECT.name}: every requirement must be NAME>=VERSION or NAME>=VERSION,<VERSION")
     return [f"{match[1]}=={match[2]}" for match in parsed if match]
 
 

@@ -15,6 +15,12 @@ if os.environ.get("CI"):
 # Figures are not looked at here, whatever display there is.
 os.environ["MPLBACKEND"] = "agg"
 
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep Matplotlib's settings and list of fonts to the tests: a user's own change what is drawn and said."""
+    os.environ["MPLCONFIGDIR"] = str(config.cache.mkdir("matplotlib"))
+
+
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 

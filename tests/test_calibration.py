@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import rocking
 from rocking.analysis.calibration import population
@@ -343,6 +344,7 @@ def test_a_release_test_gives_the_block_within_its_errors(model):
     assert found.misfit == pytest.approx(NOISE, rel=0.1)
 
 
+@pytest.mark.slow
 def test_standard_errors_are_those_of_repeated_tests():
     fits = [rocking.calibrate_history(TIMES, released(seed=seed)) for seed in range(16)]
     for name, truth in TRUTH.items():
@@ -382,6 +384,29 @@ def test_without_noise_the_block_is_found_exactly():
         assert found.estimates[name].value == pytest.approx(truth, rel=1e-6)
 
 
+def test_a_calibration_draws_what_was_measured_and_what_it_predicts(found, shaken):
+    tests = found.plot().axes[0]
+    curve, fell, _ = tests.lines
+    np.testing.assert_array_equal(curve.get_ydata(), np.sort(found.probabilities))
+    assert len(fell.get_xdata()) == shaken[1].sum()
+    assert [axes.get_xlabel() for axes in found.plot().axes[1:]] == ["p (rad/s)", "alpha (rad)", "restitution"]
+    mine = Figure()
+    assert found.plot(mine.add_subplot()) is mine and len(mine.axes) == 1
+    assert found.plot(figsize=(3.4, 4.0)).get_size_inches().tolist() == [3.4, 4.0]
+
+
+def test_a_history_is_drawn_with_the_block_that_explains_it():
+    measured = released()
+    found = rocking.calibrate_history(TIMES, measured, p=2.5, alpha=0.2, initial_rotation=0.1)
+    figure = found.plot()
+    drawn = {line.get_label(): line for line in figure.axes[0].lines}
+    np.testing.assert_allclose(drawn["measured"].get_ydata(), measured, rtol=1e-12)
+    time, fitted = drawn["fitted"].get_data()
+    np.testing.assert_array_equal(fitted, found.response.rotation(time))
+    np.testing.assert_array_equal(figure.axes[1].lines[0].get_ydata(), found.residuals)
+    assert figure.get_suptitle().startswith("restitution = 0.8")
+
+
 def test_what_is_known_is_kept():
     found = rocking.calibrate_history(TIMES, released(), p=2.5, alpha=0.2, initial_rotation=0.1)
     assert (found.block.p, found.block.alpha) == (2.5, 0.2)
@@ -403,6 +428,7 @@ def test_a_release_to_the_other_side_is_found_too():
     assert found.estimates["restitution"].value == pytest.approx(0.88, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_correlated_noise_widens_the_errors():
     white = np.random.default_rng(0).normal(0.0, 1.0, len(TIMES))
     correlated = np.convolve(white, np.ones(20) / math.sqrt(20), mode="same")
@@ -424,7 +450,9 @@ def test_correlated_noise_widens_the_errors():
         ({"rotation": np.roll(released(), 1) * (TIMES > 0.0)}, "initial_rotation="),
         ({"rotation": ["a"] * len(TIMES)}, "numbers"),
         ({"times": TIMES[:6], "rotation": released()[:6]}, "6 samples"),
-        ({"times": TIMES[:30], "rotation": released()[:30]}, "does not determine restitution"),
+        pytest.param(
+            {"times": TIMES[:30], "rotation": released()[:30]}, "does not determine restitution", marks=pytest.mark.slow
+        ),
         ({"p": 2.5, "alpha": 0.2, "restitution": 0.9, "initial_rotation": 0.1}, "everything is known"),
         ({"alpha": (0.3, 0.2)}, "alpha must be"),
         ({"restitution": (0.5, 2.0)}, "restitution must be"),

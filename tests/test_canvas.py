@@ -9,6 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 from nbclient import NotebookClient
 
+from rocking.errors import InvalidOption
+
 DRAW = """
 import sys
 import numpy as np
@@ -70,6 +72,28 @@ def test_a_notebook_shows_a_figure_once(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     cells = ["draw()", "figure = draw()", "figure", "import matplotlib.pyplot as plt\ndraw(); draw()"]
     assert images(*cells) == [1, 0, 1, 1]
+
+
+def test_a_notebook_shows_a_figure_of_the_caller_once(monkeypatch):
+    for name in CHOICES:
+        monkeypatch.delenv(name, raising=False)
+    own = "import matplotlib.pyplot as plt\nfigure, ax = plt.subplots()\n"
+    cells = [
+        f"{own}draw(ax=ax)",
+        f"{own}drawn = draw(ax=ax)",
+        f"{own}draw(ax=ax)\nplt.show()",
+        f"{own}draw(ax=ax)\nax.set_title('mine');",
+        "figure",
+        "import copy\nimport pickle",
+        f"{own}draw(ax=ax)\ncopies = pickle.loads(pickle.dumps(figure)), copy.deepcopy(figure)\nplt.close('all')",
+    ]
+    assert images(*cells) == [1, 1, 1, 1, 1, 0, 0]
+
+
+@pytest.mark.parametrize("size", [(3.0,), (3.0, 2.0, 1.0), (3.0, 0.0), (3.0, float("nan")), "wide"])
+def test_a_figure_of_no_size_is_refused(size):
+    with pytest.raises(InvalidOption, match="figsize must be"):
+        drawn(figsize=size)
 
 
 def drawn(**options) -> Figure:

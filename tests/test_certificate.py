@@ -70,8 +70,10 @@ MOTIONS = {
     "ricker": lambda: rocking.pulses.ricker(1.4, 1.0),
     "shipped record": shipped,
 }
+#: With these the ball arithmetic of the nonlinear model takes some ten seconds.
+LONG = {"sine", "shipped record"}
 KINDS = [
-    (model, block, motion)
+    pytest.param(model, block, motion, marks=[pytest.mark.slow] if model == "nonlinear" and motion in LONG else [])
     for model in ("linear", "nonlinear")
     for block in (SYMMETRIC, TWO_SIDED)
     for motion in MOTIONS

@@ -22,7 +22,8 @@ def test_table_repeats_the_printed_equations(a, omega, eta):
     """Amplitude and frequency cancel in the product's kernel; here they are in every term."""
     table = chattering.asymptotic_table(a, omega, eta)
     printed = np.array(cycles(a, omega, eta, 40))
-    assert table["term"][:40] == pytest.approx(printed.sum(axis=1), rel=1e-9)
+    assert table["term"][:40] == pytest.approx(printed[:, :2].sum(axis=1), rel=1e-9)
+    assert table["speed_after"][:40] == pytest.approx(printed[:, 2] * (a - 1.0) ** 1.5, rel=1e-9)
     assert (table["order"][:40] == np.where(printed[:, 0] > 0.0, 1, 3)).all()
 
 
@@ -36,6 +37,23 @@ def test_table_adds_up_to_eq65():
         chattering.chattering_time(1.02, 3.0, 0.9, method="asymptotic"), rel=1e-14
     )
     assert table["interval"][-2] < 1e-16 * table["time"][-1]
+
+
+def test_speeds_and_phases_of_the_table_are_those_of_the_impacts_as_the_amplitude_falls_to_one():
+    eps = 1e-8
+    table = chattering.asymptotic_table(1.0 + eps, 2.0, 0.92)
+    impacts = chattering.sequence(1.0 + eps, 2.0, 0.92).impacts[:40]
+    for name in ("speed_before", "speed_after", "interval"):
+        assert table[name][:40] == pytest.approx(impacts[name], rel=1e-6)
+    phases = 2.0 * impacts["time"] + np.arcsin(1.0 / (1.0 + eps))
+    assert table["phase"][:40] == pytest.approx(phases, abs=1e-9)
+
+
+def test_the_first_speed_of_the_table_is_the_first_term_of_eq_34():
+    table = chattering.asymptotic_table(1.02, 3.0, 0.9)
+    assert table["speed_before"][0] == pytest.approx(16.0 * np.sqrt(2.0) / 9.0 * 0.02**1.5, rel=1e-13)
+    assert table["speed_after"] == pytest.approx(0.9 * table["speed_before"], rel=1e-14)
+    assert np.sin(table["phase"][0] - 3.0 * table["time"][0]) == pytest.approx(1.0 / 1.02, rel=1e-12)
 
 
 def test_eq65_is_leading_order_right_and_never_incomplete():

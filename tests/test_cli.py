@@ -39,7 +39,8 @@ def test_simulate_writes_what_it_says(run, tmp_path):
     code, out, _ = run("simulate", RECORD, *BLOCK, "--out", tmp_path / "new" / "folder", "--model", "linear")
     assert code == 0
     names = {path.name for path in (tmp_path / "new" / "folder").iterdir()}
-    expected = {"events.csv", "response.csv", "response.nc", "response.pdf", "response.png", "result.json"}
+    expected = {f"{table}.csv" for table in ("response", "events", "impacts")}
+    expected |= {"response.nc", "response.pdf", "response.png", "result.json"}
     assert names == expected
     assert all(name in out for name in names)
 
@@ -100,7 +101,7 @@ def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command)
     [
         ([RECORD], "--half-width"),
         ([RECORD, "--half-width", "0.2"], "--half-height"),
-        ([RECORD, *BLOCK, "--p", "2"], "either"),
+        ([RECORD, *BLOCK, "--p", "2"], "different descriptions"),
         ([RECORD, "--half-width", "0", "--half-height", "1"], "--half-width"),
         ([RECORD, "--half-width", "-1", "--half-height", "1"], "--half-width"),
         ([RECORD, "--half-width", "2", "--half-height", "1"], "give --restitution"),
@@ -116,7 +117,7 @@ def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command)
         ([RECORD, *BLOCK, "--bogus"], "--bogus"),
         ([RECORD, *BLOCK, "--p"], "--p"),
         (["ridgecrest-clc-9", *BLOCK], "ridgecrest-clc-9"),
-        ([], "a block needs"),
+        ([], "a block is needed"),
         (BLOCK, "give one record or more"),
     ],
 )

@@ -1,6 +1,7 @@
 """The commands with many simulations: their results, their files, one line for every mistake."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -31,7 +32,8 @@ def test_spectrum_prints_fractiles_and_writes_what_it_says(run, tmp_path):
     code, out, _ = run("spectrum", RECORD, *arguments)
     assert code == 0
     assert "restitution 0.9" in out
-    assert {path.name for path in tmp_path.iterdir()} == {"result.json", "spectrum.nc", "spectrum.pdf", "spectrum.png"}
+    names = {"fractiles.csv", "peaks.csv", "spectrum.nc", "spectrum.pdf", "spectrum.png"}
+    assert {path.name for path in tmp_path.iterdir()} == names | {"result.json"}
     assert all(path.name in out for path in tmp_path.iterdir())
 
 
@@ -54,7 +56,8 @@ def test_map_prints_shares_and_writes_what_it_says(run, tmp_path):
     assert code == 0
     for words in ("no uplift", "rocks", "lowest amplitude that overturns"):
         assert words in out
-    assert {path.name for path in tmp_path.iterdir()} == {"map.nc", "map.pdf", "map.png", "result.json"}
+    names = {"boundaries.csv", "modes.csv", "map.nc", "map.pdf", "map.png"}
+    assert {path.name for path in tmp_path.iterdir()} == names | {"result.json"}
 
 
 def test_ida_json_is_the_analysis(run):
@@ -64,20 +67,34 @@ def test_ida_json_is_the_analysis(run):
     dataset = incremental_dynamic_analysis(
         rocking.Block(0.12, 0.55), rocking.records.load(RECORD), measure="pgv", levels=np.linspace(0.2, 1.5, 12)
     )
-    assert result["overturning_level"] == float(dataset.overturning_level[0, 0])
-    assert [band["from"] for band in result["overturns"]] == dataset.band_start.values.tolist()
-    assert result["overturns"][-1]["to"] is None
+    assert result["overturning_level_m_s"] == float(dataset.overturning_level[0, 0])
+    assert [band["from_m_s"] for band in result["overturns"]] == dataset.band_start.values.tolist()
+    assert result["overturns"][-1]["to_m_s"] is None
 
 
 def test_ida_prints_bands_and_writes_what_it_says(run, tmp_path):
     code, out, _ = run("ida", RECORD, *SIZES, "--out", tmp_path)
     assert code == 0
-    assert "and more" in out
-    assert {path.name for path in tmp_path.iterdir()} == {"ida.nc", "ida.pdf", "ida.png", "result.json"}
+    # What is open above was looked at up to the last level, and no further; it is not all that overturns.
+    assert re.search(r"at all levels looked at, [\d.]+ to [\d.]+ g$", out, re.MULTILINE)
+    assert "and more" not in out and "5 % apart; bands and gaps that lie between two of them are not seen" in out
+    names = {"bands.csv", "levels.csv", "ida.nc", "ida.pdf", "ida.png"}
+    assert {path.name for path in tmp_path.iterdir()} == names | {"result.json"}
     code, out, _ = run("ida", RECORD, *SIZES, "--levels", "0.1,0.2")
-    assert "never" in out
+    assert "at no level looked at, 0.010197 to 0.020394 g" in out
+    assert "none of them lifts a block; that begins at 0.21818 g" in out
     code, out, _ = run("ida", RECORD, *SIZES, "--levels", "20,21")
-    assert "at every level" in out
+    assert "at every level looked at, 2.0394 to 2.1414 g" in out
+    assert "none of them lifts" not in out
+
+
+def test_a_fragility_of_a_symmetric_block_tells_that_both_polarities_count_once(run):
+    stripes = [RECORD, OTHER, "ridgecrest-clc-090", *SIZES, "--measure", "pgv", "--levels", "0.4:1.2:9"]
+    once = run("fragility", *stripes)[1]
+    both = run("fragility", *stripes, "--polarity", "both")[1]
+    told = ", one polarity, since a symmetric block does the same in both"
+    assert once and told in both
+    assert both.replace(told, "") == once
 
 
 STRIPES = ["--measure", "pgv", "--levels", "0.4:1.2:9", "--polarity", "both"]
@@ -112,7 +129,7 @@ def test_fragility_prints_a_table_and_writes_what_it_says(run, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (["spectrum", RECORD, "--alpha", "0.2"], "either p"),
+        (["spectrum", RECORD, "--alpha", "0.2"], "one of --p"),
         (["spectrum", "--alpha", "0.2", "--p", "2"], "record"),
         (["spectrum", RECORD, "--alpha", "high", "--p", "2"], "--alpha"),
         (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2"], "--p"),
@@ -133,7 +150,7 @@ def test_fragility_prints_a_table_and_writes_what_it_says(run, tmp_path):
         (["ida", RECORD, "--p", "2"], "--alpha"),
         (["ida", RECORD, *SIZES, "--measure", "pgd"], "pgd"),
         (["ida", RECORD, *SIZES, "--measure", "sa"], "period"),
-        (["ida", RECORD, *SIZES, "--levels", "2,1"], "increase"),
+        (["ida", RECORD, *SIZES, "--levels", "2g,1g"], "increase"),
         (["ida", *SIZES], "record"),
         (["fragility", RECORD, *SIZES], "overturning"),
         (["fragility", RECORD, *SIZES, "--limits", "half"], "--limits"),

@@ -69,6 +69,17 @@ def test_without_loss_at_impacts_nothing_rests(run):
     assert json.loads(run("chatter", 1.03, 2, 1, "--json")[1])["series"]["error"] is None
 
 
+@pytest.mark.parametrize("sequence", [(1.03, 2, 0.92), (1.5, 2, 0.92), (1.03, 2, 1), (1, 2, 0.9)])
+def test_chatter_draws_the_sequence_whatever_becomes_of_it(run, tmp_path, sequence):
+    code, out, _ = run("chatter", *sequence, "--out", tmp_path)
+    assert code == 0
+    names = {"chatter.pdf", "chatter.png", "impacts.csv", "result.json"} | (
+        {"cycles.csv"} if sequence[2] < 1 else set()
+    )
+    assert {path.name for path in tmp_path.iterdir()} == names
+    assert all(name in out for name in names)
+
+
 def test_at_the_threshold_there_is_nothing_to_wait_for(run):
     result = json.loads(run("chatter", 1, 2, 0.92, "--json")[1])
     assert result["complete"] is True
@@ -113,7 +124,7 @@ def test_paper_writes_all_figures(run, tmp_path):
     code, _, _ = run("paper", "--out", tmp_path)
     assert code == 0
     drawn = {path.stem for path in tmp_path.glob("*.pdf")}
-    assert drawn == {f"figure-{number}" for number in (2, 3, 4, 5, 6, 7, 9, 10, 11)}
+    assert drawn == {f"figure-{number}" for number in range(1, 12)} | {"figure-6-surface"}
 
 
 @pytest.mark.parametrize(
@@ -145,12 +156,41 @@ def test_a_mistake_is_one_line_and_exit_2(run, arguments, word):
     assert word.lower() in err.lower()
 
 
-@pytest.mark.parametrize("number", [1, 8, 99])
-def test_a_figure_that_is_not_computed_is_refused(run, tmp_path, number):
+@pytest.mark.parametrize("number", [0, 12, 99])
+def test_a_figure_that_there_is_none_of_is_refused(run, tmp_path, number):
     code, out, err = run("paper", "--figure", number, "--out", tmp_path)
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
-    assert "9, 10, 11" in err
+    assert "Figs 1 to 11" in err
+
+
+def test_paper_draws_a_figure_for_other_parameters(run, tmp_path):
+    code, out, err = run("paper", "--figure", 5, "--eta", 0.8, "--omega", 3, "--out", tmp_path)
+    assert (code, err) == (0, "")
+    assert out.startswith("Fig. 5: chattering time against amplitude; omega = 3, eta = 0.8\n")
+    assert f"{critical_amplitude(3.0, 0.8):.7g} here" in out
+    code, out, _ = run("paper", "--figure", 1, "--alpha", "20deg", "--out", tmp_path)
+    assert code == 0
+    assert "alpha = 0.349065850399 rad" in out
+
+
+def test_paper_refuses_a_parameter_that_a_figure_does_not_depend_on(run, tmp_path):
+    code, out, err = run("paper", "--figure", 5, "--p", 2, "--out", tmp_path / "new")
+    assert (code, out) == (2, "")
+    assert err == "rocking: Fig. 5 does not depend on p; it takes omega and eta\n"
+    code, out, err = run("paper", "--eta", 0.8, "--out", tmp_path / "new")
+    assert (code, out) == (2, "")
+    assert err == "rocking: with --eta one figure is drawn: say which with --figure\n"
+    assert not (tmp_path / "new").exists()
+
+
+def test_paper_draws_figure_6_as_contours_and_as_a_surface(run, tmp_path):
+    code, _, _ = run("paper", "--figure", 6, "--out", tmp_path)
+    assert code == 0
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {
+        "figure-6.pdf", "figure-6.png", "figure-6-surface.pdf", "figure-6-surface.png", "figure-6-surface.csv",
+    }  # fmt: skip
 
 
 def test_a_folder_that_cannot_be_written_to_is_refused(run, tmp_path):

@@ -18,6 +18,7 @@ from rocking import quantities
 from rocking.cli import app, wording
 from rocking.errors import InvalidOption
 from rocking.motion.named import expanded
+from rocking.plausibility import motion_notes
 from rocking.progress import note, notes_for
 
 RECORD = "el-centro-meloland-270"
@@ -32,7 +33,7 @@ def folder(tmp_path):
     place = tmp_path / "records"
     place.mkdir()
     for k in range(3):
-        samples = (1.0 + k) * np.sin(np.linspace(0.0, 12.0, 120))
+        samples = 0.4 * (1.0 + k) * np.sin(np.linspace(0.0, 12.0, 120))
         lines = "".join(f"{value:.5f}\n" for value in samples)
         title = "Event, 1/1/2000, Station, 90"
         text = f"PEER\n{title}\nACCELERATION IN UNITS OF G\nNPTS= 120, DT= .02 SEC,\n{lines}"
@@ -149,6 +150,17 @@ def test_the_table_is_a_workbook_where_openpyxl_is_installed(run, folder, tmp_pa
     sheet = openpyxl.load_workbook(tmp_path / "summary.xlsx").active
     assert sheet.max_row == 4
     assert sheet["A1"].value == "record"
+    assert (sheet.title, sheet.freeze_panes) == ("summary", "A2")
+
+
+def test_without_openpyxl_a_note_says_why_there_is_no_workbook(run, folder, tmp_path, monkeypatch):
+    loaded = [name for name in sys.modules if name.partition(".")[0] in ("openpyxl", "xlsxwriter")]
+    for name in {*loaded, "openpyxl", "xlsxwriter"}:
+        monkeypatch.setitem(sys.modules, name, None)
+    code, _, err = run("simulate", folder, *BLOCK, "--out", tmp_path)
+    assert code == 0
+    assert "note: no summary.xlsx: install rocking[excel]" in err
+    assert not (tmp_path / "summary.xlsx").exists()
 
 
 def test_an_unreadable_record_is_an_error_unless_one_keeps_going(run, folder):
@@ -313,14 +325,87 @@ def test_a_peak_of_another_order_is_noted(run, tmp_path, unit, sentence):
     assert sentence in run("simulate", record, *BLOCK, "--units", unit, "--dt", "0.01")[2]
 
 
-def test_units_in_a_heading_are_offered_and_a_contradiction_is_noted(run, tmp_path):
+def test_units_in_a_heading_are_taken_and_a_contradiction_is_noted(run, tmp_path):
     record = tmp_path / "record.txt"
     record.write_text("time (s), a (cm/s2)\n0.00,0.0\n0.01,120.5\n0.02,0.0\n")
-    code, _, err = run("simulate", record, *BLOCK)
-    assert code == 2
-    assert "its heading says cm/s2; give --units cm/s2" in err
+    assert run("simulate", record, *BLOCK)[::2] == (0, "")
     assert run("simulate", record, *BLOCK, "--units", "cm/s2")[2] == ""
-    assert "heading says cm/s2, but the numbers are taken for g" in run("simulate", record, *BLOCK, "--units", "g")[2]
+    for command in (["simulate", record, *BLOCK], ["records", record]):
+        assert "heading says cm/s2, but the numbers are taken for g" in run(*command, "--units", "g")[2]
+
+
+def test_units_and_step_apply_to_those_of_several_files_that_do_not_say_theirs(run, folder):
+    (folder / "plain.txt").write_text("0\n1.5\n-0.5\n0\n")
+    (folder / "headed.csv").write_text("time (s),a (cm/s2)\n0,0\n0.02,120\n0.04,0\n")
+    code, out, err = run("records", folder, "--units", "m/s2", "--dt", 0.02, "--json")
+    assert (code, err) == (0, "")
+    held = {Path(each["file"]).name: each["channels"][0] for each in json.loads(out)["files"]}
+    assert {name: each["units"] for name, each in held.items()} == {
+        "headed.csv": "cm/s2", "plain.txt": "m/s2", **{f"r{k}.AT2": "G" for k in range(3)}
+    }  # fmt: skip
+    assert held["headed.csv"]["pga_g"] == pytest.approx(1.2 / GRAVITY)
+    assert run("simulate", folder, *BLOCK, "--units", "m/s2", "--dt", 0.02)[0] == 0
+    # Of one file alone a contradiction is refused.
+    code, _, err = run("simulate", folder / "r0.AT2", *BLOCK, "--units", "m/s2")
+    assert code == 2 and "the units are g" in err
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "sentence"),
+    [
+        ("--pga", "0.4", "--pga 0.4 is taken for 0.4 m/s^2, 0.0408 g; write 0.4g for 0.4 g"),
+        ("--pga", "400", "the peak acceleration is 40.8 g"),
+        ("--sa", "0.3@1", "--sa 0.3 is taken for 0.3 m/s^2"),
+        ("--sa", "0.3g@1000", "the peak acceleration is 8.35e+03 g"),
+        ("--pgv", "40", "more than any ground motion has"),
+        ("--scale", "0", "the acceleration is zero throughout"),
+    ],
+)
+def test_a_suspicious_scaling_is_noted(run, option, value, sentence):
+    code, _, err = run("simulate", RECORD, *BLOCK, option, value)
+    assert code == 0
+    assert sentence in err and err.count("note") == 1
+
+
+def test_a_sensible_scaling_is_not_noted(run):
+    for scaling in (["--pga", "0.4g"], ["--pga", "4"], ["--pgv", "0.5"], ["--sa", "0.4g@1"], ["--scale", "-1"]):
+        assert run("simulate", RECORD, *BLOCK, *scaling)[::2] == (0, "")
+
+
+@pytest.mark.parametrize("heading", ["t_ms,a_ms2\n", ""])
+def test_a_step_that_no_record_has_is_noted(run, tmp_path, heading):
+    record = tmp_path / "record.csv"
+    record.write_text(heading + "0,0\n10,1.2\n20,-0.5\n30,0\n")
+    err = run("simulate", record, *BLOCK, *([] if heading else ["--units", "m/s2"]))[2]
+    assert "the sampling step is 10 s, too coarse for a record: are the times in seconds?" in err
+    assert "the peak velocity is 10.2 m/s, too much" in err
+
+
+def test_no_shipped_record_looks_like_a_mistake():
+    for name in rocking.records.names():
+        notes = motion_notes(rocking.records.load(name))
+        assert len(notes) == name.endswith("-up"), notes
+
+
+def test_a_pattern_finds_shipped_records_where_no_file_matches(run, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert expanded(["ridgecrest-*-090"]) == ["ridgecrest-clc-090", "ridgecrest-tow2-090"]
+    assert "2 records" in run("simulate", "ridgecrest-*-090", *BLOCK)[1]
+    assert run("records", "ridgecrest-*-090")[1].count("ridgecrest-") == 2
+    (tmp_path / "ridgecrest-mine-090").write_text("0\n1\n")
+    assert expanded(["ridgecrest-*-090"]) == ["ridgecrest-mine-090"]
+    assert "no file or shipped record matches" in run("simulate", "parkfield-*", *BLOCK)[2]
+
+
+@pytest.mark.parametrize("command", ["simulate", "records"])
+def test_a_station_s_name_leads_to_its_horizontal_records(run, command):
+    block = BLOCK if command == "simulate" else []
+    for name in ("el-centro", "elcentro", "el-centro-meloland"):
+        err = run(command, name, *block)[2]
+        assert "el-centro-meloland-270" in err and "-up" not in err
+    err = run(command, "ridgecrest", *block)[2]
+    assert err.count("ridgecrest-") == 4 and "-up" not in err
+    assert "did you mean ridgecrest-clc-up?" in run(command, "ridgecrest-cls-up", *block)[2]
 
 
 def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
@@ -338,17 +423,21 @@ def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
     assert run("critical", 2, 0.9, "--quiet")[2].splitlines() == ["rocking: enough"]
 
 
-def test_compiling_is_said_once():
+def test_compiling_is_said_once_for_each_work_and_not_where_it_is_short():
     program = (
+        "import time\n"
         "from numba import njit\n"
         "from rocking import compiling, progress\n"
-        "compiling.announce()\n"
-        "with progress.notes_for('everybody'):\n"
+        "def compiled(seconds, patience):\n"
+        "    compiling._PATIENCE = patience\n"
+        "    compiling.announce(seconds)\n"
         "    njit(lambda x: x + 1)(1)\n"
-        "    njit(lambda x: x + 2)(1)\n"
+        "with progress.notes_for('everybody'):\n"
+        "    for seconds, patience in ((7, 1e9), (7, 0.0), (7, 0.0), (9, 1e9), (9, 0.0), (7, 0.0)):\n"
+        "        compiled(seconds, patience)\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stderr.count("compiling once") == 1
+    assert re.findall(r"note: compiling.* up to (\d) s", done.stderr) == ["7", "9"]
 
 
 def test_a_cold_cache_is_announced_by_the_command_line(tmp_path):
@@ -356,7 +445,22 @@ def test_a_cold_cache_is_announced_by_the_command_line(tmp_path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     for expected in (1, 0):
         done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
-        assert done.stderr.count("compiling once") == expected
+        assert done.stderr.count("note: compiling") == expected
+
+
+@pytest.mark.slow
+def test_a_cold_cache_is_announced_by_a_study(tmp_path):
+    file, place = str(tmp_path / "few.toml"), str(tmp_path / "few")
+    Path(file).write_text('[motions]\nrecords = ["el-centro-meloland-270"]\n[blocks]\np = 2.0\nalpha = 0.2\n', "utf-8")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    told = []
+    for command in (["create", file, place], ["run", place]):
+        program = f"from rocking.cli import main; main({['study', *command]})"
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
+        )
+        told.append(done.stderr.count("note: compiling"))
+    assert told == [1, 0]  # a pilot, at creation, compiles
 
 
 def test_notes_go_to_those_who_want_them(capsys):
@@ -387,6 +491,19 @@ def test_a_history_s_motion_may_be_scaled(run, tmp_path):
     code, _, err = run("calibrate", table, "--motion", RECORD, "--scale", "2", "--pgv", "1")
     assert code == 2
     assert "--scale and --pgv" in err
+
+
+def test_a_calibration_draws_what_it_found(run, tmp_path):
+    table, out = tmp_path / "history.csv", tmp_path / "out"
+    block = rocking.Block.from_parameters(p=2.5, alpha=0.2, restitution=0.9)
+    times = np.arange(0.0, 3.0, 0.05)
+    rotation = rocking.simulate(block, None, initial_rotation=0.1, duration=3.0).rotation(times)
+    rotation += 1e-4 * np.random.default_rng(1).normal(size=times.size)
+    rows = (f"{time},{angle}\n" for time, angle in zip(times, rotation, strict=True))
+    table.write_text("time_s,rotation_rad\n" + "".join(rows))
+    known = ["--p", "2.5", "--alpha", "0.2", "--initial-rotation", "0.1"]
+    assert run("calibrate", table, *known, "--out", out)[0] == 0
+    assert {path.name for path in out.iterdir()} == {"calibration.png", "calibration.pdf", "result.json"}
 
 
 def test_a_coefficient_of_friction_is_put_to_the_test(run):

@@ -9,7 +9,7 @@ import pytest
 from oracles import apart
 
 LIMIT = 20.0
-PROMPT = 2.0
+PROMPT = 4.0  # a second after the interrupt, and as much again and more where others use the machine
 
 MANY = "of_dataset(rocking.simulate_many({}, record, model={!r}, threads=2))"
 LIVELY = "rocking.Blocks(p=np.linspace(1.0, 6.0, {}), alpha=0.2, restitution=1.0 - 1e-12)"

@@ -9,11 +9,15 @@ from matplotlib.text import Text
 from rocking.plot import (
     DrawnSequence,
     FragilityLine,
+    Parameter,
     ScaledMotion,
     SpectrumCurves,
     fragility_figure,
     ida_figure,
+    intervals_figure,
+    measured_figure,
     outcome_figure,
+    outcomes_figure,
     regions_figure,
     response_figure,
     spectrum_figure,
@@ -103,7 +107,34 @@ def outcomes_of(**options):
     )
 
 
+def intervals_of(count=60, **options):
+    intervals = 0.5 * 0.9 ** np.arange(count) * np.where(np.arange(count) % 2, 0.1, 1.0)
+    return intervals_figure(intervals=intervals, eta=0.9, **options)
+
+
+def trials_of(sides=2, **options):
+    rng = np.random.default_rng(1)
+    probabilities, values = rng.uniform(size=80), np.exp(rng.normal(size=(50, sides)))
+    names = ("p (rad/s)", "alpha (rad)", "restitution")
+    parameters = [Parameter(name, values, np.array([[1.0, 0.5, 2.0]] * sides)) for name in names]
+    fell = probabilities > rng.uniform(size=80)
+    weights = np.full(50, 0.02)
+    return outcomes_figure(
+        probabilities=probabilities, overturned=fell, parameters=parameters, weights=weights, **options
+    )
+
+
+def measured_of(**options):
+    time = np.linspace(0.0, 5.0, 101)
+    fine = np.linspace(0.0, 5.0, 1001)
+    arrays = {"time": time, "measured": np.sin(time), "residual": 1e-3 * np.cos(time)}
+    return measured_figure(**arrays, fitted_time=fine, fitted=np.sin(fine), **options)
+
+
 FIGURES = {
+    "intervals": (intervals_of, 4.2),
+    "outcomes of tests": (trials_of, 4.8),
+    "measured": (measured_of, 3.8),
     "response": (response_of, 4.8),
     "spectrum of two": (lambda **options: spectrum_of(2, 2, **options), 4.2),
     "spectrum of twelve": (lambda **options: spectrum_of(12, 4, **options), 4.2),
@@ -171,19 +202,37 @@ def test_a_spectrum_of_two_motions_names_them_and_has_no_fractiles():
     assert entries(figure) == ["α = 0", *RECORDS[:2]]
 
 
-def test_the_fractiles_of_a_spectrum_are_named_on_their_lines():
+def test_the_fractiles_of_a_spectrum_are_told_apart_by_their_widths():
     figure = spectrum_of(6)
-    labels = {text.get_text(): text.xy for text in figure.axes[0].texts}
-    assert list(labels) == ["16 %", "median", "84 %"]
-    lines = [[*zip(*line.get_data(), strict=True)] for line in figure.axes[0].lines[-3:]]
-    assert all(at in line for at, line in zip(labels.values(), lines, strict=True))
-    assert entries(figure)[1:] == ["each of 6 motions", "fractiles of all"]
-    assert [text.get_text() for text in spectrum_of(6, 3).axes[0].texts] == ["median"] * 3
+    assert entries(figure) == ["α = 0", "each of 6 motions", "median", "16, 84 % of the motions are below"]
+    widths = [handle.get_linewidth() for handle in figure.legends[0].legend_handles[2:]]
+    assert [line.get_linewidth() for line in figure.axes[0].lines[-3:]] == [widths[1], widths[0], widths[1]]
+    assert not figure.axes[0].texts
+    assert entries(spectrum_of(6, 3))[3:] == ["each of 6 motions", "median"]
+    assert entries(spectrum_of(6, fractiles=[0.45, 0.75, 0.9]))[2:] == [
+        "45 % of the motions are below",
+        "75, 90 % of the motions are below",
+    ]
+
+
+@pytest.mark.parametrize(("ends", "numbers"), [((1.0, 6.0), "1 1.5 2 3 4 5 6"), ((0.3, 60.0), "0.5 1 2 5 10 20 50")])
+def test_sizes_are_numbered_over_less_than_a_decade_and_over_more(ends, numbers):
+    x = np.geomspace(*ends, 5)
+    curve = SpectrumCurves("α", np.ones((1, 5)), np.ones((1, 5)), np.zeros(5))
+    figure = spectrum_figure(x=x, curves=[curve], fractiles=[0.5], motions=["a"], x_label="p")
+    figure.draw_without_rendering()
+    low, high = figure.axes[1].get_xlim()
+    written = [
+        tick.label1.get_text() for tick in figure.axes[1].xaxis.get_major_ticks() if low <= tick.get_loc() <= high
+    ]
+    assert " ".join(written) == numbers
 
 
 def test_few_scaled_motions_are_named_and_many_are_a_family_with_fractiles():
     few, many = ida_of(4), ida_of(12)
-    assert entries(few)[:4] == RECORDS[:4]
+    assert entries(few)[:4] == [f"{k + 1}: {name}" for k, name in enumerate(RECORDS[:4])]
+    assert [text.get_text() for text in few.axes[1].get_xticklabels()] == ["1", "2", "3", "4"]
+    assert entries(ida_of(1))[0] == RECORDS[0] and not ida_of(1).axes[1].get_xticks().size
     assert len({line.get_color() for line in few.axes[0].lines}) == 4
     assert entries(many)[0] == "each motion"
     assert [text.get_text() for text in many.axes[0].texts] == ["16 %", "median", "84 %"]
@@ -204,10 +253,52 @@ def test_the_lowest_level_that_reaches_a_peak_is_on_the_curve_before_it_turns_ba
     np.testing.assert_allclose(levels_reaching(always, np.array([0.1, 0.9])), [1.0, 1.0])
 
 
-def test_the_frame_of_an_ida_ends_above_what_stands():
+def test_the_frame_of_an_ida_ends_with_the_levels_or_above_what_stands_with_arrows():
+    motions = scaled(3)
+    stands = max(motion.levels[np.isfinite(motion.peak)].max() for motion in motions)
+    last = motions[0].levels[-1]
+    assert last > 1.5 * stands
     figure = ida_of(3)
-    stands = max(motion.levels[np.isfinite(motion.peak)].max() for motion in scaled(3))
-    assert stands < figure.axes[0].get_ylim()[1] < 1.3 * stands
+    assert figure.axes[0].get_ylim()[1] == 1.5 * stands
+    assert [line.get_xdata()[0] for line in figure.axes[1].lines if line.get_marker() == "^"] == [0, 1, 2]
+    cut = [motion._replace(levels=motion.levels[:28], peak=motion.peak[:28]) for motion in motions]
+    ends = [motion._replace(bands=np.array([[motion.bands[0, 0], motion.levels[-1]]])) for motion in cut]
+    whole = ida_figure(motions=ends, level_label="PGA")
+    assert whole.axes[0].get_ylim()[1] == motions[0].levels[27] < 1.5 * stands
+    assert not [line for line in whole.axes[1].lines if line.get_marker() == "^"]
+
+
+def test_the_thinnest_band_of_an_ida_has_ends_that_are_seen():
+    motion = scaled(1)[0]._replace(bands=np.array([[3.0, 3.0000001]]))
+    strips = ida_figure(motions=[motion], level_label="PGA").axes[1]
+    (ends,) = [line for line in strips.lines if line.get_marker() == "_"]
+    np.testing.assert_allclose(ends.get_ydata(), 3.0, rtol=1e-6)
+    assert ends.get_markeredgewidth() >= 0.8
+
+
+def test_the_intervals_of_a_sequence_are_drawn_with_the_limit_of_their_ratios():
+    figure = intervals_of(6)
+    assert entries(figure) == ["impacts 1, 3, ...", "impacts 2, 4, ...", "η² = 0.81"]
+    _, odd, even = figure.axes[0].lines
+    assert (odd.get_xdata().tolist(), even.get_xdata().tolist()) == ([1, 3, 5], [2, 4, 6])
+    np.testing.assert_allclose(odd.get_ydata(), [0.5, 0.405, 0.32805])
+    ratios = np.concatenate([line.get_ydata() for line in figure.axes[1].lines[1:]])
+    np.testing.assert_allclose(ratios, 0.81)
+    assert figure.axes[0].get_yscale() == "log"
+    none = intervals_of(0)
+    none.draw_without_rendering()
+    assert [axes.texts[0].get_text() for axes in none.axes] == ["no such impacts"] * 2
+
+
+def test_tests_are_drawn_in_the_order_of_their_probability_and_blocks_by_weight():
+    tests, first, *_ = trials_of().axes
+    curve, fell, stood = tests.lines
+    assert np.all(np.diff(curve.get_ydata()) >= 0.0)
+    numbers = np.concatenate([fell.get_xdata(), stood.get_xdata()])
+    assert sorted(numbers) == list(range(1, 81))
+    assert set(fell.get_ydata()) == {1.0} and set(stood.get_ydata()) == {0.0}
+    assert [sum(stairs.get_data().values) for stairs in first.patches] == pytest.approx([1.0, 1.0])
+    assert entries(trials_of(1))[3:] == ["blocks", "centre: median and 90 %"]
 
 
 def test_dots_of_a_fragility_say_what_they_pool():

@@ -530,13 +530,58 @@ def test_a_long_line_costs_little_more_than_its_size(content: bytes, file: Calla
     assert peak < 8 * len(content)
 
 
+@pytest.mark.parametrize(
+    ("heading", "factor"),
+    [
+        ("time (s), acceleration (cm/s2)", 0.01), ("t, a [cm/s²]", 0.01), ("t,a (m s⁻²)", 1.0), ("t,a (m·s-2)", 1.0),
+        ("t,a (mg)", 1e-3 * GRAVITY), ("t_ms,a_ms2", 1.0), ("time_s,ground_acceleration_m_s2", 1.0),
+        ("t_s,acc_g", GRAVITY), ("# El Centro\n# t (s), a (gal)", 0.01),
+    ],
+)  # fmt: skip
+def test_a_heading_states_the_units(heading: str, factor: float, file: Callable[[bytes], Path]) -> None:
+    path = file(f"{heading}\n0,0\n0.01,2.5\n0.02,-1\n".encode())
+    assert read(path).pga == pytest.approx(2.5 * factor, rel=1e-15)
+    assert read(path, units="g").pga == pytest.approx(2.5 * GRAVITY, rel=1e-15)
+
+
+def test_a_heading_in_another_encoding_states_the_units(file: Callable[[bytes], Path]) -> None:
+    assert read(file("t,a [cm/s²]\n0,0\n0.01,2.5\n".encode("latin-1"))).pga == pytest.approx(0.025)
+
+
+def test_a_heading_of_several_units_states_none(file: Callable[[str], Path]) -> None:
+    assert "does not say its units" in complaint(file("a (g) or (cm/s2)\n0,0\n0.01,2.5\n"))
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", "  "])
+def test_columns_that_a_heading_names_are_channels(delimiter: str, file: Callable[[str], Path]) -> None:
+    rows = [
+        ["time (s)", "NS (cm/s2)", "EW (cm/s2)"],
+        ["0.0", "1.5", "4.0"],
+        ["0.1", "2.5", "5.0"],
+        ["0.2", "3.5", "9.0"],
+    ]
+    path = file("".join(delimiter.join(row) + "\n" for row in rows))
+    first, second = channels(path)
+    assert [(each.number, each.name, each.dt) for each in (first, second)] == [(1, "NS", 0.1), (2, "EW", 0.1)]
+    assert second.acceleration.tolist() == [0.04, 0.05, 0.09]
+    assert "the file holds 2 channels; give channel= as one of 1 'NS', 2 'EW'" in complaint(path)
+    assert read(path, channel="NS").pga == read(path, channel=1).pga == 0.035
+
+
+def test_of_named_columns_those_with_a_unit_of_acceleration_are_read(file: Callable[[str], Path]) -> None:
+    names = "time_s,rotation_rad,angular_velocity_rad_s,ground_acceleration_m_s2"
+    (channel,) = channels(file(f"{names}\n0,1,2,3\n0.5,4,5,6\n"))
+    assert (channel.name, channel.acceleration.tolist()) == ("ground_acceleration_m_s2", [3.0, 6.0])
+
+
 def test_units() -> None:
     path = written.FOLDER / "column.txt"
-    pga = {units: read(path, dt=0.005, units=units).pga for units in ("g", "m/s2", "cm/s2", "gal", "mm/s2")}
+    pga = {units: read(path, dt=0.005, units=units).pga for units in ("g", "m/s2", "cm/s2", "gal", "mm/s2", "mg")}
     assert pga["cm/s2"] == pga["gal"] == pytest.approx(np.abs(SERIES).max(), abs=1e-8)
     assert pga["m/s2"] == pytest.approx(100.0 * pga["gal"])
     assert pga["mm/s2"] == pytest.approx(0.1 * pga["gal"])
     assert pga["g"] == pytest.approx(pga["m/s2"] * GRAVITY)
+    assert pga["mg"] == pytest.approx(1e-3 * pga["g"])
     assert read(path, dt=0.005, units="M/s^2").pga == pga["m/s2"]
     for unknown in ("ft", "", "g/10", 3):
         assert "are not known; give one of g, m/s2" in complaint(path, dt=0.005, units=unknown)
@@ -695,6 +740,20 @@ def test_paths_may_be_text_bytes_or_paths(file: Callable[[str], Path]) -> None:
 def test_foreign_files_are_said_to_be_text_or_binary(file: Callable[[bytes], Path]) -> None:
     assert "this is a binary file (byte 0 at 2)" in complaint(file(b"ab\x00cd\n"))
     assert "this is text in no format known here" in complaint(file(b"Dear reader,\nthere is no record here.\n"))
+    assert "no line of it holds numbers alone" in complaint(file("time (s), acceleration (g)\n"))
+
+
+@pytest.mark.parametrize(
+    ("begin", "what"),
+    [
+        (b"\x93NUMPY\x01\x00", "Motion.from_samples"),
+        (b"PK\x03\x04", "save its table as CSV"),
+        (b"\x1f\x8b", "unpack it"),
+    ],
+)
+def test_files_of_other_kinds_are_told_what_to_do_with(begin: bytes, what: str, file: Callable[[bytes], Path]) -> None:
+    message = complaint(file(begin + bytes(64)))
+    assert what in message and "rocking[formats]" not in message
     assert "V3 file of spectra" in complaint(file(b"Response and Fourier Amplitude Spectra\n1 2 3\n"))
 
 

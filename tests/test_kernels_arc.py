@@ -118,9 +118,10 @@ def nonlinear_series(
 ) -> tuple[Record, int, float]:
     scratch, p = new_scratch(), lam**0.5
     scratch["ground"][: len(A)] = A
+    scratch["weight"][0] = 1.0
     block = rocking_block((p, p), (alpha, alpha), nonlinear=True)
     block["stiffness"] = lam
-    order, h = expand_nonlinear(block, state_of(0, u, v), scratch, len(A) - 1, h)
+    order, h = expand_nonlinear(block, state_of(0, u, v), scratch, (len(A) - 1, 0), h)
     return scratch["rotation"], order, h
 
 

@@ -184,10 +184,42 @@ def test_a_window_in_which_the_motion_passes_a_limit_has_no_bounds() -> None:
     assert np.all(np.isfinite(bounds_over(ground, 0, 0.0, 0.9, (-0.6, 0.4), work())))
 
 
-def test_a_window_over_too_many_pieces_has_no_bounds() -> None:
-    ground = in_units_of_g(np.arange(401.0), np.zeros((400, 2)))
-    assert np.all(np.isfinite(bounds_over(ground, 0, 0.0, 250.0, ANYTHING, work())))
-    assert np.all(np.isnan(bounds_over(ground, 0, 0.0, 300.0, ANYTHING, work())))
+def piece_by_piece(ground: Ground, piece: int, offset: float, window: float) -> np.ndarray:
+    """Bounds over a window without the help of stretches."""
+    low, high, steepest, jumps = math.inf, -math.inf, 0.0, 0.0
+    while True:
+        left = float(ground.pieces[piece, 1]) - offset
+        here = bounds_within(ground, piece, offset, min(window, left), work())
+        low, high, steepest = min(low, here.low), max(high, here.high), max(steepest, here.slope)
+        if window <= left:
+            return np.array([low, high, steepest, jumps])
+        end = acceleration(ground, piece, float(ground.pieces[piece, 1]))
+        jumps += abs(float(ground.pieces[piece + 1, 2]) - end) + here.jumps
+        window, piece, offset = window - left, piece + 1, 0.0
+
+
+@quick
+@given(
+    st.integers(0, 2**32 - 1), st.integers(2, 4), st.integers(0, 5 * STRETCH), st.floats(0.0, 0.99), st.floats(0.0, 1.2)
+)
+def test_bounds_over_whole_stretches_are_those_of_their_pieces(
+    seed: int, columns: int, piece: int, share: float, part: float
+) -> None:
+    random = np.random.default_rng(seed)
+    count = 5 * STRETCH + 3
+    widths = random.uniform(0.01, 1.0, count)
+    ground = in_units_of_g(np.cumsum([0.0, *widths]), random.normal(size=(count, columns)) * random.random((count, 1)))
+    offset = share * float(ground.pieces[piece, 1]) * (seed % 2)
+    window = part * float(ground.pieces[-1, 0])
+    bounds = bounds_over(ground, piece, offset, window, ANYTHING, work())
+    assert np.array(bounds) == pytest.approx(piece_by_piece(ground, piece, offset, window), rel=1e-13)
+
+
+def test_a_window_over_too_many_stretches_has_no_bounds() -> None:
+    count = 200 * STRETCH
+    ground = in_units_of_g(np.arange(count + 1.0), np.zeros((count, 2)))
+    assert np.all(np.isfinite(bounds_over(ground, 0, 0.0, 100.0 * STRETCH, ANYTHING, work())))
+    assert np.all(np.isnan(bounds_over(ground, 0, 0.0, 150.0 * STRETCH, ANYTHING, work())))
 
 
 @quick

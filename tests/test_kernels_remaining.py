@@ -16,7 +16,7 @@ from rocking.kernels.remaining import Restoring, remaining_time
 GRAVITY = 9.80665
 FOREVER = 1e9
 
-many = settings(deadline=None, max_examples=300)
+many = settings(deadline=None, max_examples=100)
 quick = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.filter_too_much])
 few = settings(deadline=None, max_examples=12)
 

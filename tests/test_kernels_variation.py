@@ -97,7 +97,7 @@ def test_the_shift_of_the_rest_is_its_derivative_by_what_is_changed(model: str, 
         return multiprecision.rest_time(changed, start + strength * shift, 1 - 2 * side, v + strength * faster)
 
     block = block_of(problem)
-    dv = faster + restoring(block, side, problem.acceleration(start) / problem.gravity) * shift
+    dv = faster + restoring(ground_of(problem), block, side, 0, start) * shift
     trail = Trail(
         ground_of(problem), block, rules_for(nonlinear=model == "nonlinear"), state.records(0, state.NODE_ROW)
     )

@@ -461,6 +461,8 @@ def test_a_notebook_shows_the_motion_with_its_peaks_in_the_colour_of_the_text():
     assert len(line) <= 400
     assert heights.index(max(heights)) == pytest.approx(len(line) * 12_345 / 20_000, abs=3)
     assert "-0.5" in page
+    assert ">0</text>" in page and ">200 s</text>" in page
+    assert [line[0].split(",")[0], line[-1].split(",")[0]] == ["56.0", "470.0"]
 
 
 def test_a_motion_draws_itself_into_given_axes():

@@ -220,7 +220,7 @@ def test_blocks_that_each_have_their_own_scaling_do_what_simulate_says():
 def test_a_map_has_units_names_and_provenance():
     dataset = overturning_map("half-sine", BLOCK, amplitudes=[0.5, 3.0], frequencies=[1.0, 2.0])
     assert dataset.pulse.startswith("half sine: ")
-    assert "0.2 rad" in dataset.block
+    assert dataset.alpha_rad == [0.2, 0.2]
     assert dataset.tolerance == 1e-9
     assert all(dataset[name].attrs for name in ("mode", "peak_rotation", "overturning_amplitude", "amplitude"))
 
@@ -250,7 +250,9 @@ def test_the_figure_names_every_mode_that_it_shows():
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"pulse": "square"}, "one of sine"),
+        ({"pulse": "square"}, "no pulse 'square'"),
+        ({"pulse": "one-sin"}, "did you mean one-sine"),
+        ({"pulse": "triangular"}, "one of sine, .* or a function"),
         ({"pulse": "sine"}, "cycles"),
         ({"pulse": "half-sine", "cycles": 2.0}, "cycles"),
         ({"pulse": rocking.pulses.half_sine, "cycles": 2.0}, "bind"),
@@ -274,3 +276,11 @@ def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert runpy.run_path(str(EXAMPLE))["main"]() < 1e-8
     assert (tmp_path / "out" / "map.png").stat().st_size > 10_000
+
+
+def test_the_summary_tells_none_from_already_the_first():
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    low = rocking.overturning_map("one-sine", block, amplitudes=[0.5, 1.5], frequencies=[5.0]).summary()
+    assert "none of those up to 1.5" in low
+    high = rocking.overturning_map("one-sine", block, amplitudes=[4.0, 5.0], frequencies=[5.0]).summary()
+    assert "4 or less" in high

@@ -127,25 +127,22 @@ def test_impacts_uplifts_and_rests_are_marked_at_their_times():
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_an_overturned_block_leaves_the_frame_with_a_mark_and_its_time(side):
+def test_an_overturned_block_leaves_the_frame_and_its_fall_is_marked_at_its_time(side):
     time = np.linspace(0.0, 10.0, 1001)
-    figure = figure_of(rotation=side * np.exp(time) * 1e-4, overturn_time=10.0)
+    figure = figure_of(rotation=side * np.exp(time) * 1e-4, overturn_time=9.75)
     axes = figure.axes[0]
     low, high = axes.get_ylim()
     assert high - low < 5.0
-    mark = labelled(axes, "_overturning")
-    curve = labelled(axes, "_rotation").get_ydata()
-    assert mark.get_ydata()[0] == (high if side > 0.0 else low)
-    at = np.searchsorted(time, mark.get_xdata()[0])
-    assert low <= curve[at] <= high
-    assert not low <= curve[at + 1] <= high
-    assert [text.get_text() for text in axes.texts] == ["overturned at 10.000 s"]
+    mark = labelled(axes, "overturned at 9.750 s")
+    assert [mark.get_xdata()[0], mark.get_ydata()[0]] == [9.75, high if side > 0.0 else low]
+    assert mark.get_marker() != labelled(axes, "uplift").get_marker()
+    assert "overturned at 9.750 s" in legend_of(figure)
 
 
 def test_a_fall_that_stays_in_the_frame_is_marked_at_its_end():
     time = np.linspace(0.0, 10.0, 1001)
     figure = figure_of(rotation=0.157 * time, slenderness=(1.2, 1.2), overturn_time=10.0)
-    mark = labelled(figure.axes[0], "_overturning")
+    mark = labelled(figure.axes[0], "overturned at 10.000 s")
     np.testing.assert_allclose([mark.get_xdata()[0], mark.get_ydata()[0]], [10.0, 1.57 / 1.2])
 
 

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 
@@ -30,6 +30,10 @@ def stacks(draw) -> Stack:
 
 
 @given(stacks(), stacks())
+@example(
+    stack(-1, 0.5, 2, 1.0, 0, 2.0, -1, 3.0, 1, 4.0, 0),
+    stack(-1, 1.0, 0, 1.5, 1, 2.0, 0, 2.5, 1, 3.0, 0),
+)
 def test_half_way_both_sides_fill_the_frame_in_order(left, right):
     for levels in meeting(left, right):
         assert levels[0] == LOW
@@ -114,6 +118,17 @@ def test_lobes_apart_from_each_other_are_not_joined():
     left, right = meeting(stack(-1, 2.0, 1, 4.0, -1), stack(-1, 6.0, 2, 8.0, -1))
     np.testing.assert_allclose(left, [0.0, 3.0, 3.0, 10.0])
     np.testing.assert_allclose(right, [0.0, 7.0, 7.0, 10.0])
+
+
+def test_a_boundary_leaves_the_frame_straight():
+    columns = [stack(-1, 5.0, 0), stack(-1, 7.0, 0), stack(-1)]
+    (at, levels, _), (_, other, _) = runs(np.arange(3.0), columns)
+    np.testing.assert_allclose(at, [0.0, 1.0, 1.5])
+    np.testing.assert_allclose(levels[1], [5.0, 7.0, 8.0])
+    np.testing.assert_allclose(other, [[0.0, 0.0], [10.0, 10.0]])
+    _, (at, levels, _) = runs(np.arange(3.0), [stack(0), stack(-1, 1.0, 0), stack(-1, 5.0, 0)])
+    np.testing.assert_allclose(at, [0.5, 1.0, 2.0])
+    np.testing.assert_allclose(levels[1], [0.0, 1.0, 5.0])
 
 
 def map_of(columns, **options):

@@ -13,6 +13,7 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.response import Sensitivity
+from rocking.response.forces import Contact
 from rocking.response.summary import time_text
 
 TABLES = {
@@ -58,6 +59,16 @@ def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(s
         assert len(max(re.findall(r'points="([^"]*)"', page), key=len).split()) <= 400
     extreme = np.max(np.abs([float(text) for text in re.findall(r">(-?[\d.]+)</text>", shaken._repr_html_())[:2]]))
     assert extreme == pytest.approx(shaken.peak_over_slenderness, rel=2e-3)
+    assert f">{fallen.overturn_time:.4g} s</text>" in fallen._repr_html_()
+
+
+def test_what_takes_a_pass_along_the_response_is_found_once(monkeypatch):
+    response = simulate(Block(0.12, 0.55), rocking.pulses.one_sine(3.0, 1.0))
+    first = response.to_dict()
+    monkeypatch.setattr(Contact, "largest", None)
+    monkeypatch.setattr(Contact, "first", None)
+    assert response.to_dict() == first
+    assert f"{response.required_friction:.4f}" in response.summary()
 
 
 def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatch):
@@ -74,7 +85,11 @@ def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatc
         (230.7262443771, 0.9e-3, "230.726244377 s"),
         (230.7262443771, 0.02, "230.7262444 s"),
         (230.7262443771, 3.0, "230.72624 s"),
-        (230.7262443771, 1e9, "231 s"),
+        (230.7262443771, 0.9e3, "230.726 s"),
+        (230.7262443771, 1.2e3, "230.726 +- 0.001 s"),
+        (230.7262443771, 4e5, "230.7 +- 0.4 s"),
+        (230.7262443771, 2e6, "231 +- 2 s"),
+        (230.7262443771, 1e9, "about 231 s"),
         (230.7262443771, math.nan, "231 s"),
     ],
 )

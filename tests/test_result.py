@@ -109,6 +109,52 @@ def test_a_result_draws_itself_into_axes_of_the_caller(results):
         assert not other.has_data()
 
 
+def test_whatever_draws_itself_does_so_at_the_size_that_is_wanted(results):
+    fragility = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
+    for found in [*results.values(), fragility, rocking.simulate(BLOCK, PULSE), PULSE]:
+        assert found.plot(figsize=(3.4, 2.7)).get_size_inches().tolist() == [3.4, 2.7]
+
+
+HEADERS = {
+    ("RockingSpectrum", "fractiles"): "fractile,alpha_rad,restitution,p_rad_s,period_s,size_m,"
+    "fractile_over_alpha,overturned_share",
+    ("RockingSpectrum", "peaks"): "motion,alpha_rad,restitution,p_rad_s,period_s,size_m,"
+    "peak_rotation_rad,peak_over_alpha,overturned",
+    ("OverturningMap", "modes"): "amplitude,frequency,mode,peak_rotation_rad",
+    ("OverturningMap", "boundaries"): "boundary_frequency,boundary_amplitude,mode_below,mode_above",
+    ("IncrementalDynamicAnalysis", "levels"): "motion,level_m_s2,block,p_rad_s,alpha_rad,restitution,"
+    "peak_rotation_rad,peak_over_alpha,overturned",
+    ("IncrementalDynamicAnalysis", "bands"): "band_motion,band_block,band_start_m_s2,band_end_m_s2",
+    ("ChatteringMap", "outcomes"): "a,omega,outcome,complete,uplift_s,rest_s,lower_s,upper_s,rests,overturned",
+}
+
+
+def test_every_result_is_written_as_tables_whose_columns_have_units(results, tmp_path):
+    written = {}
+    for name, found in results.items():
+        for table in found.TABLES:
+            found.to_csv(tmp_path / "table.csv", table)
+            written[name, table] = (tmp_path / "table.csv").read_text().splitlines()
+            rows = found.data[[*found.TABLES[table]]].to_dataframe()
+            assert len(found.to_dataframe(table)) == len(rows) == len(written[name, table]) - 1
+        assert found.to_dataframe().equals(found.to_dataframe(next(iter(found.TABLES))))
+        with pytest.raises(rocking.InvalidOption, match="table must be one of"):
+            found.to_dataframe("histories")
+    assert {key: lines[0] for key, lines in written.items()} == HEADERS
+
+
+def test_the_rows_of_a_table_are_the_values_of_the_result(results):
+    spectrum, scaled = results["RockingSpectrum"], results["IncrementalDynamicAnalysis"]
+    for row in spectrum.to_dataframe("peaks").itertuples():
+        at = {"motion": row.motion, "alpha": row.alpha_rad, "restitution": row.restitution, "p": row.p_rad_s}
+        assert float(spectrum.peak_over_alpha.sel(at)) == row.peak_over_alpha
+        assert math.isinf(row.peak_over_alpha) == row.overturned
+    bands = scaled.to_dataframe("bands")
+    assert bands.band_motion.tolist() == ["one-sine"] * len(scaled.bands(0))
+    ends = list(zip(bands.band_start_m_s2, bands.band_end_m_s2, strict=True))
+    assert str(ends) == str(scaled.bands(0))
+
+
 def test_a_part_of_a_result_is_a_result(spectrum):
     part = spectrum.select(alpha=0.2, p=[1.0, 3.0])
     assert dict(part.sizes) == {"motion": 2, "alpha": 1, "restitution": 1, "p": 2, "fractile": 3}
@@ -128,7 +174,7 @@ def test_levels_go_on_to_three_times_the_first_that_overturns_and_no_further():
 def test_columns_of_the_table_of_bands_do_not_touch():
     record = rocking.records.load("ridgecrest-clc-090")
     text = rocking.incremental_dynamic_analysis(BLOCK, [record, PULSE], tolerance=1e-2).summary()
-    rows = text.splitlines()[3:]
+    rows = text.splitlines()[4:]
     assert len(rows) == 2
     assert [row.split("  ")[0] for row in rows] == ["ridgecrest-clc-090", "one-sine"]
 

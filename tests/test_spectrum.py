@@ -108,8 +108,8 @@ def test_the_figure_draws_fractiles_and_leaves_out_what_overturns(spectrum):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"p": None}, "either p"),
-        ({"size": [1.0]}, "either p"),
+        ({"p": None}, "give one of p="),
+        ({"size": [1.0]}, "not both of p="),
         ({"p": None, "size": [-1.0]}, "size"),
         ({"p": [0.0]}, "p must"),
         ({"p": "fast"}, "p must"),
@@ -138,5 +138,6 @@ def test_a_figure_of_too_many_curves_is_refused(spectrum):
 
 def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert runpy.run_path(str(EXAMPLE))["main"]() == pytest.approx(-0.93668, abs=1e-5)
+    # Responses to one of its records are ambiguous: the last place of a machine's sine changes their peaks by 1e-4.
+    assert runpy.run_path(str(EXAMPLE))["main"]() == pytest.approx(-0.9367, abs=5e-4)
     assert (tmp_path / "out" / "spectrum.png").stat().st_size > 10_000

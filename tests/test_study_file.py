@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.cli import main
 from rocking.studies import TEMPLATE, read_study
 
 TEXT = """\
@@ -31,20 +30,6 @@ polarity = "both"
 model = "linear"
 chattering = "certified=1e-9"
 """
-
-
-@pytest.fixture
-def run(capsys):
-    def call(*arguments):
-        code = 0
-        try:
-            main([str(argument) for argument in arguments])
-        except SystemExit as stop:
-            code = stop.code or 0
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture
@@ -88,8 +73,10 @@ def test_blocks_come_from_a_table_as_well(tmp_path, file):
         ('p = "1:6:5"', 'p = "fast"', 2, "p takes a number"),
         ("restitution = 0.9", "restitutoin = 0.9", 4, "no restitutoin; it takes alpha, csv"),
         ("[scales]", "[scale]", 14, "no table"),
-        ('family = "one-sine"', 'family = "two-sine"', 10, "family must be one of"),
-        ("frequency = [0.5, 1.0]", "cycles = 2", 10, "not complete"),
+        ('family = "one-sine"', 'family = "two-sine"', 10, "did you mean one-sine"),
+        ("frequency = [0.5, 1.0]", "", 10, "the pulse one-sine needs frequency as well"),
+        ("frequency = [0.5, 1.0]", "frequncy = 2", 12, "no frequncy; did you mean frequency"),
+        ("frequency = [0.5, 1.0]", "frequency = -2", 10, "frequency must be a positive number"),
         ('amplitude = ["0.3g", "0.5g"]', 'amplitude = "0.3h"', 11, "acceleration"),
         ("factor = [0.5, 1.0]", "factor = []", None, "factor"),
         ("factor = [0.5, 1.0]", "factor = 1\npga = 2", None, "one measure only"),
@@ -132,6 +119,7 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
         "units": 20,
         "simulations": 200,
         "failed": {},
+        "running": None,
     }
     assert "20 units are sound" in run("study", "verify", folder, "--recompute", 2)[1]
     assert run("study", "export", folder, table)[0] == 0

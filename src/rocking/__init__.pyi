@@ -1,6 +1,7 @@
 from . import chattering
 from .analysis.calibration import Calibration, HistoryCalibration, calibrate, calibrate_history
 from .analysis.fragility import Fragility, fit_fragility, fragility
+from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
@@ -15,6 +16,7 @@ from .errors import (
     StudyError,
     UnreadableRecord,
 )
+from .explorer.notebook import explore
 from .motion import Motion, pulses, records
 from .motion.formats import read
 from .response import Response
@@ -31,6 +33,7 @@ __all__ = [
     "Calibration",
     "Certified",
     "Fragility",
+    "HazardCurve",
     "HistoryCalibration",
     "IntervalThreshold",
     "InvalidBlock",
@@ -47,6 +50,7 @@ __all__ = [
     "calibrate",
     "calibrate_history",
     "chattering",
+    "explore",
     "fit_fragility",
     "fragility",
     "incremental_dynamic_analysis",

@@ -126,6 +126,13 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     return axis
 
 
+def hint_of_degrees(angle: float) -> str:
+    """Return the end of a sentence that refuses an angle, rad, where it would make sense in degrees; else nothing."""
+    if not 0.5 * math.pi <= abs(angle) < 90.0:
+        return ""
+    return f"; if it is in degrees, give math.radians({angle:g})"
+
+
 def _real(value: object) -> float | None:
     """Value as a float (infinite where it is too large for one), or None if it is not one real number."""
     single = _single(value)

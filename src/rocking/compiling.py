@@ -1,34 +1,68 @@
-"""A word before the kernels are compiled: that takes a while, and happens once."""
+"""A word while kernels are compiled: that takes a while, and happens once."""
 
 from __future__ import annotations
 
 import functools
+import time
+from typing import Any, Final
 
 from rocking.progress import note
 
-#: Processor time that the kernels of a simulation take to compile, s.
-_SECONDS = 10
+#: Processor time, s, that takes to compile what is missing, with nothing there: for the simulation of any motion, alone
+#: or in ensembles; for a chattering sequence under a sine; for critical amplitudes under one.
+SIMULATIONS: Final = 25
+SEQUENCES: Final = 20
+AMPLITUDES: Final = 5
+
+#: What takes less than this is not worth a word, s.
+_PATIENCE: Final = 1.0
+
+
+def announce(seconds: int) -> None:
+    """From now on, note on stderr when kernels are not found in the cache and must be compiled; once for each work.
+
+    Parameters
+    ----------
+    seconds : int
+        Processor time that it takes at most: `SIMULATIONS`, `SEQUENCES` or `AMPLITUDES`.
+
+    Notes
+    -----
+    The compiler itself says when it is at work: what is cached, for which sources and processor, is known to it alone.
+    """
+    _listener().expect(seconds)
 
 
 @functools.cache
-def announce() -> None:
-    """From now on, note on stderr when kernels are not found in the cache and must be compiled.
-
-    The compiler itself says when it starts: what is cached, for which sources and processor, is known to it alone.
-    """
+def _listener() -> Any:
+    """Return what listens to the compiler."""
     from numba.core import event
 
-    class FirstStart(event.Listener):  # type: ignore[misc]
-        """Speaks when the first kernel is compiled."""
+    class Listener(event.Listener):  # type: ignore[misc]
+        """Speaks as soon as the compiler has been at work for some time; a kernel is compiled with its parts."""
 
-        told = False
+        def __init__(self) -> None:
+            self.expected, self.told = 0, set[int]()
+            self.kernels, self.since, self.spent = 0, 0.0, 0.0
+
+        def expect(self, seconds: int) -> None:
+            if seconds != self.expected:
+                self.expected, self.spent = seconds, 0.0
 
         def on_start(self, event: object) -> None:
-            if not self.told:
-                note(f"compiling once for this machine, about {_SECONDS} s; later runs start at once")
-            self.told = True
+            now = time.process_time()
+            if self.kernels == 0:
+                self.since = now
+            self.kernels += 1
+            if self.spent + now - self.since >= _PATIENCE and self.expected not in self.told:
+                self.told.add(self.expected)
+                note(f"compiling what this needs, up to {self.expected} s of processor time; later runs find it ready")
 
         def on_end(self, event: object) -> None:
-            pass
+            self.kernels -= 1
+            if self.kernels == 0:
+                self.spent += time.process_time() - self.since
 
-    event.register("numba:compile", FirstStart())
+    listener = Listener()
+    event.register("numba:compile", listener)
+    return listener

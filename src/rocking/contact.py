@@ -9,7 +9,7 @@ from rocking.arrays import Floats
 
 def contact_forces(
     motion: tuple[Floats, Floats, Floats],
-    ground_over_g: Floats,
+    ground_over_g: tuple[Floats, Floats],
     side: Floats,
     slenderness: Floats,
     radius_over_g: Floats,
@@ -20,8 +20,8 @@ def contact_forces(
     ----------
     motion : tuple of ndarray
         theta (rad), and its first and second rate.
-    ground_over_g : ndarray
-        Ground acceleration in units of g.
+    ground_over_g : tuple of ndarray
+        Ground acceleration in units of g, horizontal and vertical.
     side : ndarray
         +1 or -1, the side that the block leans to; 0 at rest.
     slenderness, radius_over_g : ndarray
@@ -30,7 +30,7 @@ def contact_forces(
     Notes
     -----
     On side i = +-1, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
-    pivot; forces are m (a + x'') and m (g + y''). At rest they are (a/g, 1).
+    pivot; forces are m (a + x'') and m (g + a_v + y''). At rest they are (a/g, 1 + a_v/g).
     """
     rotation, velocity, acceleration = motion
     psi = slenderness - np.abs(rotation)
@@ -38,7 +38,8 @@ def contact_forces(
     speed = np.abs(side) * velocity**2
     horizontal = side * radius_over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
     vertical = radius_over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)
-    return ground_over_g + horizontal, 1.0 + vertical
+    push, lift = ground_over_g
+    return push + horizontal, 1.0 + lift + vertical
 
 
 def friction_demand(horizontal: Floats, vertical: Floats) -> Floats:

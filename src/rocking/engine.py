@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
-from rocking.compiling import announce
+from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import Unfinished
 from rocking.kernels import state, status
 from rocking.kernels.ground import Ground
@@ -27,11 +27,14 @@ from rocking.problem import ground_of, records_of, rules_of
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
 
-#: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; all else is as far as it came.
+#: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
+#: it while the block moved or the motion went on. All else is then as far as it came. ``stalled`` counts the rests that
+#: were not proven. Times of what never happened are 0.
 OUTCOME = np.dtype(
     [
-        ("overturned", "?"), ("unfinished", "?"), ("peak_rotation", "f8"), ("peak_time", "f8"), ("impacts", "i8"),
-        ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("last_rest", "f8"), ("duration", "f8"),
+        ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("peak_rotation", "f8"), ("peak_time", "f8"),
+        ("impacts", "i8"), ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("first_uplift", "f8"),
+        ("first_rest", "f8"), ("last_rest", "f8"), ("stalled", "i8"), ("duration", "f8"),
     ]
 )  # fmt: skip
 
@@ -114,7 +117,7 @@ def simulate_tasks(
     What becomes of a block depends on the block and its motion alone, bit for bit, whatever shares its task. An
     interrupt leaves the rest undone.
     """
-    announce()
+    announce(SIMULATIONS)
     if executor is not None:
         yield from _in_flight(setup, tasks, executor, _AHEAD * cores(), None)
         return
@@ -203,12 +206,14 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
     ground = ground_of(task.motion, blocks.gravity, task.factor)
     bodies = records_of(blocks, setup.model, limits)
     states = state.new_states(len(blocks), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))
-    for chosen, substeps in _companies(bodies, task.motion.step, setup.model):
+    # Lanes step through even samples under a constant weight.
+    step = task.motion.step if task.motion.vertical is None else None
+    for chosen, substeps in _companies(bodies, step, setup.model):
         if stop is not None and stop.is_set():
             break
-        _march_together(ground, rules, (bodies, states), chosen, task.motion.step, substeps)
+        _march_together(ground, rules, (bodies, states), chosen, step, substeps)
     _march_on(ground, rules, bodies, states, stop)
-    return _outcomes(states)
+    return _outcomes(states, task.motion.duration)
 
 
 def _companies(bodies: Records, step: float | None, model: Model) -> Iterator[tuple[Integers, int]]:
@@ -265,13 +270,16 @@ def slices(ground: Ground) -> int:
     return math.ceil((BUDGET + _BUDGET_OF_A_PIECE * len(ground.pieces)) / SLICE)
 
 
-def _outcomes(states: Records) -> NDArray[np.void]:
+def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes = np.empty(len(states), dtype=OUTCOME)
     outcomes["overturned"] = states["ending"] == status.FELL
     outcomes["unfinished"] = states["ending"] == status.UNFINISHED
+    early = (states["side"] != state.AT_REST) | (states["end"] < motion_end)
+    outcomes["stopped"] = (states["ending"] == status.DONE) & early
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
-        ("rests", "rests"), ("time_at_rest", "resting"), ("last_rest", "rested"), ("duration", "end"),
+        ("rests", "rests"), ("time_at_rest", "resting"), ("first_uplift", "first_uplift"),
+        ("first_rest", "first_rest"), ("last_rest", "rested"), ("stalled", "stalled"), ("duration", "end"),
     ):  # fmt: skip
         outcomes[name] = states[field]
     return outcomes

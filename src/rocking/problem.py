@@ -14,6 +14,7 @@ from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
 from rocking.kernels.ground import Ground
+from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
@@ -23,12 +24,20 @@ from rocking.treatment.base import Model
 def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Ground:
     """Ground of a motion times a factor; without a motion, no piece at all.
 
+    A negative factor reverses the polarity of the horizontal component alone.
+
     The last few are kept: laying out a record takes as long as a block's march through it.
     """
     if motion is None:
         return ground.ground_of(_NO_BREAKPOINTS, _NO_COEFFICIENTS, 1.0, 0.0)
     coefficients = motion.coefficients if factor == 1.0 else _frozen(motion.coefficients * factor)
-    return ground.ground_of(motion.breakpoints, coefficients, 1.0 / gravity, motion.error * abs(factor))
+    if motion.vertical is None:
+        return ground.ground_of(motion.breakpoints, coefficients, 1.0 / gravity, motion.error * abs(factor))
+    breakpoints, (pushes, lifts) = piecewise.together(motion, motion.vertical)
+    error = max(motion.error, motion.vertical.error)
+    return ground.ground_of(
+        breakpoints, pushes * factor, 1.0 / gravity, error * abs(factor), vertical=lifts * abs(factor)
+    )
 
 
 def records_of(blocks: Blocks, model: Model, limits: Floats) -> state.Records:

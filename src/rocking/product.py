@@ -39,6 +39,10 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "rests": ("1", "times the block came to rest"),
     "time_at_rest": ("s", "time spent at rest"),
     "unfinished": ("1", "whether the simulation was given up after too many steps; the rest is as far as it came"),
+    "stopped": (
+        "1",
+        "whether the duration ended it while the block moved or the motion went on, and left the verdict open",
+    ),
 }
 
 
@@ -192,7 +196,7 @@ class Product:
             "motion": ("motion", _names(self.motions)),
             "scale": ("scale", self.scales.values, about),
             "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in self.signs]),
-            **_block_coordinates(self.blocks),
+            **block_coordinates(self.blocks),
         }
 
     def _attributes(self) -> dict[str, Any]:
@@ -218,7 +222,8 @@ def _names(motions: Sequence[Motion]) -> list[str]:
     return names
 
 
-def _block_coordinates(blocks: Blocks) -> dict[str, Any]:
+def block_coordinates(blocks: Blocks) -> dict[str, Any]:
+    """Parameters of blocks as coordinates of the dimension ``block``, with units; of unequal sides one for each."""
     columns: dict[str, tuple[NDArray[Any], str]] = {
         "p": (blocks.p, "rad/s"),
         "alpha": (blocks.alpha, "rad"),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from datetime import timedelta
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal
 
@@ -21,6 +22,13 @@ Audience = Literal["terminal", "everybody", "nobody"]
 _audience: Audience = "terminal"
 
 
+def _as_it_is(sentence: str) -> str:
+    return sentence
+
+
+_phrased: Callable[[str], str] = _as_it_is
+
+
 def note(sentence: str) -> None:
     """Say a sentence on stderr, on a line of its own, to whom `notes_for` has chosen.
 
@@ -29,28 +37,29 @@ def note(sentence: str) -> None:
     >>> note("nobody reads this where stderr is not a terminal")
     """
     if _audience == "everybody" or (_audience == "terminal" and sys.stderr.isatty()):
-        print(f"rocking: note: {' '.join(sentence.split())}", file=sys.stderr)
+        print(f"rocking: note: {_phrased(' '.join(sentence.split()))}", file=sys.stderr)
 
 
 @contextlib.contextmanager
-def notes_for(audience: Audience) -> Iterator[None]:
-    """Choose who is told, while a command runs.
+def notes_for(audience: Audience, phrased: Callable[[str], str] = _as_it_is) -> Iterator[None]:
+    """Choose who is told, while a command runs, and in whose words.
 
     Examples
     --------
     >>> with notes_for("nobody"):
     ...     note("not even a person at a terminal sees this")
     """
-    global _audience
-    before, _audience = _audience, audience
+    global _audience, _phrased
+    before = _audience, _phrased
+    _audience, _phrased = audience, phrased
     try:
         yield
     finally:
-        _audience = before
+        _audience, _phrased = before
 
 
 class Progress:
-    """Progress bar on stderr, drawn once the work has taken a second.
+    """Progress bar on stderr with the rate and the time left, drawn once the work has taken a second.
 
     Parameters
     ----------
@@ -61,7 +70,7 @@ class Progress:
     show : bool, optional
         By default only if stderr is a terminal.
     done : int
-        Steps that were done before.
+        Steps that were done before; they do not count for the rate.
 
     Examples
     --------
@@ -74,7 +83,7 @@ class Progress:
         self._what, self._total = what, total
         self._show = (_audience != "nobody" and sys.stderr.isatty()) if show is None else show
         self._start = time.monotonic()
-        self._done = done
+        self._before = self._done = done
         self._bar: rich.progress.Progress | None = None
 
     def __enter__(self) -> Progress:
@@ -99,15 +108,18 @@ class Progress:
             return
         if self._bar is None:
             self._bar = _started(self._what, self._total)
-        self._bar.update(self._bar.task_ids[0], completed=self._done)
+        rate = (self._done - self._before) / (time.monotonic() - self._start)
+        left = f"{timedelta(seconds=round(max(self._total - self._done, 0) / rate))} left" if rate else ""
+        self._bar.update(self._bar.task_ids[0], completed=self._done, rate=f"{rate:.3g}/s", left=left)
 
 
 def _started(what: str, total: int) -> rich.progress.Progress:
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    texts = [TextColumn(f"{{task.{name}}}") for name in ("description", "fields[rate]", "fields[left]")]
+    columns = (texts[0], BarColumn(), MofNCompleteColumn(), *texts[1:])
     bar = Progress(*columns, console=Console(stderr=True), transient=True)
-    bar.add_task(what, total=total)
+    bar.add_task(what, total=total, rate="", left="")
     bar.start()
     return bar

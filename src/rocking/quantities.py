@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
 import numpy as np
@@ -22,7 +22,12 @@ _MOST: Final = 100_000
 _WRITTEN: Final = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)\s*(\D.*?)?\s*", re.IGNORECASE
 )
-_DEGREES: Final = {"": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0}
+
+#: What one of these units is in SI units and radians.
+_ANGLES: Final = {"": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0}
+_FREQUENCIES: Final = {"": 1.0, "hz": 1.0, "rad/s": 0.5 / math.pi}
+_VELOCITIES: Final = {"": 1.0, "m/s": 1.0, "cm/s": 0.01}
+_TIMES: Final = {"": 1.0, "s": 1.0}
 
 
 def number(text: str, option: str) -> float:
@@ -44,10 +49,32 @@ def acceleration(text: str, option: str) -> float:
 
 def angle(text: str, option: str) -> float:
     """Return an angle, rad, from "12deg", "0.2rad" or "0.2" (rad)."""
-    value, unit = _parts(text)
-    if value is None or unit.lower() not in _DEGREES:
-        raise InvalidOption(f"{option} takes an angle as 12deg or 0.2 (rad), not {text.strip()!r}")
-    return value * _DEGREES[unit.lower()]
+    return _in_units(_ANGLES, text, option, "an angle as 12deg or 0.2 (rad)")
+
+
+def frequency(text: str, option: str) -> float:
+    """Return a frequency, Hz, from "2Hz", "12.6rad/s" or "2" (Hz)."""
+    return _in_units(_FREQUENCIES, text, option, "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
+
+
+def velocity(text: str, option: str) -> float:
+    """Return a velocity, m/s, from "0.4m/s", "40cm/s" or "0.4" (m/s)."""
+    return _in_units(_VELOCITIES, text, option, "a velocity as 40cm/s or 0.4 (m/s)")
+
+
+def duration(text: str, option: str) -> float:
+    """Return a time, s, from "1.5s" or "1.5"."""
+    return _in_units(_TIMES, text, option, "a time as 1.5 (s)")
+
+
+def tilt(text: str, option: str) -> float:
+    """Return an angle, rad, as `angle`, of a block that stands: below pi/2, and no degrees without their unit."""
+    value = angle(text, option)
+    if 0.5 * math.pi <= abs(value) < 90.0 and not _parts(text)[1]:
+        raise InvalidOption(
+            f"{option} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?"
+        )
+    return value
 
 
 def sides(text: str, option: str, quantity: Quantity = number) -> float | list[float]:
@@ -73,6 +100,13 @@ def values(text: str, option: str, quantity: Quantity = number) -> Floats:
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
         raise InvalidOption(f"{option}: a range with :log needs positive ends, not {text!r}")
     return np.geomspace(start, stop, count)
+
+
+def _in_units(units: Mapping[str, float], text: str, option: str, wanted: str) -> float:
+    value, unit = _parts(text)
+    if value is None or unit.lower() not in units:
+        raise InvalidOption(f"{option} takes {wanted}, not {text.strip()!r}")
+    return value * units[unit.lower()]
 
 
 def _parts(text: str) -> tuple[float | None, str]:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from rocking.errors import InvalidOption, OutputError
+from rocking import checks
+from rocking.errors import InvalidOption
+from rocking.tables import named, text_table, write_netcdf, write_text
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -28,7 +32,11 @@ class Result(ABC):
     ----------
     data : xarray.Dataset
         All numbers, with units and meaning of each variable.
+    TABLES : mapping of str to tuple of str
+        Tables that `to_dataframe` and `to_csv` know, the first by default, and the variables of each.
     """
+
+    TABLES: ClassVar[Mapping[str, tuple[str, ...]]]
 
     data: xr.Dataset
 
@@ -65,8 +73,44 @@ class Result(ABC):
         """Return what was found by name; units are in the names."""
 
     @abstractmethod
-    def plot(self, ax: Axes | None = None, *, title: str = "") -> Figure:
-        """Draw what was found: in a new figure, or in `ax`."""
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw what was found: in a new figure of this size (width and height, inches), or in `ax`."""
+
+    def to_dataframe(self, table: str | None = None) -> pd.DataFrame:
+        """Return one of the tables as a data frame: a row for each point, columns named with their units.
+
+        Parameters
+        ----------
+        table : str, optional
+            One of `TABLES`; by default the first.
+
+        Raises
+        ------
+        InvalidOption
+            If there is no such table.
+        """
+        names = [*self.TABLES]
+        part = self._table(names[0] if table is None else checks.one_of(table, "table", InvalidOption, names))
+        # A dimension alone, without labels, only counts the rows.
+        rows = [] if len(part.dims) == 1 and not part.coords else [*part.dims]
+        columns = dict.fromkeys([*rows, *part.coords, *part.data_vars])
+        return part.to_dataframe().reset_index()[[*columns]].rename(columns=lambda name: _with_unit(part[name]))
+
+    def to_csv(self, path: str | Path, table: str | None = None) -> None:
+        """Write one of the tables of `to_dataframe` as text columns with a header; "inf" stands for infinity.
+
+        Raises
+        ------
+        InvalidOption
+            As `to_dataframe`.
+        OutputError
+            If the file cannot be written.
+        """
+        rows = self.to_dataframe(table)
+        write_text(path, rows.to_csv(index=False, float_format="%.15g", lineterminator="\n"))
+
+    def _table(self, name: str) -> xr.Dataset:
+        return self.data[[*self.TABLES[name]]]
 
     def to_netcdf(self, path: str | Path) -> None:
         """Write the dataset to a NetCDF file.
@@ -76,10 +120,7 @@ class Result(ABC):
         OutputError
             If the file cannot be written.
         """
-        try:
-            self.data.to_netcdf(path, engine="h5netcdf")
-        except OSError as error:
-            raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
+        write_netcdf(path, self.data)
 
     def __getattr__(self, name: str) -> Any:
         # Not before `data` is there (while it is unpickled), and no protocol that was not meant.
@@ -102,6 +143,18 @@ class Result(ABC):
         return f"<p><b>{type(self).__name__}</b>: {self.summary().splitlines()[0]}</p>{html}"
 
 
-def some(count: int) -> list[int]:
-    """List at most a dozen positions, evenly from the first to the last."""
-    return sorted({round(k) for k in np.linspace(0, count - 1, min(count, _SHOWN))})
+def _with_unit(variable: xr.DataArray) -> str:
+    return named(str(variable.name), variable.attrs.get("units", "1"))
+
+
+def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Table of at most a dozen rows, evenly from the first to the last; it says so where there are more.
+
+    Examples
+    --------
+    >>> table_of_some(["n"], [[k] for k in range(100)]).splitlines()[-2:]
+    ['99', '(12 of 100 rows)']
+    """
+    chosen = sorted({round(k) for k in np.linspace(0, len(rows) - 1, min(len(rows), _SHOWN))})
+    table = text_table(header, [rows[k] for k in chosen])
+    return table if len(chosen) == len(rows) else f"{table}\n({len(chosen)} of {len(rows)} rows)"

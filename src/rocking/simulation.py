@@ -6,7 +6,7 @@ import math
 
 from rocking import checks
 from rocking.block import Block, Blocks, one_block
-from rocking.compiling import announce
+from rocking.compiling import SIMULATIONS, announce
 from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state, status
@@ -50,7 +50,8 @@ def simulate(
         How sequences of impacts end: "certified" (default), "velocity", "interval" or "time", or the object with its
         parameter (`Certified`, `VelocityThreshold`, `IntervalThreshold`, `AsymptoticTime`).
     duration : float, optional
-        Time to stop at, s. By default to the end of the motion, and on until rest or overturning.
+        Time to stop at, s. By default to the end of the motion, and on until rest or overturning. Where it ends the
+        response while the block still moves or the motion goes on, the response is `stopped`, and has no verdict.
     initial_rotation : float
         Rotation at time 0, rad; positive leans to side +.
     initial_velocity : float
@@ -70,6 +71,9 @@ def simulate(
 
     Notes
     -----
+    The block sticks to the ground. Whether it would slide at a coefficient of friction, and when, is asked of the
+    response: `Response.sliding_time`, ``summary(friction)``.
+
     Between impacts the rotation is a Taylor series about the last event (paper, Eq. 15); the next impact is the first
     root of that series divided by time (paper, Eq. 20), found so that none can be missed.
 
@@ -83,7 +87,7 @@ def simulate(
     >>> response.overturned, len(response.impacts) > 50, f"{response.events['time'][-1]:.6f}"
     (False, True, '4.235818')
     """
-    announce()
+    announce(SIMULATIONS)
     how, blocks, motion = treatment(chattering), Blocks.of([one_block(block)]), one_motion(motion)
     rules = rules_of(blocks, model, how, duration, record=True)
     trail = Trail(
@@ -127,7 +131,9 @@ def _initial_state(rotation: float, velocity: float) -> tuple[int, float, float]
     if abs(rate) > _FASTEST:
         raise InvalidOption(f"initial_velocity must be at most {_FASTEST:g} rad/s in size, not {rate:g}")
     if abs(theta) >= 0.5 * math.pi:
-        raise InvalidOption(f"initial_rotation must be below pi/2 rad in size, not {theta:g}")
+        raise InvalidOption(
+            f"initial_rotation must be below pi/2 rad in size, not {theta:g}{checks.hint_of_degrees(theta)}"
+        )
     if theta == 0.0 and rate == 0.0:
         return state.AT_REST, 0.0, 0.0
     sign = math.copysign(1.0, theta if theta != 0.0 else rate)

@@ -64,15 +64,16 @@ def history(time: Floats, values: Floats, label: str) -> str:
 
 
 def thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """At most `MOST_POINTS` points of a line: the least and the greatest of each of so many even spans of time."""
+    """At most `MOST_POINTS` points of a line: its ends, and the least and greatest of each of so many spans of time."""
     if len(time) <= MOST_POINTS:
         return time, values
-    spans = np.linspace(time[0], time[-1], MOST_POINTS // 2 + 1)[1:-1]
-    kept: list[int] = []
+    spans = np.linspace(time[0], time[-1], MOST_POINTS // 2)[1:-1]
+    kept = {0, len(time) - 1}
     for part in np.split(np.arange(len(time)), np.searchsorted(time, spans)):
         if len(part):
-            kept += sorted({int(part[np.argmin(values[part])]), int(part[np.argmax(values[part])])})
-    return time[kept], values[kept]
+            kept |= {int(part[np.argmin(values[part])]), int(part[np.argmax(values[part])])}
+    chosen = sorted(kept)
+    return time[chosen], values[chosen]
 
 
 def outline(corners: Sequence[tuple[float, float]], size: float, label: str) -> str:

@@ -5,13 +5,17 @@ from __future__ import annotations
 import io
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rocking.errors import OutputError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Wider than any table, so that none is wrapped or cut.
 _WIDTH = 100_000
@@ -99,3 +103,21 @@ def write_text(path: str | Path, text: str) -> None:
         Path(path).write_text(text, "utf-8")
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
+
+
+def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
+    """Write a dataset to a NetCDF file.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    folder = Path(path).parent
+    if not folder.is_dir():
+        raise OutputError(f"{path} cannot be written: there is no folder {folder}; make it, or choose another place")
+    try:
+        dataset.to_netcdf(path, engine="h5netcdf")
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else error
+        raise OutputError(f"{path} cannot be written: {reason}; choose another place") from error

@@ -12,6 +12,11 @@ def exact(x: float) -> fmpq:
     return fmpq(*float(x).as_integer_ratio())
 
 
+def as_float(x: fmpq) -> float:
+    """Double next to a rational number."""
+    return int(x.p) / int(x.q)
+
+
 def polynomial(c: Sequence[float]) -> fmpq_poly:
     """Polynomial by ascending powers, its doubles taken as exact numbers."""
     return fmpq_poly([exact(x) for x in c])
@@ -37,5 +42,5 @@ def first_above(f: fmpq_poly, start: float, end: float) -> float:
     points = turning_points(f, start, end)
     for left, right in itertools.pairwise(points):
         if f((left + right) / 2) > 0:
-            return float(int(left.p) / int(left.q))
+            return as_float(left)
     return math.inf

@@ -10,7 +10,7 @@ import numpy as np
 
 
 def cycles(a: float, omega: float, eta: float, count: int):
-    """(T_{n;1}, T_{n;3}) of each cycle n, one of them zero."""
+    """(T_{n;1}, T_{n;3}) of each cycle n, one of them zero, and the speed after its impact over eps^(3/2)."""
     i0 = -1
     sigma1 = 0.0
     velocity3 = 0.0
@@ -33,5 +33,5 @@ def cycles(a: float, omega: float, eta: float, count: int):
             velocity3 + 2 * phi2_0 * third + 2 * phi2_2 * first + 3 * phi3_1 * first**2 + 4 * phi4_0 * first**3
         )
         sigma1 += first
-        terms.append((first, third))
+        terms.append((first, third, abs(velocity3)))
     return terms

@@ -70,7 +70,8 @@ class Problem:
         excess = np.polynomial.Polynomial(-side * coefficients) - self.threshold(side)
         if excess(time - start) > 0.0:
             return time
-        roots = excess.roots()
+        with np.errstate(over="ignore"):  # a slope next to nothing passes nowhere
+            roots = excess.roots()
         real = np.sort(roots[np.abs(roots.imag) < 1e-12 * (end - start)].real) + start
         slope = excess.deriv()
         for root in real:

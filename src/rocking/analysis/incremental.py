@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
+from rocking.analysis.bands import Levels
 from rocking.analysis.boundaries import Boundaries, boundaries
 from rocking.analysis.intensity import Measure, MeasureName
 from rocking.analysis.levels import described, several_motions, simulate_levels
@@ -20,7 +21,7 @@ from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.result import Result
-from rocking.tables import text_table
+from rocking.tables import named, text_table
 from rocking.treatment import Certified
 from rocking.treatment.base import Model
 
@@ -122,8 +123,8 @@ def incremental_dynamic_analysis(
         raise InvalidOption("a block with restitution 1 never comes to rest; scaling up needs one below 1")
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model, "threads": threads, "progress": progress}
+    first = _lowest_uplift(many, shaken, values, how, model)
     if levels is None:
-        first = _lowest_uplift(many, shaken, values, how, model)
         table = _until_overturned(many, shaken, how, first, options)
     else:
         table = simulate_levels(
@@ -147,7 +148,7 @@ def incremental_dynamic_analysis(
     flat = grid.reshape(len(grid), -1).astype(np.int64)
     edges = boundaries(table.level.values, flat, overturned, tolerance=width, progress=progress)
     found = _dataset(table, _bands(flat, edges), many, how)
-    return IncrementalDynamicAnalysis(found.assign_attrs(blocks=described(blocks)))
+    return IncrementalDynamicAnalysis(found.assign_attrs(blocks=described(blocks), lowest_uplift=first))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -161,8 +162,21 @@ class IncrementalDynamicAnalysis(Result):
         smaller slenderness; infinite where it overturns) and overturned. Over (motion, block): overturning_level, the
         lowest; NaN where no level overturns, or the first one already does. Over (band): band_motion and band_block
         (positions along these dimensions), band_start and band_end; NaN where the band goes on below or above the
-        levels.
+        levels. Its attribute lowest_uplift is the level from which on a motion lifts a block.
     """
+
+    TABLES = MappingProxyType(
+        {
+            "levels": ("peak_rotation", "peak_over_alpha", "overturned"),
+            "bands": ("band_motion", "band_block", "band_start", "band_end"),
+        }
+    )
+
+    def _table(self, name: str) -> xr.Dataset:
+        part = super()._table(name)
+        if name == "levels":
+            return part
+        return part.assign(band_motion=("band", self.data.motion.values[self.data.band_motion.values]))
 
     def bands(self, motion: int, block: int = 0) -> list[tuple[float, float]]:
         """Return the bands of levels that overturn a block under a motion, both by position.
@@ -177,43 +191,54 @@ class IncrementalDynamicAnalysis(Result):
         return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
     def summary(self) -> str:
-        """Levels that overturn each block under each motion."""
-        many = self.data.sizes["block"] > 1
+        """Levels that overturn each block under each motion, and which levels were looked at."""
+        data = self.data
+        many = data.sizes["block"] > 1
+        looked_at = Levels.of(data)
         rows = [
-            [
-                str(self.data.motion.values[m]),
-                *([b] if many else []),
-                _bands_text(self.bands(m, b), self.data.level.scale),
-            ]
-            for m in range(self.data.sizes["motion"])
-            for b in range(self.data.sizes["block"])
+            [str(data.motion.values[m]), *([b] if many else []), looked_at.overturning(self.bands(m, b))]
+            for m in range(data.sizes["motion"])
+            for b in range(data.sizes["block"])
         ]
-        what = self.data.blocks if not many else f"{self.data.sizes['block']} blocks"
-        head = f"{what}, {self.data.model} model; {self.data.level.label} that overturns"
-        return f"{head}\n\n{text_table(['motion', *(['block'] if many else []), 'overturns'], rows)}"
+        what = data.blocks if not many else f"{data.sizes['block']} blocks"
+        table = text_table(["motion", *(["block"] if many else []), "overturns"], rows)
+        head = f"{what}, {data.model} model; {data.level.label} that overturns"
+        return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table])
 
     def to_dict(self) -> dict[str, Any]:
-        """Levels, peaks and bands by name."""
-        peaks = self.data.peak_over_alpha.transpose("motion", "block", "level").values
+        """Levels, peaks and bands by name; units are in the names."""
+        data, units = self.data, self.data.level.units
+        peaks = data.peak_over_alpha.transpose("motion", "block", "level").values
+        lowest = data.overturning_level.transpose("motion", "block").values
         return {
-            "blocks": self.data.blocks,
-            "model": self.data.model,
-            "measure": self.data.level.long_name,
-            "level": self.data.level.values,
+            "blocks": data.blocks,
+            "model": data.model,
+            "measure": data.level.long_name,
+            named("level", units): data.level.values,
+            named("lowest_uplift", units): data.lowest_uplift,
             "motions": [
                 {
-                    "name": str(self.data.motion.values[m]),
+                    "name": str(data.motion.values[m]),
                     "block": b,
-                    "overturning_level": float(self.data.overturning_level.transpose("motion", "block")[m, b]),
-                    "overturns": [{"from": low, "to": high} for low, high in self.bands(m, b)],
+                    named("overturning_level", units): float(lowest[m, b]),
+                    "overturns": [
+                        {named("from", units): low, named("to", units): high} for low, high in self.bands(m, b)
+                    ],
                     "peak_over_alpha": peaks[m, b],
                 }
-                for m in range(self.data.sizes["motion"])
-                for b in range(self.data.sizes["block"])
+                for m in range(data.sizes["motion"])
+                for b in range(data.sizes["block"])
             ],
         }
 
-    def plot(self, ax: Axes | None = None, *, block: int = 0, title: str = "") -> Figure:
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        block: int = 0,
+        title: str = "",
+        figsize: tuple[float, float] | None = None,
+    ) -> Figure:
         """Draw level against peak rotation for one block, and the bands of levels that overturn it.
 
         Parameters
@@ -224,6 +249,8 @@ class IncrementalDynamicAnalysis(Result):
             Position of the block.
         title : str
             Title; by default the block and the model.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
         """
         from rocking.plot import ScaledMotion, ida_figure
 
@@ -238,7 +265,11 @@ class IncrementalDynamicAnalysis(Result):
             motions.append(ScaledMotion(str(data.motion.values[m]), levels, peaks[m], bands))
         what = data.blocks if data.sizes["block"] == 1 else f"block {block}"
         return ida_figure(
-            motions=motions, level_label=data.level.label, title=title or f"{what}, {data.model} model", ax=ax
+            motions=motions,
+            level_label=data.level.label,
+            title=title or f"{what}, {data.model} model",
+            ax=ax,
+            figsize=figsize,
         )
 
 
@@ -265,16 +296,6 @@ def _until_overturned(
     table = xr.concat(whole, "level", data_vars="all", coords="minimal", compat="override", join="override")
     beyond = np.flatnonzero(table.level.values >= float(last))
     return table.isel(level=slice(0, beyond[0] + 1 if beyond.size else None))
-
-
-def _bands_text(bands: Sequence[tuple[float, float]], scale: float) -> str:
-    return "; ".join(_band_text(scale * low, scale * high) for low, high in bands) or "never"
-
-
-def _band_text(low: float, high: float) -> str:
-    if math.isnan(low):
-        return "at every level" if math.isnan(high) else f"up to {high:.5g}"
-    return f"{low:.5g} and more" if math.isnan(high) else f"{low:.5g} to {high:.5g}"
 
 
 def _bands(flat: Integers, edges: Boundaries) -> NDArray[np.float64]:

@@ -85,7 +85,18 @@ class Measure:
     @property
     def label(self) -> str:
         """Name and units for people."""
-        return self.quantity + {"m/s^2": " (g)", "m/s": " (m/s)", "1": ""}[self.units]
+        return self.quantity + (f" ({self.shown_in})" if self.shown_in else "")
+
+    @property
+    def shown_in(self) -> str:
+        """Units for people; nothing if it has none."""
+        return {"m/s^2": "g", "m/s": "m/s", "1": ""}[self.units]
+
+    def shown(self, value: float) -> str:
+        """Value, in SI units, with its unit; an acceleration in g, too."""
+        if self.units == "m/s^2":
+            return f"{value:.6g} m/s^2 ({value / STANDARD_GRAVITY:.4g} g)"
+        return f"{value:.6g}" if self.units == "1" else f"{value:.6g} {self.units}"
 
     @property
     def of_motion(self) -> Literal["pga", "pgv", "sa"]:

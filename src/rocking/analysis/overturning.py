@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.analysis.boundaries import Boundaries, boundaries
@@ -20,10 +20,11 @@ from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
+from rocking.named_pulses import pulse_family
 from rocking.progress import Progress
-from rocking.result import Result, some
+from rocking.result import Result, table_of_some
 from rocking.simulation import simulate
-from rocking.tables import text_table
+from rocking.tables import cell, named, text_table
 from rocking.treatment import Certified
 from rocking.treatment.base import Model
 
@@ -40,14 +41,11 @@ NO_UPLIFT: Final = -3
 RESTS: Final = -2
 ROCKS: Final = -1
 
-_FAMILIES: Final[dict[str, Callable[..., Motion]]] = {
-    "sine": pulses.sine,
-    "half-sine": pulses.half_sine,
-    "one-sine": pulses.one_sine,
-    "one-cosine": pulses.one_cosine,
-    "ricker": pulses.ricker,
-    "mavroeidis-papageorgiou": pulses.mavroeidis_papageorgiou,
-}
+#: Families of one amplitude and one frequency; the others of `rocking.pulses` are given as functions.
+_FAMILIES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
+
+#: Share of a map that is written as a number.
+_LEAST_SHARE: Final = 1e-3
 
 
 def overturning_map(
@@ -136,7 +134,9 @@ def overturning_map(
     attributes = {
         "program": f"rocking {VERSION}",
         "model": model,
-        "block": f"{block.description}: alpha = {block.alpha} rad, restitution = {block.restitution}",
+        "block": block.description,
+        named("alpha", "rad"): [side.alpha for side in block.sides],
+        "restitution": [side.restitution for side in block.sides],
         "pulse": f"{unit.name}: {unit.description.text}",
         "tolerance": width,
     }
@@ -156,6 +156,26 @@ def mode_name(mode: int) -> str:
     return f"overturns after {mode} impact{'s' if mode > 1 else ''}"
 
 
+def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
+    """Modes of blocks under one motion.
+
+    Parameters
+    ----------
+    ends : structured array
+        What became of them, as the engine tells it (`rocking.engine.OUTCOME`).
+    duration : float
+        Of the motion, s.
+
+    Returns
+    -------
+    ndarray of int
+        As in `OverturningMap`, but of a block that overturns after it has rested, all its impacts.
+    """
+    rested = (ends["uplifts"] > 1) | ((ends["rests"] > 0) & (ends["last_rest"] <= duration))
+    modes = np.where(ends["uplifts"] == 0, NO_UPLIFT, np.where(rested, RESTS, ROCKS))
+    return np.where(ends["overturned"], ends["impacts"], modes)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class OverturningMap(Result):
     """What a pulse does to a block, over amplitude and frequency; from `overturning_map`.
@@ -172,22 +192,36 @@ class OverturningMap(Result):
         the pulse. n >= 0: overturns, after n impacts since it last uplifted.
     """
 
+    TABLES = MappingProxyType(
+        {
+            "modes": ("mode", "peak_rotation"),
+            "boundaries": ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above"),
+        }
+    )
+
     def summary(self) -> str:
         """Shares of the map that each outcome takes, and the lowest amplitude that overturns at some frequencies."""
         modes, counts = np.unique(self.data.mode, return_counts=True)
         shares = [
-            (mode_name(int(mode)), f"{100 * count / self.data.mode.size:.1f} %")
+            (mode_name(int(mode)), _percent(count / self.data.mode.size))
             for mode, count in zip(modes, counts, strict=True)
         ]
-        lowest = self.data.overturning_amplitude.values
-        rows = [(float(self.data.frequency[k]), float(lowest[k])) for k in some(lowest.size)]
+        rows = [(float(ratio), self._lowest(k)) for k, ratio in enumerate(self.data.frequency)]
         return "\n\n".join(
             [
-                f"{self.data.pulse.partition(':')[0]} on a {self.data.block}; {self.data.model} model",
+                f"{self._pulse} on a block with {self._proportions}; {self.data.model} model",
                 text_table(["outcome", "share of the map"], shares),
-                text_table(["frequency over p", "lowest amplitude that overturns"], rows),
+                table_of_some(["2 pi f/p", "lowest amplitude that overturns"], rows),
             ]
         )
+
+    def _lowest(self, k: int) -> str:
+        """Lowest amplitude that overturns at a frequency, in words; beyond the grid's amplitudes nothing is known."""
+        lowest, amplitudes = float(self.data.overturning_amplitude[k]), self.data.amplitude.values
+        if not math.isnan(lowest):
+            return cell(lowest)
+        is_open_below = self.data.mode.values[0, k] >= 0
+        return f"{amplitudes[0]:g} or less" if is_open_below else f"none of those up to {amplitudes[-1]:g}"
 
     def to_dict(self) -> dict[str, Any]:
         """Grid, modes and boundaries by name."""
@@ -196,6 +230,7 @@ class OverturningMap(Result):
         return {
             "pulse": self.data.pulse,
             "block": self.data.block,
+            **{name: self.data.attrs[name] for name in (named("alpha", "rad"), "restitution")},
             "model": self.data.model,
             "tolerance": self.data.tolerance,
             "modes": {str(mode): mode_name(int(mode)) for mode in np.unique(self.data.mode)},
@@ -206,7 +241,7 @@ class OverturningMap(Result):
             "boundaries": [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)],
         }
 
-    def plot(self, ax: Axes | None = None, *, title: str = "") -> Figure:
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the modes as regions between the refined boundaries, in a new figure or in `ax`.
 
         Parameters
@@ -215,6 +250,8 @@ class OverturningMap(Result):
             Where to draw; by default in a new figure.
         title : str
             Title; by default the pulse and the block.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
         """
         from rocking.plot import regions_figure
 
@@ -227,11 +264,29 @@ class OverturningMap(Result):
             edges=[data.boundary_amplitude.values[here] for here in columns],
             regions=[[modes[0, k], *data.mode_above.values[here]] for k, here in enumerate(columns)],
             names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, data.mode_above.values)},
-            x_label="frequency of the pulse over p",
+            x_label="2πf/p, with the frequency f of the pulse",
             y_label="amplitude over the smallest that lifts the block",
-            title=title or f"{data.pulse.partition(':')[0]}, {data.block}, {data.model}",
+            title=title or f"{self._pulse}, {self._proportions}, {data.model} model",
             ax=ax,
+            figsize=figsize,
         )
+
+    @property
+    def _pulse(self) -> str:
+        return str(self.data.pulse.partition(":")[0])
+
+    @property
+    def _proportions(self) -> str:
+        """What counts of the block, for people: the numbers are the same on both sides of most."""
+        alpha, restitution = (
+            ", ".join(dict.fromkeys(f"{value:.5g}" for value in self.data.attrs[name]))
+            for name in (named("alpha", "rad"), "restitution")
+        )
+        return f"alpha = {alpha} rad, restitution = {restitution}"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %" if share >= _LEAST_SHARE else f"below {100.0 * _LEAST_SHARE:.1g} %"
 
 
 @dataclass(frozen=True)
@@ -263,11 +318,8 @@ class _PulseProblem:
         for task, outcomes in simulate_each(Setup(blocks, self.model, self.chattering), self.unit, factors):
             ends[task.blocks] = outcomes
             done(len(outcomes))
-        overturned, uplifts = ends["overturned"], ends["uplifts"]
-        rested = (uplifts > 1) | ((ends["rests"] > 0) & (ends["last_rest"] <= self.unit.duration))
-        modes = np.where(uplifts == 0, NO_UPLIFT, np.where(rested, RESTS, ROCKS))
-        modes[overturned] = ends["impacts"][overturned]
-        for k in np.flatnonzero(overturned & (uplifts > 1)):
+        modes = modes_of(ends, self.unit.duration)
+        for k in np.flatnonzero(ends["overturned"] & (ends["uplifts"] > 1)):
             modes[k] = self._last_impacts(blocks[int(k)], float(level[k]))
         return modes, ends["peak_rotation"]
 
@@ -284,16 +336,11 @@ def _unit_pulse(pulse: str | PulseFamily, frequency: float, parameters: dict[str
         if parameters:
             raise InvalidOption(f"a pulse given as a function takes no {', '.join(parameters)}; bind them to it")
         return pulse(1.0, frequency)
-    name = pulse.lower().replace(" ", "-").replace("_", "-")
-    if name not in _FAMILIES:
+    family = pulse_family(pulse)
+    if family.name not in _FAMILIES:
         raise InvalidOption(f"pulse must be one of {', '.join(_FAMILIES)}, or a function, not {pulse!r}")
-    family = _FAMILIES[name]
-    try:
-        inspect.signature(family).bind(1.0, frequency, **parameters)
-    except TypeError as error:
-        raise InvalidOption(f"the pulse {name!r} is not complete: {error}") from None
-    unit = family(1.0, frequency, **parameters)
-    return unit.scaled(pga=1.0) if family is pulses.mavroeidis_papageorgiou else unit
+    unit = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
+    return unit.scaled(pga=1.0) if family.make is pulses.mavroeidis_papageorgiou else unit
 
 
 def _resized(block: Block, ratios: Floats) -> Blocks:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -16,9 +18,9 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.motion.description import labelled
 from rocking.motion.motion import Motion
-from rocking.result import Result, some
-from rocking.tables import text_table
+from rocking.result import Result, table_of_some
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
 
@@ -152,10 +154,17 @@ class RockingSpectrum(Result):
         (m) of the rectangular block.
     """
 
+    TABLES = MappingProxyType(
+        {
+            "fractiles": ("fractile_over_alpha", "overturned_share"),
+            "peaks": ("peak_rotation", "peak_over_alpha", "overturned"),
+        }
+    )
+
     def summary(self) -> str:
         """Fractiles of peak rotation over slenderness at some sizes, for each slenderness and restitution."""
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
-        parts = [f"peak rotation over slenderness, {self.data.sizes['motion']} motion(s), {self.data.model} model"]
+        parts = [f"peak rotation over slenderness, {self._motions()}, {self.data.model} model"]
         for title, one in self._curves():
             fractiles = one.fractile_over_alpha.transpose("p", "fractile").values
             rows = [
@@ -165,9 +174,9 @@ class RockingSpectrum(Result):
                     *("overturns" if np.isinf(value) else float(value) for value in fractiles[j]),
                     f"{100 * float(one.overturned_share[j]):.0f} %",
                 ]
-                for j in some(self.data.sizes["p"])
+                for j in range(self.data.sizes["p"])
             ]
-            parts.append(f"{title}\n{text_table(header, rows)}")
+            parts.append(f"{title}\n{table_of_some(header, rows)}")
         return "\n\n".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
@@ -189,7 +198,14 @@ class RockingSpectrum(Result):
             "overturned_share": data.overturned_share.values,
         }
 
-    def plot(self, ax: Axes | None = None, *, against: Abscissa = "p", title: str = "") -> Figure:
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        against: Abscissa = "p",
+        title: str = "",
+        figsize: tuple[float, float] | None = None,
+    ) -> Figure:
         """Draw single motions thin, fractiles thick, and the share that overturns.
 
         Parameters
@@ -200,6 +216,8 @@ class RockingSpectrum(Result):
             Abscissa.
         title : str
             Title; by default the model and the number of motions.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
 
         Raises
         ------
@@ -226,11 +244,28 @@ class RockingSpectrum(Result):
             x=self.data[against].values,
             curves=curves,
             fractiles=self.data.fractile.values.tolist(),
-            motions=[str(name) for name in self.data.motion.values],
+            motions=self._labels(),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
-            title=title or f"{self.data.sizes['motion']} motion(s), {self.data.model} model",
+            title=title or f"{self._motions()}, {self.data.model} model",
             ax=ax,
+            figsize=figsize,
         )
+
+    def _labels(self) -> list[str]:
+        """Names of the motions, with what was done to them."""
+        names, histories = self.data.motion.values, self.data.histories
+        return [
+            labelled(str(name), done.split("; ") if done else []) for name, done in zip(names, histories, strict=True)
+        ]
+
+    def _motions(self) -> str:
+        """Name the motion, or count them; those that were scaled are told from those that were not."""
+        labels = self._labels()
+        changed = sum(bool(done) for done in self.data.histories)
+        if len(labels) == 1:
+            return labels[0]
+        which = "all" if changed == len(labels) else f"{changed} of them"
+        return f"{len(labels)} motions" + (f", {which} scaled or processed" if changed else "")
 
     def _curves(self) -> list[tuple[str, xr.Dataset]]:
         """Name and select each combination of slenderness and restitution."""
@@ -240,7 +275,7 @@ class RockingSpectrum(Result):
 
 def _curve_name(one: xr.Dataset) -> str:
     restitution = f", restitution {float(one.restitution):g}" if "restitution" in one.coords else ""
-    return f"alpha = {float(one.alpha):g}{restitution}"
+    return f"alpha = {float(one.alpha):.5g} rad ({math.degrees(one.alpha):.4g}°){restitution}"
 
 
 def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares: Floats) -> xr.Dataset:
@@ -283,7 +318,7 @@ def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares
             "period": ("p", 2.0 * np.pi / axes["p"], {"units": "s", "long_name": "2 pi/p"}),
             "size": ("p", radius, {"units": "m", "long_name": "half diagonal of the rectangular block"}),
         },
-        {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions")},
+        {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions", "histories")},
     )
 
 
@@ -296,7 +331,8 @@ def _rates(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> Float
     if size is not None and p is None:
         g = checks.positive(gravity, "gravity", InvalidOption, "m/s^2")
         return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", InvalidOption))
-    raise InvalidOption("a spectrum needs either p (rad/s) or size (half diagonals, m)")
+    which = "one of" if p is None else "not both of"
+    raise InvalidOption(f"give {which} p= (rad/s) and size= (half diagonals, m)")
 
 
 def _shares(fractiles: Sequence[float]) -> Floats:

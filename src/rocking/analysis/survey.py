@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +11,9 @@ from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import OutputError
 from rocking.motion.motion import Motion
-from rocking.progress import Progress
+from rocking.progress import Progress, note
 from rocking.response import Response
+from rocking.response.verdict import in_brief
 from rocking.simulation import simulate
 from rocking.tables import named, text_table, to_json, write_text
 
@@ -61,9 +61,13 @@ class Survey:
         rows = self.rows()
         overturned = sum(row["overturned"] for row in rows)
         shown = _SHOWN if self.friction is None else _SHOWN | {_SLIDING: f"slides at {self.friction:g}, s"}
+        if any(row["processing"] for row in rows):
+            shown = shown | {"processing": "done to the record"}
         table = text_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
+        undecided = sum(row["stopped"] or row["unfinished"] for row in rows)
         count = "1 record" if len(rows) == 1 else f"{len(rows)} records"
-        return f"{self.block.description}: {count}, overturned by {overturned}\n\n{table}"
+        known = f", not decided under {undecided}" if undecided else ""
+        return f"{self.block.description}: {count}, overturned by {overturned}{known}\n\n{table}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for machines."""
@@ -83,7 +87,8 @@ class Survey:
         """Return a name for a folder of each record, no two alike."""
         names: dict[str, None] = {}
         for record in self.records:
-            stem = Path(record).stem if record != "-" else "standard-input"
+            # A pulse is named by its text, with a colon, which not every system has in a name.
+            stem = Path(record).stem.replace(":", "-") if record != "-" else "standard-input"
             others = (f"{stem}-{k}" for k in range(2, len(self.records) + 2))
             names[stem if stem not in names else next(name for name in others if name not in names)] = None
         return list(names)
@@ -102,9 +107,9 @@ class Survey:
         write_text(folder / "summary.json", to_json(self.to_dict()) + "\n")
         write_text(folder / "summary.csv", frame.to_csv(index=False, lineterminator="\n"))
         try:
-            frame.to_excel(folder / "summary.xlsx", index=False)
+            frame.to_excel(folder / "summary.xlsx", sheet_name="summary", freeze_panes=(1, 0), index=False)
         except ImportError:
-            pass
+            note("no summary.xlsx: install rocking[excel] for a workbook; summary.csv holds the same table")
         except OSError as error:
             raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another folder") from error
 
@@ -166,10 +171,13 @@ def _row(record: str, response: Response) -> dict[str, Any]:
         named("duration", "s"): motion.duration,
         named("pga", "g"): motion.pga / STANDARD_GRAVITY,
         named("pgv", "m/s"): motion.pgv,
-        "verdict": _verdict(response),
+        "processing": "; ".join(motion.history),
+        "verdict": in_brief(response),
         "overturned": response.overturned,
+        "unfinished": response.unfinished,
+        "stopped": response.stopped,
         named("overturn_time", "s"): response.overturn_time,
-        "peak_over_slenderness": math.inf if response.overturned else response.peak_over_slenderness,
+        "peak_over_slenderness": response.peak_over_slenderness,
         named("peak_rotation", "rad"): response.peak_rotation,
         named("peak_time", "s"): response.peak_time,
         "impacts_resolved": len(response.impacts),
@@ -177,11 +185,3 @@ def _row(record: str, response: Response) -> dict[str, Any]:
         named("time_at_rest", "s"): response.time_at_rest,
         "required_friction": response.required_friction,
     }
-
-
-def _verdict(response: Response) -> str:
-    if response.overturned:
-        return f"overturns at {response.overturn_time:.2f} s"
-    if response.unfinished:
-        return f"unfinished, given up at {response.duration:.2f} s"
-    return "rocks" if len(response.events) or len(response.impacts) else "does not move"

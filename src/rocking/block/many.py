@@ -190,4 +190,6 @@ def _columns(array: Floats) -> Floats:
 def _check(values: Floats, limits: Limits, rule: str) -> None:
     bad = np.argwhere(~((values >= limits.low) & (values <= limits.high)))
     if len(bad):
-        raise InvalidBlock(f"{rule.format(*limits)}, not {values[tuple(bad[0])]:g} (block {bad[0][0]})")
+        value = float(values[tuple(bad[0])])
+        hint = checks.hint_of_degrees(value) if rule.startswith("alpha") else ""
+        raise InvalidBlock(f"{rule.format(*limits)}, not {value:g} (block {bad[0][0]}){hint}")

@@ -125,7 +125,7 @@ class Block:
         g = within(gravity, "gravity", GRAVITY, "m/s^2")
         alpha, radius = math.atan2(b, h), math.hypot(b, h)
         p = math.sqrt(0.75 * g / radius)
-        e = _restitutions(restitution, (housner_restitution(alpha),) * 2)
+        e = _restitutions(restitution, (housner_restitution(alpha),) * 2, _perhaps_swapped(b, h))
         sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
         _fill(self, sides, g, f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m", b, h, mass)
 
@@ -234,7 +234,7 @@ class Block:
             Side(math.sqrt(g * radii[i] / inertias[i]), math.atan2((plus, minus)[i], h), e[i], radii[i])
             for i in range(2)
         )
-        text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, {h:.5g} m high"
+        text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
         return _made(cls, (sides[0], sides[1]), g, text, mass)
 
     @classmethod
@@ -283,7 +283,7 @@ class Block:
         alpha = math.atan2(b, h)
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
-        e = _restitutions(restitution, (kept / (1.0 + 3.0 * gamma),) * 2)
+        e = _restitutions(restitution, (kept / (1.0 + 3.0 * gamma),) * 2, _perhaps_swapped(b, h))
         p = math.sqrt(0.75 * g / radius)
         sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
         return _made(cls, sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}")
@@ -480,7 +480,8 @@ def _length(value: object, name: str) -> float:
 def _angle(value: object) -> float:
     number = checks.positive(value, "alpha", InvalidBlock, "rad")
     if number >= ALPHA.high:
-        raise InvalidBlock(f"alpha must be below pi/2 rad for a block that can stand, not {number:g}")
+        hint = checks.hint_of_degrees(number)
+        raise InvalidBlock(f"alpha must be below pi/2 rad for a block that can stand, not {number:g}{hint}")
     return within(number, "alpha", ALPHA, "rad")
 
 
@@ -493,12 +494,19 @@ def _pair(value: Any, name: str) -> tuple[object, object]:
     return values[0], values[1]
 
 
-def _restitutions(given: object, default: tuple[float, ...]) -> tuple[float, float]:
+def _perhaps_swapped(half_width: float, half_height: float) -> str:
+    """Return what to try first where a block is wider than it is high; else nothing."""
+    if half_width <= half_height:
+        return ""
+    return f"swap its sizes, {2.0 * half_width:g} m wide and {2.0 * half_height:g} m high, if that is a slip, or "
+
+
+def _restitutions(given: object, default: tuple[float, ...], mend: str = "") -> tuple[float, float]:
     if given is None:
         if min(default) <= 0.0:
             raise InvalidBlock(
                 f"conserving angular momentum gives this block a restitution of {min(default):.3g}: it is too stocky "
-                "to rock that way; give restitution= a value in (0, 1]"
+                f"to rock that way; {mend}give restitution= a value in (0, 1]"
             )
         return default[0], default[1]
     plus, minus = (

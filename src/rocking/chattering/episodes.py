@@ -123,7 +123,7 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     if response.motion is None:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     episodes["ground"] = response.motion.acceleration(proven["end"])
-    beyond = exceedances(response.motion, response.block.uplift_thresholds(response.model))
+    beyond = exceedances(response.motion, response.block.uplift_thresholds(response.model), response.block.gravity)
     if not len(beyond):
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     start, end = float(beyond[0, 0]), min(float(beyond[-1, 1]), response.duration)

@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
@@ -139,6 +140,10 @@ class ChatteringMap(Result):
         in all), overturned (sooner or later).
     """
 
+    TABLES = MappingProxyType(
+        {"outcomes": ("outcome", "complete", "uplift", "rest", "lower", "upper", "rests", "overturned")}
+    )
+
     def summary(self) -> str:
         """Shares of the map that each outcome takes."""
         values, counts = np.unique(self.data.outcome, return_counts=True)
@@ -155,7 +160,14 @@ class ChatteringMap(Result):
         columns = {str(name): self.data[name].values for name in (*self.data.outcome.dims, *self.data.data_vars)}
         return {"outcomes": {outcome.value: _words(outcome) for outcome in Outcome}, **columns}
 
-    def plot(self, ax: Axes | None = None, *, labels: Mapping[str, str] | None = None, title: str = "") -> Figure:
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        labels: Mapping[str, str] | None = None,
+        title: str = "",
+        figsize: tuple[float, float] | None = None,
+    ) -> Figure:
         """Draw the outcomes, the first parameter upwards, the second to the right.
 
         Parameters
@@ -166,6 +178,8 @@ class ChatteringMap(Result):
             What to write at the axes in place of the parameters' names.
         title : str
             Title of the figure.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
         """
         from rocking.plot.maps import outcome_figure
 
@@ -180,7 +194,34 @@ class ChatteringMap(Result):
             y_label=written.get(str(first), str(first)),
             title=title,
             ax=ax,
+            figsize=figsize,
         )
+
+
+def outcomes_of(ends: NDArray[np.void], later: Floats) -> NDArray[np.int64]:
+    """Outcomes of blocks under one motion, from what the engine keeps of each.
+
+    Parameters
+    ----------
+    ends : structured array
+        What became of them (`rocking.engine.OUTCOME`), by certified simulation.
+    later : ndarray
+        Times, s, at which the motion passes their threshold after it did so first.
+
+    Returns
+    -------
+    ndarray of int
+        An `Outcome` each. A rest counts by its time, not by the upper bound on it; and of a block that rests several
+        times UNPROVEN says that one of the rests is not proven.
+    """
+    rest, rested = ends["first_rest"], ends["rests"] > 0
+    first, last = later.min(initial=math.inf), later.max(initial=-math.inf)
+    found = np.where(rest <= last, Outcome.RESTS_LATER, Outcome.RESTS_AT_LAST)
+    found[rest <= first] = Outcome.COMPLETE
+    found[~rested] = Outcome.OVERTURNS
+    found[(ends["stalled"] > 0) | (ends["unfinished"] & ~rested)] = Outcome.UNPROVEN
+    found[ends["uplifts"] == 0] = Outcome.NO_UPLIFT
+    return found.astype(np.int64)
 
 
 def _words(outcome: Outcome) -> str:
@@ -199,7 +240,7 @@ def _followed(case: Case) -> _Point:
         return _Point(Outcome.OVERTURNS, uplift, math.nan, math.nan, math.nan, 0, response.overturned)
     first = response.chattering[0]
     # The first exceedance is the one that lifted the block.
-    later = exceedances(case.motion, case.block.uplift_thresholds(case.model))[1:, 0]
+    later = exceedances(case.motion, case.block.uplift_thresholds(case.model), case.block.gravity)[1:, 0]
     return _Point(
         _outcome(float(first["upper"]), later),
         uplift,

@@ -8,7 +8,7 @@ import math
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,14 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.chattering.theory.amplitude import critical_amplitude
 from rocking.chattering.theory.asymptotic import asymptotic_table, first_impact_speed, first_interval
-from rocking.chattering.theory.duration import chattering_time, sequence
+from rocking.chattering.theory.duration import chattering_time, first_arc, sequence
 from rocking.chattering.theory.series import series_diagnosis
 from rocking.errors import InvalidOption, OutsideFit
 from rocking.tables import rows_of, text_table, to_json, write_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 #: Rows of a table for people, of which the last is the last.
 _SHOWN: Final = 12
@@ -95,7 +99,7 @@ class ChatteringReport:
         """
         cycles = self.cycle_rows()
         shown = [*cycles[: _SHOWN - 1], cycles[-1]] if len(cycles) > _SHOWN else cycles
-        header = ["n", "sign", "term", "interval, p t", "time, p t"]
+        header = ["n", "sign", "term", "interval, p t", "time, p t", "phase, rad", "speed before", "speed after"]
         rows: list[list[Any]] = [
             [
                 c["n"],
@@ -103,12 +107,15 @@ class ChatteringReport:
                 f"T_{c['n']};{c['order']} = {c['term']:.6g}",
                 f"{c['interval']:.6e}",
                 f"{c['time']:.9f}",
+                f"{c['phase']:.6f}",
+                f"{c['speed_before']:.6e}",
+                f"{c['speed_after']:.6e}",
             ]
             for c in shown
         ]
         left_out = len(cycles) - len(shown)
         if left_out:
-            rows.insert(-1, ["...", "", f"({left_out} more)", "", ""])
+            rows.insert(-1, ["...", "", f"({left_out} more)", "", "", "", "", ""])
         return text_table(header, rows)
 
     def write(self, folder: Path) -> None:
@@ -123,6 +130,31 @@ class ChatteringReport:
         write_text(folder / "impacts.csv", _csv(self.impacts))
         if self.cycles is not None:
             write_text(folder / "cycles.csv", _csv(self.cycles))
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw the intervals between the impacts, and the ratios that tend to eta^2 where chattering is complete.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Draw the intervals here, without the ratios; by default in a new figure.
+        title : str
+            Title; by default the parameters and the time of rest.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+        """
+        from rocking.plot import intervals_figure
+
+        values = self.values
+        rest = values["chattering_time"]["exact"]
+        end = "incomplete" if math.isnan(rest) else f"at rest at p t = {rest:.6g}"
+        return intervals_figure(
+            intervals=self.impacts["interval"],
+            eta=values["eta"],
+            title=title or f"a = {values['a']:g}, ω = {values['omega']:g}, η = {values['eta']:g}: {end}",
+            ax=ax,
+            figsize=figsize,
+        )
 
     def _verdict(self) -> str:
         half_period = self._time(self.values["half_period"])
@@ -141,8 +173,11 @@ class ChatteringReport:
         return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {bracket['impacts']} impacts"
 
     def _pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
+        approximate = f"{values[equation]:.9g} by Eq. {equation[2:]}"
+        if math.isnan(values["exact"]):
+            return f"none, the block does not come down; {approximate}"
         exact = self._time(values["exact"]) if time else f"{values['exact']:.9g}"
-        return f"{exact} exact, {values[equation]:.9g} by Eq. {equation[2:]}"
+        return f"{exact} exact, {approximate}"
 
 
 def chattering_report(
@@ -183,7 +218,8 @@ def chattering_report(
     if p is not None:
         p = checks.positive(p, "p", InvalidOption, "rad/s")
     exact = sequence(a, omega, eta)
-    first = exact.impacts[0] if exact.impacts.size else {"interval": 0.0, "speed_before": 0.0}
+    impacts = [(row["interval"], row["speed_before"]) for row in exact.impacts[:1]]
+    interval, speed = impacts[0] if impacts else first_arc(a, omega)
     values: dict[str, Any] = {
         "a": a,
         "omega": omega,
@@ -200,8 +236,8 @@ def chattering_report(
         "resolved": resolved,
         "bracket": {"lower": exact.lower, "upper": exact.upper, "impacts": int(exact.impacts.size)},
         "critical_amplitude": float(critical_amplitude(omega, eta)),
-        "first_interval": {"exact": float(first["interval"]), "eq32": float(first_interval(a, omega))},
-        "first_impact_speed": {"exact": float(first["speed_before"]), "eq34": float(first_impact_speed(a, omega))},
+        "first_interval": {"exact": float(interval), "eq32": float(first_interval(a, omega))},
+        "first_impact_speed": {"exact": float(speed), "eq34": float(first_impact_speed(a, omega))},
     }
     if p is not None:
         values["p_rad_s"] = p

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Floats
 from rocking.block import Block
+from rocking.engine import require_finished
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
@@ -173,6 +174,8 @@ def compare_schemes(
 
     Raises
     ------
+    Unfinished
+        If a simulation is given up.
     InvalidOption
         As `rocking.simulate`.
 
@@ -194,7 +197,7 @@ def compare_schemes(
     """
 
     def response(treatment: Treatment) -> Response:
-        return simulate(
+        found = simulate(
             block,
             motion,
             model=model,
@@ -202,6 +205,8 @@ def compare_schemes(
             initial_rotation=initial_rotation,
             initial_velocity=initial_velocity,
         )
+        require_finished(np.array([found.unfinished]))
+        return found
 
     certified = response(Certified())
     outcomes, refused = [], []

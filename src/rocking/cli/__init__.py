@@ -14,7 +14,7 @@ from cyclopts import App, CycloptsError
 import rocking
 from rocking.cli import wording
 from rocking.errors import OutsideFit, RockingError
-from rocking.progress import note, notes_for
+from rocking.progress import Audience, note, notes_for
 
 app = App(
     name="rocking",
@@ -26,6 +26,7 @@ app = App(
 for _command, _help in {
     "simulate": "Simulate a block under a record, or under many, and say what happens to it.",
     "records": "List the shipped records, or show what a record file holds.",
+    "pulses": "List the pulses that --pulse takes, with their parameters.",
     "chatter": "Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.",
     "critical": "Give the amplitude up to which chattering under a sine is complete, by every method.",
     "paper": "Redraw the paper's figures from computation.",
@@ -34,6 +35,7 @@ for _command, _help in {
     "ida": "Scale motions up until the block overturns and beyond (incremental dynamic analysis).",
     "fragility": "Fit the probability that a block overturns against the intensity of the motions.",
     "calibrate": "Find the block behind observed outcomes, or behind a measured rotation history.",
+    "explore": "Open a page on which a block is seen to rock, chatter, rest and fall.",
     "study": "Run a study too long for one sitting: created once, resumed after anything.",
 }.items():
     app.command(f"rocking.cli.{_command}:{_command}", name=_command, help=_help)
@@ -63,7 +65,8 @@ def _run(arguments: list[str]) -> None:
     wording.refuse_unknown_options(app, arguments)
     command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
     quiet = any(getattr(value, "quiet", False) for value in bound.arguments.values())
-    with notes_for("nobody" if quiet else "everybody"), _warnings_as_notes():
+    audience: Audience = "nobody" if quiet else "everybody"
+    with notes_for(audience, lambda sentence: wording.in_options(sentence, app, arguments)), _warnings_as_notes():
         command(*bound.args, **bound.kwargs)
 
 

@@ -14,10 +14,11 @@ from rocking.analysis.calibration.outcomes import Calibration
 from rocking.analysis.calibration.outcomes import calibrate as run
 from rocking.analysis.calibration.tables import Outcomes, read
 from rocking.cli import batch
-from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledOptions
+from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledPulseOptions
 from rocking.errors import InvalidOption
-from rocking.quantities import Quantity, angle, number, sides
-from rocking.tables import text_table, to_json, write_text
+from rocking.motion.motion import Motion
+from rocking.quantities import Quantity, number, sides, tilt
+from rocking.tables import text_table
 from rocking.treatment.base import Model
 
 
@@ -35,14 +36,15 @@ def calibrate(
     motion: str | None = None,
     initial_rotation: str | None = None,
     seed: int = 0,
-    file: Annotated[ScaledOptions, RECORDS] = ScaledOptions(),
+    file: Annotated[ScaledPulseOptions, RECORDS] = ScaledPulseOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Find the block behind observed outcomes (overturned or not), or behind a measured rotation history.
 
     DATA is a CSV table with a header. Outcomes: columns motion (a record file, or a shipped record) and overturned (1
     or 0), and where wanted scale, channel and group. A history: columns time_s and rotation_rad (or rotation_deg).
-    The records of --predict and --motion may be scaled. --out holds result.json and, of outcomes, ensemble.csv.
+    The motions of --predict, --motion and --pulse may be scaled. --out holds calibration.png, .pdf, result.json and, of
+    outcomes, ensemble.csv.
 
     Parameters
     ----------
@@ -63,9 +65,10 @@ def calibrate(
     folds
         Outcomes: parts for cross-validation; 0: none. Tests of one group stay together.
     predict
-        Outcomes: records to predict, files or names of shipped records.
+        Outcomes: records to predict, files or names of shipped records; pulses to predict go with --pulse.
     motion
-        History: record of the base's motion; without it, the block was released and rocked freely.
+        History: record of the base's motion, or give one --pulse; without either, the block was released and rocked
+        freely.
     initial_rotation
         History: rotation at time 0, 2deg or 0.03 (rad); by default fitted in a release test, 0 under a motion.
     seed
@@ -73,22 +76,23 @@ def calibrate(
     """
     ranges = {
         "p": None if p is None else _range(p, "--p", number),
-        "alpha": None if alpha is None else _range(alpha, "--alpha", angle),
+        "alpha": None if alpha is None else _range(alpha, "--alpha", tilt),
         "restitution": None if restitution is None else _range(restitution, "--restitution", number),
     }
-    start = None if initial_rotation is None else angle(initial_rotation, "--initial-rotation")
+    start = None if initial_rotation is None else tilt(initial_rotation, "--initial-rotation")
     given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
     choices = {name: value for name, value in given.items() if value is not None}
     with output.folder() as folder:
         table = read(data, channel=file.channel, dt=file.dt, units=file.units)
         if isinstance(table, Outcomes):
             _refuse("a history", motion=motion, initial_rotation=initial_rotation)
-            others = [file.read(name) for name in predict]
+            others = {name: file.read(name) for name in predict} | file.pulses()
             found = run(table.motions, table.overturned, seed, candidates=candidates, **choices)
-            results = _outcomes_results(found, table, folds, dict(zip(predict, found.predict(others), strict=True)))
+            predicted = dict(zip(others, found.predict([*others.values()]), strict=True))
+            results = _outcomes_results(found, table, folds, predicted)
         else:
             _refuse("outcomes", predict=predict or None, folds=folds or None)
-            shaking = None if motion is None else file.read(motion)
+            shaking = _shaking(motion, file)
             history = calibrate_history(
                 table.times, table.rotation, shaking, **choices, initial_rotation=start, seed=seed
             )
@@ -100,15 +104,23 @@ def calibrate(
 
 @dataclass(frozen=True)
 class _Results:
+    found: Calibration | HistoryCalibration
     numbers: dict[str, Any]
     text: str
-    calibration: Calibration | None = None
 
 
 def _refuse(belong_to: str, **given: object) -> None:
     for name, value in given.items():
         if value is not None:
             raise InvalidOption(f"--{name.replace('_', '-')} is for {belong_to}; the columns of this table are not")
+
+
+def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
+    """Motion of the base, if it moved."""
+    motions = file.pulses() if record is None else {record: file.read(record)} | file.pulses()
+    if len(motions) > 1:
+        raise InvalidOption("a history has one motion of the base: give --motion, or one --pulse")
+    return next(iter(motions.values()), None)
 
 
 def _range(text: str, option: str, quantity: Quantity) -> float | tuple[float, ...]:
@@ -126,14 +138,14 @@ def _outcomes_results(found: Calibration, table: Outcomes, folds: int, predicted
     if predicted:
         rows = [(name, float(chance)) for name, chance in predicted.items()]
         parts.append("\n" + text_table(["motion", "probability"], rows))
-    return _Results(numbers, "\n".join(parts), found)
+    return _Results(found, numbers, "\n".join(parts))
 
 
 def _history_results(found: HistoryCalibration) -> _Results:
-    return _Results(found.to_dict(), found.summary())
+    return _Results(found, found.to_dict(), found.summary())
 
 
 def _write(folder: Path, results: _Results) -> None:
-    write_text(folder / "result.json", to_json(results.numbers) + "\n")
-    if results.calibration is not None:
-        results.calibration.to_csv(folder / "ensemble.csv")
+    batch.write(folder, figures={"calibration": results.found.plot()}, result=results.numbers)
+    if isinstance(results.found, Calibration):
+        results.found.to_csv(folder / "ensemble.csv")

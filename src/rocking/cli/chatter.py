@@ -24,7 +24,8 @@ def chatter(
 ) -> None:
     """Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.
 
-    Times are dimensionless, p t; with --p also in seconds. --out holds result.json, impacts.csv and cycles.csv.
+    Times are dimensionless, p t; with --p also in seconds. --out holds chatter.png, .pdf (intervals between
+    the impacts), result.json, impacts.csv and cycles.csv.
 
     Parameters
     ----------
@@ -51,4 +52,5 @@ def chatter(
             result = {**result, "asymptotic_table": report.cycle_rows()}
         if folder is not None:
             report.write(folder)
+            batch.write_figure(folder, "chatter", report.plot())
         batch.show(result, text, as_json=output.as_json, folder=folder)

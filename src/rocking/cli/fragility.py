@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Annotated
 
+from rocking import checks
 from rocking.analysis.fragility.fit import fragility as run
+from rocking.analysis.hazard import HazardCurve
 from rocking.cli import batch
 from rocking.cli.options import (
     BLOCK,
@@ -33,6 +36,9 @@ def fragility(
     bootstrap: int = 0,
     seed: int = 0,
     taxonomy: str = "rocking-block",
+    hazard: Path | None = None,
+    site: int = 0,
+    years: float = 50.0,
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
@@ -51,7 +57,7 @@ def fragility(
     limits
         Limit states, with commas between: overturning, or NAME=ROTATION over slenderness, as half=0.5.
     polarity
-        Motions as they are (+), reversed (-), or both.
+        Motions as they are (+), reversed (-), or both; a symmetric block does the same in both, which count once.
     confidence
         Probability of the intervals and bands.
     bootstrap
@@ -60,8 +66,17 @@ def fragility(
         Seed of its random numbers.
     taxonomy
         Identifier of the fragility function in NRML.
+    hazard
+        CSV file of the site's hazard curve (pga_g,annual_rate, or OpenQuake's): adds annual rates of exceeding the
+        limit states, and risk.png and .pdf to --out.
+    site
+        Row of OpenQuake's file, from 0.
+    years
+        Time for which probabilities are given.
     """
     body = block.block()
+    curve = None if hazard is None else HazardCurve.read(hazard, site=site, period=measure.period)
+    checks.positive(years, "years", InvalidOption)
     with output.folder() as folder:
         fitted = run(
             body,
@@ -75,13 +90,18 @@ def fragility(
             samples=bootstrap or 1,
             seed=seed,
         )
+        found, text = fitted.to_dict(), fitted.summary()
+        risk = None if curve is None else fitted.annual_rate(curve)
+        if risk is not None:
+            found["risk"], text = risk.to_dict(years), f"{text}\n\n{risk.summary(years)}"
         if folder is not None:
             for form in ("continuous", "discrete"):
                 fitted.to_nrml(folder / f"fragility-{form}.xml", taxonomy=taxonomy, format=form)
             fitted.to_csv(folder / "fragility.csv")
             fitted.outcomes_to_csv(folder / "outcomes.csv")
-            batch.write(folder, "fragility", figure=fitted.plot(), result=fitted.to_dict())
-        batch.show(fitted.to_dict(), fitted.summary(), as_json=output.as_json, folder=folder)
+            figures = {"fragility": fitted.plot()} | ({} if risk is None else {"risk": risk.plot()})
+            batch.write(folder, figures=figures, result=found)
+        batch.show(found, text, as_json=output.as_json, folder=folder)
 
 
 def _limits(text: str) -> dict[str, float]:

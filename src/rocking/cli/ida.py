@@ -33,8 +33,9 @@ def ida(
     """Scale motions up until the block overturns and beyond (incremental dynamic analysis).
 
     The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Without
-    --levels, they go in steps of 5 % to three times that by which every motion has overturned the block. --out holds
-    ida.png, .pdf, .nc and result.json.
+    --levels, they go in steps of 5 % to three times that by which every motion has overturned the block. Bands and
+    gaps between two levels are not seen; close ones see more of them. --out holds ida.png, .pdf, .nc, levels.csv,
+    bands.csv (of levels that overturn) and result.json.
 
     Parameters
     ----------

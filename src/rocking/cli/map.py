@@ -27,7 +27,7 @@ def map(
     """Map what a pulse does to a block, over amplitude and frequency, with refined boundaries.
 
     Lists of numbers are 1,2,5 or START:STOP:COUNT, with :log at the end for equal ratios. --out holds map.png, .pdf,
-    .nc and result.json.
+    .nc, modes.csv, boundaries.csv and result.json.
 
     Parameters
     ----------

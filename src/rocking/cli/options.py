@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final
 
 from cyclopts import Group, Parameter
 
 from rocking.analysis.intensity import MeasureName
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, UnreadableRecord
 from rocking.motion.motion import Motion
-from rocking.motion.named import expanded, named_motion
-from rocking.plausibility import block_notes, motion_notes
+from rocking.motion.named import expanded, named_motion, named_vertical
+from rocking.named_pulses import named_pulse
+from rocking.plausibility import block_notes, level_notes, motion_notes
 from rocking.progress import Progress, note
-from rocking.quantities import acceleration, angle, number, sides, values
+from rocking.quantities import acceleration, number, sides, tilt, values
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     from rocking.block import Block
+
+#: Options that say what a rectangular block is.
+_SIZES: Final = ("--width", "--height")
+_HALVES: Final = ("--half-width", "--half-height")
 
 #: Spread over the command's own options, each group under its own heading in the help.
 BLOCK: Final = Parameter(name="*", group=Group("Block", sort_key=1))
@@ -45,6 +51,11 @@ def _help(text: str) -> Parameter:
     return Parameter(help=text)
 
 
+def _written(text: str) -> Parameter:
+    """Help of an option whose value is a number as people write it, which may begin with a minus sign."""
+    return Parameter(help=text, allow_leading_hyphen=True)
+
+
 def _flag(name: str, text: str) -> Parameter:
     return Parameter(name=name, negative="", help=text)
 
@@ -58,57 +69,70 @@ class SlendernessOptions:
     width: Annotated[float | None, _help("Width of a rectangular block, m; with --height.")] = None
     height: Annotated[float | None, _help("Its height, m.")] = None
     alpha: Annotated[
-        str | None, _help("Slenderness, 12deg or 0.2 (rad); two with a comma between are side + and side -.")
+        str | None, _written("Slenderness, 12deg or 0.2 (rad); two with a comma between are side + and side -.")
     ] = None
     restitution: Annotated[
-        str | None, _help("Factor on the angular speed at an impact, in (0, 1]; one or two; Housner's by default.")
+        str | None, _written("Factor on the angular speed at an impact, in (0, 1]; one or two; Housner's by default.")
     ] = None
 
-    def block(self) -> Block:
-        """Return the block; where only its slenderness is given, with p = 1."""
-        if self.alpha is None and not self._sized():
-            raise InvalidBlock("a map needs --alpha, or --width and --height (m), or their halves")
-        return self._block(None if self.alpha is None else "1")
+    #: Options that say what the block is without its sizes.
+    _PARAMETERS: ClassVar[tuple[str, ...]] = ("--alpha",)
 
-    def _block(self, p: str | None) -> Block:
+    def block(self) -> Block:
+        """Return the block, with notes on what looks like a mistake; of its slenderness alone, with p = 1."""
         from rocking.block import Block
 
         e = None if self.restitution is None else sides(self.restitution, "--restitution")
-        halves = self._halves()
-        if halves is not None and p is None and self.alpha is None:
-            block = Block(*halves, restitution=e)
-        elif not self._sized() and p is not None and self.alpha is not None:
-            block = Block.from_parameters(sides(p, "--p"), sides(self.alpha, "--alpha", angle), e)
+        given = tuple(option for option, value in self._options().items() if value is not None)
+        if given == _SIZES:
+            block = Block(width=self.width, height=self.height, restitution=e)
+        elif given == _HALVES:
+            block = Block(self.half_width, self.half_height, restitution=e)
+        elif given == self._PARAMETERS and self.alpha is not None:
+            block = Block.from_parameters(self._p(), sides(self.alpha, "--alpha", tilt), e)
         else:
-            raise InvalidBlock(
-                "a block needs either --width and --height (m), or their halves --half-width and --half-height, "
-                "or --p (rad/s) and --alpha"
-            )
+            raise InvalidBlock(_which_block(given, (_SIZES, _HALVES, self._PARAMETERS)))
         for sentence in block_notes(block):
             note(sentence)
         return block
 
-    def _sized(self) -> bool:
-        return any(size is not None for size in (self.half_width, self.half_height, self.width, self.height))
+    def _options(self) -> dict[str, Any]:
+        """Return what is given of the block, by option."""
+        halves = {"--half-width": self.half_width, "--half-height": self.half_height}
+        return {"--width": self.width, "--height": self.height, **halves, "--alpha": self.alpha}
 
-    def _halves(self) -> tuple[float, float] | None:
-        """Half sizes, if the sizes are either both full or both half."""
-        if self.width is None and self.height is None and self.half_width is not None and self.half_height is not None:
-            return self.half_width, self.half_height
-        if self.half_width is None and self.half_height is None and self.width is not None and self.height is not None:
-            return 0.5 * self.width, 0.5 * self.height
-        return None
+    def _p(self) -> float | list[float]:
+        return 1.0
 
 
 @dataclass(frozen=True)
 class BlockOptions(SlendernessOptions):
     """A block by its sizes or by its parameters."""
 
-    p: Annotated[str | None, _help("Frequency parameter, rad/s; one number or two; with --alpha.")] = None
+    p: Annotated[str | None, _written("Frequency parameter, rad/s; one number or two; with --alpha.")] = None
 
-    def block(self) -> Block:
-        """Return the block."""
-        return self._block(self.p)
+    _PARAMETERS: ClassVar[tuple[str, ...]] = ("--p", "--alpha")
+
+    def _options(self) -> dict[str, Any]:
+        return {"--p": self.p, **super()._options()}
+
+    def _p(self) -> float | list[float]:
+        assert self.p is not None
+        return sides(self.p, "--p")
+
+
+def _which_block(given: Sequence[str], descriptions: Sequence[Sequence[str]]) -> str:
+    """Say what is missing of a block, or which of the options that are given belong to different descriptions of it."""
+    begun = [options for options in descriptions if set(options) & set(given)]
+    if len(begun) > 1:
+        return f"{' and '.join(given)} belong to different descriptions of a block; give one: {_choices(begun)}"
+    if begun:
+        return f"a block needs more than {' and '.join(given)}: give {_choices(begun)}"
+    return f"a block is needed: give {_choices(descriptions)}"
+
+
+def _choices(descriptions: Sequence[Sequence[str]]) -> str:
+    return ", or ".join(" and ".join(options) for options in descriptions)
 
 
 @dataclass(frozen=True)
@@ -116,15 +140,29 @@ class FileOptions:
     """What a record file does not say."""
 
     channel: Annotated[str | None, _help("Channel of a record, by number or name, where there are several.")] = None
-    dt: Annotated[float | None, _help("Sampling step, s, of a text file that does not give times.")] = None
-    units: Annotated[str | None, _help("Units of a text file: g, m/s2, cm/s2, gal, mm/s2.")] = None
+    dt: Annotated[float | None, _help("Sampling step, s, of files that do not say theirs.")] = None
+    units: Annotated[str | None, _help("Units of files that do not say theirs: g, m/s2, cm/s2, gal, mm/s2, mg.")] = None
 
-    def read(self, name: str) -> Motion:
-        """Return the motion of a record, with notes on what looks like a mistake."""
-        motion = named_motion(name, channel=self.channel, dt=self.dt, units=self.units)
+    def read(self, name: str, *, several: bool = False) -> Motion:
+        """Return the motion of a record, alone or one of several."""
+        motion = named_motion(name, channel=self.channel, dt=self.dt, units=self.units, several=several)
+        return self.finished(name, motion)
+
+    def finished(self, name: str, motion: Motion) -> Motion:
+        """Return a motion as the simulations take it, with notes on what looks like a mistake."""
         for sentence in motion_notes(motion):
             note(f"{name}: {sentence}")
         return motion
+
+
+def _acceleration(text: str, option: str) -> float:
+    """Return an acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
+    value = acceleration(text, option)
+    if not value > 0.0:
+        raise InvalidOption(f"{option} must be above 0, not {text.strip()}; --scale -1 reverses a motion")
+    for sentence in level_notes(text, value, option):
+        note(sentence)
+    return value
 
 
 @dataclass(frozen=True)
@@ -132,42 +170,80 @@ class ScaledOptions(FileOptions):
     """What a record file does not say, and how its motion is scaled; at most one way."""
 
     scale: Annotated[float | None, _help("Factor on the motion; negative: reversed.")] = None
-    pga: Annotated[str | None, _help("Scale to this peak ground acceleration: 0.5g, 4.9m/s2 or 4.9 (m/s^2).")] = None
+    pga: Annotated[str | None, _written("Scale to this peak ground acceleration: 0.5g, 4.9m/s2 or 4.9 (m/s^2).")] = None
     pgv: Annotated[float | None, _help("Scale to this peak ground velocity, m/s.")] = None
     sa: Annotated[
-        str | None, _help("Scale to this spectral acceleration (5 % damping) at a period: 0.4g@1.0 is 0.4 g at 1.0 s.")
+        str | None,
+        _written("Scale to this spectral acceleration (5 % damping) at a period: 0.4g@1.0 is 0.4 g at 1.0 s."),
+    ] = None
+    vertical: Annotated[
+        str | None,
+        _help("Vertical motion, scaled alike: a channel of the same file, or another file or shipped record."),
     ] = None
 
-    def read(self, name: str) -> Motion:
+    def read(self, name: str, *, several: bool = False) -> Motion:
         """Return the motion of a record, scaled."""
-        target = self._target()
-        motion = super().read(name)
-        return motion.scaled(**target) if target else motion
+        _ = self._target  # A mistake in the options is told before a long file is read.
+        return super().read(name, several=several)
 
+    def finished(self, name: str, motion: Motion) -> Motion:
+        """Return a motion with its vertical component, if one is asked for, scaled; with notes on that as well."""
+        target = self._target
+        noted = super().finished(name, motion)
+        if self.vertical is not None:
+            noted = noted.with_vertical(named_vertical(self.vertical, name, dt=self.dt, units=self.units))
+        if not target:
+            return noted
+        scaled = noted.scaled(**target)
+        for sentence in motion_notes(scaled):
+            if sentence not in motion_notes(motion):
+                note(f"{name}, scaled: {sentence}")
+        return scaled
+
+    @functools.cached_property
     def _target(self) -> dict[str, float]:
         given = {"--scale": self.scale, "--pga": self.pga, "--pgv": self.pgv, "--sa": self.sa}
         chosen = [option for option, value in given.items() if value is not None]
         if len(chosen) > 1:
             raise InvalidOption(f"{' and '.join(chosen)} scale the same motion; give one of them")
         if self.pga is not None:
-            return {"pga": acceleration(self.pga, "--pga")}
+            return {"pga": _acceleration(self.pga, "--pga")}
         if self.sa is not None:
             level, at, period = self.sa.partition("@")
             if not at:
                 raise InvalidOption(f"--sa takes an acceleration at a period, as 0.4g@1.0, not {self.sa!r}")
-            return {"sa": acceleration(level, "--sa"), "period": number(period, "--sa")}
+            return {"sa": _acceleration(level, "--sa"), "period": number(period, "--sa")}
         plain = {"factor": self.scale, "pgv": self.pgv}
         return {name: value for name, value in plain.items() if value is not None}
 
 
 @dataclass(frozen=True)
-class RecordOptions(FileOptions):
-    """Several records."""
+class PulseOptions(FileOptions):
+    """Pulses beside the records."""
+
+    pulse: Annotated[
+        tuple[str, ...],
+        Parameter(
+            consume_multiple=False,
+            negative="",
+            help="A pulse as the ground motion, sine:amplitude=0.2g,frequency=2Hz,cycles=5 (see rocking pulses); once "
+            "for each.",
+        ),
+    ] = ()
+
+    def pulses(self) -> dict[str, Motion]:
+        """Return the pulses by their texts."""
+        return {text: self.finished(text, named_pulse(text)) for text in self.pulse}
+
+
+@dataclass(frozen=True)
+class RecordOptions(PulseOptions):
+    """Several records, and pulses."""
 
     keep_going: Annotated[bool, _flag("--keep-going", "Skip records that cannot be read, and list them.")] = False
 
     def read_all(self, names: Sequence[str]) -> dict[str, Motion]:
-        """Return the motions of records, folders of them and patterns, by the name of each.
+        """Return the motions of records, folders of them and patterns, and the pulses, by the name of each.
 
         Raises
         ------
@@ -175,31 +251,37 @@ class RecordOptions(FileOptions):
             If one cannot be read, or with --keep-going none.
         """
         records = expanded(names)
-        if not records:
+        if not records and not self.pulse:
             raise InvalidOption(
-                "give one record or more: files, folders, or names of shipped records (see rocking records)"
+                "give one record or more: files, folders, or names of shipped records (see rocking records), or --pulse"
             )
+        pulses = self.pulses()
         motions: dict[str, Motion] = {}
         skipped: list[str] = []
         with Progress("reading records", total=len(records)) as progress:
             for name in records:
                 try:
-                    motions[name] = self.read(name)
+                    motions[name] = self.read(name, several=len(records) > 1)
                 except (UnreadableRecord, InvalidMotion) as error:
                     if not self.keep_going:
                         raise
                     skipped.append(str(error) if name in str(error) else f"{name}: {error}")
                 progress.advance()
-        if not motions:
+        if records and not motions:
             raise UnreadableRecord(f"none of {len(records)} records could be read; the first: {skipped[0]}")
         for reason in skipped:
             note(f"skipped: {reason}")
-        return motions
+        return motions | pulses
 
 
 @dataclass(frozen=True)
 class MotionOptions(RecordOptions, ScaledOptions):
-    """Several records, scaled."""
+    """Several records, and pulses, scaled."""
+
+
+@dataclass(frozen=True)
+class ScaledPulseOptions(PulseOptions, ScaledOptions):
+    """One record at a time, and pulses, scaled."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +299,7 @@ class MeasureOptions:
     damping: Annotated[float, _help("Its fraction of critical damping.")] = 0.05
     levels: Annotated[
         str | None,
-        _help(
+        _written(
             "Levels to scale every motion to, as 0.1g,0.2g or 0.1g:1g:10 (of velocities, m/s, and of ratios plain "
             "numbers); START:STOP:COUNT:log for equal ratios."
         ),
@@ -225,7 +307,7 @@ class MeasureOptions:
 
     def chosen(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        quantity = acceleration if self.measure in ("pga", "sa") else number
+        quantity = _acceleration if self.measure in ("pga", "sa") else number
         levels = None if self.levels is None else values(self.levels, "--levels", quantity)
         return {"measure": self.measure, "period": self.period, "damping": self.damping, "levels": levels}
 
@@ -288,7 +370,7 @@ class OutputOptions(PrintOptions):
 
 @contextlib.contextmanager
 def output_folder(folder: Path) -> Iterator[Path]:
-    """Make a folder for results; on failure, remove what was made and is empty.
+    """Make a folder for results, and tell which files were replaced; on failure, remove what was made and is empty.
 
     Raises
     ------
@@ -296,6 +378,7 @@ def output_folder(folder: Path) -> Iterator[Path]:
         If it cannot be made or written to.
     """
     made = [each for each in (folder, *folder.parents) if not each.exists()]
+    before = _written_at(folder)
     probe = folder / ".rocking-can-write"
     try:
         try:
@@ -305,8 +388,18 @@ def output_folder(folder: Path) -> Iterator[Path]:
         except OSError as error:
             raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
         yield folder
+        now = _written_at(folder)
+        replaced = [name for name, time in before.items() if now.get(name, time) != time]
+        if replaced:
+            note(f"replaced in {folder}: {', '.join(replaced)}")
     except BaseException:
         with contextlib.suppress(OSError):
             for each in made:
                 each.rmdir()
         raise
+
+
+def _written_at(folder: Path) -> dict[str, int]:
+    """Return the times, ns, at which the files in a folder and below it were written, by their names in it."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else []
+    return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in files}

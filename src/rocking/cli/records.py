@@ -7,7 +7,9 @@ from typing import Annotated
 
 from rocking.cli.options import OUTPUT, RECORDS, FileOptions, Names, PrintOptions
 from rocking.motion.catalogue import Contents, contents, shipped
-from rocking.motion.named import STANDARD_INPUT, is_shipped
+from rocking.motion.named import STANDARD_INPUT, expanded, is_shipped
+from rocking.plausibility import reading_notes
+from rocking.progress import note
 from rocking.tables import to_json
 
 
@@ -17,15 +19,20 @@ def records(
     output: Annotated[PrintOptions, OUTPUT] = PrintOptions(),
 ) -> None:
     """List the shipped records, or show what record files hold and what the reader took them for."""
-    found = [_contents(name, file) for name in names] or [shipped()]
+    files = expanded(names)
+    found = [_contents(name, file, several=len(files) > 1) for name in files] or [shipped()]
     if output.as_json:
         print(to_json(found[0].to_dict() if len(found) == 1 else {"files": [each.to_dict() for each in found]}))
     else:
         print("\n\n".join(each.summary() for each in found))
 
 
-def _contents(name: str, file: FileOptions) -> Contents:
+def _contents(name: str, file: FileOptions, *, several: bool) -> Contents:
     if is_shipped(name):
         return shipped(name)
     source = sys.stdin.buffer if name == STANDARD_INPUT else name
-    return contents(source, channel=file.channel, dt=file.dt, units=file.units)
+    found = contents(source, channel=file.channel, dt=file.dt, units=file.units, several=several)
+    for motion, entry in zip(found.motions, found.entries, strict=True):
+        for sentence in reading_notes(motion):
+            note(f"{name}, channel {entry['channel']}: {sentence}")
+    return found

@@ -21,11 +21,10 @@ from rocking.cli.options import (
     OutputOptions,
     TreatmentOptions,
 )
-from rocking.errors import InvalidOption, OutputError
-from rocking.quantities import angle
+from rocking.errors import InvalidOption
+from rocking.quantities import tilt
 from rocking.response import Response
 from rocking.simulation import simulate as run
-from rocking.tables import to_json, write_text
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,9 @@ class _Start:
         float | None,
         Parameter(help="Time to stop at, s; by default when the block is at rest after the motion, or has overturned."),
     ] = None
-    initial_rotation: Annotated[str, Parameter(help="Rotation at the start, 2deg or 0.03 (rad).")] = "0"
+    initial_rotation: Annotated[
+        str, Parameter(help="Rotation at the start, 2deg or 0.03 (rad).", allow_leading_hyphen=True)
+    ] = "0"
     initial_velocity: Annotated[float, Parameter(help="Angular velocity at the start, rad/s.")] = 0.0
     friction: Annotated[
         float | None, Parameter(help="Coefficient of friction: say whether the block would slide, and when first.")
@@ -55,8 +56,8 @@ def simulate(
     """Simulate one block under a record and say what happens to it; under several, with one line for each.
 
     The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Of one
-    record --out holds response.png, .pdf, .csv, .nc, events.csv and result.json; of several, summary.csv, summary.json
-    and (if openpyxl is installed) summary.xlsx.
+    record --out holds response.png, .pdf, .csv, .nc, events.csv, impacts.csv and result.json; of several, summary.csv,
+    summary.json and (if openpyxl is installed) summary.xlsx.
 
     Parameters
     ----------
@@ -67,14 +68,14 @@ def simulate(
     options: dict[str, Any] = {
         **model.chosen(),
         "duration": start.duration,
-        "initial_rotation": angle(start.initial_rotation, "--initial-rotation"),
+        "initial_rotation": tilt(start.initial_rotation, "--initial-rotation"),
         "initial_velocity": start.initial_velocity,
     }
     if each and output.out is None:
         raise InvalidOption("--each writes files; name the folder for them with --out")
     with output.folder() as folder:
         motions = motion.read_all(names)
-        if batch.is_single(names, motions):
+        if batch.is_single((*names, *motion.pulse), motions):
             (shaking,) = motions.values()
             _deliver(run(body, shaking, **options), folder, friction=start.friction, as_json=output.as_json)
         else:
@@ -102,13 +103,8 @@ def _deliver_all(found: Survey, folder: Path | None, *, each: bool, as_json: boo
 
 def _write(response: Response, result: dict[str, Any], folder: Path) -> None:
     """Write figure, histories, events and result into a folder."""
-    figure = response.plot()
-    try:
-        figure.savefig(folder / "response.png", dpi=160)
-        figure.savefig(folder / "response.pdf")
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
-    write_text(folder / "result.json", f"{to_json(result)}\n")
+    batch.write(folder, figures={"response": response.plot()}, result=result)
     response.to_csv(folder / "response.csv")
     response.to_csv(folder / "events.csv", "events")
+    response.to_csv(folder / "impacts.csv", "impacts")
     response.to_netcdf(folder / "response.nc")

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
 from rocking.cli import batch
 from rocking.cli.options import MODEL, OUTPUT, RECORDS, MotionOptions, Names, OutputOptions, TreatmentOptions
-from rocking.quantities import angle, values
+from rocking.quantities import tilt, values
 
 
 def spectrum(
@@ -25,7 +25,8 @@ def spectrum(
     """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.
 
     Lists of numbers are 1,2,5 or START:STOP:COUNT, with :log at the end for equal ratios. In the results, peaks are
-    null where the block overturns. --out holds spectrum.png, .pdf, .nc and result.json.
+    null where the block overturns. --out holds spectrum.png, .pdf, .nc, fractiles.csv, peaks.csv (of every motion) and
+    result.json.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ def spectrum(
     """
     with output.folder() as folder:
         axes: dict[str, Any] = {
-            "alpha": values(alpha, "--alpha", angle),
+            "alpha": values(alpha, "--alpha", tilt),
             "p": None if p is None else values(p, "--p"),
             "size": None if size is None else values(size, "--size"),
             "restitution": None if restitution is None else values(restitution, "--restitution"),

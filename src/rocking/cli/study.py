@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+from concurrent.futures import Executor
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
 
 import rocking
-from rocking.errors import OutputError, StudyError
+from rocking import checks
+from rocking.cli import batch
+from rocking.cli.options import output_folder
+from rocking.errors import InvalidOption, OutputError, StudyError
 from rocking.progress import note
+from rocking.studies.cluster import local_executor, scheduler_executor
 from rocking.studies.file import TEMPLATE, read_study
-from rocking.studies.place import Folder
+from rocking.studies.place import place_of
 from rocking.studies.study import Study, study_of
 from rocking.tables import to_json, write_text
 
@@ -30,11 +37,11 @@ def new(file: Path) -> None:
     if file.exists():
         raise OutputError(f"{file} is there already: choose another name, or remove it first")
     write_text(file, TEMPLATE)
-    print(f"written to {file}; edit it, then: rocking study create {file} FOLDER")
+    print(f"written to {file}; edit it, then: rocking study run {file}")
 
 
 @study.command
-def create(file: Path, folder: Path, *, unit_blocks: int | None = None) -> None:
+def create(file: Path, folder: str, *, unit_blocks: int | None = None) -> None:
     """Create the study of a file in a folder; with the folder there, check that it is the same study.
 
     Parameters
@@ -42,37 +49,55 @@ def create(file: Path, folder: Path, *, unit_blocks: int | None = None) -> None:
     file
         TOML file, as `rocking study new` writes one.
     folder
-        Where the study is kept.
+        Where the study is kept: a folder, or the URL of an object store (s3://bucket/prefix).
     unit_blocks
-        Blocks of a unit, a multiple of 512; by default so many that a unit takes about five seconds.
+        Blocks of a unit, a multiple of 512, of one motion and scale; by default a unit takes about five seconds.
     """
-    found = read_study(file)
-    for sentence in found.skipped:
-        note(f"left out: {sentence}")
-    made = study_of(Folder(folder), found.product, unit_blocks)
-    print(f"{made.status}; next: rocking study run {folder}")
+    print(f"{_created(file, folder, unit_blocks).status}; next: rocking study run {folder}")
 
 
 @study.command
-def run(folder: Path, *, threads: int | None = None) -> None:
+def run(
+    folder: str,
+    into: str | None = None,
+    *,
+    threads: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> None:
     """Compute what is missing. Ctrl-C finishes the units in hand and stops; run it again to go on.
 
     Parameters
     ----------
     folder
-        Where the study is kept.
+        Where the study is kept; or its TOML file, from which it is created first.
+    into
+        With a file, where the study is kept; by default a folder beside the file, of its name without .toml.
     threads
         Number of threads; by default one for every core.
+    workers
+        Number of processes instead, of one thread each (needs dask.distributed).
+    scheduler
+        Address of a scheduler of dask.distributed whose workers compute instead, as tcp://127.0.0.1:8786.
     """
-    found = rocking.study(folder)
-    report = found.run(threads=threads)
+    given = {"--threads": threads, "--workers": workers, "--scheduler": scheduler}
+    chosen = [option for option, value in given.items() if value is not None]
+    if len(chosen) > 1:
+        raise InvalidOption(f"{' and '.join(chosen)} both say who computes; give one of them")
+    found = _opened(folder, into)
+    with _executor(workers, scheduler) as executor:
+        report = found.run(threads=threads, executor=executor)
     print(f"{report}\n{found.status}")
     if report.failed:
-        raise StudyError(f"{len(report.failed)} units failed: see {folder / 'runs.jsonl'}, and run the study again")
+        raise StudyError(
+            f"{len(report.failed)} units failed, as runs.jsonl says; run the study again to try them again"
+        )
+    if report.stopped:
+        raise KeyboardInterrupt
 
 
 @study.command
-def status(folder: Path, *, as_json: Annotated[bool, Parameter(name="--json", negative="")] = False) -> None:
+def status(folder: str, *, as_json: Annotated[bool, Parameter(name="--json", negative="")] = False) -> None:
     """Say how far a study has come, also while it runs.
 
     Parameters
@@ -83,12 +108,13 @@ def status(folder: Path, *, as_json: Annotated[bool, Parameter(name="--json", ne
         Print it as JSON.
     """
     state = rocking.study(folder).status
-    done = {"done": state.done, "units": state.units, "simulations": state.simulations, "failed": state.failed}
-    print(to_json(done) if as_json else state)
+    running = None if state.running is None else asdict(state.running)
+    told = {"done": state.done, "units": state.units, "simulations": state.simulations, "failed": state.failed}
+    print(to_json(told | {"running": running}) if as_json else state)
 
 
 @study.command
-def verify(folder: Path, *, recompute: int = 0, repair: Annotated[bool, Parameter(negative="")] = False) -> None:
+def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter(negative="")] = False) -> None:
     """Read every unit and check it; compute some again and compare all bits.
 
     Parameters
@@ -110,7 +136,7 @@ def verify(folder: Path, *, recompute: int = 0, repair: Annotated[bool, Paramete
 
 
 @study.command
-def export(folder: Path, file: Path) -> None:
+def export(folder: str, file: Path) -> None:
     """Write the results to one file.
 
     Parameters
@@ -120,8 +146,63 @@ def export(folder: Path, file: Path) -> None:
     file
         NetCDF (.nc), CSV (.csv), or Parquet (.parquet, with pyarrow installed).
     """
+    is_replaced = file.exists()
     rocking.study(folder).export(file)
+    if is_replaced:
+        note(f"replaced {file}")
     print(f"written to {file}")
+
+
+@study.command
+def report(
+    folder: str, out: Path | None = None, *, as_json: Annotated[bool, Parameter(name="--json", negative="")] = False
+) -> None:
+    """Make what the study's file asks for under [report]: figures, tables (CSV) and result.json.
+
+    Parameters
+    ----------
+    folder
+        Where the study is kept.
+    out
+        Folder for what is made; by default the folder report in that of the study.
+    as_json
+        Print the result as JSON.
+    """
+    found = rocking.study(folder)
+    if out is None and "://" in folder:
+        raise InvalidOption(f"{folder} is no folder for figures and tables: name one as well")
+    with output_folder(out or Path(folder) / "report") as target:
+        made = found.report()
+        for name, one in made.items():
+            one.to_csv(target / f"{name}.csv")
+        result = {name: one.to_dict() for name, one in made.items()}
+        batch.write(target, figures={name: one.plot() for name, one in made.items()}, result=result)
+        text = "\n\n".join(one.summary() for one in made.values())
+        batch.show(result, text, as_json=as_json, folder=target)
+
+
+def _opened(folder: str, into: str | None) -> Study:
+    """Open a study, or create the one of a file."""
+    if folder.endswith(".toml"):
+        return _created(Path(folder), into or folder.removesuffix(".toml"), None)
+    if into is not None:
+        raise InvalidOption(f"{into} is for a study from a TOML file, which {folder} is not; name one place only")
+    return rocking.study(folder)
+
+
+def _created(file: Path, folder: str, unit_blocks: int | None) -> Study:
+    described = read_study(file)
+    for sentence in described.skipped:
+        note(f"left out: {sentence}")
+    return study_of(place_of(folder), described.product, unit_blocks, described.report)
+
+
+def _executor(workers: int | None, scheduler: str | None) -> contextlib.AbstractContextManager[Executor | None]:
+    if scheduler is not None:
+        return scheduler_executor(scheduler)
+    if workers is not None:
+        return local_executor(checks.whole(workers, "--workers", InvalidOption, least=1))
+    return contextlib.nullcontext()
 
 
 def _sound(found: Study, repaired: int) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Sequence
+from inspect import Parameter
 from typing import Final
 
-from cyclopts import App, CycloptsError, UnknownCommandError
+from cyclopts import App, Argument, CycloptsError, MissingArgumentError, UnknownCommandError
 
 from rocking.errors import InvalidOption
 
@@ -25,9 +26,17 @@ def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
     sentence = " ".join(str(error).split()).rstrip(".")
     if isinstance(error, UnknownCommandError):
         return _unknown_command(_called(app, arguments), (error.unused_tokens or arguments)[0])
+    command = f"rocking{''.join(f' {name}' for name in _command(app, arguments))}"
+    if isinstance(error, MissingArgumentError) and error.argument is not None:
+        return f"{_missing(error.argument, command, arguments)}; see {command} --help"
     if isinstance(error, CycloptsError):
-        return f"{sentence}; see rocking{''.join(f' {name}' for name in _command(app, arguments))} --help"
-    return _with_options(sentence, _options(app, arguments))
+        return f"{sentence}; see {command} --help"
+    return in_options(sentence, app, arguments)
+
+
+def in_options(sentence: str, app: App, arguments: Sequence[str]) -> str:
+    """Return a sentence with options in place of the arguments that they stand for."""
+    return _with_options(sentence, _options(app, arguments), _keywords(app, arguments))
 
 
 def refuse_unknown_options(app: App, arguments: Sequence[str]) -> None:
@@ -80,23 +89,47 @@ def _called(app: App, arguments: Sequence[str]) -> App:
     return app
 
 
+def _missing(argument: Argument, command: str, arguments: Sequence[str]) -> str:
+    """Say what a command needs, or that an option is given without its value."""
+    if _is_positional(argument):
+        return f"{command} needs {argument.name.lstrip('-').upper()}"
+    given = any(each.partition("=")[0] in argument.names for each in arguments)
+    return f"{argument.name} needs a value" if given else f"{command} needs {argument.name}"
+
+
+def _is_positional(argument: Argument) -> bool:
+    return not argument.keys and argument.field_info.kind is not Parameter.KEYWORD_ONLY
+
+
 def _options(app: App, arguments: Sequence[str]) -> set[str]:
     """Return the options of the command that is called."""
     called = _called(app, arguments)
     if called.default_command is None:
         return {"--help", "-h", "--version", "-V"}
-    collection = called.assemble_argument_collection()
-    own = {name for argument in collection for name in argument.names if name.startswith("-")}
-    return own | {"--help", "-h", "--version", "-V"}
+    return _names(called.assemble_argument_collection()) | {"--help", "-h", "--version", "-V"}
 
 
-def _with_options(sentence: str, options: set[str]) -> str:
+def _keywords(app: App, arguments: Sequence[str]) -> set[str]:
+    """Return the options of the command that is called which are no positional arguments as well."""
+    called = _called(app, arguments)
+    if called.default_command is None:
+        return set()
+    return _names(each for each in called.assemble_argument_collection() if not _is_positional(each))
+
+
+def _names(collection: Iterable[Argument]) -> set[str]:
+    return {name for argument in collection for name in argument.names if name.startswith("-")}
+
+
+def _with_options(sentence: str, options: set[str], keywords: set[str]) -> str:
     """Name options where a message names the arguments that they stand for."""
     for option in sorted(options, key=len, reverse=True):
         name = option.removeprefix("--").replace("-", "_")
         if len(name) > 1 or name == "p":
             sentence = re.sub(rf"(?<![\w./\\'\"-]){name} ?= ?(?=\s|[\w'\"]|$)", f"{option} ", sentence)
             sentence = re.sub(rf"\bleave {name} out\b", f"leave {option} out", sentence)
+        if option in keywords:
+            sentence = re.sub(rf"(?:^|(?<=: )){name}(?= must )", option, sentence)
         if "_" in name:
             sentence = re.sub(rf"(?<![\w./\\'\"-]){name}(?![\w./\\'\"-])", option, sentence)
-    return re.sub(r" +", " ", sentence)
+    return re.sub(r" +", " ", sentence).rstrip()

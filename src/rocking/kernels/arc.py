@@ -1,10 +1,11 @@
 """One arc between two events as a Taylor series (paper, Eq. 15), linear or nonlinear alike.
 
 The rotation is written in the frame of the side that the block leans to: u = |theta| >= 0, and the ground acceleration
-as A(t) = i a(t)/g with i the sign of that side. The two models read
+as A(t) = i a(t)/g with i the sign of that side. A vertical ground acceleration changes the weight: W(t) = 1 + a_v(t)/g.
+The two models read
 
-    linear      u'' = lam u - gain (threshold + A)
-    nonlinear   u'' = -lam (sin(alpha - u) + A cos(alpha - u))
+    linear      u'' = W lam u - gain (W threshold + A)
+    nonlinear   u'' = -lam (W sin(alpha - u) + A cos(alpha - u))
 
 and the coefficients c[k] of u follow by recurrence. In the linear model lam may have any sign: p^2 for a rocking block
 (whose gain is p^2, too), 0 for a ball, negative for an oscillator with a stop.
@@ -16,7 +17,7 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.ground import Ground, acceleration, local_series
+from rocking.kernels.ground import Ground, acceleration, has_vertical, local_series, vertical_of
 from rocking.kernels.state import ORDER, Record
 
 #: Terms of the velocity below this fraction of the largest one no longer count. (Those of the rotation are no measure:
@@ -37,22 +38,47 @@ def sign_of(side: int) -> float:
 
 
 @inlined
-def restoring(block: Record, side: int, ground: float) -> float:
-    """Restoring acceleration of a side at zero rotation, for a ground acceleration in units of g."""
-    return block.gain[side] * (block.threshold[side] + sign_of(side) * ground)
+def restoring(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+    """Restoring acceleration of a side at zero rotation."""
+    weight = weight_at(ground, piece, offset)
+    return block.gain[side] * (block.threshold[side] * weight + sign_of(side) * acceleration(ground, piece, offset))
+
+
+@inlined
+def weight_at(ground: Ground, piece: int, offset: float) -> float:
+    """Weight in the ground's frame, over that at rest: 1 + a_v/g."""
+    return 1.0 + acceleration(vertical_of(ground), piece, offset) if has_vertical(ground) else 1.0
+
+
+@inlined
+def weight_series(ground: Ground, piece: int, offset: float, W: Floats) -> int:
+    """Put the polynomial of the weight about ``offset`` into W; returns its degree."""
+    W[0] = 0.0
+    degree = local_series(vertical_of(ground), piece, offset, 1.0, W) if has_vertical(ground) else 0
+    W[0] += 1.0
+    return degree
 
 
 @shared
 def expand(
     ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float
 ) -> tuple[int, float, int]:
-    """Series of the arc from a state into scratch, for a time of at most ``left``; returns (order, step, degree)."""
+    """Series of the arc from a state into scratch, for a time of at most ``left``; returns (order, step, degree).
+
+    The degree is that of both components of the motion.
+    """
     h = step_length(ground, block, state, left)
     degree = local_series(ground, state.piece, state.offset, sign_of(state.side), scratch.ground)
     degree = significant_degree(scratch.ground, degree, h)
+    changes = weight_series(ground, state.piece, state.offset, scratch.weight)
+    if has_vertical(ground):
+        degree = raise_degree(scratch.ground, degree, scratch.weight, changes)
     if rules.nonlinear:
-        order, h = expand_nonlinear(block, state, scratch, degree, h)
+        order, h = expand_nonlinear(block, state, scratch, (degree, changes), h)
         return order, h, degree
+    if has_vertical(ground):
+        expand_linear_weighted(block, state, scratch, degree)
+        return ORDER, shortened(scratch.rotation, h), degree
     if degree <= 1:
         order = linear_order(block.stiffness[state.side], h)
         expand_linear(block, state, scratch, degree, order)
@@ -63,11 +89,22 @@ def expand(
 
 
 @inlined
+def raise_degree(A: Floats, degree: int, W: Floats, other: int) -> int:
+    """Larger degree of two polynomials, both of which are filled up with zeros to it."""
+    highest = max(degree, other)
+    for k in range(degree + 1, highest + 1):
+        A[k] = 0.0
+    for k in range(other + 1, highest + 1):
+        W[k] = 0.0
+    return highest
+
+
+@inlined
 def step_length(ground: Ground, block: Record, state: Record, left: float) -> float:
     """Length of the next Taylor step."""
     h = min(left, 1.0 / np.sqrt(abs(block.stiffness[state.side])))
     if state.u == 0.0 and state.v > 0.0:
-        g = restoring(block, state.side, acceleration(ground, state.piece, state.offset))
+        g = restoring(ground, block, state.side, state.piece, state.offset)
         if g > 0.0:
             h = min(h, _FIRST_STEP * 2.0 * state.v / g)
     return h
@@ -130,25 +167,46 @@ def expand_linear(block: Record, state: Record, scratch: Record, degree: int, or
 
 
 @shared
-def expand_nonlinear(block: Record, state: Record, scratch: Record, degree: int, h: float) -> tuple[int, float]:
-    """Series of a nonlinear arc, and of sin and cos(alpha - u); returns (order, h').
+def expand_linear_weighted(block: Record, state: Record, scratch: Record, degree: int) -> None:
+    """Full series of a linear arc while the weight changes; the motion's polynomials are of one degree."""
+    c, A, W, side = scratch.rotation, scratch.ground, scratch.weight, state.side
+    lam, gain, threshold = block.stiffness[side], block.gain[side], block.threshold[side]
+    c[0] = state.u
+    c[1] = state.v
+    for k in range(ORDER - 1):
+        value = -gain * (threshold * W[k] + A[k]) if k <= degree else 0.0
+        for j in range(min(k, degree) + 1):
+            value += lam * W[j] * c[k - j]
+        c[k + 2] = value * _WEIGHT[k]
+
+
+@shared
+def expand_nonlinear(
+    block: Record, state: Record, scratch: Record, degrees: tuple[int, int], h: float
+) -> tuple[int, float]:
+    """Series of a nonlinear arc, and of sin and cos(alpha - u), for a motion and a weight of these degrees.
+
+    Returns (order, h').
 
     Coefficients may vanish one after another (a release from rest where sin and cos balance), so that small terms alone
     do not end the series: a majorant of the velocity's, |u''| h^2 times those of an exponential, must be small as well.
     """
-    c, A, S, C = scratch.rotation, scratch.ground, scratch.sine, scratch.cosine
+    c, A, W, S, C = scratch.rotation, scratch.ground, scratch.weight, scratch.sine, scratch.cosine
     lam, psi = block.stiffness[state.side], block.slenderness[state.side] - state.u
+    degree, changes = degrees
     c[0] = state.u
     c[1] = state.v
     S[0] = math.sin(psi)
     C[0] = math.cos(psi)
     power = h * h
-    stiff = lam * math.hypot(1.0, A[0])
+    stiff = lam * math.hypot(W[0], A[0])
     rate = (math.sqrt(stiff) + abs(state.v) + stiff * h) * h
     majorant = stiff * power
     largest = term = abs(state.v) * h
     for k in range(ORDER - 1):
-        value = S[k]
+        value = W[0] * S[k]
+        for j in range(1, min(k, changes) + 1):
+            value += W[j] * S[k - j]
         for j in range(min(k, degree) + 1):
             value += A[j] * C[k - j]
         value *= -lam * _WEIGHT[k]

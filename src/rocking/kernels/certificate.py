@@ -2,7 +2,7 @@
 
 At an impact the block enters side i with speed v. Over a window, side j's restoring acceleration at zero rotation
 
-    g_j(t) = gain_j (threshold_j + j a(t)/g)
+    g_j(t) = gain_j (threshold_j W(t) + j a(t)/g),    W = 1 + a_v/g,
 
 stays within [m_j, M_j]. Comparison of the arc with two of constant acceleration bounds its duration and its height,
 energy bounds the next impact's speed, and a geometric sum bounds all that follows. The derivation is in the
@@ -15,18 +15,19 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.kernels.arc import restoring, sign_of
+from rocking.kernels.arc import restoring, sign_of, weight_series
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import (
     ROUNDING,
     Ground,
     Window,
-    acceleration,
     bounds_over,
     columns_of,
+    has_vertical,
     length_of,
     local_series,
     start_of,
+    vertical_of,
 )
 from rocking.kernels.remainder import deviation, refined_bracket
 from rocking.kernels.remaining import Restoring, remaining_time
@@ -113,27 +114,28 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     v, i = state.v, state.side
     j = block.entered[i]
     e_i, e_j = block.restitution[i], block.restitution[j]
-    here = acceleration(ground, state.piece, state.offset)
-    g_i, g_j = restoring(block, i, here), restoring(block, j, here)
+    g_i = restoring(ground, block, i, state.piece, state.offset)
+    g_j = restoring(ground, block, j, state.piece, state.offset)
     if not (g_i > 0.0 and g_j > 0.0 and e_i * e_j < 1.0 and abs(block.stiffness[i]) * v * v < g_i * g_i):
         return unproven()
     window = _WINDOW * 2.0 * v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)
     # The rounding of the times decides on which side of a jump of the motion the window ends.
     doubt = ROUNDING * (start_of(ground, state.piece) + state.offset)
-    limits = (-block.threshold[0], block.threshold[1])
-    seen = bounds_over(ground, state.piece, state.offset, window + doubt, limits, scratch.ground)
-    motion = disturbed(seen, ground.error)
+    motion = bounds_on_motion(ground, block, state, window + doubt, scratch)
     first = side_bounds(block, rules, i, motion)
     second = side_bounds(block, rules, j, motion)
     lower, upper = geometric_bracket(v, first, second, e_i, e_j)
     if not upper <= window:
         return unproven()
-    local_series(ground, state.piece, state.offset, 1.0, clear(scratch.ground))
     least, swing = min(first.least, second.least), max(first.swing, second.swing)
     height = v * v * (1.0 + 2.0 * swing / least) / least
-    seen_up_to = Seen(motion, ground.error, upper, height)
-    one = side_here(block, rules, i, scratch.ground, columns_of(ground), seen_up_to)
-    other = side_here(block, rules, j, scratch.ground, columns_of(ground), seen_up_to)
+    if has_vertical(ground) and not is_low(block, height):
+        return unproven()
+    local_series(ground, state.piece, state.offset, 1.0, clear(scratch.ground))
+    weight_series(ground, state.piece, state.offset, clear(scratch.weight))
+    seen_up_to = Seen(motion, ground.error, columns_of(ground), upper, height)
+    one = side_here(block, rules, i, scratch, seen_up_to)
+    other = side_here(block, rules, j, scratch, seen_up_to)
     if upper - lower > rules.tolerance and upper + doubt <= length_of(ground, state.piece) - state.offset:
         finer = refined_bracket(v, one, other, upper)
         if finer[1] >= finer[0]:
@@ -142,36 +144,84 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     return Proof(lower, upper, min(max(remaining_time(v, one, other), lower), upper), height)
 
 
-class Seen(NamedTuple):
-    """What is known of the time to come: bounds on the motion, its error, how long they hold, the highest rotation."""
+class Bounded(NamedTuple):
+    """Bounds on both components of the motion over a window; the vertical one adds to a weight of 1."""
 
-    motion: Window
+    horizontal: Window
+    vertical: Window
+
+
+@inlined
+def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float, scratch: Record) -> Bounded:
+    """Bounds on the motion from a state on, its error included; NaN where it passes a threshold."""
+    lifts = Window(0.0, 0.0, 0.0, 0.0)
+    if has_vertical(ground):
+        upright = bounds_over(vertical_of(ground), state.piece, state.offset, window, (-1.0, np.inf), scratch.ground)
+        lifts = disturbed(upright, ground.error)
+    weight = 1.0 + lifts.high
+    limits = (-block.threshold[0] * weight, block.threshold[1] * weight)
+    pushes = bounds_over(ground, state.piece, state.offset, window, limits, scratch.ground)
+    return Bounded(disturbed(pushes, ground.error), lifts)
+
+
+@inlined
+def is_low(block: Record, height: float) -> bool:
+    """Whether rotations up to a height leave the weight's part of the restoring acceleration below that at zero."""
+    return height <= 2.0 * min(block.slenderness[0], block.slenderness[1])
+
+
+class Seen(NamedTuple):
+    """What is known of the time to come.
+
+    Bounds on the motion, its error and the number of its coefficients, how long that holds, the highest rotation.
+    """
+
+    motion: Bounded
     error: float
+    columns: int
     window: float
     height: float
 
 
 @inlined
-def side_here(block: Record, rules: Record, j: int, A: Floats, columns: int, seen: Seen) -> Restoring:
+def side_here(block: Record, rules: Record, j: int, scratch: Record, seen: Seen) -> Restoring:
     """Side j as seen from an impact: its restoring acceleration as a parabola in time, a stiffness, and what is left.
 
-    ``A`` holds the ground acceleration about the impact.
+    ``scratch`` holds the ground acceleration and the weight about the impact.
     """
-    push = block.gain[j] * sign_of(j)
-    beyond = 0.0
-    for k in range(columns - 1, 2, -1):
-        beyond = (beyond + abs(A[k])) * seen.window
-    error = seen.error + beyond * seen.window * seen.window
+    A, W = scratch.ground, scratch.weight
+    sign, gain, threshold, lam = sign_of(j), block.gain[j], block.threshold[j], block.stiffness[j]
+    horizontal, vertical = seen.motion
+    error = seen.error + beyond_parabola(A, seen)
+    weighs = vertical.high > vertical.low
+    lift = seen.error + beyond_parabola(W, seen) if weighs else 0.0
+    sway = vertical.slope * seen.window + 2.0 * seen.error if weighs else 0.0
     if not rules.nonlinear:
-        stiffness, error = block.stiffness[j], block.gain[j] * error
+        stiffness = lam * W[0]
+        error = gain * (error + threshold * lift)
+        if weighs:
+            error = deviation(error, abs(lam) * sway, 0.0, seen.height)
     else:
-        lam, sine = block.stiffness[j], block.sine[j]
-        stiffness = lam * (block.cosine[j] - sign_of(j) * A[0] * sine)
-        largest = max(abs(seen.motion.low), abs(seen.motion.high))
-        drift = lam * sine * (seen.motion.slope * seen.window + 2.0 * seen.error)
-        error = deviation(lam * error, drift, lam * math.hypot(1.0, largest), seen.height)
-    g = block.gain[j] * (block.threshold[j] + sign_of(j) * A[0])
-    return Restoring(g, push * A[1], push * A[2] if columns > 2 else 0.0, stiffness, block.restitution[j], error)
+        sine, cosine = block.sine[j], block.cosine[j]
+        stiffness = lam * (cosine * W[0] - sign * A[0] * sine)
+        drift = lam * (sine * (horizontal.slope * seen.window + 2.0 * seen.error) + cosine * sway)
+        bend = lam * math.hypot(heaviest(vertical), largest(horizontal))
+        error = deviation(lam * (error + lift), drift, bend, seen.height)
+    g = gain * (threshold * W[0] + sign * A[0])
+    rate, curvature = gain * (sign * A[1]), gain * (sign * A[2]) if seen.columns > 2 else 0.0
+    if weighs:
+        rate += gain * threshold * W[1]
+        curvature += gain * threshold * W[2]
+    return Restoring(g, rate, curvature, stiffness, block.restitution[j], error)
+
+
+@inlined
+def beyond_parabola(A: Floats, seen: Seen) -> float:
+    """Bound on what a polynomial holds beyond degree 2."""
+    beyond = 0.0
+    for k in range(seen.columns - 1, 2, -1):
+        beyond = (beyond + abs(A[k])) * seen.window
+    return beyond * seen.window * seen.window
 
 
 @inlined
@@ -188,16 +238,36 @@ def disturbed(motion: Window, error: float) -> Window:
 
 
 @inlined
-def side_bounds(block: Record, rules: Record, j: int, motion: Window) -> Bounds:
+def largest(motion: Window) -> float:
+    """Largest size of an acceleration."""
+    return max(abs(motion.low), abs(motion.high))
+
+
+@inlined
+def heaviest(lifts: Window) -> float:
+    """Largest size of the weight."""
+    return max(1.0 + lifts.high, -(1.0 + lifts.low))
+
+
+@inlined
+def side_bounds(block: Record, rules: Record, j: int, motion: Bounded) -> Bounds:
     """Bounds on side j, rounding included, for bounds on the motion."""
-    sign = sign_of(j)
-    one = block.threshold[j] + sign * motion.low
-    other = block.threshold[j] + sign * motion.high
-    largest = max(abs(motion.low), abs(motion.high))
-    slack = ROUNDING * (block.threshold[j] + largest)
+    horizontal, vertical = motion
+    sign, threshold = sign_of(j), block.threshold[j]
+    light, heavy = threshold * (1.0 + vertical.low), threshold * (1.0 + vertical.high)
+    one, other = sign * horizontal.low, sign * horizontal.high
+    strongest, weight = largest(horizontal), heaviest(vertical)
+    slack = ROUNDING * (threshold * weight + strongest)
     # A rotation changes both models' stiffness and, in the nonlinear one, what the motion adds (at most p^2 a/g).
-    stiff = abs(block.stiffness[j]) * (math.hypot(1.0, largest) if rules.nonlinear else 1.0) * (1.0 + ROUNDING)
+    stiff = abs(block.stiffness[j]) * (math.hypot(weight, strongest) if rules.nonlinear else weight) * (1.0 + ROUNDING)
     push = (block.stiffness[j] if rules.nonlinear else block.gain[j]) * (1.0 + ROUNDING)
-    m = block.gain[j] * (min(one, other) - slack)
-    M = block.gain[j] * (max(one, other) + slack)
-    return Bounds(stiff, m, M, push * (motion.high - motion.low), push * motion.slope, push * motion.jumps)
+    # What weight adds is largest at zero rotation (`is_low`).
+    lift = block.gain[j] * threshold * (1.0 + ROUNDING)
+    return Bounds(
+        stiff,
+        block.gain[j] * (light + min(one, other) - slack),
+        block.gain[j] * (heavy + max(one, other) + slack),
+        push * (horizontal.high - horizontal.low) + lift * (vertical.high - vertical.low),
+        push * horizontal.slope + lift * vertical.slope,
+        push * horizontal.jumps + lift * vertical.jumps,
+    )

@@ -1,38 +1,51 @@
 """The ground acceleration as kernels read it: a polynomial on each piece, in units of g, and zero after the last.
 
-A row of `Ground.pieces` is one piece: start (s), length (s), coefficients in powers of the time since the start. The
-last row has no end and no acceleration, so that nothing here or above needs to ask whether the motion is over.
+A row of `Ground.pieces` is one piece: start (s), length (s), coefficients in powers of the time since the start, those
+of the vertical component, where there is one, after the horizontal ones. The last row has no end and no acceleration,
+so that nothing here or above needs to ask whether the motion is over.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
 
 #: Relative allowance for rounding in bounds.
 ROUNDING = 2.0**-48
 
-#: Pieces of one stretch: `next_beyond` passes over whole stretches.
-STRETCH = 32
+#: Pieces of one stretch: `next_beyond` and `bounds_over` pass over whole stretches.
+STRETCH = 16
 
-#: Pieces that a window may span; longer windows wait for a slower impact.
-_LONGEST_WINDOW = 256
+#: Pieces and whole stretches that a window may span; longer windows wait for a slower impact.
+_LONGEST_WINDOW = 128
 
 _START, _LENGTH, _FIRST = 0, 1, 2
 
+#: Columns of a stretch for one component.
+_BOUNDS = 4
+
 
 class Ground(NamedTuple):
-    """A motion: its pieces, the least and greatest value on each stretch of them, and its approximation error (g)."""
+    """A motion, seen by one of its components.
+
+    Its pieces; a `Window` for each stretch of them, a row each; its approximation error (g); the number of coefficients
+    of a component, and the column of the first one of this component: the horizontal one, but for `vertical_of`.
+    """
 
     pieces: Floats
     stretches: Floats
     error: float
+    columns: int
+    first: int
 
 
 class Window(NamedTuple):
-    """Bounds on the acceleration over some time: least, greatest, steepest slope, sum of all jumps."""
+    """Bounds on the acceleration over some time: least, greatest, steepest slope, sum of all jumps.
+
+    Of a piece or a stretch, ``jumps`` counts the one at its end.
+    """
 
     low: float
     high: float
@@ -40,46 +53,88 @@ class Window(NamedTuple):
     jumps: float
 
 
-def ground_of(breakpoints: Floats, coefficients: Floats, unit: float, error: float) -> Ground:
-    """Ground from a motion's breakpoints (s), coefficients and error, all times ``unit``."""
-    columns = max(2, coefficients.shape[1])
-    pieces = np.zeros((len(coefficients) + 1, _FIRST + columns))
-    stretches = np.zeros((-(-len(pieces) // STRETCH), 2))
-    lay_out(breakpoints, coefficients, unit, pieces, stretches)
-    return Ground(pieces, stretches, error * unit)
+def ground_of(
+    breakpoints: Floats, coefficients: Floats, unit: float, error: float, vertical: Floats | None = None
+) -> Ground:
+    """Ground from a motion's breakpoints (s), coefficients of both components on the same pieces, and error.
+
+    ``unit``: what coefficients and error are multiplied with, to be in units of g.
+    """
+    components = [coefficients] if vertical is None else [coefficients, vertical]
+    columns = max(2, *(component.shape[1] for component in components))
+    pieces = np.zeros((len(coefficients) + 1, _FIRST + columns * len(components)))
+    stretches = np.zeros((-(-len(pieces) // STRETCH), _BOUNDS * len(components)))
+    ground = Ground(pieces, stretches, error * unit, columns, _FIRST)
+    for k, component in enumerate(components):
+        seen = ground._replace(first=_FIRST + k * columns)
+        lay_out(breakpoints, component, unit, seen, np.zeros(columns))
+    return ground
+
+
+def components(ground: Ground, pieces: Integers) -> list[Floats]:
+    """Coefficients (g, g/s, ...) of a motion on some pieces: horizontal ones, and vertical ones if it has any."""
+    columns, count = ground.columns, ground.stretches.shape[1] // _BOUNDS
+    return [ground.pieces[pieces, _FIRST + k * columns :][:, :columns] for k in range(count)]
 
 
 @kernel
-def lay_out(breakpoints: Floats, coefficients: Floats, unit: float, pieces: Floats, stretches: Floats) -> None:
-    """Fill the rows of the pieces, and the bounds on whole stretches of them, rounding included."""
-    last = coefficients.shape[0]
+def lay_out(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground, A: Floats) -> None:
+    """Fill the rows of a ground for one component: pieces, and bounds on stretches of them. ``A`` is scratch space."""
+    pieces, last = ground.pieces, coefficients.shape[0]
     for k in range(last):
         pieces[k, _START] = breakpoints[k]
         pieces[k, _LENGTH] = breakpoints[k + 1] - breakpoints[k]
         for j in range(coefficients.shape[1]):
-            pieces[k, _FIRST + j] = coefficients[k, j] * unit
+            pieces[k, ground.first + j] = coefficients[k, j] * unit
     pieces[last, _START] = breakpoints[last]
     pieces[last, _LENGTH] = np.inf
-    for k in range(stretches.shape[0]):
-        stretches[k, 0], stretches[k, 1] = np.inf, -np.inf
+    for stretch in range(ground.stretches.shape[0]):
+        put_stretch(ground, stretch, Window(np.inf, -np.inf, 0.0, 0.0))
     for k in range(last + 1):
-        low, high = piece_bounds(pieces, k, last)
-        stretch = k // STRETCH
-        stretches[stretch, 0] = min(stretches[stretch, 0], low)
-        stretches[stretch, 1] = max(stretches[stretch, 1], high)
+        piece = bounds_within(ground, k, 0.0, pieces[k, _LENGTH], A)
+        jumps = piece.jumps + jump_after(ground, k) if k < last else 0.0
+        so_far = stretch_bounds(ground, k // STRETCH)
+        low, high = min(so_far.low, piece.low), max(so_far.high, piece.high)
+        together = Window(low, high, max(so_far.slope, piece.slope), so_far.jumps + jumps)
+        put_stretch(ground, k // STRETCH, together)
 
 
 @inlined
-def piece_bounds(pieces: Floats, piece: int, last: int) -> tuple[float, float]:
-    """Bounds on one piece, from the sizes of its terms."""
-    low = high = pieces[piece, _FIRST]
-    size = abs(low)
-    power = 1.0
-    for k in range(_FIRST + 1, pieces.shape[1] if piece < last else 0):
-        power *= pieces[piece, _LENGTH]
-        term = pieces[piece, k] * power
-        low, high, size = low + min(term, 0.0), high + max(term, 0.0), size + abs(term)
-    return low - 2.0 * ROUNDING * size, high + 2.0 * ROUNDING * size
+def put_stretch(ground: Ground, stretch: int, bounds: Window) -> None:
+    """Write down the bounds on a stretch."""
+    for k in range(_BOUNDS):
+        ground.stretches[stretch, first_bound(ground) + k] = bounds[k]
+
+
+@inlined
+def stretch_bounds(ground: Ground, stretch: int) -> Window:
+    """Bounds on a stretch."""
+    row, k = ground.stretches[stretch], first_bound(ground)
+    return Window(row[k], row[k + 1], row[k + 2], row[k + 3])
+
+
+@inlined
+def first_bound(ground: Ground) -> int:
+    """Column of a component's first bound on a stretch."""
+    return 0 if ground.first == _FIRST else _BOUNDS
+
+
+@inlined
+def has_vertical(ground: Ground) -> bool:
+    """Whether the motion has a vertical component."""
+    return ground.stretches.shape[1] > _BOUNDS
+
+
+@inlined
+def vertical_of(ground: Ground) -> Ground:
+    """Return the motion as seen by its vertical component, for all functions of this module."""
+    return Ground(ground.pieces, ground.stretches, ground.error, ground.columns, ground.first + ground.columns)
+
+
+@inlined
+def is_straight(ground: Ground) -> bool:
+    """Whether the motion is horizontal and changes evenly on each piece, as records do."""
+    return columns_of(ground) == 2 and not has_vertical(ground)
 
 
 @inlined
@@ -103,13 +158,13 @@ def length_of(ground: Ground, piece: int) -> float:
 @inlined
 def columns_of(ground: Ground) -> int:
     """Count the coefficients of a piece."""
-    return ground.pieces.shape[1] - _FIRST
+    return ground.columns
 
 
 @inlined
 def coefficient(ground: Ground, piece: int, power: int) -> float:
     """Coefficient of a power of the time since a piece's start."""
-    return ground.pieces[piece, _FIRST + power]
+    return ground.pieces[piece, ground.first + power]
 
 
 @inlined
@@ -117,7 +172,7 @@ def acceleration(ground: Ground, piece: int, offset: float) -> float:
     """Ground acceleration within a piece, g."""
     value = 0.0
     for k in range(columns_of(ground) - 1, -1, -1):
-        value = value * offset + ground.pieces[piece, _FIRST + k]
+        value = value * offset + ground.pieces[piece, ground.first + k]
     return value
 
 
@@ -126,7 +181,7 @@ def slope(ground: Ground, piece: int, offset: float) -> float:
     """Rate of the ground acceleration within a piece, g/s."""
     value = 0.0
     for k in range(columns_of(ground) - 1, 0, -1):
-        value = value * offset + k * ground.pieces[piece, _FIRST + k]
+        value = value * offset + k * ground.pieces[piece, ground.first + k]
     return value
 
 
@@ -135,7 +190,7 @@ def local_series(ground: Ground, piece: int, offset: float, sign: float, A: Floa
     """Put a piece's polynomial about ``offset``, times ``sign``, into A; returns its degree."""
     degree = columns_of(ground) - 1
     for k in range(degree + 1):
-        A[k] = sign * ground.pieces[piece, _FIRST + k]
+        A[k] = sign * ground.pieces[piece, ground.first + k]
     while degree > 0 and A[degree] == 0.0:
         degree -= 1
     if offset > 0.0:
@@ -159,10 +214,10 @@ def bounds_within(ground: Ground, piece: int, offset: float, window: float, A: F
     """
     columns = columns_of(ground)
     if columns == 2:
-        rate = ground.pieces[piece, _FIRST + 1]
-        first = ground.pieces[piece, _FIRST] + rate * offset
+        rate = ground.pieces[piece, ground.first + 1]
+        first = ground.pieces[piece, ground.first] + rate * offset
         last = first + rate * window if rate != 0.0 else first
-        rounding = ROUNDING * (abs(ground.pieces[piece, _FIRST]) + max(abs(first), abs(last)))
+        rounding = ROUNDING * (abs(ground.pieces[piece, ground.first]) + max(abs(first), abs(last)))
         return Window(min(first, last) - rounding, max(first, last) + rounding, abs(rate), rounding)
     degree = local_series(ground, piece, offset, 1.0, A)
     low = high = A[0]
@@ -184,7 +239,7 @@ def sizes(ground: Ground, piece: int, t: float) -> tuple[float, float]:
     size = size_of_slope = 0.0
     for k in range(columns_of(ground) - 1, -1, -1):
         size_of_slope = size_of_slope * t + size
-        size = size * t + abs(ground.pieces[piece, _FIRST + k])
+        size = size * t + abs(ground.pieces[piece, ground.first + k])
     return size, size_of_slope
 
 
@@ -198,27 +253,51 @@ def bounds_over(
     """
     low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
     for _ in range(_LONGEST_WINDOW):
-        left = length_of(ground, piece) - offset
-        here = bounds_within(ground, piece, offset, min(window, left), A)
+        if is_whole_stretch(ground, piece, offset, window):
+            following = piece + STRETCH
+            left = start_of(ground, following) - start_of(ground, piece)
+            here = stretch_bounds(ground, piece // STRETCH)
+        else:
+            following = piece + 1
+            left = length_of(ground, piece) - offset
+            here = bounds_within(ground, piece, offset, min(window, left), A)
         low, high, steepest = min(low, here.low), max(high, here.high), max(steepest, here.slope)
         if low < limits[0] or high > limits[1]:
             break
         if window <= left:
             return Window(low, high, steepest, jumps)
-        end = acceleration(ground, piece, length_of(ground, piece))
-        jumps += abs(coefficient(ground, piece + 1, 0) - end) + here.jumps
+        jumps += here.jumps
+        if following == piece + 1:
+            jumps += jump_after(ground, piece)
         window -= left
-        piece += 1
-        offset = 0.0
+        piece, offset = following, 0.0
     return Window(np.nan, np.nan, np.nan, np.nan)
 
 
 @inlined
+def is_whole_stretch(ground: Ground, piece: int, offset: float, window: float) -> bool:
+    """Whether a stretch starts here and ends within the window."""
+    if piece % STRETCH != 0 or offset > 0.0 or piece + STRETCH > last_piece(ground):
+        return False
+    return bool(start_of(ground, piece + STRETCH) - start_of(ground, piece) < window)
+
+
+@inlined
+def jump_after(ground: Ground, piece: int) -> float:
+    """Size of the motion's jump at the end of a piece."""
+    return abs(coefficient(ground, piece + 1, 0) - acceleration(ground, piece, length_of(ground, piece)))
+
+
+@inlined
 def next_beyond(ground: Ground, piece: int, below: float, above: float) -> int:
-    """First piece from this one on whose stretch passes out of [below, above]; the last one where none does."""
+    """First piece from this one on whose stretch passes out of [below, above]; the last one where none does.
+
+    The limits are those at rest under gravity alone: a vertical acceleration scales them with the weight.
+    """
     while piece < last_piece(ground):
         stretch = piece // STRETCH
-        if ground.stretches[stretch, 0] < below or ground.stretches[stretch, 1] > above:
+        weight = 1.0 + (stretch_bounds(vertical_of(ground), stretch).low if has_vertical(ground) else 0.0)
+        if ground.stretches[stretch, 0] < below * weight or ground.stretches[stretch, 1] > above * weight:
             return piece
         piece = (stretch + 1) * STRETCH
     return last_piece(ground)

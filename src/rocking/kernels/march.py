@@ -7,7 +7,7 @@ import numpy as np
 from rocking.kernels.arc import expand
 from rocking.kernels.certificate import unproven
 from rocking.kernels.compiled import inlined, kernel
-from rocking.kernels.ground import Ground, columns_of, last_piece, length_of, start_of
+from rocking.kernels.ground import Ground, is_straight, last_piece, length_of, start_of
 from rocking.kernels.impact import Arrival, advance, strike
 from rocking.kernels.proven import pass_proven_impacts
 from rocking.kernels.rest import ULP, Rest, note_impact, note_proof, proven_bounds, rest_after_impact, time_of
@@ -62,7 +62,7 @@ def turn(ground: Ground, block: Record, rules: Record, table: Records, scratch: 
     write_node(ground, rules, table, state)
     if state.side == AT_REST:
         return lift_off(ground, block, rules, table, scratch, state)
-    if state.run > 0 and state.u == 0.0 and not rules.nonlinear and columns_of(ground) == 2:
+    if state.run > 0 and state.u == 0.0 and not rules.nonlinear and is_straight(ground):
         pass_proven_impacts(ground, block, rules, table, state, time_left(ground, rules, state))
     outcome = follow_arc(ground, block, rules, scratch, state)
     if outcome == IMPACT:
@@ -91,6 +91,8 @@ def lift_off(ground: Ground, block: Record, rules: Record, table: Records, scrat
     state.uplifted = state.struck = time_of(ground, state)
     state.worth = np.inf
     state.resting += state.uplifted - state.rested
+    if state.uplifts == 0:
+        state.first_uplift = state.uplifted
     state.uplifts += 1
     write_event(rules, table, state, state.uplifted, UPLIFT)
     return GOING
@@ -175,8 +177,10 @@ def come_to_rest(ground: Ground, rules: Record, table: Records, state: Record, r
         return DONE
     state.side = AT_REST
     state.u = state.v = 0.0
-    state.rests += 1
     state.rested = time + rest.time
+    if state.rests == 0:
+        state.first_rest = state.rested
+    state.rests += 1
     write_event(rules, table, state, state.rested, REST)
     state.offset += rest.time
     settle(ground, state)

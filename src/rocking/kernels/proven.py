@@ -4,7 +4,7 @@ import math
 
 from rocking.kernels.arc import restoring, sign_of
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.ground import Ground, acceleration, coefficient, start_of
+from rocking.kernels.ground import Ground, coefficient, start_of
 from rocking.kernels.remaining import THIRD, Pair
 from rocking.kernels.state import Record, Records
 from rocking.kernels.tables import PROVEN_A_TURN, write_impact, write_node
@@ -26,7 +26,7 @@ def pass_proven_impacts(
     end = state.offset + left
     for _ in range(PROVEN_A_TURN):
         side, v = state.side, state.v
-        g = restoring(block, side, acceleration(ground, state.piece, state.offset))
+        g = restoring(ground, block, side, state.piece, state.offset)
         t, speed = proven_arc(v, g, block.gain[side] * sign_of(side) * rate, block.stiffness[side])
         slower = block.restitution[side] * speed
         # The arc lies below its first tangent.

@@ -8,7 +8,7 @@ import numpy as np
 from rocking.kernels.arc import restoring
 from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.ground import Ground, acceleration, length_of, start_of
+from rocking.kernels.ground import Ground, length_of, start_of
 from rocking.kernels.state import Record
 from rocking.kernels.status import CERTIFIED, INTERVAL, TIME, VELOCITY
 
@@ -125,5 +125,5 @@ def has_stalled(ground: Ground, block: Record, state: Record) -> bool:
     time = time_of(ground, state)
     fastest = max(abs(block.stiffness[0]), abs(block.stiffness[1]))
     least = ULP * (time + (1.0 / math.sqrt(fastest) if fastest > 0.0 else 0.0))
-    pressed = restoring(block, state.side, acceleration(ground, state.piece, state.offset))
+    pressed = restoring(ground, block, state.side, state.piece, state.offset)
     return bool(time - state.struck <= least and 2.0 * state.v <= least * pressed)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rocking.kernels.arc import sign_of
 from rocking.kernels.compiled import inlined
-from rocking.kernels.ground import Ground, acceleration, coefficient, columns_of
+from rocking.kernels.ground import Ground, acceleration, coefficient, is_straight
 from rocking.kernels.impact import Arrival
 from rocking.kernels.state import Record
 from rocking.kernels.status import IMPACT, STEP, UNDECIDED
@@ -32,7 +32,7 @@ _SETTLED = 1e-8
 @inlined
 def short_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> Arrival:
     """Step to the next impact or over ``left``, or the part of it that is short; UNDECIDED where it is not simple."""
-    if columns_of(ground) != 2:
+    if not is_straight(ground):
         return undecided()
     if rules.nonlinear:
         t, c = reach_nonlinear(ground, block, state, left), nonlinear_series(ground, block, state)

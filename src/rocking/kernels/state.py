@@ -48,11 +48,11 @@ RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endles
 #: Where a march stands. ``until`` is the first piece that is not marched through and ``budget`` the number of turns
 #: left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a jump;
 #: ``worth`` is the speed below which a proof is worth trying; ``stalled`` counts the rests brought about only because
-#: time hardly advanced from one impact to the next.
+#: time hardly advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times.
 STATE = _record(
     piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
     run="i8", worth="f8", struck="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8", run_start="f8",
-    uplifted="f8", rested="f8", resting="f8", end="f8",
+    uplifted="f8", rested="f8", first_uplift="f8", first_rest="f8", resting="f8", end="f8",
     nodes="i8", events="i8", sequences="i8", uplifts="i8", rests="i8", stalled="i8",
 )  # fmt: skip
 
@@ -66,8 +66,8 @@ SEQUENCE_ROW = _record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8
 #: arrays by value.
 TABLE = _record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
 
-#: Scratch space: the series of one step, of the ground and of sin and cos(alpha - u) about its start, and a spare one.
-SCRATCH = _record(rotation=_SERIES, ground=_SERIES, sine=_SERIES, cosine=_SERIES, spare=_SERIES)
+#: Scratch space: the series of one step; of the ground, the weight and sin and cos(alpha - u) about its start; a spare.
+SCRATCH = _record(rotation=_SERIES, ground=_SERIES, weight=_SERIES, sine=_SERIES, cosine=_SERIES, spare=_SERIES)
 
 
 def records(count: int, kind: np.dtype[np.void]) -> Records:

@@ -9,12 +9,14 @@ from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import (
     Ground,
     bounds_within,
+    has_vertical,
     last_piece,
     length_of,
     local_series,
     move,
     next_beyond,
     start_of,
+    vertical_of,
 )
 from rocking.kernels.root import first_root
 from rocking.kernels.state import AT_REST, Record
@@ -49,9 +51,13 @@ def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offs
         length = length_of(ground, piece)
         left = length - offset
         bounds = bounds_within(ground, piece, offset, left, A)
-        if bounds.high > minus or -bounds.low > plus:
-            degree = local_series(ground, piece, offset, 1.0, A)
+        weight = 1.0
+        if has_vertical(ground):
+            weight += bounds_within(vertical_of(ground), piece, offset, left, A).low
+        if bounds.high > minus * weight or -bounds.low > plus * weight:
+            degree = push_series(ground, piece, offset, plus, -1.0, A, d)
             to_plus, jump_plus = first_excess(A, degree, left, plus, -1.0, d)
+            degree = push_series(ground, piece, offset, minus, 1.0, A, d)
             to_minus, jump_minus = first_excess(A, degree, left, minus, 1.0, d)
             # A passing that rounding puts at the end of the piece is left to the next one, which may turn back.
             if to_plus < to_minus and offset + to_plus < length:
@@ -60,6 +66,23 @@ def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offs
                 return Uplift(piece, offset + to_minus, 1, jump_minus)
         piece += 1
         offset = 0.0
+
+
+@inlined
+def push_series(ground: Ground, piece: int, offset: float, threshold: float, sign: float, A: Floats, d: Floats) -> int:
+    """Put into A what, times ``sign``, is to pass a threshold: the motion less what it adds to the weight.
+
+    Returns the degree; ``d`` is scratch space.
+    """
+    degree = local_series(ground, piece, offset, 1.0, A)
+    if not has_vertical(ground):
+        return degree
+    changes = local_series(vertical_of(ground), piece, offset, 1.0, d)
+    for k in range(degree + 1, changes + 1):
+        A[k] = 0.0
+    for k in range(changes + 1):
+        A[k] -= sign * threshold * d[k]
+    return max(degree, changes)
 
 
 @shared

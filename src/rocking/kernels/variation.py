@@ -7,9 +7,9 @@ equation of motion, through an impact by the saltation that follows from its shi
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.kernels.arc import evaluate, expand, restoring, sign_of
+from rocking.kernels.arc import evaluate, expand, restoring, sign_of, weight_at
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.ground import acceleration, length_of, slope
+from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, vertical_of
 from rocking.kernels.state import AT_REST, ORDER, Record
 from rocking.kernels.trace import Trail
 
@@ -105,20 +105,35 @@ def expand_variation(
 @inlined
 def expand_coefficients(trail: Trail, scratch: Record, work: Floats, side: int, degree: int, order: int) -> None:
     """Series of d u''/d u, and of u'' per unit of change of the motion, into the first two rows of ``work``."""
-    lam, gain = trail.block.stiffness[side], trail.block.gain[side]
-    A, S, C = scratch.ground, scratch.sine, scratch.cosine
+    lam, gain, threshold = trail.block.stiffness[side], trail.block.gain[side], trail.block.threshold[side]
+    A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
+    changes = degree if has_vertical(trail.ground) else 0
     for k in range(order - 1):
         stiffness, forcing = 0.0, 0.0
         if trail.rules.nonlinear:
-            stiffness = C[k]
+            forcing = -S[k]
+            for j in range(min(k, changes) + 1):
+                stiffness += W[j] * C[k - j]
+                forcing += W[j] * S[k - j]
             for j in range(min(k, degree) + 1):
                 stiffness -= A[j] * S[k - j]
                 forcing += A[j] * C[k - j]
             work[0, k] = lam * stiffness
             work[1, k] = -lam * forcing
         else:
-            work[0, k] = lam if k == 0 else 0.0
-            work[1, k] = -gain * A[k] if k <= degree else 0.0
+            work[0, k] = lam * W[k] if k <= changes else 0.0
+            forcing = gain * (A[k] + threshold * added_weight(W, k, changes)) if k <= degree else 0.0
+            for j in range(min(k, changes) + 1):
+                forcing -= lam * added_weight(W, j, changes) * scratch.rotation[k - j]
+            work[1, k] = -forcing
+
+
+@inlined
+def added_weight(W: Floats, k: int, changes: int) -> float:
+    """Coefficient of what the motion adds to the weight."""
+    if k > changes:
+        return 0.0
+    return W[0] - 1.0 if k == 0 else W[k]
 
 
 @inlined
@@ -128,27 +143,43 @@ def saltation(
     """Variation after an impact that shifts; ``rates`` are that of the velocity before it, and the speed of impact."""
     block = trail.block
     dv, speed = rates
-    ground = acceleration(trail.ground, following.piece, following.offset)
+    left = restoring(trail.ground, block, node.side, following.piece, following.offset)
+    entered = restoring(trail.ground, block, following.side, following.piece, following.offset)
     e = block.restitution[node.side]
-    faster = -(dv - restoring(block, node.side, ground) * shift) + (speed if what == RESTITUTION else 0.0)
-    return -e * speed * shift, e * faster + restoring(block, following.side, ground) * shift
+    faster = -(dv - left * shift) + (speed if what == RESTITUTION else 0.0)
+    return -e * speed * shift, e * faster + entered * shift
 
 
 @inlined
 def uplift_shift(trail: Trail, node: Record, what: int) -> float:
     """Shift of the uplift with which a node begins."""
     ground, block, rules, _ = trail
-    push = -sign_of(node.side) * acceleration(ground, node.piece, node.offset)
-    rate = -sign_of(node.side) * slope(ground, node.piece, node.offset)
     threshold = block.threshold[node.side]
+    push = -push_at(ground, block, node.side, node.piece, node.offset)
+    rate = -push_rate(ground, block, node.side, node.piece, node.offset)
     if abs(push - threshold) > _JUMP * threshold:
         return 0.0
     if what == MOTION:
         return -push / rate
     if what == SLENDERNESS:
         growth = 1.0 + threshold * threshold if rules.nonlinear else 1.0
-        return block.slenderness[node.side] * growth / rate
+        weight = weight_at(ground, node.piece, node.offset)
+        return block.slenderness[node.side] * growth * weight / rate
     return 0.0
+
+
+@inlined
+def push_at(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+    """Return what the motion adds to a side's threshold: pushes towards it, and weight."""
+    added = weight_at(ground, piece, offset) - 1.0
+    return sign_of(side) * acceleration(ground, piece, offset) + block.threshold[side] * added
+
+
+@inlined
+def push_rate(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+    """Rate of `push_at`."""
+    lifts = slope(vertical_of(ground), piece, offset) if has_vertical(ground) else 0.0
+    return sign_of(side) * slope(ground, piece, offset) + block.threshold[side] * lifts
 
 
 @inlined
@@ -162,8 +193,8 @@ def rest_shift(trail: Trail, node: Record, what: int, dv: float, shift: float, r
         return shift
     block, i = trail.block, node.side
     j = block.entered[i]
-    here = acceleration(trail.ground, node.piece, node.offset)
-    g_i, g_j = restoring(block, i, here), restoring(block, j, here)
+    g_i = restoring(trail.ground, block, i, node.piece, node.offset)
+    g_j = restoring(trail.ground, block, j, node.piece, node.offset)
     dg_i, dg_j = restoring_shift(trail, node, i, what, shift), restoring_shift(trail, node, j, what, shift)
     e_i, e_j = block.restitution[i], block.restitution[j]
     de = 1.0 if what == RESTITUTION else 0.0
@@ -178,12 +209,13 @@ def restoring_shift(trail: Trail, node: Record, j: int, what: int, shift: float)
     """Change of a side's restoring acceleration at an impact that shifts."""
     ground, block, rules, _ = trail
     here = acceleration(ground, node.piece, node.offset)
-    change = block.gain[j] * sign_of(j) * shift * slope(ground, node.piece, node.offset)
+    change = block.gain[j] * shift * push_rate(ground, block, j, node.piece, node.offset)
     if what == MOTION:
-        change += block.gain[j] * sign_of(j) * here
+        change += block.gain[j] * push_at(ground, block, j, node.piece, node.offset)
     elif what == FREQUENCY:
-        change += 2.0 * restoring(block, j, here)
+        change += 2.0 * restoring(ground, block, j, node.piece, node.offset)
     elif what == SLENDERNESS:
-        stiff = block.cosine[j] - sign_of(j) * here * block.sine[j] if rules.nonlinear else 1.0
+        weight = weight_at(ground, node.piece, node.offset)
+        stiff = block.cosine[j] * weight - sign_of(j) * here * block.sine[j] if rules.nonlinear else weight
         change += block.stiffness[j] * stiff * block.slenderness[j]
     return change

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,9 +15,24 @@ from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 from rocking.motion.description import Description
 
+
+class Component(Protocol):
+    """A motion, as far as it matters here."""
+
+    @property
+    def vertical(self) -> object | None:
+        """Its vertical component."""
+
+
+M = TypeVar("M", bound=Component)
+
 #: Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take.
 STRONGEST: Final = 1e50
 _LONGEST: Final = 1e15
+
+#: What those mean who give samples and a step to the constructor.
+_OF_SAMPLES: Final = ": of samples make a motion with Motion.from_samples(acceleration, dt)"
+
 #: Far below any ground motion; pieces may be shorter, but must not change faster than over this time.
 _SHORTEST: Final = 1e-9
 
@@ -25,7 +40,7 @@ _SHORTEST: Final = 1e-9
 def pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
     """Breakpoints and coefficients of a motion as own, read-only arrays."""
     ends = _finite(breakpoints, "breakpoints", 1)
-    rows = _finite(coefficients, "coefficients", 2)
+    rows = _finite(coefficients, "coefficients", 2, _OF_SAMPLES)
     if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
         raise InvalidMotion(
             f"a motion of n pieces needs n + 1 breakpoints and coefficients of shape (n, degree + 1), "
@@ -52,6 +67,17 @@ def pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Flo
     for array in (ends, rows):
         array.setflags(write=False)
     return ends, rows
+
+
+def vertical(component: M, kind: type[M]) -> M:
+    """Return the vertical component of a motion: a motion that has none itself."""
+    if not isinstance(component, kind):
+        raise InvalidMotion(
+            f"vertical must be a Motion, as from rocking.read or Motion.from_samples, not {type(component).__name__}"
+        )
+    if component.vertical is not None:
+        raise InvalidMotion("vertical must be a motion without a vertical component of its own")
+    return component
 
 
 def samples(acceleration: ArrayLike) -> Floats:
@@ -99,15 +125,15 @@ def history(given: Iterable[str]) -> tuple[str, ...]:
     return tuple(checks.text(sentence, "sentence of a motion's history", InvalidMotion) for sentence in given)
 
 
-def _floats(values: ArrayLike, what: str, dimensions: int) -> Floats:
+def _floats(values: ArrayLike, what: str, dimensions: int, mend: str = "") -> Floats:
     array = np.array(checks.numbers(values, f"{what} of a motion", InvalidMotion), order="C")
     if array.ndim != dimensions:
-        raise InvalidMotion(f"the {what} of a motion must have {dimensions} dimension(s), not {array.ndim}")
+        raise InvalidMotion(f"the {what} of a motion must have {dimensions} dimension(s), not {array.ndim}{mend}")
     return array
 
 
-def _finite(values: ArrayLike, what: str, dimensions: int) -> Floats:
-    array = _floats(values, what, dimensions)
+def _finite(values: ArrayLike, what: str, dimensions: int, mend: str = "") -> Floats:
+    array = _floats(values, what, dimensions, mend)
     if not np.all(np.isfinite(array)):
         raise InvalidMotion(f"the {what} of a motion must be finite numbers")
     return array

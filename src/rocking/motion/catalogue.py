@@ -8,6 +8,7 @@ from typing import Any, BinaryIO
 
 from rocking.constants import STANDARD_GRAVITY
 from rocking.motion import formats, records
+from rocking.motion.formats.request import Request
 from rocking.motion.motion import Motion
 from rocking.tables import named, text_table
 
@@ -26,12 +27,15 @@ class Contents:
         What is listed.
     entries : list of dict
         One for each, with the same names in the same order; units are in the names.
+    motions : tuple of Motion
+        Those of a file's channels.
     """
 
     title: str
     facts: dict[str, Any]
     kind: str
     entries: list[dict[str, Any]]
+    motions: tuple[Motion, ...] = ()
 
     def summary(self) -> str:
         """Return the table for people."""
@@ -66,6 +70,7 @@ def contents(
     channel: str | None = None,
     dt: float | None = None,
     units: str | None = None,
+    several: bool = False,
 ) -> Contents:
     """List the acceleration channels of a file, and say what it was taken for.
 
@@ -73,20 +78,24 @@ def contents(
     ----------
     file, channel, dt, units
         As for `rocking.read`; without `channel`, all of them.
+    several
+        As for `named_motion`.
 
     Raises
     ------
     UnreadableRecord, InvalidMotion
         As for `rocking.read`.
     """
-    identification, channels = formats.content(file, channel=channel, dt=dt, units=units)
+    identification, channels = formats.content_as(file, channel, Request.checked(dt, units, several=several))
+    motions = tuple(each.motion() for each in channels)
     name = "standard input" if hasattr(file, "read") else os.fsdecode(file)
     facts = {"file": name, "format": identification.format, "reason": identification.reason}
     title = f"{name}: {identification.format}, since {identification.reason}"
     entries = [
-        {"channel": each.number, "name": each.name, "units": each.units} | _measures(each.motion()) for each in channels
+        {"channel": each.number, "name": each.name, "units": each.units} | _measures(motion)
+        for each, motion in zip(channels, motions, strict=True)
     ]
-    return Contents(title, facts, "channels", entries)
+    return Contents(title, facts, "channels", entries, motions)
 
 
 def _shipped(name: str) -> dict[str, Any]:

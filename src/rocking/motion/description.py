@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 from rocking import checks
 from rocking.errors import InvalidMotion
+
+_SCALED: Final = re.compile(r"(scaled by \S+) to .*")
 
 
 @dataclass(frozen=True)
@@ -72,3 +75,14 @@ class Description:
         """Return the description of a motion that was `how` ("delayed", "processed") off its formula."""
         family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
         return replace(self, family=family)
+
+
+def labelled(name: str, history: Sequence[str]) -> str:
+    """Return the name of a motion with what was done to it, in a few words: without what it was scaled to.
+
+    Examples
+    --------
+    >>> labelled("pulse", ["scaled by 2 to a peak ground acceleration of 2 m/s^2 (0.2039 g)", "trimmed to 2-20 s"])
+    'pulse, scaled by 2, trimmed to 2-20 s'
+    """
+    return ", ".join((name, *(_SCALED.sub(r"\1", done) for done in history)))

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from rocking.arrays import Floats
+from rocking.constants import STANDARD_GRAVITY
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 
 
-def exceedances(motion: Motion, thresholds: tuple[float, float]) -> Floats:
+def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float = STANDARD_GRAVITY) -> Floats:
     """Stretches of time in which a resting block would be lifted.
 
     Parameters
@@ -19,6 +20,8 @@ def exceedances(motion: Motion, thresholds: tuple[float, float]) -> Floats:
     thresholds : pair of float
         Accelerations, m/s^2, that lift the block to side + (where -a passes the first) and to side - (where a passes
         the second), as `Block.uplift_thresholds` gives them.
+    gravity : float
+        Gravity under which they hold, m/s^2; a vertical acceleration adds to it.
 
     Returns
     -------
@@ -34,10 +37,18 @@ def exceedances(motion: Motion, thresholds: tuple[float, float]) -> Floats:
            [1.16666667, 1.83333333]])
     """
     plus, minus = thresholds
-    cuts = np.unique(np.concatenate([motion.breakpoints, _crossings(motion, -plus), _crossings(motion, minus)]))
-    acceleration = motion.acceleration(0.5 * (cuts[:-1] + cuts[1:]))
-    beyond = (acceleration > minus) | (acceleration < -plus)
+    towards_plus, towards_minus = _push(motion, -plus / gravity), _push(motion, minus / gravity)
+    crossings = [_crossings(towards_plus, -plus), _crossings(towards_minus, minus)]
+    cuts = np.unique(np.concatenate([towards_plus.breakpoints, *crossings]))
+    middle = 0.5 * (cuts[:-1] + cuts[1:])
+    beyond = (towards_minus.acceleration(middle) > minus) | (towards_plus.acceleration(middle) < -plus)
     return cuts[np.flatnonzero(np.diff(beyond, prepend=False, append=False))].reshape(-1, 2)
+
+
+def _push(motion: Motion, threshold_over_g: float) -> Motion:
+    """Return the horizontal motion less what the vertical one adds to a threshold."""
+    alone = motion.with_vertical(None)
+    return alone if motion.vertical is None else alone + motion.vertical.scaled(-threshold_over_g)
 
 
 def _crossings(motion: Motion, level: float) -> Floats:

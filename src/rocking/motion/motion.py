@@ -1,4 +1,4 @@
-"""Ground motions: a horizontal ground acceleration that is a piecewise polynomial in time."""
+"""Ground motions: a ground acceleration, horizontal and maybe vertical, that is a piecewise polynomial in time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import arguments, measures, piecewise, processing, scaling
-from rocking.motion.description import Description
+from rocking.motion.description import Description, labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,6 +46,9 @@ class Motion:
     error : float
         Bound on the difference from the motion that `description` describes, m/s^2, beyond the rounding of
         breakpoints and coefficients; 0 where the pieces are the motion itself (records).
+    vertical : Motion, optional
+        Vertical ground acceleration over the same time, positive upwards; see `with_vertical`. All else here is about
+        the horizontal one.
 
     Attributes
     ----------
@@ -74,6 +77,7 @@ class Motion:
     description: Description = field(default_factory=lambda: Description("polynomials"))
     history: tuple[str, ...] = ()
     error: float = 0.0
+    vertical: Motion | None = None
     step: float | None = field(init=False)
 
     def __post_init__(self) -> None:
@@ -88,6 +92,8 @@ class Motion:
                 self.error, "approximation error of a motion", InvalidMotion, 0.0, arguments.STRONGEST
             ),
         }
+        if self.vertical is not None:
+            held["vertical"] = arguments.vertical(self.vertical, Motion)
         for name, value in held.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "step", piecewise.even_step(self))
@@ -101,6 +107,7 @@ class Motion:
             self.description,
             self.history,
             self.error,
+            self.vertical,
         )
         return Motion, fields
 
@@ -198,6 +205,18 @@ class Motion:
     def duration(self) -> float:
         """Time of the last breakpoint, s; the acceleration is zero after it."""
         return float(self.breakpoints[-1])
+
+    @property
+    def label(self) -> str:
+        """Name, with what was done to the motion in a few words, for titles.
+
+        Examples
+        --------
+        >>> motion = Motion([0.0, 2.0], [[1.0]], name="step")
+        >>> motion.label, motion.scaled(pga=2.0).label, (-motion).delayed(1.0).label
+        ('step', 'step, scaled by 2', 'step, polarity reversed, delayed by 1 s')
+        """
+        return labelled(self.name, self.history)
 
     @property
     def samples(self) -> tuple[Floats, Floats]:
@@ -366,6 +385,33 @@ class Motion:
         targets = {"factor": factor, "pga": pga, "pgv": pgv, "sa": sa}
         return self._times(*scaling.factor_to(self, targets, period, damping))
 
+    def with_vertical(self, vertical: Motion | None) -> Motion:
+        """Return the motion with a vertical component, which changes the weight of what stands on the ground.
+
+        It goes with the motion wherever that is scaled, delayed, processed or added to another; reversing the polarity
+        leaves it as it is. Intensity measures are those of the horizontal component.
+
+        Parameters
+        ----------
+        vertical : Motion or None
+            Vertical ground acceleration that starts at the same time, m/s^2, positive upwards; None for none.
+
+        Raises
+        ------
+        InvalidMotion
+            If `vertical` is no motion, or has a vertical component itself.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> horizontal = rocking.records.load("el-centro-meloland-270")
+        >>> both = horizontal.with_vertical(rocking.records.load("el-centro-meloland-up"))
+        >>> block = rocking.Block(width=0.5, height=2.0)
+        >>> [f"{rocking.simulate(block, motion).peak_rotation:.6f}" for motion in (horizontal, both)]
+        ['0.006366', '0.003524']
+        """
+        return replace(self, vertical=vertical)
+
     def delayed(self, delay: float) -> Motion:
         """Return the motion after `delay` seconds of no acceleration.
 
@@ -384,6 +430,7 @@ class Motion:
             self,
             breakpoints=np.concatenate([[0.0], self.breakpoints + wait]),
             coefficients=np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients]),
+            vertical=None if self.vertical is None else self.vertical.delayed(wait),
             description=self.description.changed("delayed"),
             history=(*self.history, f"delayed by {wait:.6g} s"),
         )
@@ -444,6 +491,14 @@ class Motion:
             steps.append(lambda motion: processing.resample(motion, resample))
         if not steps:
             raise InvalidMotion("name what to do: trim, baseline, band_pass or resample")
+        vertical = self.vertical
+        if vertical is not None and (trim is None or trim[0] < vertical.duration):
+            kept = None if trim is None else (trim[0], min(trim[1], vertical.duration))
+            vertical = vertical.processed(
+                trim=kept, baseline=baseline, band_pass=band_pass, order=order, resample=resample
+            )
+        elif vertical is not None:  # it is over by then
+            vertical = None
         motion: piecewise.Piecewise = self
         history = self.history
         for step in steps:
@@ -458,15 +513,18 @@ class Motion:
             description=self.description.changed("processed"),
             history=history,
             error=self.error if cut_only else 0.0,
+            vertical=vertical,
         )
 
-    def plot(self, ax: Axes | None = None) -> Figure:
+    def plot(self, ax: Axes | None = None, *, figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the ground acceleration in g over time.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
             Where to draw; by default in a new figure.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
 
         Returns
         -------
@@ -482,9 +540,8 @@ class Motion:
         from rocking.plot import motion_figure
 
         times = self.drawing_times(0.0, self.duration)
-        return motion_figure(
-            time=times, acceleration_g=self.acceleration(times) / STANDARD_GRAVITY, title=self.name, ax=ax
-        )
+        ground = self.acceleration(times) / STANDARD_GRAVITY
+        return motion_figure(time=times, acceleration_g=ground, title=self.name, ax=ax, figsize=figsize)
 
     def drawing_times(self, start: float, end: float) -> Floats:
         """Return the ends of a stretch of time, breakpoints in it, and times between them where pieces are curved."""
@@ -504,8 +561,16 @@ class Motion:
     def __str__(self) -> str:
         """Return name, duration, step, peak acceleration and what was done to the motion, in one line."""
         step = "" if self.step is None else f" in steps of {self.step:.5g} s"
-        peak = f"peak {self.pga:.5g} m/s^2 ({self.pga / STANDARD_GRAVITY:.4g} g)"
-        return "; ".join((f"{self.name}, {self.duration:.5g} s{step}, {peak}", *self.history))
+        parts = [f"{self.name}, {self.duration:.5g} s{step}, {_peak(self)}", *self.history]
+        if self.vertical is not None:
+            parts.append(f"vertical: {self.vertical.name}, {_peak(self.vertical)}")
+        return "; ".join(parts)
+
+    def __mul__(self, factor: float) -> Motion:
+        """Return the motion times a factor, as `scaled`."""
+        return self.scaled(factor) if isinstance(factor, (int, float, np.number)) else NotImplemented
+
+    __rmul__ = __mul__
 
     def __neg__(self) -> Motion:
         """Return the motion with its polarity reversed."""
@@ -515,17 +580,15 @@ class Motion:
         """Return the sum of two motions that start together."""
         if not isinstance(other, Motion):
             return NotImplemented
-        breakpoints = np.union1d(self.breakpoints, other.breakpoints)
-        degree = max(self.coefficients.shape[1], other.coefficients.shape[1])
-        mine, theirs = (
-            piecewise.refined(motion.breakpoints, motion.coefficients, breakpoints, degree) for motion in (self, other)
-        )
+        breakpoints, (mine, theirs) = piecewise.together(self, other)
+        verticals = [motion.vertical for motion in (self, other) if motion.vertical is not None]
         return Motion(
             breakpoints,
             mine + theirs,
             name=f"{self.name} + {other.name}",
             description=Description("sum", text=f"{self._origin()}; plus {other._origin()}"),
             error=self.error + other.error,
+            vertical=verticals[0] + verticals[1] if len(verticals) == 2 else next(iter(verticals), None),
         )
 
     def _origin(self) -> str:
@@ -542,4 +605,12 @@ class Motion:
             description=self.description.scaled(factor),
             history=(*self.history, done),
             error=self.error * abs(factor),
+            vertical=self._vertical_times(abs(factor), done),
         )
+
+    def _vertical_times(self, factor: float, done: str) -> Motion | None:
+        return self.vertical if self.vertical is None or factor == 1.0 else self.vertical._times(factor, done)
+
+
+def _peak(motion: Motion) -> str:
+    return f"peak {motion.pga:.5g} m/s^2 ({motion.pga / STANDARD_GRAVITY:.4g} g)"

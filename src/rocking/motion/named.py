@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import glob
 import sys
 from collections.abc import Iterable
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from rocking.errors import UnreadableRecord
 from rocking.motion import formats, records
+from rocking.motion.formats.request import Request
 from rocking.motion.motion import Motion
 
 #: The name of a record that is read from standard input.
@@ -22,6 +24,7 @@ def named_motion(
     dt: float | None = None,
     units: str | None = None,
     scale: float = 1.0,
+    several: bool = False,
 ) -> Motion:
     """Motion of a record file, or of a shipped record of that name, times a factor.
 
@@ -33,6 +36,8 @@ def named_motion(
         As for `rocking.read`.
     scale : float
         Factor on the motion.
+    several : bool
+        Whether `dt` and `units` are for several files, of which those that say theirs keep them.
 
     Raises
     ------
@@ -43,8 +48,34 @@ def named_motion(
         motion = records.load(name)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
-        motion = formats.read(file, channel=channel, dt=dt, units=units)
+        motion = formats.read_as(file, channel, Request.checked(dt, units, several=several))
     return motion if scale == 1.0 else motion.scaled(scale)
+
+
+def named_vertical(name: str, record: str, *, dt: float | None = None, units: str | None = None) -> Motion:
+    """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal one's file.
+
+    Parameters
+    ----------
+    name : str
+        Path of a file, name of a shipped record, or a channel by number or name.
+    record : str
+        Path of the file with the horizontal motion.
+    dt, units
+        As for `rocking.read`.
+
+    Raises
+    ------
+    UnreadableRecord
+        If there is no such file, record or channel.
+    """
+    if Path(name).is_file() or name in records.names():
+        return named_motion(name, dt=dt, units=units)
+    if record == STANDARD_INPUT or not Path(record).exists():
+        raise UnreadableRecord(
+            f"{name}: there is no such file or shipped record for the vertical motion, and {record} has no channels"
+        )
+    return formats.read(record, channel=name, dt=dt, units=units)
 
 
 def is_shipped(name: str) -> bool:
@@ -59,16 +90,17 @@ def is_shipped(name: str) -> bool:
         return False
     if name in records.names():
         return True
-    close = records.closest(name)
-    if close is not None and not Path(name).suffix:
-        raise UnreadableRecord(f"{name}: there is no such file or shipped record; did you mean {close}?")
+    meant = records.meant(name)
+    if meant and not Path(name).suffix:
+        raise UnreadableRecord(f"{name}: there is no such file or shipped record; did you mean {' or '.join(meant)}?")
     return False
 
 
 def expanded(names: Iterable[str]) -> list[str]:
     """Return the names of records that files, folders, patterns and shipped records stand for, each once.
 
-    A folder stands for the files in it, by name, hidden ones left out; a pattern for the files that match it.
+    A folder stands for the files in it, by name, hidden ones left out; a pattern for the files that match it, or where
+    none does for the shipped records of such names.
 
     Raises
     ------
@@ -95,6 +127,9 @@ def _files(name: str) -> list[str]:
     if not glob.has_magic(name) or Path(name).exists():
         return [name]
     matching = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
+    matching = matching or fnmatch.filter(records.names(), name)
     if not matching:
-        raise UnreadableRecord(f"{name}: no file matches this pattern; check the folder and the pattern")
+        raise UnreadableRecord(
+            f"{name}: no file or shipped record matches this pattern; check the folder and the pattern"
+        )
     return matching

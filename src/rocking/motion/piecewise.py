@@ -110,6 +110,17 @@ def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: i
     return result
 
 
+def together(one: Piecewise, other: Piecewise) -> tuple[Floats, tuple[Floats, Floats]]:
+    """Breakpoints of both, and the coefficients of each between them, of one degree."""
+    columns = max(one.coefficients.shape[1], other.coefficients.shape[1])
+    if np.array_equal(one.breakpoints, other.breakpoints):
+        breakpoints = one.breakpoints
+    else:
+        breakpoints = np.union1d(one.breakpoints, other.breakpoints)
+    mine, theirs = (refined(each.breakpoints, each.coefficients, breakpoints, columns) for each in (one, other))
+    return breakpoints, (mine, theirs)
+
+
 def root_candidates(widths: Floats, coefficients: Floats) -> Floats:
     """Points of each piece among which are all its roots; shape (pieces, degree), sorted along each row.
 

@@ -89,22 +89,28 @@ def info(name: str) -> Record:
     """
     catalogue = _catalogue()
     if name not in catalogue:
-        close = closest(name)
-        hint = f"did you mean {close!r}?" if close else f"there are {', '.join(catalogue)}"
+        close = meant(name)
+        hint = f"did you mean {' or '.join(map(repr, close))}?" if close else f"there are {', '.join(catalogue)}"
         raise UnreadableRecord(f"no shipped record is named {name!r}: {hint}")
     return Record(name=name, **catalogue[name])
 
 
-def closest(name: str) -> str | None:
-    """Return the name of the shipped record that is most like `name`, or None if none is like it.
+def meant(name: str) -> tuple[str, ...]:
+    """Return the shipped records that may be meant: one that is like `name`, or a station's horizontal ones.
 
     Examples
     --------
-    >>> closest("ridgecrest-cls-090")
-    'ridgecrest-clc-090'
+    >>> meant("ridgecrest-cls-090"), meant("el-centro")
+    (('ridgecrest-clc-090',), ('el-centro-meloland-360', 'el-centro-meloland-270'))
     """
-    close = difflib.get_close_matches(str(name), _catalogue(), n=1)
-    return close[0] if close else None
+    catalogue = _catalogue()
+    horizontal = [each for each in catalogue if catalogue[each]["direction"] != "up"]
+    begun = tuple(each for each in horizontal if each.startswith(str(name)))
+    stations = {each.rpartition("-")[0]: () for each in horizontal}
+    alike = {station: tuple(each for each in horizontal if each.startswith(station)) for station in stations}
+    alike |= {each: (each,) for each in catalogue}
+    close = difflib.get_close_matches(str(name), alike, n=1)
+    return begun or (alike[close[0]] if close else ())
 
 
 def load(name: str) -> Motion:

@@ -52,7 +52,7 @@ def factor_to(
         return factor, f"scaled by {factor:.6g}"
     words, unit = _MEASURES[what]
     ratio = measures.DAMPING if damping is None else damping
-    level = checks.positive(wanted, f"target {what}", InvalidMotion, unit)
+    level = checks.positive(wanted, what, InvalidMotion, unit)
     now = measures.target(motion, what, period, ratio)
     if now == 0.0:
         raise InvalidMotion(f"a motion that is zero throughout cannot be scaled to a {words}")

@@ -6,6 +6,7 @@ The rule, between one abscissa and the next:
 - A region that only one side has ends in a tip half way: it is there, it is gone at the neighbour, and where between
   them it ends is not known. The same holds from the neighbour's side for a region that begins.
 - Where each side has a region in the place of the other's, the two meet at an upright line half way.
+- A boundary that would end in a tip at the frame's edge runs on straight instead, until half way or out of the frame.
 
 So nothing is drawn that neither side has, and nothing is drawn beyond half the way to where it is known to be absent.
 """
@@ -42,14 +43,28 @@ def runs(x: Floats, stacks: Sequence[Stack]) -> Iterator[tuple[Floats, Floats, t
     ends = [*starts[1:], len(x)]
     met = [meeting(stacks[end - 1], stacks[end]) for end in ends[:-1]]
     for run, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        at, levels = [*x[start:end]], [stack.level for stack in stacks[start:end]]
+        inner = x[start:end]
+        levels = np.stack([stack.level for stack in stacks[start:end]], axis=1)
+        before, after = [], []
         if start > 0:
-            at = [0.5 * (x[start - 1] + x[start]), *at]
-            levels = [met[run - 1][1], *levels]
+            at = 0.5 * (x[start - 1] + x[start])
+            before = [(at, _led_on(inner, levels, at, met[run - 1][1]))]
         if end < len(x):
-            at = [*at, 0.5 * (x[end - 1] + x[end])]
-            levels = [*levels, met[run][0]]
-        yield np.array(at), np.stack(levels, axis=1), stacks[start].region
+            at = 0.5 * (x[end - 1] + x[end])
+            after = [(at, _led_on(inner[::-1], levels[:, ::-1], at, met[run][0]))]
+        whole = [*before, *zip(inner, levels.T, strict=True), *after]
+        yield np.array([at for at, _ in whole]), np.stack([level for _, level in whole], axis=1), stacks[start].region
+
+
+def _led_on(x: Floats, levels: Floats, at: float, half: Floats) -> Floats:
+    """Levels half way, after those of a run, the nearest abscissa first: straight on where they leave the frame."""
+    if len(x) < 2:
+        return half
+    low, high = half[0], half[-1]
+    nearest, next_one = levels[:, 0], levels[:, 1]
+    straight = nearest + (at - x[0]) / (x[0] - x[1]) * (nearest - next_one)
+    leaves = (half == high) & (straight > nearest) | (half == low) & (straight < nearest)
+    return np.sort(np.where(leaves, np.clip(straight, low, high), half))
 
 
 def meeting(left: Stack, right: Stack) -> tuple[Floats, Floats]:
@@ -83,9 +98,13 @@ class _Side:
         self.at[part] = np.mean(self.ends(part))
 
     def halves(self) -> Floats:
-        """Levels half way."""
+        """Levels half way.
+
+        Parts that meet each for themselves may cross their neighbours by a little where many regions crowd: sorting
+        keeps every region on its place between the others.
+        """
         known = ~np.isnan(self.half)
-        return np.where(known, self.half, np.interp(self.at, self.at[known], self.half[known]))
+        return np.sort(np.where(known, self.half, np.interp(self.at, self.at[known], self.half[known])))
 
 
 class _Parts(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import re
@@ -11,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
+from rocking import checks
+from rocking.errors import InvalidOption
 from rocking.plot.style import STYLE
 
 if TYPE_CHECKING:
@@ -50,22 +53,30 @@ def figure_for(ax: Axes | None, figsize: tuple[float, float]) -> Iterator[Figure
     figsize : (float, float)
         Width and height of a new figure, inches.
 
+    Raises
+    ------
+    InvalidOption
+        If the size is not two positive numbers.
+
     Notes
     -----
     A new figure is made through pyplot, so that `pyplot.show()` and `figure.show()` show it, if pyplot is loaded, in a
     notebook, or where there is a display and nobody chose a backend without windows. Elsewhere no global state knows of
-    it, and it is forgotten with its last reference.
+    it, and it is forgotten with its last reference. A notebook shows each figure once, as a cell's value or at its end.
     """
     if ax is not None:
+        if not hasattr(ax, "get_figure"):
+            raise InvalidOption(f"ax must be axes of Matplotlib's to draw in, not {ax!r}")
         figure = ax.get_figure(root=True)
         assert figure is not None
         yield figure
+        _show_once(figure)
         return
 
     import matplotlib as mpl
 
     with mpl.rc_context(STYLE):
-        figure = _new_figure(figsize)
+        figure = _new_figure(_size(figsize))
         yield figure
         _make_ticks(figure)
 
@@ -78,6 +89,20 @@ def add_title(figure: Figure, ax: Axes | None, title: str) -> None:
     elif short:
         # From the figure's edge, not from that of axes: the lines do not depend on how the panels are laid out.
         figure.suptitle(short, x=_TITLE_AT, ha="left", wrap=True)
+
+
+def magnified(largest: float) -> tuple[float, str]:
+    """Return a power of a thousand by which values up to this one are drawn, and the words for it in a label.
+
+    Examples
+    --------
+    >>> magnified(0.0154)
+    (1000.0, '$10^{3}$ ')
+    >>> magnified(0.4), magnified(0.0)
+    ((1.0, ''), (1.0, ''))
+    """
+    power = 3 * max(0, math.ceil((-math.log10(largest) - 0.5) / 3.0)) if largest > 0.0 else 0
+    return 10.0**power, f"$10^{{{power}}}$ " if power else ""
 
 
 def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
@@ -119,6 +144,13 @@ def _in_lines(text: str, width: int) -> str:
     return textwrap.fill(held, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
 
 
+def _size(figsize: tuple[float, float]) -> tuple[float, float]:
+    sides = checks.positive_numbers(figsize, "figsize", InvalidOption)
+    if sides.size != 2:
+        raise InvalidOption(f"figsize must be (width, height), in inches, not {sides.size} numbers")
+    return float(sides[0]), float(sides[1])
+
+
 def _new_figure(figsize: tuple[float, float]) -> Figure:
     if not _is_shown():
         from matplotlib.figure import Figure
@@ -127,10 +159,32 @@ def _new_figure(figsize: tuple[float, float]) -> Figure:
     import matplotlib.pyplot as plt
 
     figure = plt.figure(figsize=figsize, layout="constrained")
-    if "inline" in plt.get_backend():
+    if _shows_at_the_end_of_cells():
         # The cell shows the figure as its value; what pyplot still holds is shown once more after it.
         plt.close(figure)
     return figure
+
+
+def _shows_at_the_end_of_cells() -> bool:
+    """Whether a notebook shows what pyplot holds when a cell ends, and then forgets it."""
+    pyplot: Any = sys.modules.get("matplotlib.pyplot")
+    return pyplot is not None and "inline" in pyplot.get_backend()
+
+
+def _show_once(figure: Figure) -> None:
+    """Have a caller's figure forgotten by pyplot as it is first shown: else the value of a cell is shown twice."""
+    if _shows_at_the_end_of_cells():
+        vars(figure)["_ipython_display_"] = functools.partial(_show, figure)
+
+
+def _show(figure: Figure) -> None:
+    import IPython.display
+    import matplotlib.pyplot as plt
+
+    display: Any = IPython.display.display
+    del vars(figure)["_ipython_display_"]
+    plt.close(figure)
+    display(figure)
 
 
 def _is_shown() -> bool:

@@ -40,7 +40,7 @@ def fragility_figure(
     band_label: str,
     title: str = "",
     ax: Axes | None = None,
-    figsize: tuple[float, float] = (5.6, 4.2),
+    figsize: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw fitted fragility curves with their confidence bands, and the shares that were seen.
 
@@ -54,8 +54,8 @@ def fragility_figure(
         Title of the figure.
     ax : matplotlib.axes.Axes, optional
         Where to draw.
-    figsize : (float, float)
-        Width and height of a new figure, inches.
+    figsize : (float, float), optional
+        Width and height of a new figure, inches; by default 5.6 by 4.2.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def fragility_figure(
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
     ['overturning', 'band: 90 % confidence', 'dot: share of 12 outcomes at about its intensity']
     """
-    with figure_for(ax, figsize) as figure:
+    with figure_for(ax, figsize or (5.6, 4.2)) as figure:
         axes = ax or figure.add_subplot()
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_title, figure_for
+from rocking.plot.canvas import add_title, figure_for, magnified
 from rocking.plot.style import ABOVE, GROUND, INK
 
 if TYPE_CHECKING:
@@ -25,12 +26,16 @@ _SCHEMES: Final[tuple[dict[str, Any], ...]] = (
 _MARK: Final[dict[str, Any]] = {"color": ABOVE, "markersize": 4.5, "markeredgewidth": 0.0, "zorder": 4}
 
 
+#: Where the inset lies, in fractions of the axes, and what room the axes leave above the rotations for it.
+_INSET: Final = (0.3, 0.66, 0.62, 0.32)
+_ROOM: Final = 0.85
+
+
 class Detail(NamedTuple):
-    """What an inset magnifies: limits of time and rotation, and where it lies (axes fractions)."""
+    """What an inset magnifies: limits of time and rotation."""
 
     time: tuple[float, float]
     rotation: tuple[float, float]
-    place: tuple[float, float, float, float]
 
 
 class Mark(NamedTuple):
@@ -41,18 +46,24 @@ class Mark(NamedTuple):
 
 
 def excitation_figure(
-    *, time: Floats, acceleration: Floats, marks: tuple[Mark, ...], rest: float, title: str, ax: Axes | None = None
+    *,
+    time: Floats,
+    acceleration: Floats,
+    marks: tuple[Mark, ...],
+    chattering_time: float,
+    title: str,
+    ax: Axes | None = None,
 ) -> Figure:
-    """Draw a sine with the thresholds, its exceedances, the first two initiations and the time to the first rest.
+    """Draw a sine with the thresholds, its exceedances, the initiations and the time to the first rest.
 
     Parameters
     ----------
     time, acceleration : ndarray, shape (n,)
         Time over the period and ground acceleration over g alpha.
-    marks : tuple of Mark, length 2
-        The first two initiations.
-    rest : float
-        Time of the first rest, over the period.
+    marks : tuple of Mark
+        The first one or two initiations.
+    chattering_time : float
+        Time from the first initiation to rest, over the period; NaN where chattering is incomplete.
     title : str
         Title of the figure.
     ax : matplotlib.axes.Axes, optional
@@ -65,15 +76,19 @@ def excitation_figure(
     with figure_for(ax, (7.0, 2.9)) as figure:
         axes = ax or figure.add_subplot()
         _draw_excitation(axes, time, acceleration)
-        _mark_initiations(axes, marks)
-        first, second = (mark.time for mark in marks)
-        for end, height, text in ((rest, 0.0, r"$\tau_{ch}$"), (second, -0.45, "$T/2$")):
+        _mark_initiations(axes, marks, float(acceleration.max()))
+        first = marks[0].time
+        rest = first + chattering_time
+        for end, height, text in ((rest, 0.0, r"$\tau_{ch}$"), (first + 0.5, -0.45, "$T/2$")):
+            if math.isnan(end):
+                continue
             axes.annotate("", (end, height), (first, height), arrowprops={"arrowstyle": "<->", "linewidth": 0.8})
             axes.annotate(
                 text, (0.5 * (first + end), height), xytext=(0, 2), textcoords="offset points", ha="center", va="bottom"
             )
-        axes.plot([rest, rest], [-0.75, 0.1], color=ABOVE, linewidth=0.9, linestyle=(0, (4, 2)))
-        axes.annotate("at rest", (rest, -0.75), xytext=(-3, 0), textcoords="offset points", ha="right", color=ABOVE)
+        if not math.isnan(rest):
+            axes.plot([rest, rest], [-0.75, 0.1], color=ABOVE, linewidth=0.9, linestyle=(0, (4, 2)))
+            axes.annotate("at rest", (rest, -0.75), xytext=(-3, 0), textcoords="offset points", ha="right", color=ABOVE)
         axes.set_xlim(time[0], time[-1])
         add_title(figure, ax, title)
         axes.set_xlabel("time over period, $t/T$")
@@ -86,7 +101,6 @@ def history_figure(
     time: Floats,
     rotations: Mapping[str, Floats],
     acceleration: Floats,
-    limits: tuple[float, float],
     detail: Detail,
     marks: tuple[Mark, ...],
     title: str,
@@ -101,8 +115,6 @@ def history_figure(
         Rotation over slenderness by each scheme, the reference first.
     acceleration : ndarray, shape (n,)
         Ground acceleration over g alpha.
-    limits : tuple of float
-        Limits of the rotation's axis.
     detail : Detail
         What the inset shows.
     marks : tuple of Mark
@@ -116,20 +128,23 @@ def history_figure(
     """
     from matplotlib.ticker import MaxNLocator
 
-    with figure_for(None, (7.0, 4.6)) as figure:
+    with figure_for(None, (7.0, 4.9)) as figure:
         response, excitation = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
-        _draw_responses(response, time, rotations)
+        low = min(float(rotation.min()) for rotation in rotations.values())
+        high = max(float(rotation.max()) for rotation in rotations.values())
+        scale, power = magnified(max(high, -low))
+        scaled = {name: scale * rotation for name, rotation in rotations.items()}
+        _draw_responses(response, time, scaled)
         response.set_xlim(time[0], time[-1])
-        response.set_ylim(*(1e3 * limit for limit in limits))
-        response.set_ylabel(r"rotation, $10^3\,\theta/\alpha$")
+        response.set_ylim(scale * (low - 0.07 * (high - low)), scale * (high + _ROOM * (high - low)))
+        response.set_ylabel(rf"rotation, {power}$\theta/\alpha$")
         add_title(figure, None, title)
-        highest = 1e3 * max(float(rotation.max()) for rotation in rotations.values())
-        response.set_yticks([tick for tick in response.get_yticks() if 1e3 * limits[0] <= tick <= highest])
+        response.set_yticks([tick for tick in response.get_yticks() if scale * low <= tick <= scale * high])
         response.plot([mark.time for mark in marks], [0.0] * len(marks), "^", **_MARK)
-        inset = response.inset_axes(detail.place)
-        _draw_responses(inset, time, rotations)
+        inset = response.inset_axes(_INSET)
+        _draw_responses(inset, time, scaled)
         inset.set_xlim(*detail.time)
-        inset.set_ylim(*(1e3 * limit for limit in detail.rotation))
+        inset.set_ylim(*(scale * limit for limit in detail.rotation))
         inset.tick_params(labelsize=7)
         inset.yaxis.tick_right()
         inset.xaxis.set_major_locator(MaxNLocator(6))
@@ -137,7 +152,7 @@ def history_figure(
             spine.set_visible(True)
         response.indicate_inset_zoom(inset, edgecolor=INK, linewidth=0.6, zorder=0.5)
         _draw_excitation(excitation, time, acceleration)
-        _mark_initiations(excitation, marks)
+        _mark_initiations(excitation, marks, float(acceleration.max()))
         excitation.set_xlabel("time over period, $t/T$")
         figure.legend(*response.get_legend_handles_labels(), loc="outside lower center", ncols=len(rotations))
     return figure
@@ -146,7 +161,7 @@ def history_figure(
 def _draw_responses(axes: Axes, time: Floats, rotations: Mapping[str, Floats]) -> None:
     axes.axhline(0.0, color=INK, linewidth=0.4)
     for (name, rotation), style in zip(rotations.items(), _SCHEMES, strict=False):
-        axes.plot(time, 1e3 * rotation, label=name, **style)
+        axes.plot(time, rotation, label=name, **style)
 
 
 def _draw_excitation(axes: Axes, time: Floats, acceleration: Floats) -> None:
@@ -160,14 +175,16 @@ def _draw_excitation(axes: Axes, time: Floats, acceleration: Floats) -> None:
     axes.set_ylabel(r"$\ddot u_g / (g\alpha)$")
 
 
-def _mark_initiations(axes: Axes, marks: tuple[Mark, ...]) -> None:
-    axes.set_ylim(-1.35, 1.75)
+def _mark_initiations(axes: Axes, marks: tuple[Mark, ...], peak: float) -> None:
+    """Mark instants above the excitation, of this peak."""
+    height = peak + 0.09
+    axes.set_ylim(-peak - 0.32, height + 0.63)
     axes.set_yticks([-1.0, 0.0, 1.0])
     for mark in marks:
-        axes.plot(mark.time, 1.12, "v", **_MARK)
+        axes.plot(mark.time, height, "v", **_MARK)
         axes.annotate(
             mark.text,
-            (mark.time, 1.12),
+            (mark.time, height),
             xytext=(0, 4),
             textcoords="offset points",
             ha="center",

@@ -25,12 +25,16 @@ FRACTILES: Final = (0.16, 0.5, 0.84)
 #: Peak rotations at which the fractiles are taken.
 _POINTS: Final = 200
 
-#: The frame ends this many times above what stands.
-_HEADROOM: Final = 1.2
+#: The frame ends with the levels, or this many times above what stands: where strips go on, arrows say so.
+_HEADROOM: Final = 1.5
 
 _OWN: Final[dict[str, Any]] = {"linewidth": 1.1, "markersize": 5.0}
 _ALIKE: Final[dict[str, Any]] = {"linewidth": 0.6, "markersize": 3.0}
 _STRIP: Final[dict[str, Any]] = {"linewidth": 5.0, "solid_capstyle": "butt"}
+
+#: Ends of strips: lines, so that the thinnest strip is seen, and an arrow where one leaves the frame.
+_END: Final[dict[str, Any]] = {"linestyle": "", "marker": "_", "markersize": 5.0, "markeredgewidth": 0.8}
+_GOES_ON: Final[dict[str, Any]] = {"linestyle": "", "marker": "^", "markersize": 9.0, "markeredgewidth": 0.0}
 
 #: Marker that looks like a kinked curve.
 _KINK: Final = [(-4, -4), (2, -1), (0, 1), (4, 4)]
@@ -51,7 +55,7 @@ def ida_figure(
     level_label: str,
     title: str = "",
     ax: Axes | None = None,
-    figsize: tuple[float, float] = (7.0, 4.2),
+    figsize: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
 
@@ -66,8 +70,8 @@ def ida_figure(
         Title of the figure.
     ax : matplotlib.axes.Axes, optional
         Draw the curves here, without the levels that overturn.
-    figsize : (float, float)
-        Width and height of a new figure, inches.
+    figsize : (float, float), optional
+        Width and height of a new figure, inches; by default 7 by 4.2.
 
     Examples
     --------
@@ -76,10 +80,12 @@ def ida_figure(
     >>> figure = ida_figure(motions=[motion], level_label="PGA (m/s^2)", title="Scaled up")
     >>> [axes.get_xlabel() for axes in figure.axes]
     ['peak rotation / slenderness', 'overturns']
+    >>> [text.get_text() for text in figure.legends[0].get_texts()][-2:]
+    ['kink: another swing is the largest', 'strip: levels that overturn (arrow: and above)']
     """
     few = len(motions) <= _FEW
     styles = [*CURVES[: len(motions)]] if few else [{"color": GROUND, "linestyle": "-"}] * len(motions)
-    with figure_for(ax, figsize) as figure:
+    with figure_for(ax, figsize or (7.0, 4.2)) as figure:
         curves, *strips = figure.subplots(1, 2, sharey=True, width_ratios=(2.0, 1.0)).tolist() if ax is None else [ax]
         for motion, style in zip(motions, styles, strict=True):
             _draw_motion(curves, motion, style | (_OWN if few else _ALIKE))
@@ -90,7 +96,8 @@ def ida_figure(
         curves.grid()
         add_labels(curves, "peak rotation / slenderness", level_label)
         for panel in strips:
-            _draw_strips(panel, motions, styles if few else [{"color": INK}] * len(motions), named=not few)
+            _draw_strips(panel, motions, styles if few else [{"color": INK}] * len(motions))
+            _name_strips(panel, motions, few=few)
         add_title(figure, ax, title)
         add_legend(figure, ax, _handles(motions if few else [], with_strips=ax is None))
     return figure
@@ -165,23 +172,37 @@ def _highest_shown(motions: Sequence[ScaledMotion]) -> float:
     return min(_HEADROOM * float(np.max(np.concatenate(stands), initial=0.0)) or last, last)
 
 
-def _draw_strips(axes: Axes, motions: Sequence[ScaledMotion], styles: Sequence[dict[str, Any]], *, named: bool) -> None:
+def _draw_strips(axes: Axes, motions: Sequence[ScaledMotion], styles: Sequence[dict[str, Any]]) -> None:
+    top = axes.get_ylim()[1]
     for k, (motion, style) in enumerate(zip(motions, styles, strict=True)):
         for low, high in motion.bands:
             axes.plot([k, k], [low, high], color=style["color"], **_STRIP)
-    axes.set(xlabel="overturns", xlim=(-0.7, len(motions) - 0.3), xticks=[])
-    if named:
-        axes.set_xticks(range(len(motions)), [motion.label for motion in motions], rotation=90, fontsize="x-small")
+            axes.plot([k, k], [low, high], color=style["color"], **_END)
+            if high > top:
+                axes.plot(k, top, color=style["color"], clip_on=False, **_GOES_ON)
+    axes.set(xlim=(-0.7, len(motions) - 0.3))
     axes.tick_params(axis="y", left=False, labelleft=False)
     axes.grid(axis="y")
+
+
+def _name_strips(axes: Axes, motions: Sequence[ScaledMotion], *, few: bool) -> None:
+    """Write below each strip the number that its motion has in the legend, or its name where that has none."""
+    axes.set_xlabel("overturns")
+    if not few:
+        axes.set_xticks(range(len(motions)), [motion.label for motion in motions], rotation=90, fontsize="x-small")
+    elif len(motions) > 1:
+        axes.set_xticks(range(len(motions)), [str(k + 1) for k in range(len(motions))])
+    else:
+        axes.set_xticks([])
 
 
 def _handles(named: Sequence[ScaledMotion], *, with_strips: bool) -> list[Line2D]:
     """Name the motions that have a style of their own, and say what else is drawn."""
     from matplotlib.lines import Line2D
 
+    names = [f"{k}: {motion.label}" if len(named) > 1 else motion.label for k, motion in enumerate(named, start=1)]
     handles = [
-        Line2D([], [], linewidth=1.1, label=motion.label, **style) for motion, style in zip(named, CURVES, strict=False)
+        Line2D([], [], linewidth=1.1, label=name, **style) for name, style in zip(names, CURVES, strict=False)
     ] or [
         Line2D([], [], color=GROUND, linewidth=0.6, label="each motion"),
         Line2D([], [], color=ABOVE, linewidth=1.8, label="level that suffices for 16, 50, 84 % of them"),
@@ -200,5 +221,5 @@ def _handles(named: Sequence[ScaledMotion], *, with_strips: bool) -> list[Line2D
         ),
     ]
     if with_strips:
-        handles.append(Line2D([], [], color=INK, label="strip: levels that overturn", **_STRIP))
+        handles.append(Line2D([], [], color=INK, label="strip: levels that overturn (arrow: and above)", **_STRIP))
     return handles

@@ -30,7 +30,7 @@ def outcome_figure(
     y_label: str,
     title: str = "",
     ax: Axes | None = None,
-    figsize: tuple[float, float] = (5.4, 4.2),
+    figsize: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw which of up to six outcomes each point of a grid has.
 
@@ -46,8 +46,8 @@ def outcome_figure(
         Texts.
     ax : matplotlib.axes.Axes, optional
         Where to draw.
-    figsize : (float, float)
-        Width and height of a new figure, inches.
+    figsize : (float, float), optional
+        Width and height of a new figure, inches; by default 5.4 by 4.2.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def outcome_figure(
     from matplotlib.patches import Patch
 
     count = len(meanings)
-    with figure_for(ax, figsize) as figure:
+    with figure_for(ax, figsize or (5.4, 4.2)) as figure:
         axes = ax or figure.add_subplot()
         axes.pcolormesh(
             x,

@@ -13,7 +13,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def motion_figure(*, time: Floats, acceleration_g: Floats, title: str = "", ax: Axes | None = None) -> Figure:
+def motion_figure(
+    *,
+    time: Floats,
+    acceleration_g: Floats,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Figure:
     """Draw a ground acceleration over time.
 
     Parameters
@@ -24,6 +31,8 @@ def motion_figure(*, time: Floats, acceleration_g: Floats, title: str = "", ax: 
         Title of the axes.
     ax : matplotlib.axes.Axes, optional
         Where to draw; by default in a new figure.
+    figsize : (float, float), optional
+        Width and height of a new figure, inches; by default 7 by 2.4.
 
     Returns
     -------
@@ -36,7 +45,7 @@ def motion_figure(*, time: Floats, acceleration_g: Floats, title: str = "", ax: 
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_xlim()
     ('time (s)', (np.float64(0.0), np.float64(1.0)))
     """
-    with figure_for(ax, (7.0, 2.4)) as figure:
+    with figure_for(ax, figsize or (7.0, 2.4)) as figure:
         axes = ax or figure.add_subplot()
         axes.axhline(0.0, color=INK, linewidth=0.4)
         axes.plot(time, acceleration_g, color=GROUND, linewidth=0.8)

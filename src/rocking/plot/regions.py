@@ -29,7 +29,7 @@ _OVERTURNS: Final = (
 )
 
 #: Share of the frame below which nobody sees a region.
-_LEAST_SEEN: Final = 1e-4
+_LEAST_SEEN: Final = 1e-3
 
 
 def regions_figure(
@@ -43,7 +43,7 @@ def regions_figure(
     y_label: str,
     title: str = "",
     ax: Axes | None = None,
-    figsize: tuple[float, float] = (5.6, 4.6),
+    figsize: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw regions between boundaries that are known at some abscissae.
 
@@ -64,8 +64,8 @@ def regions_figure(
         Texts.
     ax : matplotlib.axes.Axes, optional
         Where to draw.
-    figsize : (float, float)
-        Width and height of a new figure, inches.
+    figsize : (float, float), optional
+        Width and height of a new figure, inches; by default 5.6 by 4.6.
 
     Notes
     -----
@@ -92,7 +92,7 @@ def regions_figure(
         for region, below, above in zip(inside, curves, curves[1:], strict=False):
             polygons.setdefault(region, []).append(np.concatenate([below, above[::-1]]))
         lines += curves[1:-1]
-    with figure_for(ax, figsize) as figure:
+    with figure_for(ax, figsize or (5.6, 4.6)) as figure:
         axes = ax or figure.add_subplot()
         for region, corners in polygons.items():
             colour, hatch = _look(region)

@@ -65,7 +65,7 @@ def response_figure(
     units: RotationUnits = "slenderness",
     title: str = "",
     ax: Axes | None = None,
-    figsize: tuple[float, float] = (7.0, 4.4),
+    figsize: tuple[float, float] | None = None,
 ) -> Figure:
     r"""Draw a response above the ground motion that caused it.
 
@@ -99,8 +99,8 @@ def response_figure(
         Title of the figure.
     ax : matplotlib.axes.Axes, optional
         Draw the rotation here, without the other panels.
-    figsize : (float, float)
-        Width and height of a new figure, inches.
+    figsize : (float, float), optional
+        Width and height of a new figure, inches; by default 7 by 4.4.
 
     Returns
     -------
@@ -122,14 +122,14 @@ def response_figure(
     scale = _scale(units, slenderness)
     drawn = scale.of(rotation)
     zoom = chattering if ax is None and chattering and _can_be_zoomed(chattering) else None
-    with figure_for(ax, figsize) as figure:
+    with figure_for(ax, figsize or (7.0, 4.4)) as figure:
         main, motion, sequence = _panels(figure, ax, shaken=motion_time.size > 0, zoomed=zoom is not None)
         _shade_rest(main, np.clip(rest_intervals, *shown))
         _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])))
         _add_degrees(main, scale, units)
         _mark_impacts(main, _within(impact_times, shown), _within(uplift_times, shown))
         if overturn_time is not None:
-            _mark_overturning(main, time, drawn, overturn_time)
+            _mark_overturning(main, drawn, overturn_time)
         main.set_xlim(*shown)
         if motion is not None:
             _draw_motion(motion, motion_time, motion_acceleration_g, thresholds_g)
@@ -228,24 +228,19 @@ def _mark_impacts(axes: Axes, impact_times: Floats, uplift_times: Floats) -> Non
         )
 
 
-def _mark_overturning(axes: Axes, time: Floats, drawn: Floats, overturn_time: float) -> None:
-    """Put an arrow where the curve leaves the frame for good, or at its end, and the time of the fall beside it."""
-    low, high = axes.get_ylim()
-    upwards = bool(drawn[-1] > 0.0)
-    last = int(np.flatnonzero((drawn >= low) & (drawn <= high))[-1])
-    at, level = float(time[last]), float(np.clip(drawn[-1], low, high))
-    axes.plot(at, level, "^" if upwards else "v", color=ABOVE, markersize=6, clip_on=False, label="_overturning")
-    left = at < 0.5 * (time[0] + time[-1])
-    axes.annotate(
-        f"overturned at {overturn_time:.3f} s",
-        # Above the marks of the impacts.
-        (at, 0.98 if upwards else 0.2),
-        xycoords=axes.get_xaxis_transform(),
-        xytext=(7 if left else -7, 0),
-        textcoords="offset points",
-        ha="left" if left else "right",
-        va="top" if upwards else "bottom",
+def _mark_overturning(axes: Axes, drawn: Floats, overturn_time: float) -> None:
+    """Put a cross at the time of the fall: where the curve ends, or at the edge of the frame that it has left."""
+    axes.plot(
+        overturn_time,
+        float(np.clip(drawn[-1], *axes.get_ylim())),
+        "X",
         color=ABOVE,
+        markersize=7,
+        markeredgecolor="white",
+        markeredgewidth=0.5,
+        clip_on=False,
+        zorder=4,
+        label=f"overturned at {overturn_time:.3f} s",
     )
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import figure_for
+from rocking.plot.canvas import add_title, figure_for, magnified
 from rocking.plot.style import ABOVE, GROUND, INK
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 _FIRST_CYCLES: Final = 5
 _LAST_CYCLES: Final = 5
 
+#: Intervals shorter than this share of a detail have no name in it.
+_NARROW: Final = 0.1
+
 
 class Ratios(NamedTuple):
     """Ratios of intervals of one sequence, their limit, and what to write above them."""
@@ -28,7 +32,9 @@ class Ratios(NamedTuple):
     title: str
 
 
-def chattering_figure(*, time: Floats, rotation: Floats, impact_times: Floats, rest: float, late_impact: int) -> Figure:
+def chattering_figure(
+    *, time: Floats, rotation: Floats, impact_times: Floats, rest: float, late_impact: int, title: str
+) -> Figure:
     """Draw a chattering sequence (a) with details of its first cycles (b) and of late ones (c).
 
     Parameters
@@ -41,32 +47,34 @@ def chattering_figure(*, time: Floats, rotation: Floats, impact_times: Floats, r
         Time of rest.
     late_impact : int
         Index into the impacts at which the second detail starts.
+    title : str
+        Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    with figure_for(None, (7.0, 4.8)) as figure:
+    with figure_for(None, (7.0, 5.0)) as figure:
         grid = figure.add_gridspec(2, 2)
         whole, first, last = (figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1]))
+        add_title(figure, None, title)
         _draw_whole(whole, time, rotation, impact_times, rest)
-        _draw_cycles(first, time, 1e3 * rotation, np.append(0.0, impact_times[:_FIRST_CYCLES]), 0)
+        early = np.append(0.0, impact_times[:_FIRST_CYCLES])
+        _draw_cycles(first, time, rotation, early, 0)
         first.set_title("(b) first cycles", loc="left")
         first.set_xlabel(r"time since uplift, $\tau$")
-        origin = impact_times[late_impact]
-        scale = 1e3
-        chosen = scale * (impact_times[late_impact : late_impact + _LAST_CYCLES + 1] - origin)
-        magnified = 10.0 ** np.ceil(-np.log10(np.max(np.abs(rotation[time > origin]))))
-        _draw_cycles(last, scale * (time - origin), magnified * rotation, chosen, late_impact + 1)
+        late = impact_times[late_impact : late_impact + _LAST_CYCLES + 1]
+        scale, power = magnified(float(late[-1] - late[0]))
+        _draw_cycles(last, scale * (time - late[0]), rotation, scale * (late - late[0]), late_impact + 1)
         last.set_title(rf"(c) cycles after impact {late_impact + 1}", loc="left")
-        last.set_xlabel(rf"$10^3\,(\tau - \tau_{{{late_impact + 1}}})$")
-        last.set_ylabel(rf"rotation, $10^{{{np.log10(magnified):.0f}}}\,\phi$")
+        last.set_xlabel(rf"{power}$(\tau - \tau_{{{late_impact + 1}}})$")
     return figure
 
 
 def _draw_whole(axes: Axes, time: Floats, rotation: Floats, impact_times: Floats, rest: float) -> None:
+    scale, power = magnified(float(np.max(np.abs(rotation))))
     axes.axhline(0.0, color=INK, linewidth=0.4)
-    axes.plot(time, 1e3 * rotation, color=INK, linewidth=0.9)
+    axes.plot(time, scale * rotation, color=INK, linewidth=0.9)
     axes.plot(
         impact_times,
         np.full(impact_times.size, 0.06),
@@ -90,25 +98,52 @@ def _draw_whole(axes: Axes, time: Floats, rotation: Floats, impact_times: Floats
     _pad(axes, below=0.18)
     axes.set_title("(a) the whole sequence, with its impacts as ticks", loc="left")
     axes.set_xlabel(r"time since uplift, $\tau$")
-    axes.set_ylabel(r"rotation, $10^3\,\phi$")
+    axes.set_ylabel(rf"rotation, {power}$\phi$")
 
 
 def _draw_cycles(axes: Axes, time: Floats, rotation: Floats, impacts: Floats, number: int) -> None:
-    """Draw the stretch between the given impacts, which are numbered from `number` on."""
+    """Draw the stretch between the given impacts, which are numbered from `number` on, with the intervals."""
     margin = 0.06 * (impacts[-1] - impacts[0])
     shown = (time >= impacts[0] - margin) & (time <= impacts[-1] + margin)
+    scale, power = magnified(float(np.max(np.abs(rotation[(time >= impacts[0]) & (time <= impacts[-1])]))))
     axes.axhline(0.0, color=INK, linewidth=0.4)
-    axes.plot(time[shown], rotation[shown], color=INK, linewidth=1.0)
+    axes.plot(time[shown], scale * rotation[shown], color=INK, linewidth=1.0)
     axes.plot(impacts, np.zeros(impacts.size), "o", color=INK, markersize=3.4, markerfacecolor="white")
     axes.set_xlim(impacts[0] - margin, impacts[-1] + margin)
     low, high = axes.get_ylim()
+    span = high - low
     # Neighbours lie close together: their labels stand above the curve, at two heights.
-    axes.set_ylim(low, high + 0.4 * (high - low))
+    axes.set_ylim(low - 0.24 * span, high + 0.4 * span)
     for k, at in enumerate(impacts):
-        height = high + (0.16 if k % 2 else 0.3) * (high - low)
-        axes.plot([at, at], [0.0, height], color=GROUND, linewidth=0.6, zorder=0)
+        height = high + (0.16 if k % 2 else 0.3) * span
+        axes.plot([at, at], [low - 0.08 * span, height], color=GROUND, linewidth=0.6, zorder=0)
         axes.annotate(rf"$\tau_{{{number + k}}}$", (at, height), ha="center", va="bottom")
-    axes.set_ylabel(r"rotation, $10^3\,\phi$")
+    _draw_intervals(axes, impacts, number, low - 0.05 * span)
+    axes.set_ylabel(rf"rotation, {power}$\phi$")
+
+
+def _draw_intervals(axes: Axes, impacts: Floats, number: int, height: float) -> None:
+    """Draw an arrow from impact to impact, where there is room for its name."""
+    for k, (start, end) in enumerate(itertools.pairwise(impacts)):
+        if end - start < _NARROW * (impacts[-1] - impacts[0]):
+            continue
+        arrow = {
+            "arrowstyle": "<->",
+            "linewidth": 0.6,
+            "color": INK,
+            "shrinkA": 0.0,
+            "shrinkB": 0.0,
+            "mutation_scale": 6,
+        }
+        axes.annotate("", (end, height), (start, height), arrowprops=arrow)
+        axes.annotate(
+            rf"$\Delta\tau_{{{number + k}}}$",
+            (0.5 * (start + end), height),
+            xytext=(0, -2),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+        )
 
 
 def ratio_figure(panels: Sequence[Ratios]) -> Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -21,6 +21,15 @@ _FEW: Final = 2
 
 #: So many curves leave room for all of their fractiles.
 _WITH_ALL_FRACTILES: Final = 2
+
+#: Widths of the lines of up to two motions, of the fractile nearest to the median, and of the others.
+_WIDTHS: Final = (1.6, 0.7)
+_MIDDLE: Final = 1.8
+_OTHER: Final = 0.9
+
+#: What is written of each decade of sizes, where there is less than one, and where there are more.
+_DIGITS: Final = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+_FEW_DIGITS: Final = (1.0, 2.0, 5.0)
 
 
 class SpectrumCurves(NamedTuple):
@@ -46,7 +55,7 @@ def spectrum_figure(
     x_label: str,
     title: str = "",
     ax: Axes | None = None,
-    figsize: tuple[float, float] = (5.6, 4.8),
+    figsize: tuple[float, float] | None = None,
 ) -> Figure:
     r"""Draw peak rotations against the size of the block, and below them the share of motions that overturn it.
 
@@ -65,8 +74,8 @@ def spectrum_figure(
         Texts.
     ax : matplotlib.axes.Axes, optional
         Draw the peak rotations here, without the shares.
-    figsize : (float, float)
-        Width and height of a new figure, inches.
+    figsize : (float, float), optional
+        Width and height of a new figure, inches; by default 5.6 by 4.8.
 
     Examples
     --------
@@ -78,12 +87,12 @@ def spectrum_figure(
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['peak rotation / slenderness', 'share\noverturned']
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
-    ['tall', 'each of 3 motions', 'fractiles of all']
+    ['tall', 'each of 3 motions', 'median']
     """
     few = len(motions) <= _FEW
-    middle = min(fractiles, key=lambda share: abs(share - 0.5))
+    middle = _middle(fractiles)
     chosen = {share: k for k, share in enumerate(fractiles) if share == middle or len(curves) <= _WITH_ALL_FRACTILES}
-    with figure_for(ax, figsize) as figure:
+    with figure_for(ax, figsize or (5.6, 4.8)) as figure:
         panels = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0)).tolist() if ax is None else [ax]
         peaks, *shares = panels
         for style, curve in zip(CURVES, curves, strict=False):
@@ -95,19 +104,15 @@ def spectrum_figure(
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
         for panel in panels:
             panel.grid(which="both")
-        _scale_sizes(panels[-1])
+        _scale_sizes(panels[-1], x)
         peaks.set_ylim(bottom=0.0)
         add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
         for panel in shares:
             panel.set_ylim(-0.03, 1.03)
             add_labels(panel, x_label, "share overturned")
         add_title(figure, ax, title)
-        add_legend(figure, ax, _handles(curves, motions))
+        add_legend(figure, ax, _handles(curves, motions, chosen))
     return figure
-
-
-#: Widths of the lines of up to two motions.
-_WIDTHS: Final = (1.6, 0.7)
 
 
 def _draw_named(axes: Axes, x: Floats, curve: SpectrumCurves, style: dict[str, Any]) -> None:
@@ -122,30 +127,11 @@ def _draw_family(
     for single in curve.singles:
         axes.plot(x, _cut(single), color=style["color"], linewidth=0.5, alpha=0.35)
     for share, row in fractiles.items():
-        thick = share == min(fractiles, key=lambda one: abs(one - 0.5))
-        axes.plot(x, _cut(curve.fractiles[row]), linewidth=1.8 if thick else 0.9, **style)
-        _label_fractile(axes, x, curve.fractiles[row], share, style["color"])
+        axes.plot(x, _cut(curve.fractiles[row]), linewidth=_MIDDLE if share == _middle(fractiles) else _OTHER, **style)
 
 
-def _label_fractile(axes: Axes, x: Floats, fractile: Floats, share: float, colour: str) -> None:
-    """Name a fractile where its longest stretch ends: the smallest blocks, where fractiles are furthest apart."""
-    ends = np.flatnonzero(np.diff(np.isfinite(fractile), prepend=False, append=False))
-    if not ends.size:
-        return
-    starts, lengths = ends[::2], ends[1::2] - ends[::2]
-    longest = np.argmax(lengths)
-    top = starts[longest] + lengths[longest] - 1
-    axes.annotate(
-        "median" if share == 0.5 else f"{100 * share:g} %",
-        (x[top], fractile[top]),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha="center",
-        va="bottom",
-        color=colour,
-        fontsize="small",
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.8},
-    )
+def _middle(fractiles: Iterable[float]) -> float:
+    return min(fractiles, key=lambda share: abs(share - 0.5))
 
 
 def _cut(values: Floats) -> Floats:
@@ -153,16 +139,18 @@ def _cut(values: Floats) -> Floats:
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _scale_sizes(axes: Axes) -> None:
+def _scale_sizes(axes: Axes, x: Floats) -> None:
+    """Scale an axis logarithmically, with as many numbers as there is room for."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
+    decades = float(np.log10(x[-1] / x[0])) if x.size > 1 else 0.0
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_locator(LogLocator(subs=_DIGITS if decades < 1.0 else _FEW_DIGITS))
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str]) -> list[Line2D]:
+def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles: Iterable[float]) -> list[Line2D]:
     from matplotlib.lines import Line2D
 
     each = [
@@ -171,8 +159,14 @@ def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str]) -> list[L
     if len(motions) <= _FEW:
         named = zip(motions, _WIDTHS, strict=False)
         return each + [Line2D([], [], color=INK, linewidth=width, label=name) for name, width in named]
-    return [
-        *each,
-        Line2D([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions"),
-        Line2D([], [], color=GROUND, linewidth=1.8, label="fractiles of all"),
-    ]
+    each.append(Line2D([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions"))
+    middle = _middle(fractiles)
+    others = ", ".join(f"{100 * share:g}" for share in sorted(fractiles) if share != middle)
+    each.append(Line2D([], [], color=INK, linewidth=_MIDDLE, label=_named(f"{100 * middle:g}")))
+    if others:
+        each.append(Line2D([], [], color=INK, linewidth=_OTHER, label=_named(others)))
+    return each
+
+
+def _named(percent: str) -> str:
+    return "median" if percent == "50" else f"{percent} % of the motions are below"

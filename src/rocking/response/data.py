@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from rocking import checks
+from rocking import checks, tables
 from rocking.arrays import Floats
-from rocking.errors import InvalidOption, OutputError
+from rocking.errors import InvalidOption
 from rocking.response.history import History, even_times
 from rocking.tables import named, rows_of, write_text
 
@@ -30,6 +30,9 @@ _UNITS: Final[dict[str, dict[str, str]]] = {
     "chattering": {"start": "s", "end": "s", "lower": "s", "upper": "s", "impacts": "1"},
 }
 _DIMENSIONS: Final = {"events": "event", "impacts": "impact", "chattering": "sequence"}
+
+#: Points that a computer's memory holds.
+_MOST_POINTS: Final = 50_000_000
 
 #: Points of a history whose motion has no step of its own.
 _POINTS: Final = 2000
@@ -74,11 +77,7 @@ def write_csv(response: Response, path: str | Path, table: Table, dt: float | No
 
 def write_netcdf(response: Response, path: str | Path, dt: float | None) -> None:
     """Write the dataset as a NetCDF file."""
-    whole = dataset(response, dt)
-    try:
-        whole.to_netcdf(path, engine="h5netcdf")
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
+    tables.write_netcdf(path, dataset(response, dt))
 
 
 def records(response: Response, table: Table) -> list[dict[str, Any]]:
@@ -92,11 +91,14 @@ def records(response: Response, table: Table) -> list[dict[str, Any]]:
 def _histories(response: Response, times: Floats) -> dict[str, tuple[Floats, str]]:
     states = History(response.trail, response.duration).states(times)
     ground = np.zeros_like(times) if response.motion is None else response.motion.acceleration(times)
-    return {
+    histories = {
         "rotation": (states[:, 0], "rad"),
         "angular_velocity": (states[:, 1], "rad/s"),
         "ground_acceleration": (ground, "m/s^2"),
     }
+    if response.motion is not None and response.motion.vertical is not None:
+        histories["vertical_ground_acceleration"] = (response.motion.vertical.acceleration(times), "m/s^2")
+    return histories
 
 
 def _axis(response: Response, dt: float | None) -> Floats:
@@ -104,7 +106,12 @@ def _axis(response: Response, dt: float | None) -> Floats:
         step = None if response.motion is None else response.motion.step
         # A pulse of a few straight lines has a step, too, that shows nothing.
         dt = step if step and step <= 0.01 * response.duration else max(response.duration, 1e-3) / _POINTS
-    return even_times(response.duration, checks.positive(dt, "dt", InvalidOption, "s"))
+    step = checks.positive(dt, "dt", InvalidOption, "s")
+    if response.duration > _MOST_POINTS * step:
+        raise InvalidOption(
+            f"dt = {step:g} s makes more than {_MOST_POINTS:,} points of {response.duration:g} s; take a longer step"
+        )
+    return even_times(response.duration, step)
 
 
 def _attributes(response: Response) -> dict[str, Any]:
@@ -120,6 +127,8 @@ def _attributes(response: Response) -> dict[str, Any]:
         "model": response.model,
         "chattering_treatment": repr(response.treatment),
         "overturned": int(response.overturned),
+        "unfinished": int(response.unfinished),
+        "stopped": int(response.stopped),
         named("overturn_time", "s"): response.overturn_time,
         named("peak_rotation", "rad"): response.peak_rotation,
         named("peak_time", "s"): response.peak_time,

@@ -23,7 +23,12 @@ _EVEN_TIMES: Final = 4001
 
 
 def figure(
-    response: Response, units: RotationUnits, window: tuple[float, float] | None, chattering: bool, ax: Axes | None
+    response: Response,
+    units: RotationUnits,
+    window: tuple[float, float] | None,
+    chattering: bool,
+    ax: Axes | None,
+    figsize: tuple[float, float] | None,
 ) -> Figure:
     """Draw the rotation over the ground motion, from the window's start to its end."""
     from rocking.plot import DrawnSequence, response_figure
@@ -50,8 +55,9 @@ def figure(
         duration=response.duration,
         chattering=None if sequence is None else DrawnSequence(*sequence),
         units=units,
-        title=f"{response.block.description} under {'no motion' if motion is None else motion.name}",
+        title=f"{response.block.description} under {'no motion' if motion is None else motion.label}",
         ax=ax,
+        figsize=figsize,
     )
 
 

@@ -16,6 +16,7 @@ from rocking.block import Block
 from rocking.contact import contact_forces
 from rocking.errors import InvalidOption
 from rocking.kernels import state
+from rocking.kernels.ground import components
 from rocking.motion import piecewise
 from rocking.response.history import History, bisected
 
@@ -101,21 +102,24 @@ class Contact:
 
     def _forces_in(self, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
         """Compute the forces in the steps that start at these rows: on the side and under the piece of each."""
-        nodes = self.history.trail.nodes[rows]
         theta, rate, acceleration = self.history.states_in(times, rows).T
-        side = np.maximum(nodes["side"], 0)
+        leaning = self.history.trail.nodes["side"][rows]
+        side = np.maximum(leaning, 0)
         alpha = np.array([s.alpha for s in self.block.sides])[side]
         radius = np.array([s.radius for s in self.block.sides])[side]
-        sign = np.where(nodes["side"] == state.AT_REST, 0.0, 1.0 - 2.0 * side)
-        ground = self._ground_in(times, nodes)
+        at_rest = leaning == state.AT_REST
+        sign = np.where(at_rest, 0.0, 1.0 - 2.0 * side)
+        ground = self._ground_in(times, rows, at_rest)
         return contact_forces((theta, rate, acceleration), ground, sign, alpha, radius / self.block.gravity)
 
-    def _ground_in(self, times: Floats, nodes: state.Records) -> Floats:
-        """Ground acceleration in g: in the piece where a step starts; at rest, which may span many, wherever it is."""
-        pieces = self.history.trail.ground.pieces
-        anywhere = np.maximum(np.searchsorted(pieces[:, 0], times, side="right") - 1, 0)
-        piece = np.where(nodes["side"] == state.AT_REST, anywhere, nodes["piece"])
-        return piecewise.value(pieces[piece, 2:], np.maximum(times - pieces[piece, 0], 0.0))
+    def _ground_in(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
+        """Both ground accelerations in g: in the piece where a step starts; at rest, which may span many, anywhere."""
+        ground = self.history.trail.ground
+        anywhere = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
+        piece = np.where(at_rest, anywhere, self.history.trail.nodes["piece"][rows])
+        elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
+        push, *lift = (piecewise.value(coefficients, elapsed) for coefficients in components(ground, piece))
+        return push, lift[0] if lift else np.zeros_like(push)
 
     def _samples(self) -> tuple[Floats, Integers]:
         """Sample every step, and at rest every piece of the motion, ends included and in order; with their steps."""

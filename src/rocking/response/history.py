@@ -58,7 +58,7 @@ class History:
         return np.column_stack([nodes["time"][rows], after[rows]])
 
     def tipping_time(self, slenderness: tuple[float, float]) -> float:
-        """Last time, s, at which a block that overturns passes its balance point on the way out.
+        """Last time, s, at which a block passes its balance point on the way out; NaN if it ends within it.
 
         Parameters
         ----------
@@ -66,12 +66,16 @@ class History:
             Of side + and side -, rad.
         """
         nodes = self.trail.nodes
+        if nodes["side"][-1] == state.AT_REST:
+            return math.nan
         last_arc = nodes[np.flatnonzero(nodes["u"] == 0.0)[-1] if np.any(nodes["u"] == 0.0) else 0 :]
         balance = slenderness[int(nodes["side"][-1])]
 
         def is_beyond(time: float) -> bool:
             return bool(abs(self.states(time)[0]) >= balance)
 
+        if not is_beyond(self.end):
+            return math.nan
         ends = last_arc["time"]
         times = (ends[:-1, None] + np.linspace(0.0, 1.0, _LOOKS) * np.diff(ends)[:, None]).ravel()
         within = np.flatnonzero(np.abs(self.states(times)[:, 0]) < balance)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -144,13 +145,26 @@ class Response:
         return self.peak_rotation / self.block.sides[0 if leaning > 0.0 else 1].alpha
 
     @property
-    def tipping_time(self) -> float:
-        """Last time, s, at which a block that overturns passes its balance point, |theta| = alpha; NaN if it does not.
+    def moves_at_end(self) -> bool:
+        """Whether the block is not at rest at the end of the response."""
+        return bool(self.trail.nodes["side"][-1] != state.AT_REST)
 
-        From then on it only falls.
+    @property
+    def stopped(self) -> bool:
+        """Whether `duration` ended the simulation before a verdict: the block still moved, or the motion went on.
+
+        What became of the block is then not known, and `overturned` says no more than "not by then".
         """
-        if not self.overturned:
-            return math.nan
+        over = self.motion is None or self.duration >= self.motion.duration
+        return not (self.overturned or self.unfinished) and (self.moves_at_end or not over)
+
+    @property
+    def tipping_time(self) -> float:
+        """Last time, s, at which the block passes its balance point, |theta| = alpha; NaN if it ends within it.
+
+        From then on a block that overturns only falls; one that is beyond it where the simulation was `stopped` may yet
+        be caught by the motion.
+        """
         plus, minus = self.block.sides
         return self._history.tipping_time((plus.alpha, minus.alpha))
 
@@ -222,7 +236,7 @@ class Response:
         """Friction coefficient that sticking needs at any time; infinite where the normal force is not positive."""
         return friction_demand(*self._contact.forces(time))
 
-    @property
+    @cached_property
     def required_friction(self) -> float:
         """Largest friction coefficient that sticking needs, between impacts and until the block tips (`tipping_time`).
 
@@ -230,7 +244,7 @@ class Response:
         """
         return self._contact.largest(friction_demand)
 
-    @property
+    @cached_property
     def minimum_normal_force(self) -> float:
         """Smallest normal force over the weight, between impacts and until the block tips (`tipping_time`)."""
         return -self._contact.largest(_pull)
@@ -263,7 +277,7 @@ class Response:
         level = checks.positive(friction, "friction", InvalidOption)
         return self._contact.first(friction_demand, lambda demand: demand > level)
 
-    @property
+    @cached_property
     def lift_off_time(self) -> float:
         """First time, s, at which the normal force is no longer positive, so that the base would leave the ground.
 
@@ -273,7 +287,12 @@ class Response:
 
     @property
     def _contact(self) -> Contact:
-        return Contact(self._history, self.block, self.tipping_time if self.overturned else self.duration)
+        return Contact(self._history, self.block, self._end_of_contact)
+
+    @property
+    def _end_of_contact(self) -> float:
+        """Time up to which contact is looked at, s: until the block tips, or to the end."""
+        return self.duration if math.isnan(self.tipping_time) else self.tipping_time
 
     def summary(self, friction: float | None = None) -> str:
         """Return what happened in words, line by line, as ``rocking simulate`` prints it.
@@ -287,7 +306,8 @@ class Response:
         -----
         What drives the block (the motion, or the initial state) is taken to be known to a millionth of itself, about
         what the usual record formats print. Times and the peak are given without the digits that so small a change of
-        it moves, by `sensitivity`, and with nine decimals and six digits at most.
+        it moves, by `sensitivity`, and with nine decimals and six digits at most; a change of a time by a millisecond
+        or more is told with it, after +-.
 
         Examples
         --------
@@ -407,6 +427,7 @@ class Response:
         units: RotationUnits = "slenderness",
         window: tuple[float, float] | None = None,
         chattering: bool = False,
+        figsize: tuple[float, float] | None = None,
     ) -> Figure:
         """Figure of the rotation with impacts and rests, and of the motion with thresholds.
 
@@ -420,13 +441,15 @@ class Response:
             Stretch of time to draw, s; by default from a little before the first event to a little after the last.
         chattering : bool
             Whether to show the longest chattering sequence, impact by impact, in a panel of its own.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
 
         Raises
         ------
         InvalidOption
-            If there is no such unit, or the window is not a stretch of the response.
+            If there is no such unit, the window is not a stretch of the response, or the size is not one.
         """
-        return figure.figure(self, units, window, chattering, ax)
+        return figure.figure(self, units, window, chattering, ax, figsize)
 
 
 def _pull(_: Floats, vertical: Floats) -> Floats:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking.response import data
+from rocking.response.verdict import in_words
 from rocking.tables import named, plain
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ KNOWN: Final = 1e-6
 #: Events that a summary lists.
 _LISTED: Final = 12
 _MOST_DECIMALS, _MOST_DIGITS = 9, 6
+
+#: From so much on, s, the unknown part of a time is told with it.
+_TOLD: Final = 1e-3
 
 
 def text(response: Response, friction: float | None) -> str:
@@ -40,15 +44,17 @@ def text(response: Response, friction: float | None) -> str:
         *_contact_lines(response, friction),
         ("verdict", _verdict(response, known)),
     ]
+    if any(" +- " in entry for _, entry in lines):
+        lines.append(("+-", "what a millionth more or less of what drives the block changes"))
     return "\n".join(f"{name:<20}{entry}" for name, entry in lines)
 
 
 def line(response: Response) -> str:
     """Return what happened, in one line."""
-    shaken = "no motion" if response.motion is None else response.motion.name
+    shaken = "no motion" if response.motion is None else response.motion.label
     peak = "" if response.overturned else f", peak {response.peak_over_slenderness:.4f} of the slenderness"
     return (
-        f"{response.block.description} under {shaken}: {_outcome(response, f'{response.overturn_time:.4f} s')}{peak}; "
+        f"{response.block.description} under {shaken}: {in_words(response, f'{response.overturn_time:.4f} s')}{peak}; "
         f"{len(response.events)} events, {len(response.impacts)} impacts resolved, {response.duration:.5g} s"
     )
 
@@ -72,11 +78,14 @@ def values(response: Response, friction: float | None) -> dict[str, Any]:
                 named("duration", "s"): motion.duration,
                 named("pga", "m/s^2"): motion.pga,
                 "history": motion.history,
+                "vertical": motion.vertical
+                and {"name": motion.vertical.name, named("pga", "m/s^2"): motion.vertical.pga},
             },
             "model": response.model,
             "chattering_treatment": repr(response.treatment),
             "overturned": response.overturned,
             "unfinished": response.unfinished,
+            "stopped": response.stopped,
             named("overturn_time", "s"): response.overturn_time,
             named("tipping_time", "s"): response.tipping_time,
             named("peak_rotation", "rad"): response.peak_rotation,
@@ -99,7 +108,7 @@ def values(response: Response, friction: float | None) -> dict[str, Any]:
 
 
 def time_text(time: float, change: float) -> str:
-    """Time in s, without the decimals that an unknown part `KNOWN` of what drives the block would change.
+    """Time in s, as far as it is known where what drives the block is known to `KNOWN` of itself.
 
     Parameters
     ----------
@@ -109,16 +118,21 @@ def time_text(time: float, change: float) -> str:
     Examples
     --------
     >>> time_text(230.726244377, 0.0), time_text(230.726244377, 3.0), time_text(230.726244377, 4e5)
-    ('230.726244377 s', '230.72624 s', '231 s')
+    ('230.726244377 s', '230.72624 s', '230.7 +- 0.4 s')
     """
-    return f"{time:.{_decimals(KNOWN * change)}f} s"
+    unknown = KNOWN * change
+    text = f"{time:.{_decimals(unknown)}f}"
+    if not unknown >= _TOLD:
+        return f"{text} s"
+    return f"{text} +- {unknown:.1g} s" if unknown < 0.5 * time else f"about {text} s"
 
 
 def _decimals(unknown: float) -> int:
-    """Decimals of a number of which so much is unknown."""
+    """Decimals of a number of which so much is unknown: of what is told, the one that is uncertain as well."""
     if not unknown > 0.0:
         return 0 if math.isnan(unknown) else _MOST_DECIMALS
-    return min(max(math.floor(-math.log10(unknown)), 0), _MOST_DECIMALS)
+    known = -math.log10(unknown)
+    return min(max(math.ceil(known) if unknown >= _TOLD else math.floor(known), 0), _MOST_DECIMALS)
 
 
 def _parameters(response: Response) -> str:
@@ -130,7 +144,11 @@ def _motion_text(response: Response) -> str:
     motion = response.motion
     if motion is None:
         return "none: free rocking"
-    return f"{motion.name}, {motion.duration:.2f} s, peak {motion.pga / response.block.gravity:.4f} g"
+    gravity = response.block.gravity
+    parts = [f"{motion.name}, {motion.duration:.2f} s, peak {motion.pga / gravity:.4f} g", *motion.history]
+    if motion.vertical is not None:
+        parts.append(f"vertical {motion.vertical.name}, peak {motion.vertical.pga / gravity:.4f} g")
+    return "; ".join(parts)
 
 
 def _event_lines(response: Response, known: Sensitivity) -> list[tuple[str, str]]:
@@ -138,13 +156,12 @@ def _event_lines(response: Response, known: Sensitivity) -> list[tuple[str, str]
     changes = known.driving()[1]
     lines = []
     for event, change in zip(response.events[:_LISTED], changes, strict=False):
-        decimals = _decimals(KNOWN * change)
-        entry = f"{event['time']:.{decimals}f} s"
+        entry = time_text(float(event["time"]), float(change))
         if event["kind"] == "uplift":
             entry += f", to side {'+' if event['side'] > 0 else '-'}"
         sequence = sequences.get(float(event["time"]))
         if event["kind"] == "rest" and sequence is not None:
-            entry += _bracket_text(sequence, min(decimals, 4))
+            entry += _bracket_text(sequence, min(_decimals(KNOWN * change), 4))
         lines.append((str(event["kind"]), entry))
     if len(response.events) > _LISTED:
         lines.append(("...", f"{len(response.events) - _LISTED} more events"))
@@ -188,22 +205,12 @@ def _sliding(response: Response, friction: float | None) -> dict[str, Any]:
 
 
 def _before_tipping(response: Response) -> str:
-    return f", until it tips at {response.tipping_time:.4f} s" if response.overturned else ""
-
-
-def _outcome(response: Response, overturn_time: str) -> str:
-    if response.overturned:
-        return f"overturns at {overturn_time}"
-    if len(response.events) == 0 and len(response.impacts) == 0:
-        return "does not move"
-    return "rocks and does not overturn"
+    return "" if math.isnan(response.tipping_time) else f", until it tips at {response.tipping_time:.4f} s"
 
 
 def _verdict(response: Response, known: Sensitivity) -> str:
     changes = known.driving()[1]
-    verdict = _outcome(response, time_text(response.overturn_time, changes[-1]) if response.overturned else "")
-    if response.unfinished:
-        verdict += f"; UNFINISHED: given up at {response.duration:.4f} s, after too many steps"
+    verdict = in_words(response, time_text(response.overturn_time, changes[-1]) if response.overturned else "")
     if response.stalled:
         verdict += f"; {response.stalled} rest(s) not proven"
     ambiguities = known.ambiguities(response.peak_rotation)

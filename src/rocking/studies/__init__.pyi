@@ -1,5 +1,22 @@
 from .file import TEMPLATE, StudyFile, read_study
+from .fragility import BlockFragilities
+from .report import FragilityPlan, ReportPlan, SpectrumPlan
 from .run import RunReport
-from .study import Status, Study, study
+from .spectrum import StudySpectrum
+from .study import Running, Status, Study, study
 
-__all__ = ["TEMPLATE", "RunReport", "Status", "Study", "StudyFile", "read_study", "study"]
+__all__ = [
+    "TEMPLATE",
+    "BlockFragilities",
+    "FragilityPlan",
+    "ReportPlan",
+    "RunReport",
+    "Running",
+    "SpectrumPlan",
+    "Status",
+    "Study",
+    "StudyFile",
+    "StudySpectrum",
+    "read_study",
+    "study",
+]

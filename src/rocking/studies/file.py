@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
-import inspect
 import itertools
 import re
 import tomllib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,10 +18,11 @@ from rocking import quantities
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import RockingError, StudyError, UnreadableRecord
-from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion
+from rocking.named_pulses import pulse_family
 from rocking.product import Product, Scales
+from rocking.studies.report import FragilityPlan, ReportPlan, SpectrumPlan
 from rocking.treatment import treatment
 
 TEMPLATE: Final = """\
@@ -53,6 +54,14 @@ polarity = "+"                  # or "-", "both"
 model = "nonlinear"             # or "linear"
 chattering = "certified"
 # duration = 40.0
+
+[report.fragility]              # what `rocking study report` makes; may be changed later
+measure = "pga"                 # pga, pgv, sa (with period, damping), pga_ratio, pgv_ratio
+limits = { overturning = inf }  # peak rotation over slenderness, as half = 0.5; inf: overturning
+blocks = "each"                 # a curve for each block; or "together": one for all
+
+# [report.spectrum]
+# fractiles = [0.16, 0.5, 0.84]
 """
 
 #: Keys of every table.
@@ -61,14 +70,13 @@ _KEYS: Final[Mapping[str, frozenset[str]]] = {
     "motions": frozenset({"records", "channel", "units", "dt", "skip_unreadable", "pulses"}),
     "scales": frozenset({"factor", "pga", "pgv", "sa", "period", "damping", "polarity"}),
     "simulation": frozenset({"model", "chattering", "duration"}),
+    "report": frozenset({"fragility", "spectrum"}),
 }
 
 _QUANTITIES: Final[Mapping[str, Callable[[str, str], float]]] = {
-    "alpha": quantities.angle,
-    "phase": quantities.angle,
+    "alpha": quantities.tilt,
     "pga": quantities.acceleration,
     "sa": quantities.acceleration,
-    "amplitude": quantities.acceleration,
 }
 
 
@@ -82,10 +90,13 @@ class StudyFile:
         Blocks, motions, scales and rules.
     skipped : tuple of str
         A sentence for each record that could not be read, where the file says to go on.
+    report : ReportPlan or None
+        What is to be made of the results.
     """
 
     product: Product
     skipped: tuple[str, ...]
+    report: ReportPlan | None
 
 
 def read_study(path: str | Path) -> StudyFile:
@@ -147,7 +158,29 @@ class _Reader:
             raise
         except RockingError as error:
             raise StudyError(f"{self.file}: {error}") from error
-        return StudyFile(product, tuple(skipped))
+        return StudyFile(product, tuple(skipped), self._report())
+
+    def _report(self) -> ReportPlan | None:
+        if "report" not in self.tables:
+            return None
+        plans: dict[str, Any] = {}
+        for name, kind in {"fragility": FragilityPlan, "spectrum": SpectrumPlan}.items():
+            given = self.tables["report"].get(name)
+            if given is None:
+                continue
+            table = f"report.{name}"
+            if not isinstance(given, dict):
+                raise self._wrong("report", name, f"{name} must be a table, [{table}]")
+            known = [each.name for each in fields(kind)]
+            for key in given:
+                if key not in known:
+                    raise self._wrong(table, key, f"[{table}] has no {key}; it takes {', '.join(known)}")
+            try:
+                plans[name] = kind(**given)
+            except RockingError as error:
+                key = next((key for key in given if key in str(error)), None)
+                raise self._wrong(table, key, str(error)) from None
+        return ReportPlan(**plans)
 
     def _check_keys(self) -> None:
         for table, content in self.tables.items():
@@ -217,48 +250,46 @@ class _Reader:
         return expanded(there)
 
     def _pulses(self, k: int, pulse: dict[str, Any]) -> list[Motion]:
-        family = str(pulse.pop("family", "")).replace("-", "_").replace(" ", "_")
-        make = getattr(pulses, family, None) if family in pulses.__all__ else None
-        if make is None:
-            raise self._wrong("motions.pulses", "family", f"family must be one of {', '.join(pulses.__all__)}", k)
-        words = {name: value for name, value in pulse.items() if name in _WORDS}
-        axes = {
-            name: self._numbers("motions.pulses", name, value) for name, value in pulse.items() if name not in _WORDS
-        }
-        made = []
-        for values in itertools.product(*axes.values()):
-            numbers = dict(zip(axes, (float(value) for value in values), strict=True))
-            try:
-                inspect.signature(make).bind(**numbers, **words)
-                made.append(make(**numbers, **words))
-            except TypeError as error:
-                raise self._wrong(
-                    "motions.pulses", "family", f"the pulse {family} is not complete: {error}", k
-                ) from None
-        return made
+        with self._line_told("motions.pulses", "family", k):
+            family = pulse_family(str(pulse.pop("family", "")))
+        axes: dict[str, Sequence[Any] | Floats] = {}
+        for key, value in pulse.items():
+            with self._line_told("motions.pulses", key, k):
+                quantity = family.quantity(key)
+                axes[key] = [value] if quantity is None else _read(key, value, quantity)
+        with self._line_told("motions.pulses", "family", k):
+            return [family.motion(dict(zip(axes, values, strict=True))) for values in itertools.product(*axes.values())]
 
     def _numbers(self, table: str, key: str, value: Any) -> Floats:
-        """Numbers of a key: one, a list, or a range."""
-        quantity = _QUANTITIES.get(key, quantities.number)
+        with self._line_told(table, key):
+            return _read(key, value, _QUANTITIES.get(key, quantities.number))
+
+    @contextlib.contextmanager
+    def _line_told(self, table: str, key: str, occurrence: int = 0) -> Iterator[None]:
+        """Give a mistake the line of the key that it is in."""
         try:
-            if isinstance(value, str):
-                return quantities.values(value, key, quantity)
-            each = value if isinstance(value, list) else [value]
-            return np.array([quantity(one if isinstance(one, str) else repr(one), key) for one in each])
+            yield
         except RockingError as error:
-            raise self._wrong(table, key, str(error)) from None
+            raise self._wrong(table, key, str(error), occurrence) from None
 
     def _wrong(self, table: str | None, key: str | None, sentence: str, occurrence: int = 0) -> StudyError:
         return StudyError(f"{self.file}, line {_line(self.text, table, key, occurrence)}: {sentence}")
 
 
 _OSCILLATOR: Final = ("period", "damping")
-_WORDS: Final = ("kind", "name")
+
+
+def _read(key: str, value: Any, quantity: quantities.Quantity) -> Floats:
+    """Numbers of a value: one, a list, or a range."""
+    if isinstance(value, str):
+        return quantities.values(value, key, quantity)
+    each = value if isinstance(value, list) else [value]
+    return np.array([quantity(one if isinstance(one, str) else repr(one), key) for one in each])
 
 
 def _cell(table: Path, line: int, name: str, text: str) -> float:
     try:
-        return (quantities.angle if name == "alpha" else quantities.number)(text, name)
+        return (quantities.tilt if name == "alpha" else quantities.number)(text, name)
     except RockingError as error:
         raise StudyError(f"{table}, line {line}: {error}") from None
 
@@ -271,6 +302,8 @@ def _line(text: str, table: str | None, key: str | None, occurrence: int) -> int
         if heading:
             here = heading[1]
             seen += here == table
+            if key is not None and here == f"{table}.{key}":
+                return number
             if here == table and seen == occurrence:
                 heading_line = number
         found = re.match(r"\s*([\w.-]+)\s*=", line)

@@ -51,7 +51,7 @@ def from_bytes(data: bytes) -> Product:
         words = json.loads(_words(arrays["words"]))
         return Product(
             blocks=_blocks(arrays),
-            motions=tuple(_motion(arrays, k) for k in range(words["motions"])),
+            motions=tuple(_motion(arrays, f"motions/{k}") for k in range(words["motions"])),
             scales=Scales(words["measure"], arrays["scales/values"], words["options"]),
             polarity=words["polarity"],
             model=words["model"],
@@ -116,22 +116,26 @@ def _motion_arrays(motion: Motion) -> dict[str, NDArray[Any]]:
         "history": motion.history,
         "error": motion.error,
     }
-    return {
+    arrays: dict[str, NDArray[Any]] = {
         "breakpoints": motion.breakpoints,
         "coefficients": motion.coefficients,
         "words": _text(json.dumps(words)),
     }
+    if motion.vertical is not None:
+        arrays |= {f"vertical/{name}": values for name, values in _motion_arrays(motion.vertical).items()}
+    return arrays
 
 
-def _motion(arrays: Mapping[str, NDArray[Any]], k: int) -> Motion:
-    words = json.loads(_words(arrays[f"motions/{k}/words"]))
+def _motion(arrays: Mapping[str, NDArray[Any]], place: str) -> Motion:
+    words = json.loads(_words(arrays[f"{place}/words"]))
     return Motion(
-        arrays[f"motions/{k}/breakpoints"],
-        arrays[f"motions/{k}/coefficients"],
+        arrays[f"{place}/breakpoints"],
+        arrays[f"{place}/coefficients"],
         name=words["name"],
         description=Description(words["family"], words["parameters"], words["text"]),
         history=tuple(words["history"]),
         error=words["error"],
+        vertical=_motion(arrays, f"{place}/vertical") if f"{place}/vertical/words" in arrays else None,
     )
 
 

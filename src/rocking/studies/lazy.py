@@ -14,7 +14,7 @@ from rocking.arrays import Floats
 from rocking.engine import OUTCOME
 from rocking.errors import StudyError
 from rocking.studies.store import Store
-from rocking.studies.units import OUTCOMES, exact, name_of
+from rocking.studies.units import OUTCOMES, Key, exact, name_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,26 +36,25 @@ class _Outcome(BackendArray):
 
     def _selected(self, key: tuple[Any, ...]) -> NDArray[Any]:
         axes = [np.arange(size)[part] for size, part in zip(self.shape, key, strict=True)]
-        grids = [np.atleast_1d(axis) for axis in axes]
-        found = np.full([len(grid) for grid in grids], np.nan)
-        units = grids[3] // self._store.grid.blocks
-        outer = (enumerate(grid.tolist()) for grid in grids[:3])
-        for (i, m), (j, s), (k, p) in itertools.product(*outer):
-            for unit in np.unique(units).tolist():
-                here = np.flatnonzero(units == unit)
-                values = self._unit((m, s, p, unit))
-                found[i, j, k, here] = values[grids[3][here] - unit * self._store.grid.blocks]
+        wanted = [np.atleast_1d(axis) for axis in axes]
+        found = np.full([len(axis) for axis in wanted], np.nan)
+        parts = self._store.grid.unit
+        units = [np.unique(axis // part).tolist() for axis, part in zip(wanted, parts, strict=True)]
+        for unit in itertools.product(*units):
+            here = [np.flatnonzero(axis // part == k) for axis, part, k in zip(wanted, parts, unit, strict=True)]
+            within = [axis[at] - k * part for axis, at, part, k in zip(wanted, here, parts, unit, strict=True)]
+            found[np.ix_(*here)] = self._unit(unit)[np.ix_(*within)]
         dropped = tuple(position for position, axis in enumerate(axes) if axis.ndim == 0)
         return self._typed(found.squeeze(axis=dropped))
 
-    def _unit(self, key: tuple[int, int, int, int]) -> Floats:
+    def _unit(self, key: Key) -> Floats:
         outcomes = self._store.outcomes(key)
         if outcomes is not None:
             values: Floats = outcomes[OUTCOMES.index(self._name)]
             return values
         if self._complete:
             raise StudyError(f"unit {name_of(key)} is gone since these results were opened: run the study again")
-        return np.full(self._store.grid.simulations(key), np.nan)
+        return np.full(self._store.grid.counts(key), np.nan)
 
     def _typed(self, values: NDArray[np.float64]) -> NDArray[Any]:
         return exact(self._name, values) if self._complete else values

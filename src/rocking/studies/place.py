@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import socket
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final, Protocol
+from typing import IO, Final, Protocol
 
 from rocking.errors import OutputError, StudyError
+from rocking.studies import locks
 
 #: End of the names of files that are half-written; a crash leaves them, the next run removes them.
 _PART: Final = ".part"
+
+#: How often, and how long after one another, a lock is tried, s.
+_TRIES: Final = 3
+_MOMENT: Final = 0.02
 
 
 class Place(Protocol):
@@ -34,6 +39,9 @@ class Place(Protocol):
 
     def locked(self) -> contextlib.AbstractContextManager[str]:
         """Keep everyone else from running the study; gives a note on a lock that was left behind, or nothing."""
+
+    def holder(self) -> str:
+        """Say who runs the study now; empty where nobody does."""
 
 
 class Folder:
@@ -55,7 +63,7 @@ class Folder:
             target.parent.mkdir(parents=True, exist_ok=True)
             written = _written(target.parent, data)
             try:
-                written.rename(target)
+                written.replace(target)
             except OSError:
                 written.unlink(missing_ok=True)
                 raise
@@ -94,27 +102,68 @@ class Folder:
     @contextlib.contextmanager
     def locked(self) -> Iterator[str]:
         """Hold the file `lock`, which names the process and host that hold it, for as long as the process lives."""
-        import fcntl
-
-        self.path.mkdir(parents=True, exist_ok=True)
-        with (self.path / "lock").open("a+", encoding="utf-8") as file:
-            file.seek(0)
-            holder = file.read().strip()
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
-                    raise StudyError(f"{self.path / 'lock'} cannot be locked: {error.strerror}") from error
-                raise StudyError(f"the study in {self.path} is being run by {holder or 'another process'}") from None
+        with self._lock_file() as file:
+            if not _taken(file):
+                raise StudyError(f"the study in {self.path} is being run by {_read(file) or 'another process'}")
+            before = _read(file)
             file.truncate(0)
-            file.write(f"process {os.getpid()} on {socket.gethostname()}")
+            file.write(this_process())
             file.flush()
             for left in self.path.rglob(f"*{_PART}"):
                 left.unlink(missing_ok=True)
             try:
-                yield f"took over from {holder}, which did not finish" if holder else ""
+                yield f"took over from {before}, which did not finish" if before else ""
             finally:
                 file.truncate(0)
+                locks.leave(file)
+
+    def holder(self) -> str:
+        """Read the lock, where somebody holds it."""
+        try:
+            with (self.path / "lock").open("a+", encoding="utf-8") as file:
+                if not locks.take(file):
+                    return _read(file)
+                locks.leave(file)
+        except OSError:  # who may not write here does not run it
+            pass
+        return ""
+
+    @contextlib.contextmanager
+    def _lock_file(self) -> Iterator[IO[str]]:
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            with (self.path / "lock").open("a+", encoding="utf-8") as file:
+                yield file
+        except OSError as error:
+            raise OutputError(f"{self.path / 'lock'} cannot be locked: {error.strerror or error}") from error
+
+
+def place_of(where: str | Path) -> Place:
+    """Return the place that a path or a URL (``s3://bucket/prefix``) names."""
+    if "://" in str(where):
+        from rocking.studies.objects import ObjectStore
+
+        return ObjectStore(str(where))
+    return Folder(Path(where))
+
+
+def this_process() -> str:
+    """Name this process and its host."""
+    return f"process {os.getpid()} on {socket.gethostname()}"
+
+
+def _taken(file: IO[str]) -> bool:
+    """Lock a file; tried again, since somebody who only asks for the holder has it for a moment."""
+    for _ in range(_TRIES):
+        if locks.take(file):
+            return True
+        time.sleep(_MOMENT)
+    return False
+
+
+def _read(file: IO[str]) -> str:
+    file.seek(0)
+    return file.read().strip()
 
 
 def _written(folder: Path, data: bytes) -> Path:
@@ -132,6 +181,8 @@ def _written(folder: Path, data: bytes) -> Path:
 
 
 def _flush_folder(folder: Path) -> None:
+    if os.name == "nt":  # folders cannot be opened there; its file system keeps a journal of names
+        return
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -7,25 +7,25 @@ import signal
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any, Final
+from typing import Final
 
-from rocking.engine import cores
-from rocking.errors import RockingError, StudyError
+from rocking.compiling import SIMULATIONS, announce
 from rocking.progress import Progress
 from rocking.studies.store import Store
-from rocking.studies.units import Key, compute
+from rocking.studies.units import Key, name_of
+from rocking.studies.workers import LOST, Workers, sentence, workers_of
 
-#: Units that are handed out ahead of the results, for each worker.
+#: Units that are handed out for each worker: one that it computes, and the next.
 _AHEAD: Final = 2
 
-#: How often a unit is tried whose worker died.
-_TRIES: Final = 3
+#: How often a unit is handed out again whose worker died.
+_AGAIN: Final = 3
 
-#: How often the executor is asked whether it still lives, s.
+#: How often the workers are asked whether they still live, s.
 _PULSE: Final = 0.5
 
 
@@ -88,99 +88,96 @@ class Stop:
                 signal.signal(number, handler)
 
 
-def run(store: Store, *, threads: int | None, executor: Executor | None, progress: bool | None) -> RunReport:
+def run(
+    store: Store,
+    *,
+    threads: int | None,
+    executor: Executor | None,
+    progress: bool | None,
+    failing: Callable[[str, str], None],
+) -> RunReport:
     """Compute all units that are not done; in threads, or by any executor.
+
+    Parameters
+    ----------
+    store : Store
+        Where the units are kept.
+    threads, executor, progress
+        As for `Study.run`.
+    failing : callable
+        Told the name of each unit that cannot be computed, and why, as it happens.
 
     Raises
     ------
     StudyError
-        If the executor dies.
+        If the workers are gone.
     """
+    announce(SIMULATIONS)
     start, stop = time.monotonic(), Stop()
     missing = list(store.missing())
-    done = {"units": 0, "simulations": 0}
+    units = simulations = 0
     failed: dict[str, str] = {}
-    total = sum(store.grid.simulations(key) for key in store.grid)
-    left = sum(store.grid.simulations(key) for key in missing)
+    before = store.grid.total - sum(map(store.grid.simulations, missing))
     with (
         stop.listening(),
-        Progress("simulating", total, show=progress, done=total - left) as bar,
-        _pool(executor, threads) as (pool, workers),
+        Progress("simulating", store.grid.total, show=progress, done=before) as bar,
+        workers_of(executor, threads) as workers,
+        contextlib.closing(_results(store, iter(missing), workers, stop)) as results,
     ):
-        for key, outcome in _results(store, iter(missing), pool, workers * _AHEAD, stop):
+        for key, outcome in results:
             if isinstance(outcome, bytes):
                 store.put(key, outcome)
-                count = store.grid.simulations(key)
-                done["units"] += 1
-                done["simulations"] += count
-                bar.advance(count)
+                units += 1
+                simulations += store.grid.simulations(key)
+                bar.advance(store.grid.simulations(key))
             else:
-                failed[".".join(map(str, key))] = outcome
+                failed[name_of(key)] = outcome
+                failing(name_of(key), outcome)
                 bar.note(f"{len(failed)} units failed")
-    stopped = stop.asked and done["units"] + len(failed) < len(missing)
-    return RunReport(done["units"], done["simulations"], time.monotonic() - start, failed, stopped)
-
-
-@contextlib.contextmanager
-def _pool(executor: Executor | None, threads: int | None) -> Iterator[tuple[Executor, int]]:
-    """Give the executor, or one of threads, and how many workers it has at least."""
-    if executor is not None:
-        yield executor, getattr(executor, "_max_workers", None) or cores()
-        return
-    count = threads or cores()
-    pool = ThreadPoolExecutor(count)
-    try:
-        yield pool, count
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    stopped = stop.asked and units + len(failed) < len(missing)
+    return RunReport(units, simulations, time.monotonic() - start, failed, stopped)
 
 
 def _results(
-    store: Store, keys: Iterator[Key], pool: Executor, most: int, stop: Stop
-) -> Iterator[tuple[Key, bytes | str]]:
+    store: Store, keys: Iterator[Key], workers: Workers, stop: Stop
+) -> Generator[tuple[Key, bytes | str], None, None]:
     """Give the bytes of every unit as they come, or a sentence where it failed."""
     pending: dict[Future[bytes], Key] = {}
     tries: Counter[Key] = Counter()
 
     def submit(key: Key) -> None:
         tries[key] += 1
-        pending[_submitted(store, key, pool)] = key
+        pending[workers.submit(store.work(key))] = key
 
-    while True:
-        while len(pending) < most and not stop.asked and (key := next(keys, None)) is not None:
-            submit(key)
-        if not pending:
-            return
-        finished = wait(pending, timeout=_PULSE, return_when=FIRST_COMPLETED).done
-        _check_alive(pool)
-        for future in finished:
-            key = pending.pop(future)
-            try:
-                yield key, future.result()
-            except RockingError as error:
-                yield key, str(error)
-            except (CancelledError, Exception) as error:  # the worker died, or its task was lost with it
-                _check_alive(pool, error)
-                if tries[key] >= _TRIES:
-                    yield key, f"the worker died {_TRIES} times: {error or type(error).__name__}"
-                else:
-                    submit(key)
-
-
-def _submitted(store: Store, key: Key, pool: Executor) -> Future[bytes]:
-    """Hand a unit to a worker, with all that it needs."""
     try:
-        return pool.submit(compute, *store.work(key))
-    except RuntimeError as error:
-        raise StudyError(f"the workers are gone: {error}; what was computed is kept, run the study again") from error
+        while True:
+            most = _AHEAD * max(1, workers.count)
+            while len(pending) < most and not stop.asked and (key := next(keys, None)) is not None:
+                submit(key)
+            if not pending:
+                return
+            finished = wait(pending, timeout=_PULSE, return_when=FIRST_COMPLETED).done
+            workers.check()
+            for future in finished:
+                key = pending.pop(future)
+                outcome = _outcome(future)
+                if isinstance(outcome, BaseException):
+                    workers.check(outcome)
+                    if tries[key] <= _AGAIN:
+                        submit(key)
+                        continue
+                    outcome = f"its worker died {tries[key]} times: {sentence(outcome)}"
+                yield key, outcome
+    finally:
+        for future in pending:
+            future.cancel()
 
 
-def _check_alive(pool: Executor, error: BaseException | None = None) -> None:
-    """Check that an executor which knows whether it lives, does."""
-    client: Any = getattr(pool, "_client", None)
-    broken: Any = getattr(pool, "_broken", False)
-    if (client is not None and client.status != "running") or broken:
-        raise StudyError(
-            f"the workers are gone: {error or broken or 'no connection to the scheduler'}; what was computed is kept, "
-            "run the study again"
-        )
+def _outcome(future: Future[bytes]) -> bytes | str | BaseException:
+    """Bytes of a unit, why it cannot be computed, or with which error its worker went away."""
+    try:
+        return future.result()
+    except LOST as error:
+        return error
+    except Exception as error:
+        return sentence(error)

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 from collections.abc import Iterator
 from typing import Any, Final
 
+import numpy as np
+
 from rocking.arrays import Floats
 from rocking.constants import VERSION
-from rocking.engine import Setup
 from rocking.errors import StudyError
 from rocking.kernels.compiled import fingerprint
-from rocking.motion.motion import Motion
 from rocking.product import Product
 from rocking.studies import inputs
 from rocking.studies.place import Place
-from rocking.studies.units import DamagedUnit, Grid, Key, decoded, key_of, name_of
+from rocking.studies.units import Axes, DamagedUnit, Grid, Key, Work, decoded, key_of, name_of
 
 FORMAT: Final = 1
 _ARRAY: Final = "result"
@@ -38,11 +39,14 @@ class Store:
 
     def __init__(self, place: Place, product: Product, grid: Grid) -> None:
         self.place, self.product, self.grid = place, product, grid
+        # Neighbouring units share their motions or their blocks.
+        self._factors = functools.lru_cache(1)(self._factors_of)
+        self._setup = functools.lru_cache(1)(lambda unit: product.setup(grid.ranges((0, 0, 0, unit))[3]))
 
     @classmethod
-    def create(cls, place: Place, product: Product, unit_blocks: int) -> Store:
+    def create(cls, place: Place, product: Product, unit: Axes) -> Store:
         """Write an empty store; `study.json` last, so that half a store is none."""
-        grid = Grid(product.shape, unit_blocks)
+        grid = Grid(product.shape, unit)
         archive = inputs.to_bytes(product)
         place.put("inputs.npz", archive)
         place.put("zarr.json", _GROUP.encode())
@@ -51,7 +55,7 @@ class Store:
             "format": FORMAT,
             "version": VERSION,
             "kernels": fingerprint(),
-            "unit_blocks": unit_blocks,
+            "unit": list(unit),
             "shape": list(product.shape),
             "inputs": hashlib.sha256(archive).hexdigest(),
             "parts": inputs.hashes(product),
@@ -73,7 +77,7 @@ class Store:
         if archive is None or hashlib.sha256(archive).hexdigest() != about["inputs"]:
             raise StudyError("inputs.npz is missing or damaged; restore it, or create the study again elsewhere")
         product = inputs.from_bytes(archive)
-        grid = Grid(product.shape, about["unit_blocks"])
+        grid = Grid(product.shape, tuple(about["unit"]))
         for name, text in (("zarr.json", _GROUP), (f"{_ARRAY}/zarr.json", grid.metadata())):
             if place.get(name) != text.encode():
                 place.put(name, text.encode())
@@ -108,20 +112,26 @@ class Store:
 
     def done(self) -> set[Key]:
         """Keys of the units that are done."""
-        found = (key_of(name) for name in self.place.names(_ARRAY))
-        cells = self.grid.cells
-        return {key for key in found if key is not None and all(k < n for k, n in zip(key, cells, strict=True))}
+        found = map(key_of, self.place.names(_ARRAY))
+        m, s, k, b = self.grid.cells
+        return {key for key in found if key and key[0] < m and key[1] < s and key[2] < k and key[3] < b}
 
     def missing(self) -> Iterator[Key]:
         """Keys of the units that are not done, in order."""
         done = self.done()
         return (key for key in self.grid if key not in done)
 
-    def work(self, key: Key) -> tuple[Setup, Motion, float, int]:
-        """Return all that `units.compute` needs for a unit."""
-        motion = self.product.motions[key[0]]
-        factor = float(self.product.scales.factors(motion)[key[1]]) * self.product.signs[key[2]]
-        return self.product.setup(self.grid.block_range(key)), motion, factor, self.grid.blocks
+    def work(self, key: Key) -> Work:
+        """Return all that a worker needs for a unit."""
+        motions, scales, polarities, _ = self.grid.ranges(key)
+        factors = self._factors(key[0])[:, scales, polarities]
+        return Work(self._setup(key[3]), self.product.motions[motions], factors, self.grid.unit)
+
+    def _factors_of(self, unit: int) -> Floats:
+        """Factors on the motions of a unit, shape (motions, scales, polarities)."""
+        motions = self.product.motions[self.grid.ranges((unit, 0, 0, 0))[0]]
+        factors = np.array([self.product.scales.factors(motion) for motion in motions])
+        return factors[:, :, None] * np.array(self.product.signs, dtype=np.float64)
 
     def put(self, key: Key, data: bytes) -> None:
         """Store a unit."""
@@ -132,7 +142,7 @@ class Store:
         return self.place.get(f"{_ARRAY}/{name_of(key)}")
 
     def outcomes(self, key: Key) -> Floats | None:
-        """Outcomes of a unit, shape (outcomes, blocks); None where it is not done.
+        """Outcomes of a unit, shape (outcomes, motions, scales, polarities, blocks); None where it is not done.
 
         Raises
         ------
@@ -143,7 +153,7 @@ class Store:
         if data is None:
             return None
         try:
-            return decoded(data, self.grid.simulations(key), self.grid.blocks)
+            return decoded(data, self.grid.counts(key), self.grid.unit)
         except DamagedUnit as error:
             raise StudyError(
                 f"unit {name_of(key)} is damaged, {error}: verify(repair=True) computes it again"

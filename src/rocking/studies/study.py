@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import socket
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,16 +16,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
+from rocking.analysis.fragility.curve import Fragility
+from rocking.analysis.fragility.fit import OVERTURNING
+from rocking.analysis.intensity import Measure, MeasureName
 from rocking.block import Block, Blocks
+from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import InvalidOption, OutputError, StudyError
 from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
 from rocking.product import Polarity, Product, Scales
 from rocking.studies import store as stores
-from rocking.studies.place import Folder, Place
+from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
+from rocking.studies.place import Place, place_of, this_process
+from rocking.studies.report import Made, ReportPlan, keep, kept, report
 from rocking.studies.run import RunReport, run
+from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.store import Store
-from rocking.studies.units import OUTCOMES, Key, compute, name_of
+from rocking.studies.units import OUTCOMES, Axes, Key, Work, compute, name_of
 from rocking.treatment import Treatment, treatment
 from rocking.treatment.base import Model
 
@@ -36,8 +42,36 @@ if TYPE_CHECKING:
 #: Units are multiples of so many blocks, which the engine takes through a motion together.
 _GROUP: Final = 512
 
-#: How long a unit should take, s.
+#: How long a unit should take, s; how many units there should be at least, and simulations in one at most.
 _UNIT: Final = 5.0
+_FEWEST: Final = 32
+_LARGEST: Final = 1 << 18
+
+
+@dataclass(frozen=True)
+class Running:
+    """A run that goes on while somebody asks.
+
+    Attributes
+    ----------
+    holder : str
+        Process and host.
+    rate : float
+        Simulations a second since it started.
+    seconds_left : float
+        Time that it will take at this rate; infinite before its first unit.
+    """
+
+    holder: str
+    rate: float
+    seconds_left: float
+
+    def __str__(self) -> str:
+        """Write it in one line."""
+        left = (
+            f"{self.seconds_left:.0f} s left" if math.isfinite(self.seconds_left) else "its first unit is not done yet"
+        )
+        return f"being run by {self.holder}: {self.rate:.3g} simulations a second, {left}"
 
 
 @dataclass(frozen=True)
@@ -52,14 +86,17 @@ class Status:
         Simulations in all units.
     failed : mapping
         Sentence for each unit that the last run could not compute.
+    running : Running or None
+        The run that goes on now, where there is one.
     runs : tuple
-        Starts and ends of every run, as `runs.jsonl` has them.
+        What happened in every run, as `runs.jsonl` has it.
     """
 
     done: int
     units: int
     simulations: int
     failed: dict[str, str]
+    running: Running | None
     runs: tuple[dict[str, Any], ...]
 
     @property
@@ -71,7 +108,8 @@ class Status:
         """Write it in one line."""
         share = 100.0 * self.done / self.units
         text = f"{self.done} of {self.units} units done ({share:.1f} %), {self.simulations} simulations in all"
-        return text + (f"; {len(self.failed)} failed in the last run" if self.failed else "")
+        text += f"; {len(self.failed)} failed in the last run" if self.failed else ""
+        return text + (f"; {self.running}" if self.running else "")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,23 +164,41 @@ class Study:
             threads = checks.whole(threads, "threads", InvalidOption, least=1)
         self.store.check_program()
         with self.place.locked() as note:
-            self._log({"event": "start", "note": note})
+            self._log({"event": "start", "note": note, "done": self._simulations(self.store.done())})
             try:
-                report = run(self.store, threads=threads, executor=executor, progress=progress)
+                report = run(self.store, threads=threads, executor=executor, progress=progress, failing=self._failing)
             except BaseException as error:
                 self._log({"event": "end", "error": str(error) or type(error).__name__})
                 raise
-            self._log({"event": "end", **asdict(report)})
+            self._log({"event": "end", "units": report.units, "seconds": report.seconds, "stopped": report.stopped})
         return report
 
     @property
     def status(self) -> Status:
         """How far it has come; may be asked while another process runs it."""
         runs = tuple(self._runs())
-        ended = [one for one in runs if one.get("event") == "end"]
-        failed = ended[-1].get("failed", {}) if ended else {}
+        starts = [k for k, entry in enumerate(runs) if entry.get("event") == "start"]
+        last = runs[starts[-1] :] if starts else ()
+        failed = {entry["unit"]: entry["why"] for entry in last if entry.get("event") == "failed"}
+        done = self.store.done()
         grid = self.store.grid
-        return Status(len(self.store.done()), len(grid), math.prod(grid.shape), failed, runs)
+        return Status(len(done), len(grid), grid.total, failed, self._running(last, done), runs)
+
+    def _running(self, last: tuple[dict[str, Any], ...], done: set[Key]) -> Running | None:
+        """Whoever runs it, and how fast since the start of the last run."""
+        holder = self.place.holder()
+        if not holder or not last:
+            return None
+        seconds = time.time() - datetime.fromisoformat(last[0]["time"]).timestamp()
+        now = self._simulations(done)
+        rate = max(now - last[0]["done"], 0) / max(seconds, 1.0)
+        return Running(holder, rate, (self.store.grid.total - now) / rate if rate else math.inf)
+
+    def _simulations(self, done: set[Key]) -> int:
+        return sum(map(self.store.grid.simulations, done))
+
+    def _failing(self, unit: str, why: str) -> None:
+        self._log({"event": "failed", "unit": unit, "why": why})
 
     def results(self) -> xr.Dataset:
         """Outcomes so far, read from the store when they are needed.
@@ -191,18 +247,110 @@ class Study:
         """
         if recompute or repair:
             self.store.check_program()
+            announce(SIMULATIONS)
         done = sorted(self.store.done())
         faults = {key: fault for key in done if (fault := self._fault(key))}
         sound = [key for key in done if key not in faults]
         rng = np.random.default_rng(seed)
         for k in rng.permutation(len(sound))[:recompute]:
-            if compute(*self.store.work(sound[k])) != self.store.raw(sound[k]):
+            if compute(self.store.work(sound[k])) != self.store.raw(sound[k]):
                 faults[sound[k]] = f"unit {name_of(sound[k])} is not what this program computes"
         if repair:
             with self.place.locked():
                 for key in faults:
-                    self.store.put(key, compute(*self.store.work(key)))
+                    self.store.put(key, compute(self.store.work(key)))
         return list(faults.values())
+
+    def fragility(
+        self,
+        *,
+        measure: MeasureName = "pga",
+        period: float | None = None,
+        damping: float = 0.05,
+        limits: Mapping[str, float] = OVERTURNING,
+        confidence: float = 0.9,
+    ) -> Fragility:
+        """Fit the probability that a limit is exceeded to the outcomes of all blocks, as `rocking.fragility` does.
+
+        Parameters
+        ----------
+        measure, period, damping, limits, confidence
+            As for `rocking.fragility`. What a motion measures at a scale is its intensity.
+
+        Raises
+        ------
+        StudyError
+            If units are missing or damaged.
+        InvalidOption
+            If an argument is out of its range, or no lognormal fits.
+        """
+        return pooled_fragility(self.store, Measure(measure, period, damping), limits, confidence)
+
+    def block_fragilities(
+        self,
+        *,
+        measure: MeasureName = "pga",
+        period: float | None = None,
+        damping: float = 0.05,
+        limits: Mapping[str, float] = OVERTURNING,
+        confidence: float = 0.9,
+        progress: bool | None = None,
+    ) -> BlockFragilities:
+        """Fit a fragility curve to the outcomes of each block.
+
+        Parameters
+        ----------
+        measure, period, damping, limits, confidence
+            As for `rocking.fragility`. A curve takes some hundredths of a second where motions were scaled to the
+            measure (stripes), and seconds where thousands of outcomes have an intensity each (a cloud).
+        progress : bool, optional
+            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+
+        Raises
+        ------
+        StudyError
+            If units are missing or damaged.
+        InvalidOption
+            If an argument is out of its range. A block that no lognormal fits has a sentence in place of a curve.
+        """
+        return block_fragilities(self.store, Measure(measure, period, damping), limits, confidence, progress)
+
+    def spectrum(self, fractiles: Sequence[float] = FRACTILES) -> StudySpectrum:
+        """Fractiles over the motions of the peak rotation over slenderness, for each scale and block.
+
+        Parameters
+        ----------
+        fractiles : sequence of float
+            Shares of the motions, in (0, 1), that stay below.
+
+        Raises
+        ------
+        StudyError
+            If units are missing or damaged.
+        InvalidOption
+            If a fractile is out of its range.
+        """
+        return study_spectrum(self.store, fractiles)
+
+    def report(self, progress: bool | None = None) -> dict[str, Made]:
+        """Make what the study's file asks for under [report].
+
+        Parameters
+        ----------
+        progress : bool, optional
+            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+
+        Returns
+        -------
+        dict
+            "fragility" and "spectrum", as far as they are asked for: results with a summary and a figure.
+
+        Raises
+        ------
+        StudyError
+            If nothing is asked for, or units are missing or damaged.
+        """
+        return report(self.store, kept(self.store), progress)
 
     def export(self, path: str | Path) -> None:
         """Write the results to one file: NetCDF (.nc), CSV (.csv) or Parquet (.parquet, with pyarrow installed).
@@ -243,11 +391,11 @@ class Study:
     def _done_mask(self, done: set[Key]) -> np.ndarray[Any, np.dtype[np.bool_]]:
         mask = np.zeros(self.store.grid.shape, dtype=bool)
         for key in done:
-            mask[(*key[:3], self.store.grid.block_range(key))] = True
+            mask[self.store.grid.ranges(key)] = True
         return mask
 
     def _log(self, entry: dict[str, Any]) -> None:
-        who = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "process": os.getpid(), "host": socket.gethostname()}
+        who = {"time": datetime.now().astimezone().isoformat(timespec="seconds"), "by": this_process()}
         self.place.append("runs.jsonl", json.dumps(who | entry))
 
     def _runs(self) -> Iterator[dict[str, Any]]:
@@ -281,13 +429,15 @@ def study(
     Parameters
     ----------
     folder : path
-        Where the study is kept.
+        Where the study is kept: a folder, or the URL of an object store as ``"s3://bucket/prefix"``, which
+        needs obstore.
     blocks, motions
         As for `simulate_many`; without both, the study must be there, and needs no script.
     model, chattering, factor, pga, pgv, sa, period, damping, polarity, duration
         As for `simulate_many`.
     unit_blocks : int, optional
-        Blocks of a unit, a multiple of 512; by default so many that a unit takes about five seconds, from a pilot.
+        Blocks of a unit, a multiple of 512, of one motion, scale and polarity; by default a unit holds as many of all
+        as take about five seconds, from a pilot.
 
     Returns
     -------
@@ -311,7 +461,7 @@ def study(
     >>> study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    place = Folder(Path(folder))
+    place = place_of(folder)
     if blocks is None or motions is None:
         if blocks is not None or motions is not None:
             raise InvalidOption("a new study needs blocks and motions; one that is there needs neither")
@@ -328,8 +478,19 @@ def study(
     return study_of(place, product, unit_blocks)
 
 
-def study_of(place: Place, product: Product, unit_blocks: int | None = None) -> Study:
+def study_of(place: Place, product: Product, unit_blocks: int | None = None, plan: ReportPlan | None = None) -> Study:
     """Create the study of a product in a place, or open the one that is there and check its inputs.
+
+    Parameters
+    ----------
+    place : Place
+        Where it is kept.
+    product : Product
+        What is simulated.
+    unit_blocks : int, optional
+        Blocks of a unit of one motion, scale and polarity; by default units are made from a pilot.
+    plan : ReportPlan, optional
+        What is to be made of the results; takes the place of what was.
 
     Raises
     ------
@@ -339,9 +500,12 @@ def study_of(place: Place, product: Product, unit_blocks: int | None = None) -> 
     if stores.exists(place):
         found = Store.open(place)
         found.check_inputs(product)
-        return Study(place, found)
-    width = _pilot(product) if unit_blocks is None else _checked_width(unit_blocks)
-    return Study(place, Store.create(place, product, width))
+    else:
+        unit = _pilot(product) if unit_blocks is None else (1, 1, 1, _checked_width(unit_blocks))
+        found = Store.create(place, product, unit)
+    if plan is not None:
+        keep(found, plan)
+    return Study(place, found)
 
 
 def _checked_width(unit_blocks: int) -> int:
@@ -351,17 +515,27 @@ def _checked_width(unit_blocks: int) -> int:
     return width
 
 
-def _pilot(product: Product) -> int:
-    """Blocks of a unit that takes about five seconds: from one group of blocks spread over all, under one motion."""
-    count = len(product.blocks)
-    if count <= _GROUP:
-        return _GROUP
-    some = product.blocks.select(np.linspace(0, count - 1, _GROUP).astype(np.int64))
+def _pilot(product: Product) -> Axes:
+    """Units that take about five seconds, or less where there would be too few of them, or too many simulations in one.
+
+    How long one simulation takes is measured with a group of blocks spread over all, under the longest motion.
+    """
+    motions, scales, polarities, count = product.shape
+    some = product.blocks.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
     motion = max(product.motions, key=lambda one: len(one.coefficients))
-    factor = float(product.scales.factors(motion).max())
+    factors = np.array([[[product.scales.factors(motion).max()]]])
+    announce(SIMULATIONS)
     setup = Product(some, (motion,), Scales(), "+", product.model, product.treatment, product.duration).setup()
-    compute(setup, motion, factor, _GROUP)  # compiles
+    work = Work(setup, (motion,), factors, (1, 1, 1, len(some)))
+    compute(work)  # compiles
     start = time.perf_counter()
-    compute(setup, motion, factor, _GROUP)
-    groups = math.ceil(_UNIT / max(time.perf_counter() - start, 1e-3))
-    return _GROUP * min(groups, math.ceil(count / _GROUP))
+    compute(work)
+    each = (time.perf_counter() - start) / len(some)
+    most = min(_UNIT / each, math.prod(product.shape) / _FEWEST, _LARGEST)
+    width = min(_GROUP * max(1, int(most) // _GROUP), count)
+    left = most / width
+    held = []
+    for size in (scales, polarities, motions):
+        held.append(max(1, min(size, int(left))))
+        left /= held[-1]
+    return held[2], held[0], held[1], width

@@ -77,6 +77,8 @@ class AsymptoticTime(Treatment):
                 'chattering="time" is the scheme for sinusoidal motions (rocking.pulses.sine), not for '
                 f'{"free rocking" if motion is None else motion.description.family}; use "certified"'
             )
+        if motion.vertical is not None:
+            raise InvalidOption('chattering="time" knows no vertical motion; use "certified"')
         if not blocks.is_symmetric:
             raise InvalidOption('chattering="time" is for symmetric blocks; use "certified"')
         parameters = motion.description.parameters

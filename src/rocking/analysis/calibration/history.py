@@ -6,21 +6,26 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.calibration.space import HIGHEST, PARAMETERS, Range, value_range
+from rocking.analysis.calibration.space import HIGHEST, PARAMETERS, Range, unit_of, value_range
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
+from rocking.response.figure import drawing_times
 from rocking.simulation import simulate
 from rocking.tables import text_table
 from rocking.treatment.base import Model
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 #: Blocks that the search starts from.
 _CANDIDATES: Final = 2048
@@ -44,6 +49,9 @@ _INSENSITIVE: Final = 1e-7
 _STEP: Final = 1e-5
 _LARGEST_STEP: Final = 0.05
 _REFINED: Final = 4
+
+#: Units of the estimates, by the first word of their names, for people.
+_UNITS: Final = {"p": " rad/s", "alpha": " rad", "restitution": "", "initial": " rad"}
 
 #: Nearer to a bound than this, in the logarithm, counts as at it.
 _AT_BOUND: Final = 1e-6
@@ -83,8 +91,8 @@ class HistoryCalibration:
         "initial_rotation" (rad).
     covariance : ndarray, shape (k, k)
         Of the logarithms of the estimates, in their order.
-    residuals : ndarray, shape (n,)
-        Measured less simulated rotation, rad.
+    times, residuals : ndarray, shape (n,)
+        Times of the samples, s, and measured less simulated rotation, rad.
     response : Response
         The simulation.
     """
@@ -92,6 +100,7 @@ class HistoryCalibration:
     block: Block
     estimates: Mapping[str, Measured]
     covariance: Floats
+    times: Floats
     residuals: Floats
     response: Response
 
@@ -103,10 +112,16 @@ class HistoryCalibration:
     def summary(self) -> str:
         """Return the estimates as a table for people."""
         rows = [
-            [name, one.value, float(f"{one.deviation:.2g}"), "at its bound" if one.at_bound else ""]
+            [
+                name,
+                one.value,
+                float(f"{one.deviation:.2g}"),
+                unit_of(name),
+                "at its bound" if one.at_bound else "",
+            ]
             for name, one in self.estimates.items()
         ]
-        table = text_table(["parameter", "value", "std. error", ""], rows)
+        table = text_table(["parameter", "value", "std. error", "unit", ""], rows)
         return f"{table}\n\n{self._misfit_text()}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -119,9 +134,42 @@ class HistoryCalibration:
             "misfit_rad": self.misfit,
         }
 
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw the measured rotation, that of the fitted block, and the residuals.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Draw the rotations here, without the residuals; by default in a new figure.
+        title : str
+            Title; by default the estimates.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+        """
+        from rocking.plot import measured_figure
+
+        simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
+        end = min(float(self.times[-1]), self.response.duration)
+        between = drawing_times(self.response, float(self.times[0]), end)
+        return measured_figure(
+            time=self.times,
+            measured=simulated + self.residuals,
+            residual=self.residuals,
+            fitted_time=between,
+            fitted=self.response.rotation(between),
+            title=title or self._estimates_text(),
+            ax=ax,
+            figsize=figsize,
+        )
+
+    def _estimates_text(self) -> str:
+        return ", ".join(
+            f"{name.replace('_', ' ')} = {one.value:.4g}{_UNITS[name.partition('_')[0]]}"
+            for name, one in self.estimates.items()
+        )
+
     def __repr__(self) -> str:
-        estimates = ", ".join(f"{name} = {one.value:.4g}" for name, one in self.estimates.items())
-        return f"<HistoryCalibration: {estimates}; {self._misfit_text()}>"
+        return f"<HistoryCalibration: {self._estimates_text()}; {self._misfit_text()}>"
 
     def _misfit_text(self) -> str:
         return f"misfit {self.misfit:.3g} rad (root mean square) over {len(self.residuals)} samples"
@@ -359,6 +407,7 @@ def _result(problem: _HistoryProblem, logs: Floats) -> HistoryCalibration:
         block=problem.block(logs),
         estimates=MappingProxyType(estimates),
         covariance=covariance,
+        times=problem.history.times,
         residuals=residuals,
         response=problem.response(logs, float(problem.history.times[-1])),
     )

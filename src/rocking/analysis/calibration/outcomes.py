@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,7 @@ from rocking import checks
 from rocking.analysis.calibration import population
 from rocking.analysis.calibration.population import Evidence
 from rocking.analysis.calibration.scores import Scores
-from rocking.analysis.calibration.space import PARAMETERS, Candidates, Range, Space
+from rocking.analysis.calibration.space import PARAMETERS, Candidates, Range, Space, unit_of
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.engine import require_finished
@@ -24,6 +24,12 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.tables import named, text_table, write_text
 from rocking.treatment.base import Model
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from rocking.plot import Parameter
 
 #: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
 _LAPSE: Final = 0.005
@@ -195,9 +201,8 @@ class Calibration:
 
     def summary(self) -> str:
         """Return the estimates and scores as a table for people."""
-        units = {"p": "rad/s", "alpha": "rad", "restitution": "1"}
         rows = [
-            [name, one.median, one.lower, one.upper, f"{100 * one.dispersion:.0f} %", units[name.partition("_")[0]]]
+            [name, one.median, one.lower, one.upper, f"{100 * one.dispersion:.0f} %", unit_of(name)]
             for name, one in self.estimates.items()
         ]
         lines = [
@@ -235,6 +240,39 @@ class Calibration:
         table = np.hstack([self.blocks.p, self.blocks.alpha, self.blocks.restitution, self.weights[:, None]])
         rows = [",".join(f"{value:.10g}" for value in row) for row in table]
         write_text(path, "\n".join([",".join([*columns, "weight"]), *rows]) + "\n")
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw what happened against the fitted probability of every test, and the ensemble of blocks.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Draw the tests here, without the blocks; by default in a new figure.
+        title : str
+            Title; by default the number of motions and the model.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+        """
+        from rocking.plot import outcomes_figure
+
+        return outcomes_figure(
+            probabilities=self.probabilities,
+            overturned=self.observed,
+            parameters=[self._parameter(name) for name in PARAMETERS],
+            weights=self.weights,
+            title=title or self.summary().splitlines()[0],
+            ax=ax,
+            figsize=figsize,
+        )
+
+    def _parameter(self, name: str) -> Parameter:
+        """One parameter for a figure: of both sides where they may differ."""
+        from rocking.plot import Parameter
+
+        estimates = [one for key, one in self.estimates.items() if key.partition("_")[0] == name]
+        values = getattr(self.blocks, name)[:, : len(estimates)]
+        ends = np.array([(one.median, one.lower, one.upper) for one in estimates])
+        return Parameter({"p": "p (rad/s)", "alpha": "alpha (rad)"}.get(name, name), values, ends)
 
     def __repr__(self) -> str:
         return f"<Calibration: {self.summary().splitlines()[0]}; fitted: {self.scores}>"

@@ -18,6 +18,8 @@ from rocking.errors import InvalidOption
 #: Parameters of a block's side, in the order of the coordinates.
 PARAMETERS: Final = ("p", "alpha", "restitution")
 
+_UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "initial": "rad"}
+
 #: What a block allows.
 HIGHEST: Final = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
 
@@ -132,6 +134,11 @@ class Candidates:
     log_weights: Floats = field(repr=False)
 
 
+def unit_of(estimate: str) -> str:
+    """Return the unit of an estimate: of a parameter, of either side, or of the initial rotation."""
+    return _UNITS[estimate.partition("_")[0]]
+
+
 def value_range(pair: Sequence[float], name: str, highest: float) -> Range:
     """Return the two ends of a range.
 
@@ -146,5 +153,7 @@ def value_range(pair: Sequence[float], name: str, highest: float) -> Range:
         raise InvalidOption(f"{name} must be a pair (lowest, highest), not {pair!r}") from None
     if not 0.0 < low < high <= highest or math.isinf(high):
         limit = "" if math.isinf(highest) else f" and at most {highest:g}"
-        raise InvalidOption(f"{name} must be a pair (lowest, highest) of positive, increasing numbers{limit}")
+        hint = checks.hint_of_degrees(high) if name == "alpha" else ""
+        kind = "positive, increasing numbers"
+        raise InvalidOption(f"{name} must be a pair (lowest, highest) of {kind}{limit}, not {low:g}, {high:g}{hint}")
     return low, high

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,9 @@ from rocking.arrays import Floats
 from rocking.errors import RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
+
+#: The decimal comma of a number.
+_DECIMAL_COMMA: Final = re.compile(r"(?<=\d),(?=\d+(?:[eE][+-]?\d+)?$)")
 
 _ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
 
@@ -71,7 +75,8 @@ def read(path: Path, *, channel: str | None, dt: float | None, units: str | None
         if {"time_s", column} <= set(table.columns):
             return History(table.numbers("time_s"), unit * table.numbers(column))
     raise UnreadableRecord(
-        f"{path}, line 1: the columns must be motion,overturned (outcomes) or time_s,rotation_rad (a history), "
+        f"{path}, line 1: the columns must be motion,overturned (outcomes) or time_s,rotation_rad or "
+        "time_s,rotation_deg (a history), "
         f"not {','.join(table.columns)}"
     )
 
@@ -83,11 +88,16 @@ def _table(path: Path) -> _Table:
         raise UnreadableRecord(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise UnreadableRecord(f"{path} is no text table; save it as CSV") from None
-    reader = csv.reader(text.splitlines())
+    lines = text.splitlines()
+    # As record tables: semicolons separate where the header has one, and a comma is then the decimal sign.
+    semicolons = bool(lines) and ";" in lines[0]
+    reader = csv.reader(lines, delimiter=";" if semicolons else ",")
     cells = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(cell.strip() for cell in row)]
     if len(cells) < 2:
         raise UnreadableRecord(f"{path} holds no rows below its header")
     (_, columns), *rows = cells
+    if semicolons:
+        rows = [(line, [_DECIMAL_COMMA.sub(".", cell) for cell in row]) for line, row in rows]
     for line, row in rows:
         if len(row) != len(columns):
             raise UnreadableRecord(f"{path}, line {line}: {len(row)} cells under {len(columns)} columns; correct it")
@@ -98,7 +108,9 @@ def _table(path: Path) -> _Table:
 def _outcomes(table: _Table, *, channel: str | None, dt: float | None, units: str | None) -> Outcomes:
     motions, overturned = [], []
     for line, row in table.rows:
-        overturned.append(table.convert(line, row["overturned"].lower(), _ANSWERS.__getitem__, "0 or 1"))
+        overturned.append(
+            table.convert(line, row["overturned"].lower(), _ANSWERS.__getitem__, "0 or 1, no or yes, false or true")
+        )
         scale = table.convert(line, row.get("scale") or "1", float, "a number")
         name = _file_or_name(row["motion"], table.path.parent)
         wanted = row.get("channel") or channel

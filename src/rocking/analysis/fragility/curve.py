@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking import checks
 from rocking.analysis.fragility import lognormal, nrml
 from rocking.analysis.fragility.confidence import Confidence, Resamples
 from rocking.analysis.fragility.lognormal import Probit
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from rocking.analysis.hazard import HazardCurve
+    from rocking.analysis.risk import Risk
 
 #: Points of a curve in a table or a figure.
 _POINTS: Final = 201
@@ -114,6 +118,54 @@ class FragilityCurve:
         """
         at = _intensities(intensity)
         return np.asarray(self.fitted.probability(_logarithm(at).ravel())[0].reshape(at.shape))
+
+    def intensity_of(self, probability: float) -> float:
+        """Intensity at which the fitted probability is as given.
+
+        A rock that still stands has, most likely, never been shaken so strongly that it would have fallen with a
+        probability of 0.95: ``intensity_of(0.95)`` is the amplitude that is unlikely to have been exceeded in its life.
+
+        Raises
+        ------
+        InvalidOption
+            If the probability is not between 0 and 1.
+        """
+        from scipy.special import ndtri
+
+        share = checks.share(probability, "probability", InvalidOption)
+        score = float(ndtri(share))
+        return math.exp((score - float(self.fitted.intercept[0])) / float(self.fitted.slope[0]))
+
+    def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.95) -> Floats:
+        """Annual rates of motions of an intensity or more that fit with none having exceeded the limit state in a time.
+
+        Were such motions more frequent, a block that stood for `years` would have fallen with a probability above
+        `confidence`: -ln(1 - confidence)/(years P(intensity)). A hazard curve above it is contradicted by a precarious
+        rock of that age.
+
+        Parameters
+        ----------
+        intensity : array_like
+            Intensities in SI units, above 0.
+        years : float
+            For how long the block has stood.
+        confidence : float
+            Probability with which it would have fallen.
+
+        Returns
+        -------
+        ndarray
+            Rates (1/year), shaped like the intensities; infinite at 0.
+
+        Raises
+        ------
+        InvalidOption
+            If an argument is out of range.
+        """
+        time = checks.positive(years, "years", InvalidOption)
+        share = checks.share(confidence, "confidence", InvalidOption)
+        with np.errstate(divide="ignore"):
+            return np.asarray(-math.log1p(-share) / (time * self.probability(intensity)))
 
     def band(self, intensity: ArrayLike) -> tuple[Floats, Floats]:
         """Lower and upper end of the pointwise confidence band of the probability."""
@@ -220,7 +272,7 @@ class Fragility:
 
     def __repr__(self) -> str:
         curves = ", ".join(
-            f"{one.limit_state}: median {self.measure.scale * one.median:.4g}, dispersion {one.dispersion:.3g}"
+            f"{one.limit_state}: median {self._in_units(one.median)}, dispersion {one.dispersion:.3g}"
             for one in self.curves
         )
         return f"<Fragility: {self.description}; {self.measure.label}; {curves}>"
@@ -238,6 +290,45 @@ class Fragility:
                 return curve
         names = ", ".join(curve.limit_state for curve in self.curves)
         raise InvalidOption(f"there is no limit state {limit_state!r}; there are {names}")
+
+    def annual_rate(self, hazard: HazardCurve) -> Risk:
+        """Annual rates of exceeding the limit states at a site, from its hazard curve.
+
+        Parameters
+        ----------
+        hazard : HazardCurve
+            Annual rates of the intensities that this fragility is against.
+
+        Returns
+        -------
+        Risk
+            Rate, return period and probability in a number of years, for each limit state.
+
+        Raises
+        ------
+        InvalidOption
+            If the two are not of one intensity measure.
+
+        Notes
+        -----
+        The integral of rate(x) dP(x) over all intensities x, in closed form: a lognormal against a power of x on each
+        segment of the hazard curve. For one power k all along, it is rate(median) exp((k dispersion)^2/2) (Cornell).
+
+        Examples
+        --------
+        >>> from rocking import HazardCurve, fit_fragility
+        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
+        >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
+        >>> one = risk.rate("overturning")
+        >>> f"{one.annual_rate:.6f} {one.probability(50.0):.4f}"
+        '0.000434 0.0215'
+        """
+        from rocking.analysis.risk import risk
+
+        return risk(self, hazard)
+
+    def _in_units(self, intensity: float) -> str:
+        return f"{self.measure.scale * intensity:.4g} {self.measure.shown_in}".rstrip()
 
     @property
     def range(self) -> tuple[float, float]:
@@ -329,15 +420,25 @@ class Fragility:
         states = [curve.limit_state for curve in self.curves]
         nrml.write(path, function, states, nrml.Header(model_id, asset_category, loss_category, self.description))
 
-    def plot(self, ax: Axes | None = None, *, title: str = "") -> Figure:
-        """Draw the curves with their bands and the shares that were seen, in a new figure or in `ax`."""
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw the curves with their bands and the shares that were seen.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default in a new figure.
+        title : str
+            Title; by default the description.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+        """
         from rocking.plot import FragilityLine, fragility_figure
 
         intensity, scale = np.linspace(0.0, self.range[1], _POINTS), self.measure.scale
         lines = []
         for curve in self.curves:
             at, seen, outcomes = _shares_seen(curve)
-            text = f"{curve.limit_state}: median {scale * curve.median:.4g}, dispersion {curve.dispersion:.3g}"
+            text = f"{curve.limit_state}: median {self._in_units(curve.median)}, dispersion {curve.dispersion:.3g}"
             chance, band = curve.probability(intensity), curve.band(intensity)
             lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, outcomes))
         return fragility_figure(
@@ -346,6 +447,7 @@ class Fragility:
             band_label=f"band: {100 * self.curves[0].confidence:g} % confidence ({self.band_kind})",
             title=title or self.description,
             ax=ax,
+            figsize=figsize,
         )
 
 

@@ -108,13 +108,14 @@ def fragility(
     median 1.443, dispersion 0.524
     """
     many, how = Blocks.of(blocks), Measure(measure, period, damping)
+    mirrored = polarity == "both" and many.is_symmetric
     bands = _Bands(confidence, band, samples, seed)
     if not limits:
         raise InvalidOption("limits must name at least one limit state")
     shaken, values = several_motions(motions, how)
     options: dict[str, Any] = {
         "chattering": chattering,
-        "polarity": "+" if polarity == "both" and many.is_symmetric else polarity,
+        "polarity": "+" if mirrored else polarity,
         "threads": threads,
         "progress": progress,
     }
@@ -134,10 +135,10 @@ def fragility(
     clusters = np.broadcast_to(np.arange(len(shaken))[None, :, None, None], ratio.shape)
     x = np.broadcast_to(intensity, ratio.shape).ravel()
     curves = [
-        _curve(name, x, _passed(ratio, limit, name).ravel(), np.ones(x.size), clusters.ravel(), bands)
+        _curve(name, x, passed(ratio, limit, name).ravel(), np.ones(x.size), clusters.ravel(), bands, how)
         for name, limit in limits.items()
     ]
-    text = _described(described(blocks), len(shaken), None if levels is None else len(intensity))
+    text = _described(described(blocks), len(shaken), None if levels is None else len(intensity), mirrored=mirrored)
     only = many[0] if len(many) == 1 else None
     return Fragility(tuple(curves), how, text, only, model, _outcomes(table, x, ratio, limits))
 
@@ -147,7 +148,7 @@ def _outcomes(table: xr.Dataset, intensity: Floats, ratio: Floats, limits: Mappi
     import pandas as pd
 
     motion, block, polarity = (np.broadcast_to(axis, ratio.shape).ravel() for axis in _axes(table))
-    passed = {f"exceeded_{name}": _passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()}
+    exceeded = {f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()}
     return pd.DataFrame(
         {
             "motion": motion,
@@ -157,7 +158,7 @@ def _outcomes(table: xr.Dataset, intensity: Floats, ratio: Floats, limits: Mappi
             "peak_rotation_rad": table.peak_rotation.values.ravel(),
             "peak_over_alpha": ratio.ravel(),
             "overturned": table.overturned.values.ravel(),
-            **passed,
+            **exceeded,
         }
     )
 
@@ -251,7 +252,7 @@ def fit_fragility(
     groups = np.arange(x.size) if clusters is None else _clusters(clusters, x.size)
     bands = _Bands(confidence, band, samples, seed)
     curves = [
-        _curve(name, x, _whole(values, "exceeded", x.size, 0.0, count), count, groups, bands)
+        _curve(name, x, _whole(values, "exceeded", x.size, 0.0, count), count, groups, bands, how)
         for name, values in outcomes.items()
     ]
     return Fragility(tuple(curves), how, description, block, "nonlinear", None)
@@ -275,10 +276,10 @@ class _Bands:
 
 
 def _curve(
-    name: str, intensity: Floats, exceeded: Floats, trials: Floats, clusters: Integers, bands: _Bands
+    name: str, intensity: Floats, exceeded: Floats, trials: Floats, clusters: Integers, bands: _Bands, measure: Measure
 ) -> FragilityCurve:
     z = np.log(intensity)
-    fault = lognormal.unidentified(z, exceeded, trials)
+    fault = lognormal.unidentified(z, exceeded, trials, measure.shown)
     if fault is not None:
         raise InvalidOption(f"no lognormal can be fitted to {name!r}: {fault}")
     fitted = lognormal.fit(z, exceeded[None, :], trials[None, :])
@@ -309,7 +310,7 @@ def _curve(
     )
 
 
-def _passed(ratio: Floats, limit: float, name: str) -> Floats:
+def passed(ratio: Floats, limit: float, name: str) -> Floats:
     """Whether peak rotation over slenderness passes a limit: 1 or 0; infinite is overturning."""
     what = f"the limit {name!r} (rotation over slenderness)"
     if not checks.number(limit, what, InvalidOption) >= 0.0:
@@ -337,6 +338,7 @@ def _clusters(clusters: ArrayLike, size: int) -> Integers:
     return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
 
 
-def _described(blocks: str, motions: int, stripes: int | None) -> str:
+def _described(blocks: str, motions: int, stripes: int | None, *, mirrored: bool) -> str:
     how = "cloud" if stripes is None else f"{stripes} stripes"
-    return f"{blocks}, {motions} motion{'s' if motions > 1 else ''}, {how}"
+    text = f"{blocks}, {motions} motion{'s' if motions > 1 else ''}, {how}"
+    return f"{text}, one polarity, since a symmetric block does the same in both" if mirrored else text

@@ -7,6 +7,7 @@ has one maximum, or none where the outcomes are separated.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -89,7 +90,7 @@ class Goodness:
     p_value: float
 
 
-def unidentified(z: Floats, exceeded: Floats, trials: Floats) -> str | None:
+def unidentified(z: Floats, exceeded: Floats, trials: Floats, shown: Callable[[float], str]) -> str | None:
     """Say why no rising lognormal fits best; None where one does.
 
     Parameters
@@ -98,6 +99,8 @@ def unidentified(z: Floats, exceeded: Floats, trials: Floats) -> str | None:
         Logarithms of the intensity.
     exceeded, trials : ndarray, shape (n,)
         Outcomes that exceeded, of how many, at each.
+    shown : callable
+        Writes an intensity with its unit.
     """
     yes, no = z[exceeded > 0], z[exceeded < trials]
     if not yes.size:
@@ -105,11 +108,13 @@ def unidentified(z: Floats, exceeded: Floats, trials: Floats) -> str | None:
     if not no.size:
         return f"all of the {_count(trials)} outcomes exceed the limit: weaker motions are needed"
     if z.min() == z.max():
-        return f"all outcomes are at one intensity, {math.exp(z[0]):.6g}: others are needed"
+        return f"all outcomes are at one intensity, {shown(math.exp(z[0]))}: others are needed"
     if no.max() <= yes.min() + _overlap(z):
         low, high = math.exp(no.max()), math.exp(yes.min())
         where = (
-            f"below {low:.6g} and all do above it" if low >= high else f"up to {low:.6g} and all do from {high:.6g} on"
+            f"below {shown(low)} and all do above it"
+            if low >= high
+            else f"up to {shown(low)} and all do from {shown(high)} on"
         )
         return (
             f"the outcomes are separated, none exceeds the limit {where}: the fragility is a step there, and motions "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
@@ -9,17 +11,20 @@ from rocking.chattering.paper.amplitudes import figure_5, figure_6, figure_7
 from rocking.chattering.paper.figure import PaperFigure, Statement
 from rocking.chattering.paper.histories import figure_4, figure_9, figure_10, figure_11
 from rocking.chattering.paper.sequences import figure_2, figure_3
+from rocking.chattering.paper.sketches import figure_1, figure_8
 from rocking.errors import InvalidOption
 
-#: The figures that show computed results; 1 is a sketch of the block and 8 a flowchart.
-FIGURES: Final = MappingProxyType(
+#: All figures of the paper. A figure takes those parameters that it depends on; their defaults are the paper's values.
+FIGURES: Final[Mapping[int, Callable[..., PaperFigure]]] = MappingProxyType(
     {
+        1: figure_1,
         2: figure_2,
         3: figure_3,
         4: figure_4,
         5: figure_5,
         6: figure_6,
         7: figure_7,
+        8: figure_8,
         9: figure_9,
         10: figure_10,
         11: figure_11,
@@ -27,13 +32,31 @@ FIGURES: Final = MappingProxyType(
 )
 
 
-def paper_figure(number: int) -> PaperFigure:
-    """Compute one of the paper's figures.
+def paper_figure(
+    number: int,
+    *,
+    a: float | None = None,
+    omega: float | None = None,
+    eta: float | None = None,
+    p: float | None = None,
+    alpha: float | None = None,
+) -> PaperFigure:
+    """Compute one of the paper's figures, for the paper's parameters or for others.
 
     Parameters
     ----------
     number : int
-        2 to 7 or 9 to 11; Fig. 1 is a sketch of the block and Fig. 8 a flowchart.
+        1 to 11.
+    a : float, optional
+        Amplitude of the ground acceleration over g alpha, above 1: Figs 2 to 4 and 9 to 11.
+    omega : float, optional
+        Its frequency over the block's p: Figs 2 to 5 and 9 to 11.
+    eta : float, optional
+        Coefficient of restitution, below 1: Figs 2 to 5, 7 and 9 to 11.
+    p : float, optional
+        The block's frequency parameter, rad/s: Figs 2 and 9 to 11, whose data are in seconds, too.
+    alpha : float, optional
+        Its slenderness, rad: Fig. 1, and Figs 2 and 9 to 11, whose data are in rad, too.
 
     Returns
     -------
@@ -43,7 +66,12 @@ def paper_figure(number: int) -> PaperFigure:
     Raises
     ------
     InvalidOption
-        If there is no such figure.
+        If there is no such figure, it does not depend on a parameter that is given, or a parameter is out of its range.
+
+    Warns
+    -----
+    OutsideFit
+        Where the figure shows Eq. 76 or 77 beyond the frequencies and restitutions that they were fitted to.
 
     Examples
     --------
@@ -51,11 +79,25 @@ def paper_figure(number: int) -> PaperFigure:
     >>> spread = figure.statements[0]
     >>> spread.claim, spread.paper, round(spread.here, 2)
     ('spread of a_cr from omega = 0.5 to 8, %', 0.5, 0.52)
+    >>> paper_figure(7, eta=0.8).caption
+    'Fig. 7: critical amplitude against frequency; eta = 0.8'
     """
     if number not in FIGURES:
-        known = ", ".join(map(str, FIGURES))
-        raise InvalidOption(f"the paper's figures that show results are {known}, not {number!r}")
-    return FIGURES[number]()
+        raise InvalidOption(f"the paper has Figs 1 to {len(FIGURES)}, not {number!r}")
+    figure = FIGURES[number]
+    given = {"a": a, "omega": omega, "eta": eta, "p": p, "alpha": alpha}
+    chosen = {name: value for name, value in given.items() if value is not None}
+    taken = inspect.signature(figure).parameters
+    strange = [name for name in chosen if name not in taken]
+    if strange:
+        takes = f"it takes {_listed([*taken])}" if taken else "it is drawn in one way only"
+        raise InvalidOption(f"Fig. {number} does not depend on {_listed(strange)}; {takes}")
+    return figure(**chosen)
+
+
+def _listed(names: list[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 __all__ = ["FIGURES", "PaperFigure", "Statement", "paper_figure"]

@@ -9,46 +9,53 @@ from typing import Final
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.chattering.paper.case import ETA, OMEGA
+from rocking.chattering.paper.case import ETA, OMEGA, Case, in_symbols, in_words, lossy
 from rocking.chattering.paper.figure import PaperFigure, Statement
 from rocking.chattering.theory.amplitude import critical_amplitude
-from rocking.chattering.theory.duration import chattering_time
-from rocking.plot.amplitudes import duration_figure, frequency_figure, surface_figure
+from rocking.chattering.theory.duration import chattering_time, resolved_by_default
+from rocking.plot.amplitudes import contour_figure, duration_figure, frequency_figure, surface_figure
 
 #: Amplitudes of Fig. 5, gathered towards both of its vertical tangents, and how far it goes past the second.
 _AMPLITUDES: Final = 201
 _BEYOND: Final = 1.15
 
 #: Frequencies over which the paper states a spread, and the restitutions of Fig. 6.
-_FREQUENCIES: Final = np.linspace(0.5, 8.0, 76)
-_RESTITUTIONS: Final = np.linspace(0.5, 0.97, 48)
+_FREQUENCIES: Final = np.geomspace(0.5, 8.0, 97)
+_RESTITUTIONS: Final = np.linspace(0.5, 0.97, 95)
 
 #: Restitution from which the paper calls the critical amplitude independent of the frequency.
 _PRACTICAL: Final = 0.75
 
-#: Distances from the vertical tangents of Fig. 5, in a, between which its local exponents are taken.
-_NEAR: Final = np.array([1e-7, 1e-8])
+#: Distances from the vertical tangents of Fig. 5 between which its local exponents are taken, as shares of a_cr - 1.
+_NEAR: Final = np.array([3e-6, 3e-7])
+
+#: Frequencies at which Fig. 5 compares the chattering time.
+_COMPARED: Final = np.array([0.5, 1.0, 2.0, 5.0])
 
 
-def figure_5() -> PaperFigure:
-    """Chattering time over half a period against amplitude, at omega = 2, eta = 0.92: exact, Eq. 75, Eq. 65."""
-    critical = float(critical_amplitude(OMEGA, ETA))
+def figure_5(*, omega: float = OMEGA, eta: float = ETA) -> PaperFigure:
+    """Chattering time over half a period against amplitude: exact, Eq. 75, Eq. 65."""
+    case = Case(omega=omega, eta=eta)
+    critical = case.critical
     inside = 1.0 + (critical - 1.0) * np.sin(np.linspace(0.0, 0.5 * math.pi, _AMPLITUDES)) ** 2
     a = np.concatenate([inside, np.linspace(critical, 1.0 + _BEYOND * (critical - 1.0), 32)[1:]])
     methods = {"exact": "exact", "asymptotic": "asymptotic (Eq. 65)", "semianalytical": "semi-analytical (Eq. 75)"}
-    durations = {name: _over_half_period(a, name) for name in methods}
+    durations = {name: _over_half_period(a, case, name) for name in methods}
     return PaperFigure(
         5,
         "chattering time against amplitude",
+        case.words("omega", "eta"),
         {"durations": {"a": a, **durations}},
-        _duration_statements(critical),
-        partial(
-            duration_figure,
-            amplitude=a,
-            durations={label: durations[name] for name, label in methods.items()},
-            critical=critical,
-            title=rf"$\omega$ = {OMEGA:g}, $\eta$ = {ETA:g}",
-        ),
+        _duration_statements(case),
+        {
+            "durations": partial(
+                duration_figure,
+                amplitude=a,
+                durations={label: durations[name] for name, label in methods.items()},
+                critical=critical,
+                title=case.symbols("omega", "eta"),
+            )
+        },
     )
 
 
@@ -78,90 +85,123 @@ def figure_6() -> PaperFigure:
     return PaperFigure(
         6,
         "critical amplitude over frequency and restitution",
+        "",
         {"surface": {"omega": grid[0].ravel(), "eta": grid[1].ravel(), "exact": exact.ravel(), "eq76": fitted.ravel()}},
         statements,
-        partial(surface_figure, omega=_FREQUENCIES, eta=_RESTITUTIONS, exact=exact, fitted=fitted),
+        {
+            "contours": partial(contour_figure, omega=_FREQUENCIES, eta=_RESTITUTIONS, exact=exact, fitted=fitted),
+            "surface": partial(surface_figure, omega=_FREQUENCIES, eta=_RESTITUTIONS, exact=exact, fitted=fitted),
+        },
     )
 
 
-def figure_7() -> PaperFigure:
-    """Critical amplitude against frequency at eta = 0.92: exact, Eq. 76 and Eq. 77."""
+def figure_7(*, eta: float = ETA) -> PaperFigure:
+    """Critical amplitude against frequency: exact, Eq. 76 and Eq. 77."""
+    lossy(eta)
     labels = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77"}
-    critical = {name: critical_amplitude(_FREQUENCIES, ETA, method=name) for name in labels}
+    critical = {name: critical_amplitude(_FREQUENCIES, eta, method=name) for name in labels}
     exact = critical["exact"]
+    spread = float(_spread(exact[:, np.newaxis])[0])
     statements = (
-        Statement("spread of a_cr from omega = 0.5 to 8, %", 0.5, float(_spread(exact[:, np.newaxis])[0]), digits=3),
+        Statement("spread of a_cr from omega = 0.5 to 8, %", 0.5 if eta == ETA else "not given", spread, digits=3),
         Statement("a_cr at omega = 0.5 (paper: Eq. 76)", float(critical["eq76"][0]), float(exact[0])),
         Statement("a_cr at omega = 8 (paper: Eq. 76)", float(critical["eq76"][-1]), float(exact[-1])),
         Statement(
-            "a_cr at omega = 2 (paper: Eq. 77)", float(critical["eq77"][0]), float(critical_amplitude(OMEGA, ETA))
+            "a_cr at omega = 2 (paper: Eq. 77)", float(critical["eq77"][0]), float(critical_amplitude(OMEGA, eta))
         ),
     )
     return PaperFigure(
         7,
         "critical amplitude against frequency",
+        in_words({"eta": eta}),
         {"critical": {"omega": _FREQUENCIES, **critical}},
         statements,
-        partial(
-            frequency_figure,
-            omega=_FREQUENCIES,
-            critical={label: critical[name] for name, label in labels.items()},
-            title=rf"$\eta$ = {ETA:g}",
-        ),
+        {
+            "critical": partial(
+                frequency_figure,
+                omega=_FREQUENCIES,
+                critical={label: critical[name] for name, label in labels.items()},
+                title=in_symbols({"eta": eta}),
+            )
+        },
     )
 
 
-def _duration_statements(critical: float) -> tuple[Statement, ...]:
-    most = 1.0 + (critical - 1.0) * np.linspace(0.01, 0.9, 90)
-    exact = _over_half_period(most, "exact")
+def _duration_statements(case: Case) -> tuple[Statement, ...]:
+    critical = case.critical
+    excess = critical - 1.0
+    most = 1.0 + excess * np.linspace(0.01, 0.9, 90)
+    exact = _over_half_period(most, case, "exact")
     asymptotic, semianalytical = (
-        100.0 * float(np.max(np.abs(_over_half_period(most, method) / exact - 1.0)))
+        100.0 * float(np.max(np.abs(_over_half_period(most, case, method) / exact - 1.0)))
         for method in ("asymptotic", "semianalytical")
     )
-    starts, ends = 1.0 + _NEAR, critical - _NEAR
-    by_frequency = ", ".join(
-        f"{float(chattering_time(1.03, omega, ETA)) * omega / math.pi:.4f} at omega = {omega:g}"
-        for omega in (0.5, 1.0, 2.0, 5.0)
-    )
+    starts, ends = 1.0 + excess * _NEAR, critical - excess * _NEAR
+    papers = (case.omega, case.eta) == (OMEGA, ETA)
     return (
-        Statement("critical amplitude a_cr", 1.038, critical),
+        Statement("critical amplitude a_cr", 1.038 if papers else "not given", critical),
         Statement(
             "vertical asymptote at a = 1: tau_ch goes like a - 1 to the power",
             "below 1",
-            _exponent(_over_half_period(starts, "exact")),
+            _exponent(_over_half_period(starts, case, "exact")),
             digits=4,
         ),
         Statement(
             "vertical asymptote at a_cr: T/2 - tau_ch goes like a_cr - a to the power",
             "below 1",
-            _exponent(1.0 - _over_half_period(ends, "exact")),
+            _exponent(1.0 - _over_half_period(ends, case, "exact")),
             digits=4,
         ),
         Statement(
             "Eq. 65 at a_cr, over T/2 (exact: 1)",
             '"fails"',
-            float(_over_half_period(np.array([critical]), "asymptotic")[0]),
+            float(_over_half_period(np.array([critical]), case, "asymptotic")[0]),
         ),
         Statement(
-            "largest error of Eq. 65 up to 90 % of the way to a_cr, %", '"almost perfectly"', asymptotic, digits=3
+            "largest error of Eq. 65 up to 90 % of the way to a_cr, %",
+            '"almost perfectly"' if papers else "not given",
+            asymptotic,
+            digits=3,
         ),
-        Statement("the same of Eq. 75 with 60 impacts resolved, %", '"remarkable agreement"', semianalytical, digits=2),
-        Statement("Eq. 65 exceeds the exact time up to a =", "not mentioned", _crossing(critical), digits=5),
-        Statement("tau_ch/(T/2) at a = 1.03, eta = 0.92", '"solely on a and eta"', by_frequency),
+        Statement(
+            f"the same of Eq. 75 with {resolved_by_default(np.array(case.eta))} impacts resolved, %",
+            '"remarkable agreement"' if papers else "not given",
+            semianalytical,
+            digits=2,
+        ),
+        Statement("Eq. 65 exceeds the exact time up to a =", "not mentioned", _crossing(case), digits=5),
+        _by_frequency(case.eta),
     )
 
 
-def _over_half_period(a: Floats, method: str) -> Floats:
-    return np.asarray(chattering_time(a, OMEGA, ETA, method=method)) * (OMEGA / math.pi)
+def _by_frequency(eta: float) -> Statement:
+    """Chattering time over half a period at one amplitude, at which chattering is complete at all these frequencies."""
+    least = float(np.min(critical_amplitude(_COMPARED, eta))) - 1.0
+    a = 1.0 + float(f"{0.9 * least:.2g}")
+    shares = np.asarray(chattering_time(a, _COMPARED, eta)) * _COMPARED / math.pi
+    here = ", ".join(f"{share:.4f} at omega = {omega:g}" for share, omega in zip(shares, _COMPARED, strict=True))
+    return Statement(f"tau_ch/(T/2) at {in_words({'a': a, 'eta': eta})}", '"solely on a and eta"', here)
 
 
-def _crossing(critical: float) -> float:
+def _over_half_period(a: Floats, case: Case, method: str) -> Floats:
+    return np.asarray(chattering_time(a, case.omega, case.eta, method=method)) * (case.omega / math.pi)
+
+
+def _crossing(case: Case) -> float | str:
     """Amplitude at which Eq. 65 falls below the exact time, by bisection."""
-    low, high = 1.0, critical
+
+    def exceeds(a: float) -> bool:
+        there = np.array([a])
+        return bool(_over_half_period(there, case, "asymptotic") > _over_half_period(there, case, "exact"))
+
+    low, high = 1.0 + 1e-3 * (case.critical - 1.0), case.critical - 1e-3 * (case.critical - 1.0)
+    if not exceeds(low):
+        return "nowhere"
+    if exceeds(high):
+        return "a_cr"
     while high - low > 1e-9:
-        middle = np.array([0.5 * (low + high)])
-        exceeds = _over_half_period(middle, "asymptotic") > _over_half_period(middle, "exact")
-        low, high = (float(middle[0]), high) if exceeds[0] else (low, float(middle[0]))
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if exceeds(middle) else (low, middle)
     return low
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.errors import OutputError
+from rocking.errors import InvalidOption, OutputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,22 +74,52 @@ class PaperFigure:
         Its number in the paper.
     title : str
         What it shows.
+    conditions : str
+        The parameters that it is drawn for, with their values; empty where it depends on none.
     tables : mapping of str to table
         All that is drawn; each is written as a CSV file of its own.
     statements : tuple of Statement
         What the paper states about it in numbers, beside ours.
-    draw : callable
-        Draws it.
+    drawings : mapping of str to callable
+        What draws it, by name; the first is what `draw` draws unless told otherwise.
     """
 
     number: int
     title: str
+    conditions: str
     tables: Mapping[str, Table]
     statements: tuple[Statement, ...]
-    draw: Callable[[], Figure]
+    drawings: Mapping[str, Callable[[], Figure]]
+
+    @property
+    def caption(self) -> str:
+        """Number, title and conditions."""
+        return f"Fig. {self.number}: {self.title}{self.conditions and f'; {self.conditions}'}"
+
+    def draw(self, drawing: str | None = None) -> Figure:
+        """Draw it.
+
+        Parameters
+        ----------
+        drawing : str, optional
+            Which of its `drawings`, by name; by default the first.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InvalidOption
+            If there is none of that name.
+        """
+        chosen = next(iter(self.drawings)) if drawing is None else drawing
+        if chosen not in self.drawings:
+            raise InvalidOption(f"Fig. {self.number} is drawn as {' or '.join(self.drawings)}, not as {drawing!r}")
+        return self.drawings[chosen]()
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write the figure as PDF and PNG and its data as CSV into a folder that exists; the files' paths.
+        """Write all drawings as PDF and PNG and the data as CSV into a folder that exists; the files' paths.
 
         Raises
         ------
@@ -97,19 +127,27 @@ class PaperFigure:
             If a file cannot be written.
         """
         target = Path(folder)
-        names = [f"figure-{self.number}.pdf", f"figure-{self.number}.png"]
-        names += [f"figure-{self.number}-{name}.csv" for name in self.tables]
-        paths = tuple(target / name for name in names)
-        drawing = self.draw()
+        tables = {target / f"{self._stem}-{name}.csv": table for name, table in self.tables.items()}
+        paths: list[Path] = []
         try:
-            # Without a date the files of two runs are the same.
-            drawing.savefig(paths[0], metadata={"CreationDate": None})
-            drawing.savefig(paths[1], dpi=_DOTS_PER_INCH)
-            for path, table in zip(paths[2:], self.tables.values(), strict=True):
+            for k, name in enumerate(self.drawings):
+                paths += self._write_drawing(target, f"{self._stem}-{name}" if k else self._stem, self.draw(name))
+            for path, table in tables.items():
                 _write_table(path, table)
         except OSError as error:
             raise OutputError(f"{target} cannot be written to: {error.strerror}; choose another folder") from error
-        return paths
+        return (*paths, *tables)
+
+    @property
+    def _stem(self) -> str:
+        return f"figure-{self.number}"
+
+    def _write_drawing(self, folder: Path, stem: str, drawing: Figure) -> tuple[Path, Path]:
+        pdf, png = folder / f"{stem}.pdf", folder / f"{stem}.png"
+        # Without a date the files of two runs are the same.
+        drawing.savefig(pdf, metadata={"CreationDate": None})
+        drawing.savefig(png, dpi=_DOTS_PER_INCH)
+        return pdf, png
 
 
 def _write_table(path: Path, table: Table) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.chattering.paper.case import CYCLES, ETA, OMEGA, PERIOD, block, dense_times, excitation, simulated
+from rocking.chattering.paper.case import ALPHA, CYCLES, ETA, OMEGA, A, Case, P, dense_times
 from rocking.chattering.paper.figure import PaperFigure, Statement, Table
 from rocking.chattering.theory.amplitude import critical_amplitude
 from rocking.chattering.theory.duration import chattering_time
@@ -16,11 +17,17 @@ from rocking.plot.histories import Detail, Mark, excitation_figure, history_figu
 from rocking.response import Response
 from rocking.treatment import AsymptoticTime, Certified, Treatment, VelocityThreshold
 
-_COMPLETE: Final = 1.03
+#: Amplitude of Fig. 11.
 _INCOMPLETE: Final = 1.05
 
 #: Arcs of less than this share of the period are not drawn point by point.
 _SHORTEST: Final = 1e-4
+
+#: What the insets show: from and to, counted from uplift, over the chattering time (half a period where incomplete).
+_DETAILS: Final = {9: (0.64, 1.09), 10: (0.955, 1.015), 11: (0.38, 1.2)}
+
+_SINE: Final = ("a", "omega", "eta")
+_BLOCK: Final = ("p", "alpha")
 
 
 class _Scheme(NamedTuple):
@@ -38,172 +45,231 @@ _SCHEMES: Final = {
 }
 
 
-class _View(NamedTuple):
-    """What is shown of a history: limits of the rotation, and the inset."""
-
-    limits: tuple[float, float]
-    detail: Detail
-
-
-_VIEWS: Final = {
-    9: _View((-1.15e-3, 2.7e-3), Detail((0.44, 0.6), (-1.5e-4, 1.5e-4), (0.3, 0.66, 0.62, 0.32))),
-    10: _View((-1.15e-3, 2.7e-3), Detail((0.552, 0.574), (-3e-6, 3e-6), (0.3, 0.66, 0.62, 0.32))),
-    11: _View((-17e-3, 9.5e-3), Detail((0.36, 0.8), (-1.6e-3, 1.6e-3), (0.06, 0.13, 0.38, 0.34))),
-}
-
-
-def figure_4() -> PaperFigure:
-    """Excitation of amplitude 1.03, with the first two initiations and the time to rest between them."""
-    response = simulated(_COMPLETE, "certified")
+def figure_4(*, a: float = A, omega: float = OMEGA, eta: float = ETA) -> PaperFigure:
+    """Excitation, with the initiations and, where chattering is complete, the time to rest between them."""
+    case = Case(a, omega, eta)
+    response = case.simulated("certified")
     time = np.linspace(0.0, CYCLES, 1001)
-    uplifts, rests = (response.events["time"][response.events["kind"] == kind] / PERIOD for kind in ("uplift", "rest"))
+    marks = _initiations(case, {"certified": response})
+    half_periods = _none(float(np.diff([mark.time for mark in marks])[0]) * 2.0 if len(marks) > 1 else math.nan)
     statements = (
-        Statement("from the 1st to the 2nd initiation, over T/2", 1.0, 2.0 * float(uplifts[1] - uplifts[0])),
-        Statement("chattering time over T/2", "below 1", 2.0 * float(rests[0] - uplifts[0])),
+        Statement("from the 1st to the 2nd initiation, over T/2", 1.0, half_periods),
+        Statement("chattering time over T/2", "below 1", _none(2.0 * case.rest)),
     )
-    acceleration = _acceleration(_COMPLETE, time)
+    acceleration = _acceleration(case, time)
     return PaperFigure(
         4,
         "excitation",
+        case.words(*_SINE),
         {"excitation": {"time_over_period": time, "acceleration_over_g_alpha": acceleration}},
         statements,
-        partial(
-            excitation_figure,
-            time=time,
-            acceleration=acceleration,
-            marks=_initiations({"certified": response}),
-            rest=float(rests[0]),
-            title=_title(_COMPLETE),
-        ),
+        {
+            "excitation": partial(
+                excitation_figure,
+                time=time,
+                acceleration=acceleration,
+                marks=marks,
+                chattering_time=case.rest,
+                title=case.symbols(*_SINE),
+            )
+        },
     )
 
 
-def figure_9() -> PaperFigure:
-    """Response at a = 1.03 by the scheme that rests after Eq. 65's time."""
-    responses = _responses(_COMPLETE, ("certified", "chattering_threshold"))
-    time = float(chattering_time(_COMPLETE, OMEGA, ETA, method="asymptotic"))
-    scheme = _first(responses["chattering_threshold"])
+def figure_9(
+    *, a: float = A, omega: float = OMEGA, eta: float = ETA, p: float = P, alpha: float = ALPHA
+) -> PaperFigure:
+    """Response by the scheme that rests after Eq. 65's time."""
+    case = Case(a, omega, eta, p, alpha)
+    responses = _responses(case, ("certified", "chattering_threshold"))
+    scheme, certified = responses["chattering_threshold"], responses["certified"]
+    stated = [Statement("a_cr (paper: by Eq. 76 or Eq. 77, rounded)", 1.038, case.critical)]
     statements = (
-        Statement("a_cr (paper: Eq. 76)", 1.038, float(critical_amplitude(OMEGA, ETA))),
-        Statement("time from uplift to rest (paper: Eq. 65)", time, float(chattering_time(_COMPLETE, OMEGA, ETA))),
-        Statement("rest of the scheme, at its first impact past Eq. 65", "approximately after tau_ch", scheme),
-        Statement("rests in 2.5 T, though the excitation goes on", "shown", float(_rests(responses["certified"]))),
+        *(stated if (omega, eta) == (OMEGA, ETA) else []),
+        Statement("a_cr (paper: Eq. 76)", float(critical_amplitude(omega, eta, method="eq76")), case.critical),
+        Statement("a_cr (paper: Eq. 77)", float(critical_amplitude(omega, eta, method="eq77")), case.critical),
+        Statement(
+            "time from uplift to rest, p t (paper: Eq. 65)",
+            float(chattering_time(a, omega, eta, method="asymptotic")),
+            _none(float(chattering_time(a, omega, eta))),
+        ),
+        Statement(
+            "rest of the scheme, p t, at its first impact past Eq. 65",
+            "approximately after tau_ch",
+            _none(p * _first(scheme)),
+        ),
+        Statement("rests in 2.5 T, though the excitation goes on", _shown(case, A), float(_rests(certified))),
     )
-    return _history(9, "response with the chattering threshold", _COMPLETE, responses, statements)
+    return _history(9, "response with the chattering threshold", case, responses, statements)
 
 
-def figure_10() -> PaperFigure:
-    """Complete chattering at a = 1.03: both schemes rest, as they should."""
+def figure_10(
+    *, a: float = A, omega: float = OMEGA, eta: float = ETA, p: float = P, alpha: float = ALPHA
+) -> PaperFigure:
+    """Responses by both schemes where chattering is complete: they rest, as they should."""
+    case = Case(a, omega, eta, p, alpha)
     names = ("chattering_threshold", "veltol_5e-10")
-    responses = _responses(_COMPLETE, ("certified", *names))
+    responses = _responses(case, ("certified", *names))
     certified = responses["certified"]
-    statements = [Statement("complete chattering, as a is below a_cr", "yes", "yes" if _rests(certified) else "no")]
+    fitted = float(critical_amplitude(omega, eta, method="eq76"))
+    statements = [
+        Statement(
+            "complete chattering (paper: where a is below a_cr of Eq. 76)",
+            "yes" if a < fitted else "no",
+            "no" if math.isnan(case.rest) else "yes",
+        )
+    ]
     for name in names:
         response = responses[name]
         statements += [
             Statement(
-                f"{_words(name)}: rests in 2.5 T (certified: {_rests(certified)})", "shown", float(_rests(response))
+                f"{_words(name)}: rests in 2.5 T (certified: {_rests(certified)})",
+                _shown(case, A),
+                float(_rests(response)),
             ),
             Statement(
                 f"{_words(name)}: first rest, after certified, s",
-                '"properly"',
-                _first(response) - _first(certified),
+                '"properly"' if _is_papers(case, A) else "not given",
+                _none(_first(response) - _first(certified)),
                 digits=3,
             ),
         ]
-    return _history(10, "complete chattering by both schemes", _COMPLETE, responses, tuple(statements))
+    return _history(10, "response by both schemes", case, responses, tuple(statements))
 
 
-def figure_11() -> PaperFigure:
-    """Incomplete chattering at a = 1.05: a coarse velocity threshold rests where the block does not."""
-    responses = _responses(_INCOMPLETE, tuple(_SCHEMES))
+def figure_11(
+    *, a: float = _INCOMPLETE, omega: float = OMEGA, eta: float = ETA, p: float = P, alpha: float = ALPHA
+) -> PaperFigure:
+    """Responses where chattering is incomplete: a coarse velocity threshold rests where the block does not."""
+    case = Case(a, omega, eta, p, alpha)
+    responses = _responses(case, tuple(_SCHEMES))
     coarse, certified = responses["veltol_5e-2"], responses["certified"]
+    papers = _is_papers(case, _INCOMPLETE)
+    none = 0.0 if papers else "not given"
     statements = (
-        Statement("rests in 2.5 T, as a is above a_cr: incomplete chattering", 0.0, float(_rests(certified))),
+        Statement(
+            "rests in 2.5 T, as a is above a_cr: incomplete chattering" if papers else "rests in 2.5 T",
+            none,
+            float(_rests(certified)),
+        ),
         *(
-            Statement(f"{_words(name)}: rests in 2.5 T", 0.0, float(_rests(responses[name])))
+            Statement(f"{_words(name)}: rests in 2.5 T", none, float(_rests(responses[name])))
             for name in ("chattering_threshold", "veltol_5e-10")
         ),
-        Statement(f"{_words('veltol_5e-2')}: rests in 2.5 T, all wrong", "shown", float(_rests(coarse))),
-        Statement(f"{_words('veltol_5e-2')}: first wrong rest, s after uplift", "shown", _first(coarse)),
+        Statement(
+            f"{_words('veltol_5e-2')}: rests in 2.5 T{', all wrong' if papers else ''}",
+            _shown(case, _INCOMPLETE),
+            float(_rests(coarse)),
+        ),
+        Statement(
+            f"{_words('veltol_5e-2')}: first {'wrong ' if papers else ''}rest, s after uplift",
+            _shown(case, _INCOMPLETE),
+            _none(_first(coarse)),
+        ),
         Statement(
             f"{_words('veltol_5e-2')}: peak rotation over the certified one",
-            '"completely different"',
+            '"completely different"' if papers else "not given",
             coarse.peak_rotation / certified.peak_rotation,
             digits=4,
         ),
     )
-    return _history(11, "incomplete chattering, and a wrong rest", _INCOMPLETE, responses, statements)
+    return _history(11, "response by both schemes, and by a coarse velocity threshold", case, responses, statements)
 
 
-def _responses(a: float, names: tuple[str, ...]) -> dict[str, Response]:
-    return {name: simulated(a, _SCHEMES[name].treatment) for name in names}
+def _responses(case: Case, names: tuple[str, ...]) -> dict[str, Response]:
+    return {name: case.simulated(_SCHEMES[name].treatment) for name in names}
 
 
 def _history(
-    number: int, title: str, a: float, responses: dict[str, Response], statements: tuple[Statement, ...]
+    number: int, title: str, case: Case, responses: dict[str, Response], statements: tuple[Statement, ...]
 ) -> PaperFigure:
-    end, shortest = CYCLES * PERIOD, _SHORTEST * PERIOD
+    end, shortest = CYCLES * case.period, _SHORTEST * case.period
     dense = [dense_times(response.impacts["time"], end, shortest=shortest) for response in responses.values()]
     seconds = np.unique(np.concatenate(dense))
-    time = seconds / PERIOD
-    rotations = {name: r.rotation(seconds) / r.block.sides[0].alpha for name, r in responses.items()}
-    acceleration = _acceleration(a, time)
-    history = {"time_over_period": time, "acceleration_over_g_alpha": acceleration}
-    history |= {f"rotation_over_alpha_{name}": rotation for name, rotation in rotations.items()}
-    view = _VIEWS[number]
+    time = seconds / case.period
+    rotations = {name: response.rotation(seconds) for name, response in responses.items()}
+    scaled = {name: rotation / case.alpha for name, rotation in rotations.items()}
+    acceleration = _acceleration(case, time)
+    history = {"time_over_period": time, "time_s": seconds, "acceleration_over_g_alpha": acceleration}
+    history |= {f"rotation_over_alpha_{name}": rotation for name, rotation in scaled.items()}
+    history |= {f"rotation_{name}_rad": rotation for name, rotation in rotations.items()}
     return PaperFigure(
         number,
         title,
-        {"history": history, "events": _events(responses)},
+        case.words(*_SINE, *_BLOCK),
+        {"history": history, "events": _events(case, responses)},
         statements,
-        partial(
-            history_figure,
-            time=time,
-            rotations={_SCHEMES[name].label: rotation for name, rotation in rotations.items()},
-            acceleration=acceleration,
-            limits=view.limits,
-            detail=view.detail,
-            marks=_initiations(responses),
-            title=_title(a),
-        ),
+        {
+            "history": partial(
+                history_figure,
+                time=time,
+                rotations={_SCHEMES[name].label: rotation for name, rotation in scaled.items()},
+                acceleration=acceleration,
+                detail=_detail(case, _DETAILS[number], time, list(scaled.values())),
+                marks=_initiations(case, responses),
+                title=f"{case.symbols(*_SINE)}; {case.symbols(*_BLOCK)}",
+            )
+        },
     )
 
 
-def _events(responses: dict[str, Response]) -> Table:
+def _detail(case: Case, shares: tuple[float, float], time: Floats, rotations: list[Floats]) -> Detail:
+    """Return what an inset shows: all rotations within its limits of time, up to the end of chattering."""
+    uplift, length = _uplift(case), 0.5 if math.isnan(case.rest) else case.rest
+    start, end = (uplift + share * length for share in shares)
+    inside = (time >= start) & (time <= min(end, uplift + length))
+    reach = 1.2 * max(float(np.max(np.abs(rotation[inside]))) for rotation in rotations)
+    return Detail((start, end), (-reach, reach))
+
+
+def _events(case: Case, responses: dict[str, Response]) -> Table:
     """Uplifts and rests of all schemes in one table."""
     names = [name for name, response in responses.items() for _ in response.events]
     events = np.concatenate([response.events for response in responses.values()])
-    return {"scheme": np.array(names), "kind": events["kind"], "time_over_period": events["time"] / PERIOD}
+    times = {"time_over_period": events["time"] / case.period, "time_s": events["time"]}
+    return {"scheme": np.array(names), "kind": events["kind"], **times}
 
 
-def _initiations(responses: dict[str, Response]) -> tuple[Mark, ...]:
-    """First two uplifts from rest, of the scheme that rests most often."""
+def _initiations(case: Case, responses: dict[str, Response]) -> tuple[Mark, ...]:
+    """First two uplifts from rest, of the scheme that rests most often; only one where none comes to rest."""
     most = max(responses.values(), key=_rests)
-    times = most.events["time"][most.events["kind"] == "uplift"][:2] / PERIOD
-    return tuple(
-        Mark(float(time), text) for time, text in zip(times, ("1st initiation", "2nd initiation"), strict=True)
-    )
+    times = most.events["time"][most.events["kind"] == "uplift"][:2] / case.period
+    texts = ("1st initiation", "2nd initiation")
+    return tuple(Mark(float(time), text) for time, text in zip(times, texts, strict=False))
 
 
-def _acceleration(a: float, time_over_period: Floats) -> Floats:
-    rocking = block()
-    return excitation(a).acceleration(time_over_period * PERIOD) / (rocking.gravity * rocking.sides[0].alpha)
+def _uplift(case: Case) -> float:
+    """Time of the first uplift, over the period (Eq. 12)."""
+    return math.asin(1.0 / case.a) / (2.0 * math.pi)
+
+
+def _acceleration(case: Case, time_over_period: Floats) -> Floats:
+    return case.excitation().acceleration(time_over_period * case.period) / (case.block().gravity * case.alpha)
 
 
 def _first(response: Response) -> float:
-    """Time from the first uplift to the first rest."""
+    """Time from the first uplift to the first rest; NaN where there is none."""
     events = response.events
-    return float(events["time"][events["kind"] == "rest"][0] - events["time"][0])
+    rests = events["time"][events["kind"] == "rest"]
+    return float(rests[0] - events["time"][0]) if rests.size else math.nan
 
 
 def _rests(response: Response) -> int:
     return int(np.sum(response.events["kind"] == "rest"))
 
 
+def _is_papers(case: Case, a: float) -> bool:
+    """Whether a figure is the paper's own, at this amplitude; of others it states nothing."""
+    return case == Case(a)
+
+
+def _shown(case: Case, a: float) -> str:
+    return "shown" if _is_papers(case, a) else "not given"
+
+
+def _none(value: float) -> float | str:
+    return "none" if math.isnan(value) else value
+
+
 def _words(name: str) -> str:
     return name.replace("_", " ").replace("veltol", "VelTol/(p alpha) =")
-
-
-def _title(a: float) -> str:
-    return rf"$a$ = {a:g}, $\omega$ = {OMEGA:g}, $\eta$ = {ETA:g}"

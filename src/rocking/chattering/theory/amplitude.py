@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rocking.arrays import Floats
 from rocking.chattering.theory import surface
 from rocking.chattering.theory.parameters import broadcast, checked_frequency, checked_restitution
-from rocking.compiling import announce
+from rocking.compiling import AMPLITUDES, announce
 from rocking.errors import InvalidOption
 from rocking.kernels.paper import fitted_amplitudes
 from rocking.kernels.sine.critical import critical_amplitudes
@@ -59,7 +59,7 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     >>> round(float(critical_amplitude(2.0, 0.92, method="eq77")), 6)
     1.037899
     """
-    announce()
+    announce(AMPLITUDES)
     methods: dict[str, Callable[[Floats, Floats], Floats]] = {
         "exact": _exact,
         "eq76": _eq76,

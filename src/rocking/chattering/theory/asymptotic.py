@@ -20,7 +20,17 @@ from rocking.errors import InvalidOption
 from rocking.kernels.paper import eq65_sums, eq65_terms
 
 CYCLE: Final = np.dtype(
-    [("n", np.int64), ("sign", np.int8), ("order", np.int8), ("term", float), ("interval", float), ("time", float)]
+    [
+        ("n", np.int64),
+        ("sign", np.int8),
+        ("order", np.int8),
+        ("term", float),
+        ("interval", float),
+        ("time", float),
+        ("phase", float),
+        ("speed_before", float),
+        ("speed_after", float),
+    ]
 )
 
 
@@ -52,9 +62,11 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     Returns
     -------
     structured array
-        n; sign i_n of the rotation (i_0 = -1); order 1 or 3 and term T_{n;1} (i_n = i_0, Eq. 62) or T_{n;3}
-        (i_n = -i_0, Eq. 64); interval term eps^(order/2); time, the intervals' sum up to the end of cycle n. The last
-        row's time is Eq. 65: the table ends where the terms vanish in double precision.
+        A row for each cycle n: sign i_n of the rotation (i_0 = -1); order 1 or 3 and term T_{n;1} (i_n = i_0, Eq. 62)
+        or T_{n;3} (i_n = -i_0, Eq. 64); interval term eps^(order/2). Then what ends the cycle, impact n + 1: time, the
+        intervals' sum; phase omega time + psi of the ground acceleration a sin(phase), rad, with psi of Eq. 12;
+        speed_before and speed_after |phi'|, to their lowest order, eps^(3/2) (Eqs 57 and 58). The last row's time is
+        Eq. 65: the table ends where the terms vanish in double precision.
 
     Raises
     ------
@@ -63,8 +75,8 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
 
     Notes
     -----
-    Source: the paper's Eqs 57, 60, 62, 64 and 65. Mended: the procedure is to end, as printed, when Eq. 62 "returns a
-    negative solution", but its cubic always has one positive root, so it ends when the terms vanish.
+    Source: the paper's Eqs 12, 57, 58, 60, 62, 64 and 65. Mended: the procedure is to end, as printed, when Eq. 62
+    "returns a negative solution", but its cubic always has one positive root, so it ends when the terms vanish.
 
     Examples
     --------
@@ -73,6 +85,8 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     ([-1, 1, -1], [1, 3, 1])
     >>> round(float(table["time"][-1]), 9)
     0.57342594
+    >>> table["speed_before"][:3].round(6).tolist()
+    [0.003771, 0.00347, 0.003862]
     """
     excess = _excess(a)
     frequency = single(checked_frequency(omega), "omega")
@@ -90,6 +104,11 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     table["term"] = terms[:count].ravel() / frequency
     table["interval"] = table["term"] * np.sqrt(excess) ** table["order"]
     table["time"] = np.cumsum(table["interval"])
+    table["phase"] = frequency * table["time"] + math.asin(1.0 / (1.0 + excess))
+    # An arc of the second side takes as long, in these units, as the speed that it starts with, and keeps it.
+    entering = np.repeat(terms[:count, 1], 2)
+    table["speed_before"] = np.where(even, entering / restitution, entering) * excess**1.5 / frequency
+    table["speed_after"] = restitution * table["speed_before"]
     return table
 
 

@@ -24,9 +24,10 @@ from rocking.chattering.theory.parameters import (
     single,
 )
 from rocking.chattering.theory.series import series_times
-from rocking.compiling import announce
+from rocking.compiling import SEQUENCES, announce
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED
+from rocking.kernels.sine.first_arc import first_landing
 from rocking.kernels.sine.lanes import BLOCK, BLOCKS, LANES, Answers, rest_phases
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
 from rocking.kernels.sine.sequence import resolve, semianalytical_phases
@@ -113,7 +114,7 @@ def chattering_time(
     >>> round(float(chattering_time(1.01, 2.0, 0.92, method="asymptotic")), 6)
     0.573426
     """
-    announce()
+    announce(SEQUENCES)
     order = checked_count(order, "order", 1, 40)
     if resolved is not None:
         resolved = checked_count(resolved, "resolved", 1, 1_000_000)
@@ -213,7 +214,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     >>> bool(chattering.lower <= chattering.time <= chattering.upper)
     True
     """
-    announce()
+    announce(SEQUENCES)
     amplitude, frequency, restitution = _single_case(a, omega, eta)
     if checks.finite(tolerance, "tolerance", InvalidOption) < 1e-15:
         raise InvalidOption(f"tolerance must be at least 1e-15 and finite, not {tolerance!r}")
@@ -230,6 +231,40 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     if status == FOUND:
         return ChatteringSequence(impacts, True, *phases)
     return ChatteringSequence(impacts, False, math.nan, math.nan, math.nan)
+
+
+def first_arc(a: float, omega: float) -> tuple[float, float]:
+    """Time from uplift to the first impact, and the speed before it, however long the arc lasts.
+
+    Parameters
+    ----------
+    a, omega : float
+        As in `sequence`.
+
+    Returns
+    -------
+    interval, speed : float
+        Dimensionless; NaN where the block does not come down within a time of 20, in which it grows by exp(20).
+
+    Raises
+    ------
+    InvalidOption
+        If a parameter is not a single number or out of range.
+
+    Examples
+    --------
+    Half a period, pi/2, is over before this one ends:
+
+    >>> "{:.6f} {:.6f}".format(*first_arc(1.5, 2.0))
+    '1.922289 1.032126'
+    >>> first_arc(3.0, 2.0)
+    (nan, nan)
+    """
+    amplitude, frequency, _ = _single_case(a, omega, 1.0)
+    if amplitude == 1.0:
+        return 0.0, 0.0
+    status, phase, speed = first_landing(amplitude - 1.0, frequency)
+    return (phase / frequency, speed / frequency) if status == FOUND else (math.nan, math.nan)
 
 
 def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
@@ -354,7 +389,7 @@ def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int |
     times = np.where(amplitudes == 1.0, 0.0, exact)
     complete = np.flatnonzero(np.isfinite(exact) & (amplitudes > 1.0))
     sequences = amplitudes[complete], frequencies[complete], restitutions[complete]
-    impacts = _enough(sequences[2]) if resolved is None else np.full(complete.size, resolved)
+    impacts = resolved_by_default(sequences[2]) if resolved is None else np.full(complete.size, resolved)
     phases = np.zeros(complete.size)
     statuses = np.full(complete.size, UNRESOLVED, np.int8)
     semianalytical_phases(sequences, impacts, phases, statuses)
@@ -364,7 +399,10 @@ def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int |
     return times.reshape(shape)[()]
 
 
-def _enough(eta: Floats) -> NDArray[np.int64]:
-    """Impacts after which the speed has fallen as far as after 60 with the paper's restitution."""
+def resolved_by_default(eta: Floats) -> NDArray[np.int64]:
+    """Return how many impacts Eq. 75 resolves unless told otherwise.
+
+    After them the speed has fallen as far as after 60 with the paper's restitution.
+    """
     count = np.ceil(_PAPER_IMPACTS * math.log(_PAPER_RESTITUTION) / np.log(eta))
     return np.maximum(count, _PAPER_IMPACTS).astype(np.int64)

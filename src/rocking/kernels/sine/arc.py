@@ -94,20 +94,27 @@ def height(t: float, start: State, s: float, delta: float, at: Basis) -> float:
 
 
 @inlined
+def rise(t: float, start: State, s: float, delta: float, at: Basis) -> float:
+    """Rate of the height of an arc at t, where the basis is ``at``, times its decay."""
+    V, P, D = start
+    q = t * t
+    A = at.decay * at.sine + (1.0 + delta) * q * at.E
+    B = at.decay * at.versine + (1.0 + delta) * q * at.W
+    bend = at.decay * at.versine + delta * q * at.W
+    return V * (at.decay + delta * q * B) - t * (pull(P, s) * A + s * t * (D * bend + t * (1.0 - P) * at.E))
+
+
+@inlined
 def land(t: float, start: State, s: float, delta: float, at: Basis) -> Landing:
     """Correct an estimate t of an arc's duration to fourth order; ``at`` is the basis at t.
 
     The size is that of Newton's step, larger where the arc lands flat: relative to t, its fourth power is the error.
     Not that of the whole correction, which vanishes at places that are no roots, too.
     """
-    V, P, D = start
+    P, D = start.P, start.D
     q = t * t
     mean = 1.0 - P
-    A = at.decay * at.sine + (1.0 + delta) * q * at.E
-    B = at.decay * at.versine + (1.0 + delta) * q * at.W
-    bend = at.decay * at.versine + delta * q * at.W
-    G = pull(P, s)
-    speed = V * (at.decay + delta * q * B) - t * (G * A + s * t * (D * bend + t * mean * at.E))
+    speed = rise(t, start, s, delta, at)
     P_there = P + q * at.versine * mean + t * at.sine * D
     D_there = D - q * at.versine * D + t * at.sine * mean
     there = height(t, start, s, delta, at)

@@ -27,7 +27,8 @@ _MAXIMUM_PAIRS: Final = 100_000
 _FALLEN: Final = 2.3
 _SPARE_PAIRS: Final = 3
 
-#: These kernels allocate their arrays of coefficients, unlike all others.
+#: These kernels allocate their arrays of coefficients, unlike all others. Python strings the arcs together: that costs
+#: little beside them, and to compile it as well would multiply the time of a first call.
 _allocating = numba.njit(cache=True, error_model="numpy")
 
 
@@ -67,7 +68,6 @@ def extrapolated(remaining: Series, passed: Series, eta: float) -> tuple[Series,
     return column[1:], np.maximum(np.abs(from_level[1:]), np.abs(from_pair))
 
 
-@_allocating
 def first_impact(delta: float, eta: float, order: int) -> tuple[Series, Series]:
     """Phase of the first impact, over r, and v, p, d after it; shapes (1, order), (1, 3, order)."""
     phase = np.zeros((1, order))
@@ -80,7 +80,6 @@ def first_impact(delta: float, eta: float, order: int) -> tuple[Series, Series]:
     return phase, entered
 
 
-@_allocating
 def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[Series, Series]:
     """Phase passed, over r, in each of the next pairs of impacts, and v, p, d after it; ``start``: those before."""
     order = start.shape[1]
@@ -177,7 +176,6 @@ def series_basis(q: Series, delta: float) -> tuple[Series, Series, Series, Serie
     return sine, versine, E, W
 
 
-@_allocating
 def square_root_of_two_plus(order: int) -> Series:
     """Series of sqrt(2 + eps)."""
     root = np.zeros(order)

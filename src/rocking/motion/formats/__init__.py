@@ -33,6 +33,15 @@ _READERS: tuple[_Reader, ...] = (at2, cosmos, csmip_v1, csmip_v2, smc, esm, knet
 
 _LISTED = 30
 
+#: How files begin that hold no record as they are, and what becomes of them.
+_FOREIGN = {
+    b"\x93NUMPY": "an array of NumPy's; load it with numpy.load, and make a motion with Motion.from_samples(array, dt)",
+    b"PK\x03\x04": "a ZIP archive, or a workbook; unpack it, or save its table as CSV",
+    b"\x1f\x8b": "a gzip archive; unpack it",
+    b"\x89HDF": "an HDF5 or NetCDF file; write its acceleration as a text table",
+    b"CDF": "a NetCDF file; write its acceleration as a text table",
+}
+
 
 def read(
     path: str | os.PathLike[str] | BinaryIO,
@@ -47,14 +56,15 @@ def read(
     ----------
     path : str, path or binary file
         A file in PEER AT2, CSMIP V1 or V2, COSMOS, USGS SMC, K-NET/KiK-net or ESM format, a text table of one
-        column (accelerations) or two (times, accelerations), or any file that ObsPy reads if the `formats` extra
-        is installed. The format is told from the content.
+        column (accelerations), two (times, accelerations) or more that a heading names (times, then channels), or any
+        file that ObsPy reads if the `formats` extra is installed. The format is told from the content.
     channel : int or str, optional
         Number or name of the channel; needed only where the file holds several.
     dt : float, optional
         Sampling step, s; needed only for one column of accelerations. Elsewhere it must agree with the file.
-    units : {"g", "m/s2", "cm/s2", "gal", "mm/s2"}, optional
-        Units of the numbers; needed only where the file does not say: text tables and ObsPy's formats.
+    units : {"g", "m/s2", "cm/s2", "gal", "mm/s2", "mg"}, optional
+        Units of the numbers; needed only where the file does not say: ObsPy's formats, and text tables without a
+        heading such as "acceleration (cm/s2)" or "a_g". They overrule a heading.
 
     Returns
     -------
@@ -76,11 +86,15 @@ def read(
     >>> from pathlib import Path
     >>> file = Path(tempfile.mkdtemp()) / "pulse.txt"
     >>> _ = file.write_text("time (s), a (g)\n0.00, 0.0\n0.01, 0.5\n0.02, 0.0\n")
-    >>> motion = read(file, units="g")
+    >>> motion = read(file)
     >>> motion.duration, motion.pga
     (0.02, 4.903325)
     """
-    request = Request.checked(dt, units)
+    return read_as(path, channel, Request.checked(dt, units))
+
+
+def read_as(path: str | os.PathLike[str] | BinaryIO, channel: int | str | None, request: Request) -> Motion:
+    """Read one channel of a record file as a motion, as `read` does, with arguments that are checked already."""
     source = open_source(path)
     reader = _recognise(source)[0]
     return _choose(source, reader.read(source, request), channel).motion()
@@ -105,7 +119,13 @@ def content(
     UnreadableRecord, InvalidMotion
         As for `read`.
     """
-    request = Request.checked(dt, units)
+    return content_as(path, channel, Request.checked(dt, units))
+
+
+def content_as(
+    path: str | os.PathLike[str] | BinaryIO, channel: int | str | None, request: Request
+) -> tuple[Identification, tuple[Channel, ...]]:
+    """Return format and channels as `content` does, with arguments that are checked already."""
     source = open_source(path)
     reader, identification = _recognise(source)
     found = reader.read(source, request)
@@ -169,9 +189,17 @@ def _unknown(source: Source) -> UnreadableRecord:
     if wide is not None:
         return source.error(
             f"each line holds {wide} numbers, but a text table has one (acceleration) or two (time, acceleration); "
-            "keep only these"
+            f"keep only these, or name all {wide} columns in a heading line"
         )
+    foreign = next((what for mark, what in _FOREIGN.items() if source.raw.startswith(mark)), None)
+    if foreign is not None:
+        return source.error(f"this is {foreign}")
     position = source.binary_at()
+    if position is None and not table.is_foreign(source):
+        return source.error(
+            "this is text in no format known here, and no line of it holds numbers alone: if it is the heading of a "
+            "record, get the whole file"
+        )
     what = "this is text" if position is None else f"this is a binary file (byte {source.data[position]} at {position})"
     if through_obspy.installed():
         return source.error(f"{what} in no format known here, nor to ObsPy; give a strong-motion record")

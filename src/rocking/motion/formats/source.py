@@ -18,7 +18,7 @@ SIZE_LIMIT = 512 * 2**20
 #: Header lines are decoded up to this length, so that a file without line ends costs no more than any other.
 LINE_LIMIT = 512
 
-#: What a file that is already open is called in messages.
+#: What an open file without a name of its own is called in messages.
 _STREAM = "standard input"
 
 #: How alike the names of two files must be for the one to be a slip of the other.
@@ -115,7 +115,7 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
         If it is missing, not a regular file, not readable, empty or larger than SIZE_LIMIT.
     """
     read = getattr(path, "read", None)
-    name = _name(path) if read is None else _STREAM
+    name = _name(path) if read is None else _stream_name(path)
     try:
         raw = _content(name) if read is None else read(SIZE_LIMIT + 1)
     except FileNotFoundError as error:
@@ -139,6 +139,10 @@ def _hint(name: str) -> str:
         beside = [path.name for path in Path(name).parent.iterdir()]
     except (OSError, ValueError):
         beside = []
+    from rocking.motion import records  # it reads its own with the help of the formats
+
+    if name in records.names():
+        return f"it is a shipped record: load it with rocking.records.load({name!r})"
     close = difflib.get_close_matches(Path(name).name, beside, n=1, cutoff=_ALIKE)
     return f"did you mean {Path(name).with_name(close[0])}?" if close else "check the name and the folder"
 
@@ -148,6 +152,12 @@ def _name(path: Any) -> str:
         return os.fsdecode(path)
     except TypeError as error:
         raise UnreadableRecord(f"the path of a record must be a file name, not {path!r}") from error
+
+
+def _stream_name(stream: Any) -> str:
+    """Return the name of an open file; Python's own streams have none but "<stdin>" or a number."""
+    name = getattr(stream, "name", None)
+    return name if isinstance(name, str) and name and not name.startswith("<") else _STREAM
 
 
 def _content(name: str) -> bytes:

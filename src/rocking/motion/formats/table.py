@@ -1,8 +1,9 @@
-"""Plain text and CSV: one column of accelerations with dt=, or times and accelerations; units= in any case.
+"""Plain text and CSV: one column of accelerations with dt=, times and accelerations, or as many as a heading names.
 
-Heading lines and comments (#, %, !, //) are passed over. The delimiter is a semicolon (a comma is then the decimal
-sign), a comma, or blanks; between blanks a comma within a number is the decimal sign. Numbers may be quoted, and
-exponents Fortran's (1.0D-3). Rows such as "1,5" in a file without any point may be one number or two: they are refused.
+Units are those that a heading names, in brackets or after an underscore, or units=. Heading lines and comments (#, %,
+!, //) are passed over. The delimiter is a semicolon (a comma is then the decimal sign), a comma, or blanks; between
+blanks a comma within a number is the decimal sign. Numbers may be quoted, and exponents Fortran's (1.0D-3). Rows such
+as "1,5" in a file without any point may be one number or two: they are refused.
 """
 
 from __future__ import annotations
@@ -30,10 +31,11 @@ _COMMA = "a comma"
 _HEADING_LINES = 64
 _LINES_AT_ONCE = 50_000
 _LONGEST_HEADING = 10_000
-_BRACKETS = re.compile(r"[(\[]\s*([A-Za-z][\w/^*. ]{0,20}?)\s*[)\]]")
+_BRACKETS = re.compile(r"[(\[]\s*([A-Za-z][\w/^*.·⁻ -]{0,20}?)\s*[)\]]")
+_SUFFIX = re.compile(r"(?<=[A-Za-z0-9])_(?=([A-Za-z]\w{0,12})\b)")
 _COMMENT = re.compile(rb"[ \t]*(#|%|!|//)")
 
-#: No row of two numbers is longer; what is, is refused before it is split.
+#: No row of numbers is longer; what is, is refused before it is split.
 _ROW_LIMIT = 1024
 _WITHOUT_POINT = re.compile(r"[+-]?\d+(?:,\d+)?(?:[EeDd][+-]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[EeDd][+-]?\d+)?")
@@ -66,14 +68,25 @@ class _Row(NamedTuple):
     at: int
 
 
+class _Column(NamedTuple):
+    """A column of accelerations: its place in a row, its name, and the unit that its heading names."""
+
+    place: int
+    name: str
+    unit: Unit | None
+
+
 def recognise(source: Source) -> Identification | None:
-    """Return the format if, after comments and headings, rows of one or two numbers begin."""
+    """Return the format if rows of one or two numbers begin after comments and headings, or of more that are named."""
     shape = _shape(source)
-    if shape is None or shape.columns > 2:
+    if shape is None or not _columns(source, shape):
         return None
-    what = "one number" if shape.columns == 1 else f"two numbers, between them {shape.delimiter}"
-    if shape.ambiguous(source):
+    if shape.columns == 1:
+        what = "one number"
+    elif shape.ambiguous(source):
         what = "one number with a decimal comma, or two numbers"
+    else:
+        what = f"{'two' if shape.columns == 2 else shape.columns} numbers, between them {shape.delimiter}"
     return Identification(NAME, f"from line {source.line_number(shape.start)} on each line holds {what}")
 
 
@@ -83,13 +96,18 @@ def columns(source: Source) -> int | None:
     return None if shape is None else shape.columns
 
 
+def is_foreign(source: Source) -> bool:
+    """Whether the first line is the title of another format's table."""
+    return any(line.text.startswith(_OTHER_TITLES) for line in source.lines(0, _HEADING_LINES))
+
+
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file.
+    """Return the channels of the file: one, unless a heading names several.
 
     Raises
     ------
     UnreadableRecord
-        If units are not given, or dt is not given for a single column, or a row is not like the first one, or
+        If units are not known, or dt is not given for a single column, or a row is not like the first one, or
         times do not increase, or it cannot be told whether commas are decimal signs.
     """
     shape = _shape(source)
@@ -102,28 +120,53 @@ def read(source: Source, request: Request) -> list[Channel]:
         )
     if shape.columns == 1 and request.dt is None:
         raise source.error("the file does not say its sampling step; give dt= in seconds", shape.start)
-    heading = _heading_unit(source, shape.start)
-    if heading is not None and request.unit is None:
-        raise source.error(
-            f"the file does not state its units, but its heading says {heading.name}; give units={heading.name} if so",
-            shape.start,
-        )
-    unit = request.units(source, None, shape.start)
+    held = _columns(source, shape)
+    units = [request.units_by_heading(source, column.unit, shape.start) for column in held]
     values = _values(source, shape)
     dt, times = request.dt, None
-    if shape.columns == 2:
-        dt, times = _timing(source, request, shape, values[0::2])
-        values = values[1::2]
-    acceleration = to_acceleration(source, shape.start, values, unit)
-    facts = {"format": NAME, "file": source.file} | ({"heading units": heading.name} if heading else {})
-    return [Channel(source.stem, 1, acceleration, dt, times, units=unit.name, metadata=facts)]
+    if shape.columns > 1:
+        dt, times = _timing(source, request, shape, values[0 :: shape.columns])
+    channels = []
+    for number, (column, unit) in enumerate(zip(held, units, strict=True), 1):
+        facts = {"format": NAME, "file": source.file}
+        facts |= {"heading units": column.unit.name} if column.unit else {}
+        acceleration = to_acceleration(source, shape.start, values[column.place :: shape.columns], unit)
+        channels.append(Channel(column.name, number, acceleration, dt, times, units=unit.name, metadata=facts))
+    return channels
 
 
-def _heading_unit(source: Source, start: int) -> Unit | None:
-    """Return the one unit of acceleration that the lines before the first row name in brackets, or None."""
-    words = _BRACKETS.findall(source.data[: min(start, _LONGEST_HEADING)].decode("latin-1"))
+def _columns(source: Source, shape: _Shape) -> list[_Column]:
+    """Columns of accelerations; of more than two those that a heading names, with a unit of acceleration if any has."""
+    heading = _decoded(source.data[: min(shape.start, _LONGEST_HEADING)])
+    if shape.columns <= 2:
+        return [_Column(shape.columns - 1, source.stem, _unit_in(heading))]
+    lines = [line.strip().lstrip("#%!/").strip() for line in heading.splitlines() if line.strip()]
+    names = _cells(lines[-1], shape.columns) if lines else []
+    found = [_Column(k, _BRACKETS.sub("", name).strip(), _unit_in(name)) for k, name in enumerate(names)][1:]
+    return [column for column in found if column.unit] or found
+
+
+def _cells(line: str, count: int) -> list[str]:
+    """Return the names in a heading of so many columns, or none where it cannot be split so."""
+    for delimiter in (r";", r",", r"\t+", r"\s{2,}", r"\s+"):
+        cells = [cell.strip().strip('"').strip() for cell in re.split(delimiter, line)]
+        if len(cells) == count and all(cells):
+            return cells
+    return []
+
+
+def _unit_in(heading: str) -> Unit | None:
+    """Return the one unit of acceleration that a heading names in brackets or after an underscore, or None."""
+    words = [*_BRACKETS.findall(heading), *_SUFFIX.findall(heading)]
     units = {unit for word in words if (unit := find_unit(word)) is not None}
     return units.pop() if len(units) == 1 else None
+
+
+def _decoded(heading: bytes) -> str:
+    try:
+        return heading.decode("utf-8")
+    except UnicodeDecodeError:
+        return heading.decode("latin-1")
 
 
 def _shape(source: Source) -> _Shape | None:

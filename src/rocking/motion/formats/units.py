@@ -12,7 +12,7 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 
 #: What the argument `units=` takes.
-CHOICES = ("g", "m/s2", "cm/s2", "gal", "mm/s2")
+CHOICES = ("g", "m/s2", "cm/s2", "gal", "mm/s2", "mg")
 
 
 class Unit(NamedTuple):
@@ -28,20 +28,30 @@ class Unit(NamedTuple):
             return values * self.multiplier / self.divisor
 
 
+_G_TENTH = Unit("g/10", STANDARD_GRAVITY, 10.0)
+_M = Unit("m/s2", 1.0, 1.0)
+_CM = Unit("cm/s2", 1.0, 100.0)
+_MM = Unit("mm/s2", 1.0, 1000.0)
+
+#: Units by their spelling without signs: "cm/s^2", "cm/sec/sec" and "cm_s2" are "cms2" or "cmss".
 _UNITS = {
     "g": Unit("g", STANDARD_GRAVITY, 1.0),
-    "g/10": Unit("g/10", STANDARD_GRAVITY, 10.0),
-    "m/s2": Unit("m/s2", 1.0, 1.0),
-    "cm/s2": Unit("cm/s2", 1.0, 100.0),
-    "gal": Unit("cm/s2", 1.0, 100.0),
-    "mm/s2": Unit("mm/s2", 1.0, 1000.0),
+    "g10": _G_TENTH,
+    "mg": Unit("mg", STANDARD_GRAVITY, 1000.0),
+    "ms2": _M,
+    "mss": _M,
+    "cms2": _CM,
+    "cmss": _CM,
+    "gal": _CM,
+    "mms2": _MM,
+    "mmss": _MM,
 }
 
 
 def find_unit(spelling: str) -> Unit | None:
-    """Return the unit that a file spells "CM/SEC/SEC", "cm/sec2", "cm/s^2", "gal", "G", ..., or None."""
-    plain = re.sub(r"[\s^*.]", "", spelling.lower()).replace("sec", "s").replace("/s/s", "/s2")
-    return _UNITS.get(plain)
+    """Return the unit that one spells "CM/SEC/SEC", "cm/sec2", "cm/s^2", "cm/s²", "cm_s2", "gal", "G", ..., or None."""
+    plain = spelling.lower().replace("²", "2").replace("s-2", "s2").replace("s⁻2", "s2")
+    return _UNITS.get(re.sub(r"[\s^*._/·]", "", plain).replace("sec", "s"))
 
 
 def choose_unit(units: str) -> Unit:

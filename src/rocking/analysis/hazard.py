@@ -1,0 +1,209 @@
+"""Seismic hazard curves: how often a year the ground motion at a site exceeds an intensity."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.analysis.intensity import Measure
+from rocking.arrays import Floats
+from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import InvalidOption
+from rocking.tables import text_table
+
+#: Headings of an intensity in a table, with the factor to SI units.
+_HEADINGS: Final = {
+    "pga_g": ("pga", STANDARD_GRAVITY),
+    "pga_m_s2": ("pga", 1.0),
+    "pgv_m_s": ("pgv", 1.0),
+    "pgv_cm_s": ("pgv", 0.01),
+    "sa_g": ("sa", STANDARD_GRAVITY),
+    "sa_m_s2": ("sa", 1.0),
+}
+
+#: Names of intensities in OpenQuake's files, with the factor to SI units.
+_OPENQUAKE: Final = {"PGA": ("pga", STANDARD_GRAVITY), "PGV": ("pgv", 0.01), "SA": ("sa", STANDARD_GRAVITY)}
+
+_POE: Final = re.compile(r"poe-([0-9.eE+-]+)")
+
+
+@dataclass(frozen=True, eq=False)
+class HazardCurve:
+    """Mean annual rate at which the motion at a site exceeds an intensity.
+
+    Between its points the rate is a power of the intensity, a straight line in logarithms; the first and the last such
+    line go on beyond them.
+
+    Parameters
+    ----------
+    intensity : array_like, shape (n,)
+        Intensities in SI units (m/s^2, m/s), n >= 2, increasing.
+    rate : array_like, shape (n,)
+        Exceedances a year, decreasing.
+    measure : Measure or str
+        What the intensity is: "pga", "pgv", or `Measure("sa", period)`.
+    name : str
+        Short name for tables and figures.
+
+    Raises
+    ------
+    InvalidOption
+        If there are fewer than two points, or they do not increase in intensity and decrease in rate.
+
+    Examples
+    --------
+    >>> hazard = HazardCurve([1.0, 2.0, 4.0], [1e-2, 2e-3, 2e-4])
+    >>> hazard.rate_of([1.0, 2.0, 8.0]).round(12).tolist()
+    [0.01, 0.002, 2e-05]
+    """
+
+    intensity: Floats
+    rate: Floats
+    measure: Measure = Measure("pga")  # noqa: RUF009 - it is frozen
+    name: str = "hazard curve"
+
+    def __post_init__(self) -> None:
+        intensity = checks.numbers(self.intensity, "intensity of a hazard curve", InvalidOption)
+        rate = checks.numbers(self.rate, "rate of a hazard curve", InvalidOption)
+        if intensity.ndim != 1 or intensity.shape != rate.shape or len(intensity) < 2:
+            raise InvalidOption(
+                "a hazard curve needs two points or more, and as many rates as intensities, not shapes "
+                f"{intensity.shape} and {rate.shape}"
+            )
+        for what, values, way in (("intensities", intensity, 1.0), ("rates", rate, -1.0)):
+            if not (np.all(values > 0.0) and np.all(np.isfinite(values)) and np.all(way * np.diff(values) > 0.0)):
+                raise InvalidOption(
+                    f"the {what} of a hazard curve must be positive and {'increase' if way > 0.0 else 'decrease'} "
+                    "from point to point; leave out what repeats the point before"
+                )
+        given: Any = self.measure
+        measure = given if isinstance(given, Measure) else Measure(given)
+        if measure.units == "1":
+            raise InvalidOption("a hazard curve is of pga, pgv or sa, which are of the site, not of a block")
+        for name, value in (("intensity", intensity), ("rate", rate), ("measure", measure)):
+            object.__setattr__(self, name, value)
+        for array in (intensity, rate):
+            array.setflags(write=False)
+
+    @classmethod
+    def read(cls, path: str | Path, *, site: int = 0, period: float | None = None) -> HazardCurve:
+        """Read a hazard curve: a table of two columns, or what OpenQuake exports.
+
+        Parameters
+        ----------
+        path : str or Path
+            CSV file. A table has a heading that names the intensity with its units (pga_g, pga_m_s2, pgv_m_s, pgv_cm_s,
+            sa_g or sa_m_s2) and the rate (annual_rate); OpenQuake's ``hazard_curve-...csv`` says all in its first line,
+            and its probabilities of exceedance in T years become rates by -ln(1 - probability)/T.
+        site : int
+            Which row of OpenQuake's file.
+        period : float, optional
+            Period of a table's spectral acceleration, s.
+
+        Raises
+        ------
+        InvalidOption
+            If the file cannot be read, or is neither.
+        """
+        try:
+            lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it is no text"
+            raise InvalidOption(f"{path} cannot be read: {reason}") from error
+        name = Path(path).stem
+        if lines and "investigation_time" in lines[0]:
+            return _from_openquake(lines, str(path), site, name)
+        return _from_table(lines, str(path), period, name)
+
+    def rate_of(self, intensity: ArrayLike) -> Floats:
+        """Annual rate of exceeding intensities, shaped like them."""
+        at = np.asarray(intensity, dtype=np.float64)
+        exponents, factors = self.powers()
+        segment = np.clip(np.searchsorted(self.intensity, at, side="right") - 1, 0, len(self.rate) - 2)
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.exp(factors[segment] - exponents[segment] * np.log(at)))
+
+    def powers(self) -> tuple[Floats, Floats]:
+        """Exponent k and logarithm of c of each segment, on which the rate is c intensity^-k."""
+        x, y = np.log(self.intensity), np.log(self.rate)
+        exponents = -np.diff(y) / np.diff(x)
+        return exponents, y[:-1] + exponents * x[:-1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Points and measure by name."""
+        return {
+            "name": self.name,
+            "measure": {"name": self.measure.name, **self.measure.options()},
+            self.measure.column: self.intensity.tolist(),
+            "annual_rate": self.rate.tolist(),
+        }
+
+    def summary(self) -> str:
+        """Points in a table, with return periods."""
+        rows = [[self.measure.scale * x, rate, 1.0 / rate] for x, rate in zip(self.intensity, self.rate, strict=True)]
+        return text_table([self.measure.label, "annual rate", "return period (years)"], rows)
+
+    def __repr__(self) -> str:
+        low, high = self.measure.scale * self.intensity[[0, -1]]
+        return (
+            f"<HazardCurve: {self.name}; {self.measure.label} from {low:.4g} to {high:.4g}, "
+            f"annual rate from {self.rate[0]:.3g} to {self.rate[-1]:.3g}>"
+        )
+
+
+def _from_table(lines: list[str], path: str, period: float | None, name: str) -> HazardCurve:
+    rows = [row for row in csv.reader(lines) if row and not row[0].lstrip().startswith("#")]
+    heading = [cell.strip().lower() for cell in rows[0]] if rows else []
+    found = [cell for cell in heading if cell in _HEADINGS]
+    if len(found) != 1 or "annual_rate" not in heading:
+        raise InvalidOption(
+            f"{path}: a hazard curve needs a heading with annual_rate and one of {', '.join(_HEADINGS)}, "
+            f"not {','.join(heading) or 'nothing'}"
+        )
+    kind, factor = _HEADINGS[found[0]]
+    columns = [heading.index(found[0]), heading.index("annual_rate")]
+    points = []
+    for k, row in enumerate(rows[1:], start=2):
+        try:
+            points.append([float(row[column]) for column in columns])
+        except (ValueError, IndexError):
+            raise InvalidOption(f"{path}, row {k}: {','.join(row)} is not an intensity and a rate") from None
+    if kind == "sa" and period is None:
+        raise InvalidOption(f"{path}: give period= (s) of its spectral acceleration")
+    measure = Measure("sa", period) if kind == "sa" else Measure(kind)  # type: ignore[arg-type]
+    table = np.array(points, dtype=np.float64).reshape(-1, 2)
+    return HazardCurve(factor * table[:, 0], table[:, 1], measure, name)
+
+
+def _from_openquake(lines: list[str], path: str, site: int, name: str) -> HazardCurve:
+    said = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
+    kind, _, rest = said.get("imt", "").partition("(")
+    rows = list(csv.reader(lines[1:]))
+    levels = [_POE.fullmatch(cell.strip()) for cell in rows[0]] if rows else []
+    if kind not in _OPENQUAKE or not any(levels):
+        raise InvalidOption(
+            f"{path}: no hazard curve of {', '.join(_OPENQUAKE)}: imt is {said.get('imt', 'not given')}"
+        )
+    if not 0 <= site < len(rows) - 1:
+        raise InvalidOption(f"{path}: there is no site {site}; it holds {len(rows) - 1}, counted from 0")
+    columns = [k for k, level in enumerate(levels) if level]
+    intensity = np.array([float(level[1]) for level in levels if level])
+    try:
+        exceeded = np.array([float(rows[1 + site][k]) for k in columns])
+        years = float(said["investigation_time"])
+    except (ValueError, IndexError) as error:
+        raise InvalidOption(f"{path}, site {site}: {error}; it is not a whole hazard curve") from None
+    measure_name, factor = _OPENQUAKE[kind]
+    measure = Measure("sa", float(rest.rstrip(")"))) if kind == "SA" else Measure(measure_name)  # type: ignore[arg-type]
+    # Probabilities that are printed as 0 or 1 say nothing of the rate.
+    useful = (exceeded > 0.0) & (exceeded < 1.0)
+    rate = -np.log1p(-exceeded[useful]) / years
+    falling = np.append(True, np.diff(np.minimum.accumulate(rate)) < 0.0) if len(rate) else np.zeros(0, dtype=bool)
+    return HazardCurve(factor * intensity[useful][falling], rate[falling], measure, name)

@@ -1,0 +1,72 @@
+"""`rocking explore`: the explorer's page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from rocking.cli.options import OUTPUT, QuietOptions
+from rocking.errors import UnreadableRecord
+from rocking.explorer.pulses import is_pulse, pulse_of
+from rocking.motion.named import is_shipped
+
+if TYPE_CHECKING:
+    from rocking.explorer.core import Explorer
+
+
+def explore(
+    motion: str | None = None,
+    *,
+    port: int = 0,
+    no_open: Annotated[bool, Parameter(negative="")] = False,
+    address: str = "127.0.0.1",
+    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+) -> None:
+    """Open a page on which a block is seen to rock, chatter, rest and fall.
+
+    One line is printed, with a link that opens the page once, in one browser. Ctrl-C ends it.
+
+    Parameters
+    ----------
+    motion
+        What shakes the block at first: a shipped record, a record file, or a pulse; or the folder of a study, whose
+        results are shown as maps.
+    port
+        Port to listen on; by default one that is free.
+    no_open
+        Do not open a browser.
+    address
+        Address of this machine to listen on. Others than 127.0.0.1 can be reached from other machines.
+    """
+    from rocking.explorer.assets import require_packages
+
+    require_packages()
+    from rocking.explorer.core import Explorer
+    from rocking.explorer.launch import announce_and_open, served
+    from rocking.explorer.studies import StudyView
+
+    explorer = Explorer()
+    is_study = motion is not None and Path(motion).is_dir()
+    study = StudyView(Path(motion)) if motion is not None and is_study else None
+    texts = {"view": "map"} if is_study else {} if motion is None else _opening(explorer, motion)
+    here = served(explorer, texts, study, address=address, port=port)
+    announce_and_open(here, {}, open_browser=not no_open)
+    here.run()
+
+
+def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
+    """Texts of the motion that the page opens with."""
+    if is_pulse(motion):
+        pulse_of(motion)
+        return {"motion": motion}
+    if is_shipped(motion):
+        return {"motion": motion}
+    file = Path(motion)
+    try:
+        key = explorer.shelf.put(file.name, file.read_bytes())
+    except OSError as error:
+        raise UnreadableRecord(f"{motion}: this file could not be read ({error.strerror}); check the name") from None
+    explorer.shelf.contents(key)
+    return {"motion": f"file:{key}"}

@@ -1,0 +1,494 @@
+"""From a case to what a page shows: arrays, numbers and words. It knows no web."""
+
+from __future__ import annotations
+
+import math
+import sys
+import tempfile
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from rocking.arrays import Floats
+from rocking.block import Block
+from rocking.chattering.episodes import chattering_episodes
+from rocking.chattering.schemes import compare_schemes
+from rocking.errors import InvalidOption
+from rocking.explorer.case import Case, Texts, as_command, as_python, read_case
+from rocking.explorer.shelf import Shelf
+from rocking.motion.motion import Motion
+from rocking.plausibility import block_notes, motion_notes
+from rocking.response import Response
+from rocking.response.figure import active_span
+from rocking.response.verdict import in_words
+from rocking.treatment import Certified
+
+#: Times at which a rotation is evaluated across a window, and points of a line that are sent.
+_TIMES: Final = 12_000
+_POINTS: Final = 3_000
+
+#: Impacts of a window whose times are added to the line's.
+_MARKED: Final = 2_000
+
+#: Bracket on a time of rest, s, with which impacts are resolved for a window close to it: some nanoseconds are left.
+_FINEST: Final = Certified(1e-40)
+
+#: A stretch without resolved impacts is seen where it is longer than this part of a window.
+_SEEN: Final = 1e-3
+
+#: Responses that are kept, and steps in all of them: a hundred MB at most.
+_KEPT: Final = 48
+_KEPT_STEPS: Final = 2_000_000
+
+#: Ground motion of longer periods than this (s) is not drawn where a record's baseline would drift.
+_LONGEST_PERIOD: Final = 10.0
+
+#: What a figure or a table can be written as, and the type of its content.
+EXPORTS: Final[Mapping[str, str]] = {
+    "svg": "image/svg+xml",
+    "png": "image/png",
+    "csv": "text/csv; charset=utf-8",
+    "events.csv": "text/csv; charset=utf-8",
+    "impacts.csv": "text/csv; charset=utf-8",
+    "nc": "application/x-netcdf",
+}
+
+
+#: Texts that say one thing together.
+_GROUPS: Final = (
+    {"width", "height", "p", "alpha", "restitution"},
+    {"motion", "channel", "dt", "units", "scale", "pga", "pgv", "sa"},
+)
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What is sent: plain values, and arrays of floats by name."""
+
+    header: dict[str, Any]
+    arrays: dict[str, Floats] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A case with its response, and what is made of it when it is first asked for."""
+
+    case: Case
+    response: Response
+
+    @cached_property
+    def fine(self) -> Response:
+        """The same response with more impacts resolved before each proven rest."""
+        if self.case.treatment.name != _FINEST.name:
+            return self.response
+        fine = replace(self.case, treatment=_FINEST).simulate()
+        return fine if fine.stalled == self.response.stalled else self.response
+
+    def resolved(self, start: float, end: float) -> Response:
+        """Return the response whose impacts are resolved as far as a window shows."""
+        for unresolved in _unresolved(self.response, start, end):
+            if unresolved > _SEEN * (end - start):
+                return self.fine
+        return self.response
+
+    @cached_property
+    def ground(self) -> Motion | None:
+        """The motion whose displacement is drawn."""
+        return None if self.case.motion is None else _steady(self.case.motion)
+
+
+class Explorer:
+    """Cases by their texts; keeps the last responses. Safe to use from several threads.
+
+    Examples
+    --------
+    >>> explorer = Explorer()
+    >>> payload = explorer.case({"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"})
+    >>> payload.header["verdict"]
+    'It rocks, comes to rest once, and does not overturn.'
+    """
+
+    def __init__(self) -> None:
+        self.shelf = Shelf()
+        self._lock = threading.Lock()
+        self._drawing = threading.Lock()
+        self._kept: OrderedDict[tuple[tuple[str, str], ...], Shown] = OrderedDict()
+
+    def show(self, texts: Texts) -> Shown:
+        """Return a case with its response.
+
+        Raises
+        ------
+        RockingError
+            As `read_case` and `rocking.simulate`.
+        """
+        key = tuple(sorted((name, value) for name, value in texts.items() if value))
+        with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                return self._kept[key]
+        case = read_case(texts, self.shelf)
+        shown = Shown(case, case.simulate())
+        with self._lock:
+            self._kept[key] = shown
+            while len(self._kept) > 1 and (len(self._kept) > _KEPT or self._steps() > _KEPT_STEPS):
+                self._kept.popitem(last=False)
+        return shown
+
+    def case(self, texts: Texts, window: tuple[float, float] | None = None) -> Payload:
+        """Return all that the page says of a case, and its arrays in a window (s; by default where it moves).
+
+        Raises
+        ------
+        RockingError
+            As `read_case` and `rocking.simulate`.
+        """
+        shown = self.show(texts)
+        response = shown.response
+        start, end = active_span(response) if window is None else _checked(window, response)
+        header = {**_facts(shown), "window": _window(shown, start, end)}
+        return Payload(header, {**_window_arrays(shown, start, end), **_whole_arrays(shown)})
+
+    def window(
+        self, texts: Texts, window: tuple[float, float], *, ground: bool = False, points: int = _POINTS
+    ) -> Payload:
+        """Return the arrays of a window (s), evaluated anew; with those of the ground's displacement.
+
+        Raises
+        ------
+        RockingError
+            As `case`, or if the window is no stretch of time.
+        """
+        shown = self.show(texts)
+        start, end = _checked(window, shown.response)
+        arrays = _window_arrays(shown, start, end, min(max(points, 2), _POINTS))
+        if ground:
+            arrays |= _ground_arrays(shown, start, end)
+        return Payload({"window": _window(shown, start, end)}, arrays)
+
+    def compare(self, texts: Texts, changed: Texts, window: tuple[float, float] | None = None) -> Payload:
+        """Return two cases in one window: one, and the same with some texts changed.
+
+        Parameters
+        ----------
+        changed : mapping of str to str
+            What the other one has in place of the first one's texts; a block or a motion is changed as a whole.
+
+        Raises
+        ------
+        RockingError
+            As `case`.
+        """
+        first = self.show(texts)
+        second = self.show(_changed(first.case.texts, changed))
+        spans = [active_span(shown.response) for shown in (first, second)]
+        longest = max(first.response.duration, second.response.duration)
+        start, end = window or (min(span[0] for span in spans), max(span[1] for span in spans))
+        start, end = max(start, 0.0), min(end, longest)
+        header: dict[str, Any] = {"window": {"from": start, "to": end}, "duration": longest, "cases": []}
+        arrays: dict[str, Floats] = {}
+        for name, shown in (("first", first), ("second", second)):
+            header["cases"].append(_facts(shown))
+            stop = min(end, shown.response.duration)
+            if start < stop:
+                here = _window_arrays(shown, start, stop)
+                arrays |= {f"{name}_{key}": values for key, values in here.items()}
+            arrays[f"{name}_rest"] = shown.response.rest_intervals.ravel()
+        return Payload(header, arrays)
+
+    def words(self, texts: Texts) -> list[list[str]]:
+        """Return the summary of a response line by line: what, and how much."""
+        lines = self.show(texts).response.summary().splitlines()
+        return [[line[:20].strip(), line[20:].strip()] for line in lines]
+
+    def schemes(self, texts: Texts) -> list[dict[str, Any]]:
+        """Return what each treatment of chattering makes of a case, against the proven response."""
+        case = self.show(texts).case
+        found = compare_schemes(
+            case.block,
+            case.motion,
+            model=case.model,
+            initial_rotation=case.initial_rotation,
+            initial_velocity=case.initial_velocity,
+        )
+        rows = [
+            {
+                "label": outcome.treatment.label,
+                "text": str(outcome.treatment),
+                "right": outcome.is_right,
+                "verdict": outcome.verdict,
+                "error": None if math.isnan(outcome.largest_error) else outcome.largest_error,
+            }
+            for outcome in found.outcomes
+        ]
+        unfit = [
+            {"label": scheme.label, "text": str(scheme), "right": None, "verdict": reason, "error": None}
+            for scheme, reason in found.not_applicable
+        ]
+        return rows + unfit
+
+    def export(self, texts: Texts, form: str, window: tuple[float, float] | None = None) -> bytes:
+        """Return a figure or a table of a response as a file's content.
+
+        Parameters
+        ----------
+        form : str
+            One of `EXPORTS`.
+        window : (start, end), optional
+            Stretch of time that a figure shows, s.
+
+        Raises
+        ------
+        RockingError
+            As `case`, or if there is no such form.
+        """
+        if form not in EXPORTS:
+            raise InvalidOption(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
+        response = self.show(texts).response
+        with tempfile.TemporaryDirectory(prefix="rocking-") as folder:
+            file = Path(folder) / f"response.{form}"
+            writers: dict[str, Callable[[], None]] = {
+                "csv": lambda: response.to_csv(file),
+                "events.csv": lambda: response.to_csv(file, "events"),
+                "impacts.csv": lambda: response.to_csv(file, "impacts"),
+                "nc": lambda: response.to_netcdf(file),
+            }
+            if form in writers:
+                writers[form]()
+            else:
+                stretch = None if window is None else _checked(window, response)
+                with self._drawing:
+                    _draw(response, file, stretch)
+            return file.read_bytes()
+
+    def _steps(self) -> int:
+        return sum(len(shown.response.trail.nodes) for shown in self._kept.values())
+
+
+def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
+    """Texts of a case with others in their place; those of a whole group go together."""
+    kept = dict(texts)
+    for group in _GROUPS:
+        if group & changed.keys():
+            kept = {name: value for name, value in kept.items() if name not in group}
+    return {**kept, **changed}
+
+
+def _window(shown: Shown, start: float, end: float) -> dict[str, Any]:
+    """Say what a window shows: its ends, how many impacts, and how long before a rest the last one is, s."""
+    response = shown.resolved(start, end)
+    struck = response.impacts["time"]
+    count = np.searchsorted(struck, end, "right") - np.searchsorted(struck, start, "left")
+    left = [each for each in _unresolved(response, start, end) if each > _SEEN * (end - start)]
+    return {"from": start, "to": end, "impacts": int(count), "unresolved": max(left, default=None)}
+
+
+def _unresolved(response: Response, start: float, end: float) -> list[float]:
+    """Return the times, s, from the last resolved impact to the rest, of sequences that end so in a window."""
+    ends = np.asarray(response.chattering["end"], dtype=float)
+    struck = np.asarray(response.impacts["time"], dtype=float)
+    last = struck[np.searchsorted(struck, ends, side="right") - 1]
+    seen = (ends > start) & (last < end)
+    return [float(each) for each in (ends - last)[seen]]
+
+
+def thinned(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
+    """Return at most so many points of a line: the least and the greatest of each stretch of neighbours.
+
+    Examples
+    --------
+    >>> thinned(np.arange(6.0), np.array([0.0, 3.0, 1.0, 5.0, -2.0, 4.0]), 4)
+    (array([0., 1., 3., 4.]), array([ 0.,  3.,  5., -2.]))
+    """
+    if len(time) <= most:
+        return time, values
+    width = math.ceil(2 * len(time) / most)
+    rows = np.pad(values, (0, -len(values) % width), mode="edge").reshape(-1, width)
+    starts = width * np.arange(len(rows))
+    kept = np.minimum(np.union1d(starts + rows.argmin(axis=1), starts + rows.argmax(axis=1)), len(time) - 1)
+    return time[kept], values[kept]
+
+
+def _checked(window: tuple[float, float], response: Response) -> tuple[float, float]:
+    start, end = window
+    if not (math.isfinite(start) and math.isfinite(end) and start < end):
+        raise InvalidOption("a window goes from a time to a later one, both in s")
+    start, end = max(start, 0.0), min(end, response.duration)
+    if not start < end:
+        raise InvalidOption(f"the window is outside the response, which lasts {response.duration:.6g} s")
+    return start, end
+
+
+def _window_arrays(shown: Shown, start: float, end: float, points: int = _POINTS) -> dict[str, Floats]:
+    """Lines in a window; times count from its start, so that they keep their digits however narrow it is."""
+    response, motion = shown.resolved(start, end), shown.case.motion
+    struck = response.impacts["time"]
+    inside = struck[(struck >= start) & (struck <= end)]
+    marked = inside if len(inside) <= _MARKED else inside[:: math.ceil(len(inside) / _MARKED)]
+    times = np.union1d(np.linspace(start, end, min(_TIMES, 4 * points)), marked)
+    time, rotation = thinned(times, response.rotation(times), points)
+    corners = np.empty(0) if motion is None else motion.drawing_times(start, min(end, max(start, motion.duration)))
+    acceleration = corners if motion is None else motion.acceleration(corners) / shown.case.block.gravity
+    corners, acceleration = thinned(corners, acceleration, points)
+    return {
+        "time": time - start,
+        "rotation": rotation,
+        "ground_time": corners - start,
+        "ground_g": acceleration,
+        "impact": marked - start,
+    }
+
+
+def _ground_arrays(shown: Shown, start: float, end: float) -> dict[str, Floats]:
+    times = np.linspace(start, end, _POINTS // 4)
+    ground = shown.ground
+    moved = np.zeros_like(times) if ground is None else ground.displacement(np.minimum(times, ground.duration))
+    return {"displacement_time": times - start, "displacement": moved}
+
+
+def _whole_arrays(shown: Shown) -> dict[str, Floats]:
+    """Return what no window changes: impacts with their intervals, rests, uplifts, chattering sequences."""
+    response = shown.response
+    struck = np.asarray(response.impacts["time"], dtype=float)
+    intervals, ratios = _intervals(response)
+    sequences = response.chattering
+    columns = [np.asarray(sequences[name], dtype=float) for name in ("start", "end", "lower", "upper", "impacts")]
+    return {
+        "impact_time": struck,
+        "impact_speed": np.asarray(response.impacts["speed_after"], dtype=float),
+        "interval": intervals,
+        "ratio": ratios,
+        "rest": response.rest_intervals.ravel(),
+        "uplift": np.asarray(response.events["time"][response.events["kind"] == "uplift"], dtype=float),
+        "sequence": np.column_stack(columns).ravel(),
+    }
+
+
+def _intervals(response: Response) -> tuple[Floats, Floats]:
+    """Time from each impact to the next of the same rocking, and the ratio of the next interval but one to it; or NaN.
+
+    Where chattering is complete the ratio tends to the product of both restitutions: eta^2.
+    """
+    struck = np.asarray(response.impacts["time"], dtype=float)
+    intervals = np.append(np.diff(struck), np.nan)[: len(struck)]
+    uplifts = response.events["time"][response.events["kind"] == "uplift"]
+    rocking = np.searchsorted(uplifts, struck, side="right")
+    intervals[np.flatnonzero(np.diff(rocking))] = np.nan
+    ratios = np.full(len(struck), np.nan)
+    positive = np.where(intervals > 0.0, intervals, np.nan)
+    ratios[:-2] = positive[2:] / positive[:-2]
+    return intervals, ratios
+
+
+def _facts(shown: Shown) -> dict[str, Any]:
+    case, response = shown.case, shown.response
+    block, motion = case.block, case.motion
+    gravity = block.gravity
+    episodes = chattering_episodes(response)
+    return {
+        "block": {
+            "description": block.description,
+            "sides": [vars(side) for side in block.sides],
+            "symmetric": block.is_symmetric,
+            "thresholds_g": [each / gravity for each in block.uplift_thresholds(case.model)],
+            "outline": _outline(block),
+            "notes": list(block_notes(block)),
+        },
+        "motion": None
+        if motion is None
+        else {
+            "name": motion.name,
+            "duration": motion.duration,
+            "pga_g": motion.pga / gravity,
+            "notes": list(motion_notes(motion)),
+            "filtered": _drifts(motion),
+        },
+        "model": case.model,
+        "treatment": case.treatment.label,
+        "duration": response.duration,
+        "overturned": response.overturned,
+        "unfinished": response.unfinished,
+        "overturn_time": _plain(response.overturn_time),
+        "tipping_time": _plain(response.tipping_time),
+        "peak_rotation": response.peak_rotation,
+        "peak_over_slenderness": response.peak_over_slenderness,
+        "peak_time": response.peak_time,
+        "impacts": len(response.impacts),
+        "rests": int(np.sum(response.events["kind"] == "rest")),
+        "proven": int(np.sum(np.isfinite(response.chattering["upper"]))),
+        "time_at_rest": response.time_at_rest,
+        "share_at_rest": _plain(episodes.share_at_rest),
+        "eta_squared": math.prod(side.restitution for side in block.sides),
+        "verdict": verdict(response, block.uplift_thresholds(case.model)),
+        "python": as_python(case),
+        "command": as_command(case),
+    }
+
+
+def verdict(response: Response, thresholds: tuple[float, float]) -> str:
+    """Say what becomes of a block in one sentence.
+
+    Parameters
+    ----------
+    response : Response
+        What happened.
+    thresholds : pair of float
+        Ground accelerations that lift the block, m/s^2.
+    """
+    if response.stopped:
+        words = in_words(response, "")
+        return f"{words[0].upper()}{words[1:]}."
+    if not len(response.events) and not len(response.impacts) and response.peak_rotation == 0.0:
+        lifting = min(thresholds) / response.block.gravity
+        return f"It does not move: the ground acceleration never passes {lifting:.3g} g, which would lift it."
+    rests = int(np.sum(response.events["kind"] == "rest"))
+    count = {0: "does not come to rest", 1: "comes to rest once", 2: "comes to rest twice"}
+    resting = count.get(rests, f"comes to rest {rests} times")
+    if response.overturned:
+        before = "" if rests == 0 else f"{resting}, then "
+        return f"It {before}overturns, {response.overturn_time:.2f} s after the start."
+    if response.unfinished:
+        return f"It rocks on: the simulation was given up at {response.duration:.2f} s, after too many steps."
+    unproven = rests - int(np.sum(np.isfinite(response.chattering["upper"])))
+    doubt = "" if unproven == 0 else f" ({unproven} by the treatment, not proven)"
+    return f"It rocks, {resting}{doubt}, and does not overturn."
+
+
+def _outline(block: Block) -> dict[str, Any]:
+    """Corners of the block as it stands (m, pivots at height 0), its centre of mass at distance 0."""
+    right, left = (side.radius * math.sin(side.alpha) for side in block.sides)
+    heights = [side.radius * math.cos(side.alpha) for side in block.sides]
+    centre = 0.5 * (heights[0] + heights[1])
+    return {"left": left, "right": right, "centre": centre, "top": 2.0 * centre}
+
+
+def _steady(motion: Motion) -> Motion:
+    """Return the horizontal motion, or if it is a record the part of it whose displacement does not drift away."""
+    motion = motion.with_vertical(None)
+    return motion.processed(baseline=1, band_pass=(1.0 / _LONGEST_PERIOD, None)) if _drifts(motion) else motion
+
+
+def _drifts(motion: Motion) -> bool:
+    """Whether the displacement of a motion is that of a record, and can be filtered."""
+    long_enough = motion.step is not None and motion.duration > 2.0 * _LONGEST_PERIOD > 20.0 * motion.step
+    return long_enough and motion.coefficients.shape[1] == 2 and not motion.jumps
+
+
+def _draw(response: Response, file: Path, window: tuple[float, float] | None) -> None:
+    from matplotlib import rc_context
+
+    figure = response.plot(window=window, chattering=bool(len(response.chattering)))
+    with rc_context({"svg.hashsalt": "rocking"}):
+        figure.savefig(file, dpi=160)
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close(figure)
+
+
+def _plain(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,358 @@
+"""Maps of a case over two of its parameters, coarse to fine. They know no web."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.analysis.overturning import modes_of
+from rocking.arrays import Floats, Integers
+from rocking.block import Blocks
+from rocking.block.single import housner_restitution
+from rocking.chattering.maps import Outcome, outcomes_of
+from rocking.chattering.theory.amplitude import critical_amplitude
+from rocking.constants import STANDARD_GRAVITY
+from rocking.engine import Setup, Task, simulate_tasks
+from rocking.errors import InvalidOption, OutsideFit
+from rocking.explorer.case import Case, Texts
+from rocking.explorer.pulses import arguments_of, is_pulse, pulse_of
+from rocking.motion.exceedance import exceedances
+from rocking.motion.motion import Motion
+from rocking.quantities import number
+from rocking.treatment import Certified
+from rocking.treatment.asymptotic_time import FITTED_FREQUENCIES, FITTED_RESTITUTIONS
+
+#: Points of an axis.
+_FEWEST, _MOST = 8, 400
+
+#: Steps between the points of each level, coarse to fine.
+_STRIDES: Final = (8, 4, 2, 1)
+
+#: What is kept of each point, in this order.
+QUANTITIES: Final = ("outcome", "rest", "peak", "mode")
+
+#: Mode of a block that overturns after it has been at rest; the others are those of an overturning map.
+OVERTURNS_AFTER_REST: Final = -4
+
+
+@dataclass(frozen=True)
+class AxisKind:
+    """A parameter that a map may vary: its name on the page, its unit, and the ranges that are shown first.
+
+    The close range is for chattering, the wide one for overturning.
+    """
+
+    name: str
+    label: str
+    unit: str
+    close: tuple[float, float]
+    wide: tuple[float, float]
+
+
+AXES: Final = {
+    kind.name: kind
+    for kind in (
+        AxisKind("omega", "Frequency of the pulse, 2πf/p", "", (0.5, 8.0), (0.5, 8.0)),
+        AxisKind("p", "Frequency parameter p", "rad/s", (1.0, 6.0), (1.0, 6.0)),
+        AxisKind("alpha", "Slenderness α", "°", (5.0, 25.0), (5.0, 25.0)),
+        AxisKind("restitution", "Restitution η", "", (0.5, 0.97), (0.5, 0.97)),
+        AxisKind("a", "Amplitude a over the uplift threshold", "", (1.0, 1.1), (0.5, 8.0)),
+        AxisKind("pga", "Peak ground acceleration", "g", (0.1, 1.0), (0.1, 2.0)),
+    )
+}
+
+#: Pairs that would vary the same thing twice.
+_SAME: Final = ({"omega", "p"}, {"a", "pga"})
+
+
+class Axis(NamedTuple):
+    """A parameter and its values."""
+
+    name: str
+    values: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A case and the two parameters over which it is mapped.
+
+    Attributes
+    ----------
+    case : Case
+        All that is not varied.
+    motion : Motion
+        What shakes it.
+    x, y : Axis
+        Parameters to the right and upwards.
+    """
+
+    case: Case
+    motion: Motion
+    x: Axis
+    y: Axis
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of rows and columns."""
+        return self.y.values.size, self.x.values.size
+
+
+class Part(NamedTuple):
+    """Some points of a map: how far apart the points of their level are, their numbers, and their quantities."""
+
+    stride: int
+    points: Integers
+    values: NDArray[np.float32]
+
+
+def axes_of(case: Case) -> list[str]:
+    """Names of the axes that a case may be mapped over."""
+    if case.motion is None:
+        return []
+    pulse = is_pulse(case.texts.get("motion", ""))
+    frequency = pulse and "frequency" in arguments_of(case.texts["motion"])
+    return [name for name in AXES if name != "omega" or frequency]
+
+
+def grid_of(case: Case, texts: Texts) -> Grid:
+    """Read the axes of a map.
+
+    Parameters
+    ----------
+    case : Case
+        What is not varied.
+    texts : mapping of str to str
+        ``x``, ``x_from``, ``x_to``, ``y``, ``y_from``, ``y_to``: name and ends of each axis; ``points`` of each.
+
+    Raises
+    ------
+    InvalidOption
+        If the case has no motion, or an axis is none of it, varies the same as the other or is out of range.
+    """
+    if case.motion is None:
+        raise InvalidOption("a map needs a motion: choose a record or a pulse")
+    points = number(texts.get("points", "200"), "points")
+    if not (_FEWEST <= points <= _MOST and points == int(points)):
+        raise InvalidOption(f"a map has from {_FEWEST} to {_MOST} points on each axis, not {points:g}")
+    x, y = (_axis(which, case, texts, int(points)) for which in ("x", "y"))
+    if x.name == y.name or {x.name, y.name} in _SAME:
+        raise InvalidOption(f"{x.name} and {y.name} vary the same: choose another pair of axes")
+    return Grid(case, case.motion, x, y)
+
+
+def parts(grid: Grid, threads: int | None = None) -> Iterator[Part]:
+    """Simulate the points of a grid, coarse to fine, and give them as they come.
+
+    Raises
+    ------
+    RockingError
+        If a point is no block, or no motion.
+    """
+    blocks, factors, scale = _points(grid)
+    setup = Setup(blocks, grid.case.model, Certified())
+    later = _Later(grid)
+    for task, ends in simulate_tasks(setup, _tasks(grid, factors), threads=threads):
+        chosen = task.blocks
+        assert isinstance(chosen, np.ndarray)
+        values = np.empty((len(QUANTITIES), len(chosen)), np.float32)
+        alpha = blocks.alpha[chosen]
+        thresholds = _thresholds(alpha, grid) / task.factor
+        for pair in np.unique(thresholds, axis=0):
+            here = (thresholds == pair).all(axis=1)
+            values[0, here] = outcomes_of(ends[here], later.of(float(pair[0]), float(pair[1])))
+        rested = ends["rests"] > 0
+        values[1] = np.where(rested, (ends["first_rest"] - ends["first_uplift"]) * scale[chosen], np.nan)
+        values[2] = np.where(ends["overturned"], np.inf, ends["peak_rotation"] / alpha.min(axis=1))
+        modes = modes_of(ends, grid.motion.duration)
+        values[3] = np.where(ends["overturned"] & (ends["uplifts"] > 1), OVERTURNS_AFTER_REST, modes)
+        yield Part(task.key[0], chosen, values)
+
+
+class _Later:
+    """When the motion passes thresholds again, for each pair that was asked for."""
+
+    def __init__(self, grid: Grid) -> None:
+        self._motion, self._gravity = grid.motion, grid.case.block.gravity
+        self._known: dict[tuple[float, float], Floats] = {}
+
+    def of(self, plus: float, minus: float) -> Floats:
+        """Return the times, s, at which it passes the thresholds (m/s^2) after the first."""
+        if (plus, minus) not in self._known:
+            self._known[plus, minus] = exceedances(self._motion, (plus, minus), self._gravity)[1:, 0]
+        return self._known[plus, minus]
+
+
+def curves(grid: Grid) -> dict[str, Floats]:
+    """Critical amplitudes along the x axis: exact, and by the paper's Eq. 76 where that was fitted.
+
+    Empty but for a symmetric block under a sine, with the amplitude upwards.
+    """
+    case = grid.case
+    motion = case.texts.get("motion", "")
+    if not motion.startswith("sine:") or grid.y.name != "a" or not case.block.is_symmetric:
+        return {}
+    if grid.x.name not in ("omega", "restitution"):
+        return {}
+    side = case.block.sides[0]
+    omega = np.full(grid.x.values.size, 2.0 * math.pi * arguments_of(motion)["frequency"] / side.p)
+    eta = np.full(grid.x.values.size, side.restitution)
+    if grid.x.name == "omega":
+        omega = grid.x.values
+    else:
+        eta = grid.x.values
+    found = {"exact": critical_amplitude(omega, eta), "eq76": np.full(omega.size, np.nan)}
+    (low, high), (least, most) = FITTED_FREQUENCIES, FITTED_RESTITUTIONS
+    fitted = (omega >= low) & (omega <= high) & (eta >= least) & (eta <= most)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OutsideFit)
+        found["eq76"][fitted] = critical_amplitude(omega[fitted], eta[fitted], method="eq76")
+    return found
+
+
+def texts_at(grid: Grid, x: float, y: float) -> dict[str, str]:
+    """Texts of the case at a point of the map."""
+    texts = dict(grid.case.texts)
+    for name, value in ((grid.x.name, x), (grid.y.name, y)):
+        if name in ("p", "alpha", "restitution"):
+            _change_block(texts, grid.case, name, value)
+    for name, value in ((grid.x.name, x), (grid.y.name, y)):
+        if name == "omega":
+            p = min(side.p for side in grid.case.block.sides)
+            _change_pulse(texts, frequency=value * p / (2.0 * math.pi))
+    for name, value in ((grid.x.name, x), (grid.y.name, y)):
+        if name in ("a", "pga"):
+            alpha = math.radians(x) if grid.x.name == "alpha" else None
+            _change_amplitude(texts, value * (STANDARD_GRAVITY if name == "pga" else _lifting(grid, alpha)))
+    return texts
+
+
+def described(grid: Grid) -> dict[str, Any]:
+    """Say what a map shows: its axes, and what the numbers of outcomes and modes mean."""
+    return {
+        "shape": list(grid.shape),
+        "x": _described(grid.x),
+        "y": _described(grid.y),
+        "quantities": list(QUANTITIES),
+        "outcomes": [outcome.name.lower().replace("_", " ") for outcome in Outcome],
+        "curves": {name: [None if math.isnan(v) else v for v in values] for name, values in curves(grid).items()},
+    }
+
+
+def _described(axis: Axis) -> dict[str, Any]:
+    kind = AXES[axis.name]
+    return {"name": axis.name, "label": kind.label, "unit": kind.unit, "values": axis.values.tolist()}
+
+
+def _axis(which: str, case: Case, texts: Texts, points: int) -> Axis:
+    name = texts.get(which, "")
+    if name not in axes_of(case):
+        raise InvalidOption(f"this case is mapped over {', '.join(axes_of(case))}, not over {name[:20]!r}")
+    if which == "x" and name in ("a", "pga"):
+        raise InvalidOption("amplitudes go upwards: choose another parameter for the axis to the right")
+    kind = AXES[name]
+    low, high = (
+        number(texts.get(f"{which}_{end}", "") or repr(default), f"{which}_{end}")
+        for end, default in zip(("from", "to"), kind.close, strict=True)
+    )
+    if not 0.0 < low < high < math.inf:
+        raise InvalidOption(f"the axis of {name} needs a positive start below its end, not {low:g} to {high:g}")
+    return Axis(name, np.linspace(low, high, points))
+
+
+def _points(grid: Grid) -> tuple[Blocks, Floats, Floats]:
+    """Blocks of all points row by row, factors on the motion, and by what times are multiplied to be the case's."""
+    case = grid.case
+    y, x = (values.ravel() for values in np.meshgrid(grid.y.values, grid.x.values, indexing="ij"))
+    at = {grid.x.name: x, grid.y.name: y}
+    sides = {
+        name: np.tile([getattr(side, name) for side in case.block.sides], (x.size, 1))
+        for name in ("p", "alpha", "restitution")
+    }
+    slowest = sides["p"].min(axis=1, keepdims=True)
+    scale = np.ones(x.size)
+    if "p" in at:
+        sides["p"] *= at["p"][:, None] / slowest
+    if "omega" in at:
+        # A pulse of another frequency is the same block of another p, in other units of time.
+        frequency = arguments_of(case.texts["motion"])["frequency"]
+        resized = 2.0 * math.pi * frequency / at["omega"][:, None] / slowest
+        sides["p"] *= resized
+        scale = resized[:, 0]
+    if "alpha" in at:
+        sides["alpha"] = np.repeat(np.radians(at["alpha"])[:, None], 2, axis=1)
+        if "restitution" not in case.texts:
+            sides["restitution"] = np.array([[housner_restitution(alpha)] * 2 for alpha in sides["alpha"][:, 0]])
+    if "restitution" in at:
+        sides["restitution"] = np.repeat(at["restitution"][:, None], 2, axis=1)
+    factors = np.ones(x.size)
+    if "pga" in at:
+        factors = at["pga"] * STANDARD_GRAVITY / grid.motion.pga
+    elif "a" in at:
+        factors = at["a"] * _thresholds(sides["alpha"], grid).min(axis=1) / grid.motion.pga
+    return Blocks(**sides, gravity=case.block.gravity), factors, scale
+
+
+def _thresholds(alpha: Floats, grid: Grid) -> Floats:
+    """Ground accelerations, m/s^2, that lift blocks of these slendernesses, shape (n, 2)."""
+    steepness: Floats = alpha if grid.case.model == "linear" else np.tan(alpha)
+    return grid.case.block.gravity * steepness
+
+
+def _lifting(grid: Grid, alpha: float | None) -> float:
+    """Smallest ground acceleration, m/s^2, that lifts the case's block, or one of another slenderness."""
+    if alpha is None:
+        return min(grid.case.block.uplift_thresholds(grid.case.model))
+    return float(_thresholds(np.array([[alpha]]), grid)[0, 0])
+
+
+def _tasks(grid: Grid, factors: Floats) -> Iterator[Task]:
+    """Tasks level by level, row by row; points of a task share the factor on the motion."""
+    rows, columns = grid.shape
+    for level, stride in enumerate(_STRIDES):
+        for row in range(0, rows, stride):
+            done = level > 0 and row % (2 * stride) == 0
+            index = row * columns + np.arange(stride if done else 0, columns, 2 * stride if done else stride)
+            for factor in np.unique(factors[index]):
+                yield Task(index[factors[index] == factor], grid.motion, float(factor), (stride, row))
+
+
+def _change_block(texts: dict[str, str], case: Case, name: str, value: float) -> None:
+    sides = case.block.sides
+    if "width" in texts:
+        del texts["width"], texts["height"]
+        texts["p"], texts["alpha"] = repr(sides[0].p), repr(sides[0].alpha)
+    if name == "p":
+        slowest = min(side.p for side in sides)
+        texts["p"] = _both([side.p * value / slowest for side in sides])
+    elif name == "alpha":
+        texts["alpha"] = f"{value!r}deg"
+    else:
+        texts["restitution"] = repr(value)
+
+
+def _both(pair: list[float]) -> str:
+    return ",".join(map(repr, pair if pair[0] != pair[1] else pair[:1]))
+
+
+def _change_pulse(texts: dict[str, str], **numbers: float) -> None:
+    family, _, given = texts["motion"].partition(":")
+    parts = dict(part.split("=", 1) for part in given.split(","))
+    parts |= {name: repr(value) for name, value in numbers.items()}
+    texts["motion"] = f"{family}:" + ",".join(f"{name}={value}" for name, value in parts.items())
+
+
+def _change_amplitude(texts: dict[str, str], peak: float) -> None:
+    """Bring the motion to a peak acceleration, m/s^2: a pulse by its amplitude, a record by its scale."""
+    for name in ("scale", "pga", "pgv", "sa"):
+        texts.pop(name, None)
+    if is_pulse(texts["motion"]):
+        amplitude = arguments_of(texts["motion"])["amplitude"]
+        _change_pulse(texts, amplitude=amplitude * peak / pulse_of(texts["motion"]).pga)
+    else:
+        texts["pga"] = repr(peak)

@@ -1,0 +1,100 @@
+// Requests to the server: one at a time for each purpose, and the latest wins.
+
+/** @typedef {Record<string, string>} Texts */
+/** @typedef {{header: any, arrays: Record<string, Float64Array>}} Payload */
+
+/** What went wrong, in a sentence for people. */
+export class Problem extends Error {}
+
+/** @param {string} path @param {Texts} texts */
+export function address(path, texts) {
+  const query = new URLSearchParams(texts).toString();
+  return query ? `${path}?${query}` : path;
+}
+
+/** @param {string} path @param {Texts} texts @param {RequestInit} [options] */
+async function answer(path, texts, options) {
+  let response;
+  try {
+    response = await fetch(address(path, texts), options);
+  } catch (error) {
+    if (error instanceof DOMException) throw error;
+    throw new Problem("The explorer does not answer: was it ended? Start it again with rocking explore.");
+  }
+  if (response.ok) return response;
+  const text = await response.text();
+  let problem = text;
+  try { problem = JSON.parse(text).problem; } catch { /* plain text */ }
+  throw new Problem(problem);
+}
+
+/** @param {string} path @param {Texts} texts @param {RequestInit} [options] @returns {Promise<any>} */
+export async function json(path, texts, options) {
+  return (await answer(path, texts, options)).json();
+}
+
+/** Header and arrays; the arrays are views of what came, not copies.
+ * @param {string} path @param {Texts} texts @param {RequestInit} [options] @returns {Promise<Payload>} */
+export async function payload(path, texts, options) {
+  const buffer = await (await answer(path, texts, options)).arrayBuffer();
+  const length = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  /** @type {Record<string, Float64Array>} */
+  const arrays = {};
+  let at = 4 + length;
+  for (const [name, size] of Object.entries(header.arrays)) {
+    arrays[name] = new Float64Array(buffer, at, Number(size));
+    at += 8 * Number(size);
+  }
+  return {header, arrays};
+}
+
+/** Parts of a stream, each behind its length in 4 bytes.
+ * @param {string} path @param {Texts} texts @param {AbortSignal} signal */
+export async function* frames(path, texts, signal) {
+  const response = await answer(path, texts, {signal});
+  const reader = /** @type {ReadableStream<Uint8Array>} */ (response.body).getReader();
+  /** @type {Uint8Array} */
+  let held = new Uint8Array(0);
+  for (;;) {
+    while (held.length >= 4) {
+      const size = new DataView(held.buffer, held.byteOffset).getUint32(0, true);
+      if (held.length < 4 + size) break;
+      yield held.slice(4, 4 + size);
+      held = held.subarray(4 + size);
+    }
+    const {done, value} = await reader.read();
+    if (done) return;
+    const joined = new Uint8Array(held.length + value.length);
+    joined.set(held);
+    joined.set(value, held.length);
+    held = joined;
+  }
+}
+
+/** Work of which one is under way, and of all that is asked for meanwhile only the last is done. */
+export class Latest {
+  /** @param {(...given: any[]) => Promise<void>} work */
+  constructor(work) {
+    this.work = work;
+    this.busy = false;
+    /** @type {any[] | null} */
+    this.next = null;
+  }
+
+  /** @param {any[]} given */
+  async ask(...given) {
+    this.next = given;
+    if (this.busy) return;
+    this.busy = true;
+    try {
+      while (this.next) {
+        const now = this.next;
+        this.next = null;
+        await this.work(...now);
+      }
+    } finally {
+      this.busy = false;
+    }
+  }
+}

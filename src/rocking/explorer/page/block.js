@@ -1,0 +1,265 @@
+// The block to scale on its moving ground, in step with a cursor on the plots.
+
+import {Latest, payload} from "./api.js";
+import {at} from "./histories.js";
+import {colour, themed} from "./theme.js";
+import {decimals, one, short} from "./words.js";
+
+/** Wall-clock seconds that an interval between impacts takes at least where playing slows down for them. */
+const SEEN = 0.22;
+/** Stretch that is fetched ahead, in wall-clock seconds. */
+const AHEAD = 2.5;
+/** Times as slow as chosen at most: what is faster then passes unseen. */
+const SLOWEST = 50;
+
+export class View {
+  /** @param {any} page @param {import("./histories.js").Histories} histories */
+  constructor(page, histories) {
+    this.page = page;
+    this.histories = histories;
+    this.canvas = /** @type {HTMLCanvasElement} */ (one("stage"));
+    this.scrubber = /** @type {HTMLInputElement} */ (one("scrub"));
+    this.speed = /** @type {HTMLSelectElement} */ (one("speed"));
+    this.time = 0;
+    this.playing = false;
+    this.pace = 1;
+    /** @type {any} */
+    this.lines = null;
+    this.fetch = new Latest((from, to) => this.bring(from, to));
+    one("play").addEventListener("click", () => this.toggle());
+    this.scrubber.addEventListener("input", () => this.seek(this.left() + (Number(this.scrubber.value) / 10000) * (this.right() - this.left())));
+    one("to-uplift").addEventListener("click", () => this.jump("uplift"));
+    one("to-rest").addEventListener("click", () => this.jump("rest"));
+    one("magnify").addEventListener("change", () => this.paint());
+    one("view-block").addEventListener("keydown", (event) => {
+      if (event.key === " " && !(event.target instanceof HTMLButtonElement)) { event.preventDefault(); this.toggle(); }
+    });
+    new ResizeObserver(() => this.paint()).observe(this.canvas);
+    themed(() => this.paint());
+  }
+
+  left() { return this.page.shown?.header.window.from ?? 0; }
+  right() { return this.page.shown?.header.window.to ?? 1; }
+
+  enter() { this.draw(); }
+
+  leave() { this.stop(); }
+
+  draw() {
+    const {header} = this.page.shown ?? {};
+    if (!header) return;
+    if (this.of !== JSON.stringify(this.page.state.texts)) {
+      this.of = JSON.stringify(this.page.state.texts);
+      const before = this.page.shown.arrays.uplift.filter((/** @type {number} */ each) => each <= header.peak_time);
+      this.time = Math.max(this.left(), (before.at(-1) ?? 0) - 0.2);
+      this.lines = null;
+    }
+    this.seek(Math.min(Math.max(this.time, 0), header.duration));
+    one("stage-about").textContent = "The block turns about the corner that it stands on"
+      + (header.motion?.filtered ? "; the ground's displacement is drawn without periods above 10 s, with which a record's would drift away." : ".");
+  }
+
+  /** @param {string} to */
+  jump(to) {
+    const {arrays} = this.page.shown;
+    const sequences = Array.from({length: arrays.sequence.length / 5}, (_, k) => arrays.sequence[5 * k + 1] - 0.4 * Math.min(1, arrays.sequence[5 * k + 1] - arrays.sequence[5 * k] + 0.5));
+    const times = to === "uplift" ? Array.from(arrays.uplift, (each) => /** @type {number} */ (each) - 0.1) : sequences;
+    const next = times.find((each) => each > this.time + 0.05) ?? times[0];
+    if (next !== undefined) this.seek(Math.max(0, next));
+  }
+
+  toggle() {
+    if (this.playing) { this.stop(); return; }
+    if (this.time >= this.right() - 1e-9) this.seek(this.left());
+    this.playing = true;
+    one("play").textContent = "Pause";
+    one("play").setAttribute("aria-pressed", "true");
+    this.before = performance.now();
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  stop() {
+    this.playing = false;
+    one("play").textContent = "Play";
+    one("play").setAttribute("aria-pressed", "false");
+  }
+
+  /** @param {number} now */
+  tick(now) {
+    if (!this.playing) return;
+    const elapsed = Math.min(0.1, (now - (this.before ?? now)) / 1000);
+    this.before = now;
+    if (this.has(this.time)) {
+      this.pace = this.slowed(Number(this.speed.value));
+      this.time += elapsed * this.pace;
+    }
+    if (this.time >= this.right()) { this.time = this.right(); this.stop(); }
+    this.seek(this.time);
+    if (this.playing) requestAnimationFrame((next) => this.tick(next));
+  }
+
+  /** Pace at which the interval between impacts can be seen. @param {number} chosen */
+  slowed(chosen) {
+    if (!/** @type {HTMLInputElement} */ (one("slow")).checked) return chosen;
+    const {impact_time: struck, interval} = this.page.shown.arrays;
+    let low = 0, high = struck.length;
+    while (low < high) { const middle = (low + high) >> 1; if (struck[middle] <= this.time) low = middle + 1; else high = middle; }
+    const now = interval[low - 1];
+    return Number.isFinite(now) && now > 0 ? Math.max(Math.min(chosen, now / SEEN), chosen / SLOWEST) : chosen;
+  }
+
+  /** @param {number} time */
+  has(time) {
+    return this.lines && this.lines.from <= time && time <= this.lines.to && this.lines.to - this.lines.from < 40 * AHEAD * Math.max(this.pace, 1e-9);
+  }
+
+  /** @param {number} time */
+  seek(time) {
+    const {header} = this.page.shown ?? {};
+    if (!header) return;
+    this.time = Math.min(Math.max(time, 0), header.duration);
+    const width = AHEAD * this.pace;
+    const near = this.has(this.time) && (this.lines.to >= header.duration || this.time < this.lines.to - 0.3 * width);
+    if (!near) void this.fetch.ask(Math.max(0, this.time - 0.1 * width), Math.min(header.duration, this.time + width));
+    this.paint();
+    const shown = this.right() - this.left();
+    this.scrubber.value = String(Math.round((10000 * (this.time - this.left())) / shown));
+    const said = `${this.time.toFixed(decimals(Math.min(1, this.pace)))} s`;
+    this.scrubber.setAttribute("aria-valuetext", said);
+    one("clock").textContent = said;
+    this.histories.mark(this.time);
+  }
+
+  /** @param {number} from @param {number} to */
+  async bring(from, to) {
+    if (!(to > from)) return;
+    const texts = {...this.page.state.texts, from: String(from), to: String(to), ground: "1", points: "1200"};
+    try {
+      const {header, arrays} = await payload("/api/window", texts);
+      this.lines = {...header.window, ...arrays};
+      if (!this.playing) this.paint();
+    } catch (error) {
+      this.stop();
+      this.page.problem(String(error instanceof Error ? error.message : error));
+    }
+  }
+
+  /** Draw the block, its ground and what is behind it. */
+  paint() {
+    const {header} = this.page.shown ?? {};
+    const ratio = window.devicePixelRatio || 1;
+    const {clientWidth: width, clientHeight: height} = this.canvas;
+    if (!header || !width) return;
+    if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {
+      this.canvas.width = Math.round(width * ratio);
+      this.canvas.height = Math.round(height * ratio);
+    }
+    const inside = this.lines && this.time >= this.lines.from && this.time <= this.lines.to ? this.lines : null;
+    if (!inside && this.lines) return; // what is drawn stays until the next stretch has come
+    const pen = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d"));
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    this.canvas.dataset.shown = inside ? String(this.time) : "";
+    if (!inside) {
+      this.scene(pen, width, height, header.block.outline, 0, 0);
+      return;
+    }
+    const after = this.time - inside.from;
+    const theta = at(inside.time, inside.rotation, after), moved = at(inside.displacement_time, inside.displacement, after);
+    this.scene(pen, width, height, header.block.outline, theta, moved);
+    this.caption(pen, width, theta, at(inside.ground_time, inside.ground_g, after), moved);
+  }
+
+  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {any} outline @param {number} theta @param {number} moved */
+  scene(pen, width, height, outline, theta, moved) {
+    const {left, right, centre, top} = outline;
+    const reach = Math.hypot(Math.max(left, right) * 2, top);
+    const scale = (height - 92) / Math.max(reach, 1e-9);
+    const floor = height - 40;
+    const drawn = theta * Number(/** @type {HTMLSelectElement} */ (one("magnify")).value);
+    // The ground moves across a still background; where it would leave the picture, the background moves instead.
+    const room = width / 2 - scale * reach * 0.75 - 20;
+    const shift = Math.max(-room, Math.min(room, scale * moved));
+    const behind = scale * moved - shift;
+    const middle = width / 2 + shift;
+    this.background(pen, width, floor, scale, behind);
+    this.earth(pen, width, height, floor, middle, scale);
+    pen.save();
+    const pivot = drawn >= 0 ? right : -left;
+    pen.translate(middle + scale * pivot, floor);
+    pen.rotate(drawn);
+    pen.translate(-scale * pivot, 0);
+    pen.beginPath();
+    pen.rect(-scale * left, -scale * top, scale * (left + right), scale * top);
+    pen.fillStyle = colour("stone");
+    pen.fill();
+    pen.lineWidth = 1.5;
+    pen.strokeStyle = colour("ink");
+    pen.stroke();
+    pen.beginPath();
+    pen.arc(0, -scale * centre, 3.5, 0, 2 * Math.PI);
+    pen.fillStyle = colour("ink");
+    pen.fill();
+    pen.setLineDash([3, 4]);
+    pen.lineWidth = 1;
+    pen.beginPath();
+    pen.moveTo(scale * pivot, 0);
+    pen.lineTo(0, -scale * centre);
+    pen.stroke();
+    pen.restore();
+    if (drawn !== 0) {
+      pen.beginPath();
+      pen.arc(middle + scale * pivot, floor, 4, 0, 2 * Math.PI);
+      pen.fillStyle = colour("accent");
+      pen.fill();
+    }
+  }
+
+  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} floor @param {number} scale @param {number} behind */
+  background(pen, width, floor, scale, behind) {
+    const wanted = 70 / scale, power = 10 ** Math.floor(Math.log10(wanted));
+    const step = power * ([1, 2, 5].find((each) => each * power >= wanted) ?? 10);
+    pen.strokeStyle = colour("grid");
+    pen.lineWidth = 1;
+    pen.beginPath();
+    const first = Math.floor((behind - width / 2) / (scale * step));
+    for (let k = first; k * step * scale < behind + width / 2 + 1; k += 1) {
+      const x = Math.round(width / 2 + k * step * scale - behind) + 0.5;
+      pen.moveTo(x, 0);
+      pen.lineTo(x, floor);
+    }
+    for (let y = floor; y > 0; y -= step * scale) { pen.moveTo(0, Math.round(y) + 0.5); pen.lineTo(width, Math.round(y) + 0.5); }
+    pen.stroke();
+    pen.fillStyle = colour("soft");
+    pen.font = "12px system-ui, sans-serif";
+    pen.textAlign = "right";
+    pen.fillText(`grid ${short(step)} m`, width - 10, floor - 8);
+  }
+
+  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {number} floor @param {number} middle @param {number} scale */
+  earth(pen, width, height, floor, middle, scale) {
+    pen.fillStyle = colour("rest");
+    pen.fillRect(0, floor, width, height - floor);
+    pen.strokeStyle = colour("earth");
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    pen.moveTo(0, floor);
+    pen.lineTo(width, floor);
+    const pitch = 16;
+    for (let x = (((middle % pitch) + pitch) % pitch) - pitch; x < width + pitch; x += pitch) { pen.moveTo(x + 8, floor + 2); pen.lineTo(x - 2, floor + 14); }
+    pen.stroke();
+    void scale;
+  }
+
+  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} theta @param {number} ground @param {number} moved */
+  caption(pen, width, theta, ground, moved) {
+    pen.fillStyle = colour("ink");
+    pen.font = "13px system-ui, sans-serif";
+    pen.textAlign = "left";
+    const alpha = this.page.shown.header.block.sides[theta >= 0 ? 0 : 1].alpha;
+    const rows = [`rotation ${short((theta * 180) / Math.PI)}° = ${short(theta / alpha)} α`, `ground ${short(ground, 2)} g, moved ${short(100 * moved, 2)} cm`];
+    rows.forEach((row, k) => pen.fillText(row, 12, 22 + 18 * k));
+    pen.textAlign = "right";
+    if (this.playing && this.pace < 0.999 * Number(this.speed.value)) pen.fillText(`slowed to ${short(this.pace, 2)} ×`, width - 12, 22);
+  }
+}

@@ -1,0 +1,145 @@
+// Chattering sequences: their rests with brackets, intervals between impacts, and their ratios against eta^2.
+
+import {json} from "./api.js";
+import {bokeh, colour, figure, themed} from "./theme.js";
+import {fill, make, one, short, span} from "./words.js";
+
+export class ChatteringPanel {
+  /** @param {(ends: [number, number]) => void} go */
+  constructor(go) {
+    this.go = go;
+    this.chosen = 0;
+    this.made = false;
+    /** @type {any[]} */
+    this.sequences = [];
+    one("deeper").addEventListener("click", () => this.deeper());
+  }
+
+  /** @param {import("./api.js").Payload} shown @param {Record<string, string>} texts */
+  draw(shown, texts) {
+    this.shown = shown;
+    const rows = shown.arrays.sequence;
+    this.sequences = Array.from({length: rows.length / 5}, (_, k) => {
+      const [start, end, lower, upper, impacts] = rows.subarray(5 * k, 5 * k + 5);
+      const before = shown.arrays.uplift.filter((each) => each <= start);
+      return {uplift: before.length ? before[before.length - 1] : 0, start, end, lower, upper, impacts};
+    });
+    if (this.key !== JSON.stringify(texts)) this.choose(this.longest());
+    this.key = JSON.stringify(texts);
+    this.chosen = Math.min(this.chosen, Math.max(0, this.sequences.length - 1));
+    this.list();
+    this.plot();
+    if (/** @type {HTMLDetailsElement} */ (one("in-words")).open) void this.words(texts);
+  }
+
+  longest() {
+    let best = 0;
+    this.sequences.forEach((each, k) => { if (this.count(each) > this.count(this.sequences[best])) best = k; });
+    return best;
+  }
+
+  /** @param {any} sequence */
+  count(sequence) {
+    return this.shown ? this.shown.arrays.impact_time.filter((each) => each >= sequence.uplift && each <= sequence.end).length : 0;
+  }
+
+  list() {
+    const table = /** @type {HTMLTableElement} */ (one("sequences"));
+    one("sequence-tools").hidden = !this.sequences.length;
+    one("ratios").hidden = !this.sequences.length;
+    if (!this.sequences.length) {
+      table.replaceChildren(make("caption", {}, ["No sequence of impacts ends at rest: chattering, if any, is incomplete."]));
+      return;
+    }
+    fill(table, ["", "Uplift, s", "Complete from, s", "At rest, s", "Known to", "Impacts"], this.sequences.map((each, k) => {
+      const proven = Number.isFinite(each.upper);
+      const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.choose(k); this.list(); this.plot(); this.near(each); }}}, [`Show ${k + 1}`]);
+      return [button, each.uplift.toFixed(3), proven ? each.start.toFixed(4) : "not proven", each.end.toFixed(9), proven ? `± ${span(0.5 * (each.upper - each.lower))}` : "–", String(this.count(each))];
+    }));
+  }
+
+  /** @param {number} k */
+  choose(k) {
+    this.chosen = k;
+  }
+
+  /** @param {any} sequence */
+  near(sequence) {
+    const margin = 0.06 * (sequence.end - sequence.uplift);
+    this.go([Math.max(0, sequence.uplift - margin), sequence.end + margin]);
+  }
+
+  /** Ten times closer to the accumulation point. */
+  deeper() {
+    const sequence = this.sequences[this.chosen];
+    if (!sequence || !this.shown) return;
+    const {from, to} = this.shown.header.window;
+    const inside = from <= sequence.end && sequence.end <= to;
+    const width = Math.max(1e-10, inside ? 0.1 * (to - from) : sequence.end - sequence.uplift);
+    this.go([sequence.end - 0.92 * width, sequence.end + 0.08 * width]);
+  }
+
+  /** @param {{from: number, to: number, impacts: number, unresolved: number | null}} window */
+  window({from, to, impacts, unresolved}) {
+    one("depth").textContent = `${span(to - from)} shown, with ${impacts} impact${impacts === 1 ? "" : "s"}.`
+      + (unresolved ? ` The infinitely many in the last ${span(unresolved)} before the rest are summed by the proof and not drawn.` : "");
+  }
+
+  build() {
+    const B = bokeh();
+    const x_range = new B.DataRange1d({range_padding: 0.04});
+    this.intervals = figure({height: 210, x_range, y_range: new B.DataRange1d({}), y_axis_type: "log", min_border_bottom: 44}, "Interval to the next impact, by number of the impact");
+    this.ratios = figure({height: 210, x_range, y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 44}, "Ratio of intervals, by number of the impact");
+    this.intervals.left[0].axis_label = "interval (s)";
+    this.ratios.left[0].axis_label = "interval ratio";
+    for (const plot of [this.intervals, this.ratios]) plot.below[0].axis_label = "impact since uplift";
+    this.sources = [this.intervals, this.ratios].map((plot) => {
+      const source = new B.ColumnDataSource({data: {x: [], y: []}});
+      const glyph = new B.Scatter({x: {field: "x"}, y: {field: "y"}, size: 4, line_width: 1});
+      plot.add_renderers(new B.GlyphRenderer({data_source: source, glyph}));
+      themed(() => glyph.setv({line_color: colour("ink"), fill_color: colour("paper")}));
+      return source;
+    });
+    this.eta = new B.Span({dimension: "width", location: 0, line_width: 1.4});
+    this.ratios.add_layout(this.eta);
+    themed(() => { if (this.eta) this.eta.line_color = colour("accent"); });
+    this.label = new B.Label({x: 8, y: 0, x_units: "screen", y_units: "data", text_font_size: "12px", y_offset: 4});
+    this.ratios.add_layout(this.label);
+    themed(() => { if (this.label) this.label.text_color = colour("accent"); });
+    const grid = B.Plotting.gridplot([[this.intervals, this.ratios]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false});
+    const narrow = window.matchMedia("(max-width: 700px)").matches;
+    B.Plotting.show(narrow ? B.Plotting.gridplot([[this.intervals], [this.ratios]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false}) : grid, one("ratios"));
+    this.made = true;
+  }
+
+  plot() {
+    const sequence = this.sequences[this.chosen];
+    if (!sequence || !this.shown) return;
+    if (!this.made) this.build();
+    const {impact_time, interval, ratio} = this.shown.arrays;
+    const first = impact_time.findIndex((each) => each >= sequence.uplift);
+    const count = this.count(sequence);
+    const [intervals, ratios] = [interval, ratio].map((all) => {
+      const y = all.subarray(first, first + count);
+      const kept = Array.from(y.keys()).filter((k) => Number.isFinite(y[k]) && y[k] > 0);
+      return {x: Float64Array.from(kept, (k) => k + 1), y: Float64Array.from(kept, (k) => y[k])};
+    });
+    const eta = this.shown.header.eta_squared;
+    const sorted = Float64Array.from(ratios.y).sort();
+    const high = Math.max(eta, sorted[Math.floor(0.95 * sorted.length)] ?? eta), low = Math.min(eta, sorted[Math.floor(0.05 * sorted.length)] ?? eta);
+    const margin = Math.max(0.35 * (high - low), 0.02);
+    this.ratios.y_range.setv({start: low - margin, end: high + margin});
+    /** @type {any} */ (this.sources)[0].data = intervals;
+    /** @type {any} */ (this.sources)[1].data = ratios;
+    if (this.eta) this.eta.location = eta;
+    this.label?.setv({y: eta, text: `η² = ${short(eta, 4)}`});
+  }
+
+  /** All numbers, once somebody wants to read them. @param {Record<string, string>} texts */
+  async words(texts) {
+    if (!/** @type {HTMLDetailsElement} */ (one("in-words")).open) return;
+    const rows = await json("/api/words", texts);
+    fill(/** @type {HTMLTableElement} */ (one("words")), ["", ""], rows);
+    one("words").querySelector("thead")?.remove();
+  }
+}

@@ -1,0 +1,308 @@
+// Forms that change the texts of a case: its block, its motion, its model.
+
+import {NumberControl} from "./controls.js";
+import {make, sent, what} from "./words.js";
+
+/** @typedef {import("./api.js").Texts} Texts */
+/** @typedef {(texts: Texts, gone: string[]) => void} Changed */
+
+/** @param {string} id @param {string} label @param {[string, string][]} options @param {(value: string) => void} changed */
+function choice(id, label, options, changed) {
+  const select = /** @type {HTMLSelectElement} */ (make("select", {id, on: {change: () => changed(select.value)}},
+    options.map(([value, text]) => make("option", {value}, [text]))));
+  return {select, element: make("div", {className: "choice"}, [make("label", {className: "field", for: id}, [label]), select])};
+}
+
+/** @param {string} id @param {string} label @param {(on: boolean) => void} changed */
+function check(id, label, changed) {
+  const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", id, on: {change: () => changed(box.checked)}}));
+  return {box, element: make("label", {className: "check"}, [box, ` ${label}`])};
+}
+
+/** Halves of a text that may have a comma. @param {string | undefined} text */
+const sides = (text) => {
+  const parts = (text ?? "").split(",");
+  return [parts[0], parts[1] ?? parts[0]];
+};
+
+export class BlockForm {
+  /** @param {HTMLElement} element @param {any} offers @param {Changed} changed @param {string} [prefix] */
+  constructor(element, offers, changed, prefix = "") {
+    this.changed = changed;
+    /** @type {Texts} */
+    this.texts = {};
+    /** @param {string} name @param {number} side */
+    const control = (name, side) => {
+      const spec = offers.block.find((/** @type {any} */ each) => each.name === name);
+      const label = side < 0 ? spec.label : `${spec.label}, ${side ? "left (side −)" : "right (side +)"}`;
+      return new NumberControl({...spec, label, words: side > 0 ? "" : spec.words}, () => this.tell(), `${prefix}${side < 0 ? "" : side}`);
+    };
+    this.shape = choice(`${prefix}shape`, "Given by", [["sizes", "width and height"], ["parameters", "p and α"]], () => this.reshape());
+    this.sizes = ["width", "height"].map((name) => control(name, -1));
+    this.plain = ["p", "alpha"].map((name) => control(name, -1));
+    this.pairs = ["p", "alpha", "restitution"].map((name) => [control(name, 0), control(name, 1)]);
+    this.two = check(`${prefix}two`, "Two different sides", () => this.part());
+    this.housner = check(`${prefix}housner`, "Restitution by Housner", () => this.tell());
+    this.restitution = control("restitution", -1);
+    element.replaceChildren(
+      this.shape.element, ...this.sizes.map((each) => each.element), this.two.element, ...this.plain.map((each) => each.element),
+      ...this.pairs.flat().map((each) => each.element), this.housner.element, this.restitution.element,
+    );
+  }
+
+  /** Show the block of a case. @param {Texts} texts @param {any[]} [known] sides as they are, for what the texts leave out */
+  show(texts, known) {
+    this.texts = texts;
+    this.known = known ?? this.known;
+    const sized = "width" in texts;
+    const two = !sized && ["p", "alpha", "restitution"].some((name) => (texts[name] ?? "").includes(","));
+    this.shape.select.value = sized ? "sizes" : "parameters";
+    this.two.box.checked = two;
+    this.housner.box.checked = !("restitution" in texts);
+    for (const each of [...this.sizes, ...this.plain]) if (texts[each.spec.name]) each.show(sides(texts[each.spec.name])[0]);
+    for (const pair of this.pairs) pair.forEach((each, k) => { if (texts[each.spec.name]) each.show(sides(texts[each.spec.name])[k]); });
+    if (this.known) {
+      if (!texts.restitution) this.restitution.show(sent(this.known[0].restitution));
+      this.pairs[2].forEach((each, k) => { if (!texts.restitution) each.show(sent(/** @type {any[]} */ (this.known)[k].restitution)); });
+    }
+    if (texts.restitution) this.restitution.show(sides(texts.restitution)[0]);
+    this.reveal();
+  }
+
+  reveal() {
+    const sized = this.shape.select.value === "sizes", two = !sized && this.two.box.checked;
+    this.sizes.forEach((each) => { each.element.hidden = !sized; });
+    this.plain.forEach((each) => { each.element.hidden = sized || two; });
+    this.pairs.flat().forEach((each) => { each.element.hidden = !two; });
+    this.two.element.hidden = sized;
+    this.housner.element.hidden = two;
+    this.restitution.element.hidden = two || this.housner.box.checked;
+  }
+
+  /** From sizes to parameters keeps the block; back, its sizes. */
+  reshape() {
+    if (this.shape.select.value === "parameters" && this.known) {
+      const [{p, alpha}] = this.known;
+      this.plain[0].show(sent(p));
+      this.plain[1].show(`${sent((alpha * 180) / Math.PI)}deg`);
+    } else if (this.known) {
+      const [{radius, alpha}] = this.known;
+      this.sizes[0].show(sent(2 * radius * Math.sin(alpha)));
+      this.sizes[1].show(sent(2 * radius * Math.cos(alpha)));
+    }
+    this.tell();
+  }
+
+  /** Between one set of parameters and a pair of each. */
+  part() {
+    if (this.two.box.checked) {
+      this.plain.forEach((each, k) => this.pairs[k].forEach((side) => side.show(each.text)));
+      this.pairs[2].forEach((side) => side.show(this.restitution.text));
+    } else {
+      this.plain.forEach((each, k) => each.show(this.pairs[k][0].text));
+      this.restitution.show(this.pairs[2][0].text);
+    }
+    this.tell();
+  }
+
+  tell() {
+    this.reveal();
+    const sized = this.shape.select.value === "sizes", two = !sized && this.two.box.checked;
+    /** @type {Texts} */
+    const texts = {};
+    for (const each of sized ? this.sizes : two ? [] : this.plain) texts[each.spec.name] = each.text;
+    if (two) for (const [plus, minus] of this.pairs) texts[plus.spec.name] = `${plus.text},${minus.text}`;
+    else if (!this.housner.box.checked) texts.restitution = this.restitution.text;
+    this.changed(texts, ["width", "height", "p", "alpha", "restitution"]);
+  }
+}
+
+const KINDS = /** @type {[string, string][]} */ ([
+  ["record", "a shipped record"], ["pulse", "a pulse"], ["file", "a file of yours"], ["given", "the motion of the notebook"],
+  ["none", "nothing: released from a rotation"],
+]);
+const SCALES = /** @type {[string, string][]} */ ([
+  ["", "as it is"], ["pga", "to a peak acceleration (PGA)"], ["pgv", "to a peak velocity (PGV)"],
+  ["sa", "to a spectral acceleration (Sa)"], ["scale", "by a factor"],
+]);
+
+export class MotionForm {
+  /** @param {HTMLElement} element @param {any} offers @param {Changed} changed @param {string} [prefix] */
+  constructor(element, offers, changed, prefix = "") {
+    this.offers = offers;
+    this.changed = changed;
+    this.prefix = prefix;
+    /** @type {any} */
+    this.file = null;
+    this.given = "";
+    this.kind = choice(`${prefix}kind`, "Shaken by", KINDS, () => this.tell());
+    this.record = choice(`${prefix}record`, "Record", offers.records.map((/** @type {any} */ each) => [each.name, each.name]), () => this.tell());
+    this.about = make("p", {className: "derived"});
+    this.pulse = choice(`${prefix}pulse`, "Pulse", Object.entries(offers.pulses).map(([name, each]) => [name, /** @type {any} */ (each).label]), (name) => { this.furnish(name); this.tell(); });
+    this.numbers = make("div");
+    this.told = {
+      channel: choice(`${prefix}channel`, "Channel", [], () => this.tell()),
+      units: choice(`${prefix}units`, "Units of the numbers", offers.units.map((/** @type {string} */ each) => [each, each]), () => this.tell()),
+    };
+    this.dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, value: "0.01", on: {change: () => this.tell()}}));
+    this.dtElement = make("div", {className: "choice"}, [make("label", {className: "field", for: `${prefix}dt`}, ["Sampling step, s"]), this.dt]);
+    this.start = offers.start.map((/** @type {any} */ spec) => new NumberControl(spec, () => this.tell(), prefix));
+    this.scale = choice(`${prefix}scaled`, "Scaled", SCALES, () => this.tell());
+    this.scales = offers.scales.map((/** @type {any} */ spec) => new NumberControl(spec, () => this.tell(), prefix));
+    this.period = new NumberControl(offers.period, () => this.tell(), prefix);
+    element.replaceChildren(
+      this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.told.channel.element, this.told.units.element,
+      this.dtElement, ...this.start.map((/** @type {NumberControl} */ each) => each.element), this.scale.element,
+      ...this.scales.map((/** @type {NumberControl} */ each) => each.element), this.period.element,
+    );
+    this.furnish("sine");
+  }
+
+  /** Numbers and choices of a pulse. @param {string} name */
+  furnish(name) {
+    const {numbers, choices} = this.offers.pulses[name];
+    this.family = name;
+    this.controls = numbers.map((/** @type {any} */ spec) => new NumberControl(spec, () => this.tell(), `${this.prefix}pulse-`));
+    this.choices = Object.entries(choices ?? {}).map(([each, values]) => ({
+      name: each, ...choice(`${this.prefix}pulse-${each}`, "Kind", /** @type {string[]} */ (values).map((value) => [value, value]), () => this.tell()),
+    }));
+    this.numbers.replaceChildren(...this.controls.map((/** @type {NumberControl} */ each) => each.element), ...this.choices.map((each) => each.element));
+  }
+
+  /** @param {Texts} texts */
+  show(texts) {
+    const motion = texts.motion ?? this.offers.default.motion;
+    const family = motion.split(":")[0];
+    const kind = family in this.offers.pulses ? "pulse" : ["none", "file", "given"].includes(family) ? family : "record";
+    this.kind.select.value = kind;
+    if (kind === "record") this.record.select.value = motion;
+    if (kind === "given") this.given = motion;
+    if (kind === "pulse") {
+      this.pulse.select.value = family;
+      if (this.family !== family) this.furnish(family);
+      const parts = Object.fromEntries(motion.slice(family.length + 1).split(",").map((part) => part.split("=")));
+      for (const each of this.controls) if (parts[each.spec.name]) each.show(parts[each.spec.name]);
+      for (const each of this.choices ?? []) each.select.value = parts[each.name] ?? each.select.value;
+    }
+    const scaled = SCALES.map(([name]) => name).find((name) => name && texts[name]) ?? "";
+    this.scale.select.value = scaled;
+    for (const each of this.scales) if (texts[each.spec.name]) each.show(texts[each.spec.name].split("@")[0]);
+    if (texts.sa) this.period.show(texts.sa.split("@")[1] ?? "1");
+    for (const each of this.start) if (texts[each.spec.name]) each.show(texts[each.spec.name]);
+    if (texts.channel) this.told.channel.select.value = texts.channel;
+    if (texts.units) this.told.units.select.value = texts.units;
+    if (texts.dt) this.dt.value = texts.dt;
+    this.reveal();
+  }
+
+  /** A file that the server keeps. @param {any} file */
+  take(file) {
+    this.file = file;
+    this.told.channel.select.replaceChildren(...file.channels.map((/** @type {any} */ each) => make("option", {value: String(each.number)}, [`${each.number}: ${each.name}`])));
+    this.kind.select.value = "file";
+    this.scale.select.value = "";
+    this.tell();
+  }
+
+  reveal() {
+    const kind = this.kind.select.value;
+    const options = [...this.kind.select.options];
+    for (const option of options) option.hidden = (option.value === "given" && !this.given) || (option.value === "file" && !this.file && kind !== "file");
+    this.record.element.hidden = kind !== "record";
+    this.pulse.element.hidden = this.numbers.hidden = kind !== "pulse";
+    const file = kind === "file" ? this.file : null;
+    this.told.channel.element.hidden = !file || file.channels.length < 2;
+    this.told.units.element.hidden = !file || !file.missing.includes("units");
+    this.dtElement.hidden = !file || !file.missing.includes("dt");
+    for (const each of this.start) each.element.hidden = kind !== "none";
+    this.scale.element.hidden = kind === "none" || kind === "pulse";
+    for (const each of this.scales) each.element.hidden = this.scale.element.hidden || this.scale.select.value !== each.spec.name;
+    this.period.element.hidden = this.scale.element.hidden || this.scale.select.value !== "sa";
+    const record = this.offers.records.find((/** @type {any} */ each) => each.name === this.record.select.value);
+    this.about.textContent = kind === "record" && record ? `${record.event}; ${record.station}, ${record.direction === "up" ? "vertical component, used as a horizontal motion" : `${record.direction}°`}.`
+      : file ? `${file.name}: ${file.format}, since ${file.reason}.` : "";
+    this.about.hidden = !this.about.textContent;
+  }
+
+  tell() {
+    this.reveal();
+    const kind = this.kind.select.value;
+    /** @type {Texts} */
+    const texts = {};
+    if (kind === "record") texts.motion = this.record.select.value;
+    else if (kind === "none") {
+      texts.motion = "none";
+      for (const each of this.start) texts[each.spec.name] = Number.parseFloat(each.text) === 0 ? "3deg" : each.text;
+    } else if (kind === "given") texts.motion = this.given;
+    else if (kind === "pulse") {
+      const numbers = this.controls.map((/** @type {NumberControl} */ each) => `${each.spec.name}=${each.text}`);
+      const chosen = (this.choices ?? []).map((each) => `${each.name}=${each.select.value}`);
+      texts.motion = `${this.family}:${[...numbers, ...chosen].join(",")}`;
+    } else if (this.file) {
+      texts.motion = `file:${this.file.key}`;
+      if (this.file.channels.length > 1) texts.channel = this.told.channel.select.value;
+      if (this.file.missing.includes("units")) texts.units = this.told.units.select.value;
+      if (this.file.missing.includes("dt")) texts.dt = this.dt.value;
+    }
+    const scaled = this.scale.select.value;
+    if (scaled && kind !== "none" && kind !== "pulse") {
+      const control = this.scales.find((/** @type {NumberControl} */ each) => each.spec.name === scaled);
+      texts[scaled] = scaled === "sa" ? `${control.text}@${this.period.text}` : control.text;
+    }
+    this.changed(texts, ["motion", "channel", "dt", "units", "scale", "pga", "pgv", "sa", "initial_rotation", "initial_velocity"]);
+  }
+}
+
+export class TreatmentForm {
+  /** @param {HTMLElement} element @param {any} offers @param {Changed} changed @param {{prefix?: string, label?: string}} [given] */
+  constructor(element, offers, changed, {prefix = "", label = "Chattering ends by"} = {}) {
+    this.changed = changed;
+    this.treatments = offers.treatments;
+    this.kind = choice(`${prefix}treatment`, label, this.treatments.map((/** @type {any} */ each) => [each.name, each.label]), () => this.tell());
+    this.about = make("p", {className: "derived"});
+    /** @type {Record<string, NumberControl>} */
+    this.numbers = {};
+    for (const each of this.treatments) if (each.number) this.numbers[each.name] = new NumberControl({...each.number, words: ""}, () => this.tell(), `${prefix}${each.name}-`);
+    element.append(this.kind.element, this.about, ...Object.values(this.numbers).map((each) => each.element));
+    this.reveal();
+  }
+
+  /** @param {Texts} texts */
+  show(texts) {
+    const [name, value] = (texts.chattering ?? "certified").split("=");
+    this.kind.select.value = name;
+    if (value && this.numbers[name]) this.numbers[name].show(value);
+    this.reveal();
+  }
+
+  reveal() {
+    const name = this.kind.select.value;
+    this.about.textContent = this.treatments.find((/** @type {any} */ each) => each.name === name)?.words ?? "";
+    for (const [each, control] of Object.entries(this.numbers)) control.element.hidden = each !== name;
+  }
+
+  tell() {
+    this.reveal();
+    const name = this.kind.select.value;
+    const text = this.numbers[name] ? `${name}=${this.numbers[name].text}` : name;
+    this.changed(/** @type {Texts} */ (name === "certified" ? {} : {chattering: text}), ["chattering"]);
+  }
+}
+
+export class ModelForm {
+  /** @param {HTMLElement} element @param {any} offers @param {Changed} changed */
+  constructor(element, offers, changed) {
+    this.model = choice("model", "Equation of motion", [["nonlinear", "exact (nonlinear)"], ["linear", "slender block (linear)"]],
+      (value) => changed(/** @type {Texts} */ (value === "nonlinear" ? {} : {model: value}), ["model"]));
+    const [button, words] = what("Exact, or linearised for slender blocks: sin and tan of α and of the rotation are taken for the angles themselves.", "the equation of motion");
+    this.model.element.querySelector("label")?.append(" ", button);
+    element.replaceChildren(this.model.element, words);
+    this.treatment = new TreatmentForm(element, offers, changed);
+  }
+
+  /** @param {Texts} texts */
+  show(texts) {
+    this.model.select.value = texts.model ?? "nonlinear";
+    this.treatment.show(texts);
+  }
+}

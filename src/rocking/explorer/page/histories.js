@@ -1,0 +1,325 @@
+// Rotation over ground acceleration: one axis of time, which keeps its digits however far it is zoomed.
+
+import {bokeh, coarse, colour, figure, themed} from "./theme.js";
+import {decimals, short} from "./words.js";
+
+/** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, impact: Float64Array}} Lines */
+/** @typedef {{lines: Lines, rest: Float64Array, uplift: Float64Array, sides: {alpha: number}[]}} Drawn */
+
+const NARROWEST = 1e-10;
+const WIDE = 0.5;
+const UNITS = /** @type {[number, string][]} */ ([[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"]]);
+const NAMES = ["first", "second"];
+const SIGNS = [1, -1];
+
+/** Time as it is plotted: counted from an origin, in a unit that suits the window. */
+class Scale {
+  /** @param {number} from @param {number} to */
+  constructor(from, to) {
+    const width = to - from;
+    if (width >= WIDE) {
+      [this.origin, this.unit, this.label] = [0, 1, "time (s)"];
+      return;
+    }
+    const [unit, name] = UNITS.find(([each]) => width >= 2 * each) ?? UNITS[UNITS.length - 1];
+    const step = 10 ** Math.floor(Math.log10(width));
+    this.origin = Number((Math.floor(from / step) * step).toFixed(14));
+    this.unit = unit;
+    this.label = `time after ${this.origin.toFixed(Math.max(0, Math.round(-Math.log10(step))))} s (${name})`;
+  }
+
+  /** @param {number} time */
+  plotted(time) { return (time - this.origin) / this.unit; }
+
+  /** @param {number} x */
+  time(x) { return this.origin + x * this.unit; }
+
+  /** Times that count from the window's start. @param {Float64Array} times @param {number} from */
+  all(times, from) {
+    const shift = from - this.origin;
+    return times.map((each) => (shift + each) / this.unit);
+  }
+}
+
+export class Histories {
+  /** @param {HTMLElement} element @param {{window: (ends: [number, number] | null) => void, cursor?: (text: string) => void, pick?: (time: number) => void}} tell */
+  constructor(element, tell) {
+    this.element = element;
+    this.tell = tell;
+    this.scale = new Scale(0, 1);
+    /** @type {[number, number]} */
+    this.window = [0, 1];
+    this.whole = 1;
+    /** @type {(Drawn | null)[]} */
+    this.drawn = [null, null];
+    /** @type {Record<string, any>} */
+    this.sources = {};
+    /** @type {Record<string, any[]>} */
+    this.levels = {};
+    /** @type {any[]} */
+    this.cursors = [];
+    this.made = false;
+    this.quiet = false;
+    element.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  build() {
+    const B = bokeh();
+    this.x = new B.Range1d({start: 0, end: 1});
+    this.rotation = figure({height: 290, x_range: this.x, y_range: new B.Range1d({start: -1, end: 1})}, "Rotation over slenderness, over time");
+    this.ground = figure({height: 190, x_range: this.x, y_range: new B.Range1d({start: -1, end: 1}), min_border_bottom: 44}, "Ground acceleration over time");
+    this.rotation.left[0].axis_label = "rotation / slenderness";
+    this.ground.left[0].axis_label = "ground (g)";
+    this.rotation.below[0].visible = false;
+    for (const each of [this.rotation, this.ground]) this.furnish(each);
+    this.glyphs();
+    this.cursors = [this.rotation, this.ground].map((plot) => this.vertical(plot));
+    const grid = B.Plotting.gridplot([[this.rotation], [this.ground]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false});
+    B.Plotting.show(grid, this.element);
+    this.x.properties.start.change.connect(() => this.ranged());
+    this.x.properties.end.change.connect(() => this.ranged());
+    this.made = true;
+  }
+
+  /** Heights of both plots. @param {number} rotation @param {number} ground */
+  size(rotation, ground) {
+    if (!this.made) this.build();
+    this.rotation.height = rotation;
+    this.ground.height = ground;
+    this.element.style.minHeight = `${rotation + ground}px`;
+  }
+
+  /** @param {any} plot */
+  furnish(plot) {
+    const B = bokeh();
+    if (!coarse()) {
+      const zoom = new B.BoxZoomTool({dimensions: "width"});
+      zoom.overlay.setv({fill_color: colour("accent"), fill_alpha: 0.12, line_color: colour("accent"), line_dash: []});
+      const wheel = new B.WheelZoomTool({dimensions: "width", modifiers: {ctrl: true}});
+      plot.add_tools(zoom, wheel);
+      plot.toolbar.setv({active_drag: zoom, active_scroll: wheel});
+    }
+    plot.on_event("mousemove", (/** @type {any} */ event) => this.point(event.x));
+    plot.on_event("tap", (/** @type {any} */ event) => { this.point(event.x); this.tell.pick?.(this.scale.time(event.x)); });
+  }
+
+  /** @param {any} plot */
+  vertical(plot) {
+    const span = new (bokeh().Span)({dimension: "height", location: NaN, line_width: 1, visible: false});
+    plot.add_layout(span);
+    themed(() => { span.line_color = colour("accent"); });
+    return span;
+  }
+
+  /** @param {string} name @param {string[]} columns */
+  source(name, columns) {
+    const data = Object.fromEntries(columns.map((column) => [column, new Float64Array(0)]));
+    this.sources[name] = new (bokeh().ColumnDataSource)({data, name: `${this.element.id}-${name}`});
+    return this.sources[name];
+  }
+
+  glyphs() {
+    const B = bokeh();
+    /** @type {(() => void)[]} */
+    const paints = [];
+    /** @param {any} plot @param {any} glyph @param {any} source @param {(glyph: any) => void} paint */
+    const add = (plot, glyph, source, paint) => {
+      plot.add_renderers(new B.GlyphRenderer({data_source: source, glyph, level: "glyph"}));
+      paints.push(() => paint(glyph));
+    };
+    const F = (/** @type {string} */ field) => ({field});
+    add(this.rotation, new B.VStrip({x0: F("from"), x1: F("to"), line_color: null}), this.source("rest", ["from", "to"]),
+      (glyph) => { glyph.fill_color = colour("rest"); });
+    for (const [k, name] of [...NAMES.entries()].reverse()) {
+      const [ink, ground] = k === 0 ? ["ink", "ground"] : ["second", "second"];
+      add(this.ground, new B.Line({x: F("x"), y: F("y"), line_width: 1}), this.source(`${name}-ground`, ["x", "y"]),
+        (glyph) => { glyph.line_color = colour(ground); });
+      if (k === 0) for (const sign of SIGNS) {
+        const source = this.source(`beyond${sign}`, ["x", "y", "level", "line"]);
+        add(this.ground, new B.VArea({x: F("x"), y1: F("y"), y2: F("level")}), source, (glyph) => { glyph.fill_color = colour("accent"); });
+        add(this.ground, new B.Line({x: F("x"), y: F("line"), line_width: 1.2}), source, (glyph) => { glyph.line_color = colour("accent"); });
+      }
+      add(this.rotation, new B.Line({x: F("x"), y: F("y"), line_width: k === 0 ? 1.4 : 1.6, line_dash: k === 0 ? [] : [6, 3]}), this.source(name, ["x", "y"]),
+        (glyph) => { glyph.line_color = colour(ink); });
+      const marks = {angle: Math.PI / 2, size: 11, line_width: 1, marker: {value: "dash"}};
+      add(this.rotation, new B.Scatter({x: F("x"), y: F("y"), ...marks}), this.source(`${name}-impact`, ["x", "y"]),
+        (glyph) => { glyph.line_color = colour(ink); });
+    }
+    add(this.rotation, new B.Scatter({x: F("x"), y: F("y"), marker: {value: "triangle"}, size: 8, line_color: null}), this.source("uplift", ["x", "y"]),
+      (glyph) => { glyph.fill_color = colour("accent"); });
+    this.levels = {balance: [0, 1].map(() => this.level(this.rotation, [7, 3, 2, 3], "accent")), threshold: [0, 1].map(() => this.level(this.ground, [5, 3], "ink"))};
+    for (const plot of [this.rotation, this.ground]) this.level(plot, [], "soft").location = 0;
+    themed(() => paints.forEach((paint) => paint()));
+  }
+
+  /** @param {any} plot @param {number[]} dash @param {string} name */
+  level(plot, dash, name) {
+    const span = new (bokeh().Span)({dimension: "width", location: NaN, line_width: 0.9, line_dash: dash, level: "underlay"});
+    plot.add_layout(span);
+    themed(() => { span.line_color = colour(name); });
+    return span;
+  }
+
+  /** Draw one response, or two over each other.
+   * @param {[number, number]} window @param {number} whole @param {Drawn} first @param {Drawn | null} second @param {number[]} thresholds */
+  draw(window, whole, first, second, thresholds) {
+    if (!this.made) this.build();
+    this.window = window;
+    this.whole = whole;
+    this.thresholds = thresholds;
+    this.drawn = [first, second];
+    this.scale = new Scale(...window);
+    Object.assign(this.element.dataset, {origin: String(this.scale.origin), unit: String(this.scale.unit)});
+    this.quiet = true;
+    for (const plot of [this.rotation, this.ground]) plot.hold_render = true;
+    this.x.setv({start: this.scale.plotted(window[0]), end: this.scale.plotted(window[1])});
+    this.ground.below[0].axis_label = this.scale.label;
+    const heights = this.drawn.map((drawn, k) => (drawn ? this.line(NAMES[k], drawn) : this.blank(NAMES[k])));
+    const [low, high] = [Math.min(...heights.map((each) => each[0])), Math.max(...heights.map((each) => each[1]))];
+    this.frame(low, high);
+    const rests = first.rest;
+    const ends = Array.from({length: rests.length / 2}, (_, k) => [rests[2 * k], rests[2 * k + 1]]);
+    const seen = ends.filter(([start, end]) => end > window[0] && start < window[1]);
+    this.sources.rest.data = {
+      from: Float64Array.from(seen, ([start]) => this.scale.plotted(Math.max(start, window[0]))),
+      to: Float64Array.from(seen, ([, end]) => this.scale.plotted(Math.min(end, window[1]))),
+    };
+    for (const plot of [this.rotation, this.ground]) plot.hold_render = false;
+    this.quiet = false;
+  }
+
+  /** @param {string} name @param {Drawn} drawn @returns {[number, number]} */
+  line(name, drawn) {
+    const {lines, sides} = drawn;
+    const from = this.window[0];
+    const y = lines.rotation.map((each) => each / sides[each >= 0 ? 0 : 1].alpha);
+    this.sources[name].data = {x: this.scale.all(lines.time, from), y};
+    this.sources[`${name}-ground`].data = {x: this.scale.all(lines.ground_time, from), y: lines.ground_g};
+    if (name === NAMES[0]) for (const sign of SIGNS) this.beyond(sign);
+    let low = 0, high = 0;
+    for (const each of y) { if (each < low) low = each; if (each > high) high = each; }
+    return [low, high];
+  }
+
+  /** What of the ground motion is beyond the threshold of a side. @param {number} sign */
+  beyond(sign) {
+    const {x, y} = this.sources[`${NAMES[0]}-ground`].data;
+    const [plus, minus] = this.thresholds ?? [Infinity, Infinity];
+    const level = sign > 0 ? minus : plus;
+    const over = (/** @type {number} */ k) => sign * y[k] > level;
+    const cut = y.map((/** @type {number} */ each, /** @type {number} */ k) => (over(k) ? each : sign * level));
+    const line = cut.map((/** @type {number} */ each, /** @type {number} */ k) => (over(k) || over(k - 1) || over(k + 1) ? each : NaN));
+    this.sources[`beyond${sign}`].data = {x, y: cut, line, level: new Float64Array(x.length).fill(sign * level)};
+  }
+
+  /** @param {string} name @returns {[number, number]} */
+  blank(name) {
+    const none = new Float64Array(0);
+    this.sources[name].data = {x: none, y: none};
+    this.sources[`${name}-ground`].data = {x: none, y: none};
+    this.sources[`${name}-impact`].data = {x: none, y: none};
+    return [0, 0];
+  }
+
+  /** Heights of both plots, and the marks that stand at their feet. @param {number} low @param {number} high */
+  frame(low, high) {
+    const [bottom, top] = [Math.max(low, -1.6), Math.min(high, 1.6)];
+    const span = top - bottom || (this.drawn[0]?.lines.rotation.length ? 1e-3 : 1);
+    const [start, end] = [bottom - 0.24 * span, top + 0.08 * span];
+    this.rotation.y_range.setv({start, end});
+    let peak = 0;
+    for (const drawn of this.drawn) for (const each of drawn?.lines.ground_g ?? []) peak = Math.max(peak, Math.abs(each));
+    const shown = 1.1 * Math.max(peak, Math.min(...(this.thresholds ?? [0]), peak || Infinity) || 0.1);
+    this.ground.y_range.setv({start: -shown, end: shown});
+    this.levels.balance.forEach((each, k) => { each.location = k ? -1 : 1; });
+    const [plus, minus] = this.thresholds ?? [NaN, NaN];
+    this.levels.threshold[0].location = minus;
+    this.levels.threshold[1].location = -plus;
+    const from = this.window[0];
+    for (const [k, drawn] of this.drawn.entries()) {
+      if (!drawn) continue;
+      const x = this.scale.all(drawn.lines.impact, from);
+      const at = start + (0.045 + 0.075 * k) * (end - start);
+      this.sources[`${NAMES[k]}-impact`].data = {x, y: new Float64Array(x.length).fill(at)};
+    }
+    const uplifts = (this.drawn[0]?.uplift ?? new Float64Array(0)).filter((each) => each >= this.window[0] && each <= this.window[1]);
+    this.sources.uplift.data = {
+      x: uplifts.map((each) => this.scale.plotted(each)),
+      y: new Float64Array(uplifts.length).fill(start + 0.15 * (end - start)),
+    };
+  }
+
+  /** The range was changed by a tool. */
+  ranged() {
+    if (this.quiet) return;
+    window.clearTimeout(this.waiting);
+    this.waiting = window.setTimeout(() => {
+      this.go([this.scale.time(this.x.start), this.scale.time(this.x.end)]);
+    }, 30);
+  }
+
+  /** Ask for another window. @param {[number, number] | null} ends */
+  go(ends) {
+    if (ends) {
+      const width = Math.max(ends[1] - ends[0], NARROWEST);
+      const middle = 0.5 * (ends[0] + ends[1]);
+      ends = [Math.max(0, middle - 0.5 * width), Math.min(this.whole, middle + 0.5 * width)];
+      if (!(ends[1] > ends[0])) return;
+    }
+    this.tell.window(ends);
+  }
+
+  /** @param {string} how */
+  zoom(how) {
+    const [from, to] = this.window;
+    const width = to - from, middle = 0.5 * (from + to);
+    if (how === "all") this.go([0, this.whole]);
+    else if (how === "active") this.go(null);
+    else if (how === "in") this.go([middle - 0.25 * width, middle + 0.25 * width]);
+    else if (how === "out") this.go([Math.max(0, middle - width), Math.min(this.whole, middle + width)]);
+    else {
+      const shift = Math.min(Math.max((how === "left" ? -0.25 : 0.25) * width, -from), this.whole - to);
+      if (shift !== 0) this.go([from + shift, to + shift]);
+    }
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const how = {"+": "in", "=": "in", "-": "out", "−": "out", ArrowLeft: "left", ArrowRight: "right", "0": "active"}[event.key];
+    if (!how) return;
+    event.preventDefault();
+    this.zoom(how);
+  }
+
+  /** Show where the cursor is. @param {number} time */
+  mark(time) {
+    if (!this.made) return;
+    for (const span of this.cursors) span.setv({location: this.scale.plotted(time), visible: true});
+  }
+
+  /** The pointer is here: say what is. @param {number} x */
+  point(x) {
+    const time = this.scale.time(x);
+    this.mark(time);
+    const first = this.drawn[0];
+    if (!first || !this.tell.cursor) return;
+    const theta = at(first.lines.time, first.lines.rotation, time - this.window[0]);
+    const ground = at(first.lines.ground_time, first.lines.ground_g, time - this.window[0]);
+    const alpha = first.sides[theta >= 0 ? 0 : 1].alpha;
+    const width = this.window[1] - this.window[0];
+    this.tell.cursor(`${time.toFixed(decimals(width))} s: θ = ${short(theta / alpha)} α = ${short((theta * 180) / Math.PI)}°, ground ${short(ground)} g`);
+  }
+}
+
+/** Value of a line at a time. @param {Float64Array} times @param {Float64Array} values @param {number} time */
+export function at(times, values, time) {
+  let low = 0, high = times.length - 1;
+  if (high < 0 || time < times[0] || time > times[high]) return 0;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= time) low = middle; else high = middle;
+  }
+  const part = times[high] > times[low] ? (time - times[low]) / (times[high] - times[low]) : 0;
+  return values[low] + part * (values[high] - values[low]);
+}

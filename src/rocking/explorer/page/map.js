@@ -1,0 +1,431 @@
+// A map of the case over two of its parameters, coarse to fine; or of a study.
+
+import {Latest, frames, json, payload} from "./api.js";
+import {bokeh, colour, figure, themed} from "./theme.js";
+import {make, one, short} from "./words.js";
+
+/** From harmless to the worst, each darker than the one before; the last stands out. */
+const OUTCOMES = ["#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a23c"];
+const MODES = /** @type {[number, string, string][]} */ ([
+  [-3, "no uplift", "#ffffff"], [-1, "rocks", "#d7e3f2"], [-2, "rests before the motion is over", "#9db6d4"],
+  [0, "overturns without impact", "#1c2c47"], [1, "overturns after 1 impact", "#c76b29"], [2, "overturns after 2 impacts or more", "#e9a94f"],
+  [-4, "overturns after a rest", "#7a3b69"],
+]);
+/** Dark to light, even steps of lightness. */
+const RAMP = ["#0b1a3a", "#14346b", "#1f5190", "#3a74a8", "#5f97b8", "#8bb8c6", "#b9d6d4", "#e6efe4", "#fdf3d6"];
+
+const ENDS = ["x_from", "x_to", "y_from", "y_to"];
+
+export class View {
+  /** @param {any} page */
+  constructor(page) {
+    this.page = page;
+    this.study = page.offers.study;
+    /** @type {AbortController | null} */
+    this.running = null;
+    this.latest = new Latest(() => this.run());
+    /** @type {any} */
+    this.about = null;
+    this.mark = [0, 0];
+    this.form();
+    one("map").addEventListener("keydown", (event) => this.key(event));
+    one("map-open").addEventListener("click", () => this.open());
+    one("map-sine").addEventListener("click", () => this.sine());
+  }
+
+  enter() { this.update(); }
+
+  leave() { this.running?.abort(); }
+
+  /** @param {string} name @returns {HTMLSelectElement} */
+  select(name) { return one(`map-${name}`); }
+
+  form() {
+    for (const name of ["quantity", "x", "y", "points"]) this.select(name).addEventListener("change", () => this.chosen(name));
+    for (const name of ["x-from", "x-to", "y-from", "y-to"]) one(`map-${name}`).addEventListener("change", () => this.ends());
+    if (!this.study) return;
+    const tools = one("study-tools");
+    tools.hidden = false;
+    /** @param {string} name @param {string} label @param {string[]} values */
+    const slice = (name, label, values) => {
+      if (values.length < 2) return;
+      const select = /** @type {HTMLSelectElement} */ (make("select", {on: {change: () => { this.page.state.map[name] = select.value; this.update(); }}},
+        values.map((value, k) => make("option", {value: name.startsWith("fix_") ? value : String(k)}, [value]))));
+      select.value = this.page.state.map[name] ?? select.value;
+      tools.append(make("label", {}, [`${label} `, select]));
+    };
+    tools.append(make("strong", {}, [`Study ${this.study.name}`]), make("span", {className: "cursor"}, [this.study.status]));
+    slice("motion_index", "motion", this.study.motions);
+    slice("polarity_index", "polarity", this.study.polarities);
+    slice("scale_index", "scale", this.study.scales.map(String));
+    for (const [name, values] of Object.entries(this.study.fixed)) slice(`fix_${name}`, name, /** @type {number[]} */ (values).map(String));
+    for (const name of ["x-from", "x-to", "y-from", "y-to", "points"]) /** @type {HTMLElement} */ (one(`map-${name}`).parentElement).hidden = true;
+  }
+
+  /** @param {string} name */
+  chosen(name) {
+    const {map} = this.page.state;
+    map[name] = this.select(name).value;
+    if (name === "x" || name === "y") { delete map[`${name}_from`]; delete map[`${name}_to`]; }
+    if (name === "quantity" && this.about && !this.study) {
+      this.fill();
+      this.page.remember();
+      if (JSON.stringify(this.asked()) === this.drawn) { this.recolour(); return; }
+    }
+    this.update();
+  }
+
+  /** What is asked of the server: all but the quantity, since it sends all of them.
+   * @returns {Record<string, string>} */
+  asked() {
+    const ends = Object.fromEntries(ENDS.map((end) => [end, /** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value]));
+    const {x, y, points} = this.page.state.map;
+    return {...this.page.state.texts, x, y, ...ends, points: points ?? "200"};
+  }
+
+  ends() {
+    for (const end of ENDS) this.page.state.map[end] = /** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value;
+    this.update();
+  }
+
+  /** The case, or what is mapped, has changed. */
+  update() {
+    this.running?.abort();
+    void this.latest.ask();
+  }
+
+  async run() {
+    this.running = new AbortController();
+    const {signal} = this.running;
+    try {
+      if (this.study) await this.slice();
+      else await this.stream(signal);
+    } catch (error) {
+      if (error instanceof DOMException && error.name === "AbortError") return;
+      this.page.problem(error instanceof Error ? error.message : String(error));
+    }
+  }
+
+  /** Axes that the case has, and those that are chosen. */
+  axes() {
+    const {texts, map} = this.page.state;
+    const motion = texts.motion ?? "";
+    const family = motion.split(":")[0];
+    const pulse = family in this.page.offers.pulses;
+    const frequency = pulse && motion.includes("frequency=");
+    const names = this.page.offers.axes.map((/** @type {any} */ each) => each.name).filter((/** @type {string} */ name) => name !== "omega" || frequency);
+    const right = names.filter((/** @type {string} */ name) => name !== "a" && name !== "pga");
+    if (!names.includes(map.y)) map.y = pulse ? "a" : "pga";
+    if (!right.includes(map.x)) map.x = frequency ? "omega" : "p";
+    one("map-sine").hidden = family === "sine";
+    return {names, right};
+  }
+
+  fill() {
+    const {map} = this.page.state;
+    const {names, right} = this.study ? {names: this.study.axes.map((/** @type {any} */ each) => each.name), right: this.study.axes.map((/** @type {any} */ each) => each.name)} : this.axes();
+    if (this.study) {
+      if (!names.includes(map.x)) map.x = names[0];
+      if (!names.includes(map.y) || map.y === map.x) map.y = names.find((/** @type {string} */ each) => each !== map.x);
+    }
+    const offered = this.study ? this.study.axes : this.page.offers.axes;
+    const label = (/** @type {string} */ name) => offered.find((/** @type {any} */ each) => each.name === name).label;
+    for (const [name, values] of Object.entries({x: right, y: names})) {
+      this.select(name).replaceChildren(...values.map((/** @type {string} */ value) => make("option", {value}, [label(value)])));
+      this.select(name).value = map[name];
+    }
+    const quantities = this.study ? this.study.quantities : this.page.offers.quantities;
+    this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each.name}, [each.label])));
+    if (!quantities.some((/** @type {any} */ each) => each.name === map.quantity)) map.quantity = quantities[0].name;
+    this.select("quantity").value = map.quantity;
+    this.select("points").value = map.points ?? "200";
+    if (this.study) return;
+    for (const which of ["x", "y"]) {
+      const axis = offered.find((/** @type {any} */ each) => each.name === map[which]);
+      const wide = map.quantity === "peak" || map.quantity === "mode";
+      for (const [k, end] of ["from", "to"].entries()) {
+        const field = /** @type {HTMLInputElement} */ (one(`map-${which}-${end}`));
+        field.value = map[`${which}_${end}`] ?? String((wide ? axis.wide : axis.close)[k]);
+      }
+    }
+  }
+
+  /** @param {AbortSignal} signal */
+  async stream(signal) {
+    this.fill();
+    this.page.remember();
+    const started = performance.now();
+    const body = document.body.dataset;
+    this.drawn = JSON.stringify(this.asked());
+    body.map = "running";
+    let done = 0;
+    this.complete = false;
+    for await (const frame of frames("/api/map", this.asked(), signal)) {
+      if (!this.about || done === 0) {
+        this.about = JSON.parse(new TextDecoder().decode(frame));
+        this.page.problem(null);
+        const count = this.about.shape[0] * this.about.shape[1];
+        this.values = this.about.quantities.map(() => new Float32Array(count).fill(NaN));
+        this.drawAxes();
+        done = 1;
+        continue;
+      }
+      if (frame[0] === 123) { this.page.problem(JSON.parse(new TextDecoder().decode(frame)).problem); break; }
+      done += this.take(frame);
+      const [rows, columns] = this.about.shape;
+      /** @type {HTMLProgressElement} */ (one("map-progress")).value = done / (rows * columns);
+      this.soon();
+      if (!body.first || body.firstOf !== String(started)) { body.first = String(performance.now() - started); body.firstOf = String(started); }
+    }
+    this.complete = true;
+    this.recolour();
+    body.map = "complete";
+    body.mapTook = String(performance.now() - started);
+  }
+
+  /** Put a part where it belongs; a coarse point covers those that are still to come. @param {Uint8Array} frame */
+  take(frame) {
+    const view = new DataView(frame.buffer, frame.byteOffset, frame.byteLength);
+    const stride = view.getUint32(0, true), count = view.getUint32(4, true);
+    const columns = this.about.shape[1], rows = this.about.shape[0];
+    for (let k = 0; k < count; k += 1) {
+      const index = view.getUint32(8 + 4 * k, true);
+      const row = Math.floor(index / columns), column = index % columns;
+      const lastRow = Math.min(rows, row + stride), lastColumn = Math.min(columns, column + stride);
+      this.values?.forEach((/** @type {Float32Array} */ all, /** @type {number} */ q) => {
+        const value = view.getFloat32(8 + 4 * count + 4 * (q * count + k), true);
+        for (let r = row; r < lastRow; r += 1) all.fill(value, r * columns + column, r * columns + lastColumn);
+      });
+    }
+    return count;
+  }
+
+  /** Recolour at the next frame, once. */
+  soon() {
+    if (this.waiting) return;
+    this.waiting = true;
+    window.setTimeout(() => { this.waiting = false; this.recolour(); }, 90);
+  }
+
+  async slice() {
+    this.fill();
+    const {header, arrays} = await payload("/api/study", this.page.state.map);
+    this.about = {...header, quantities: [header.quantity], curves: {}, outcomes: []};
+    this.values = [Float32Array.from(arrays.values)];
+    this.drawAxes();
+    this.complete = true;
+    this.recolour();
+    /** @type {HTMLProgressElement} */ (one("map-progress")).value = 1;
+    document.body.dataset.map = "complete";
+  }
+
+  build() {
+    const B = bokeh();
+    this.plot = figure({height: 500, x_range: new B.Range1d({start: 0, end: 1}), y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 46}, "Map of outcomes over two parameters");
+    for (const grid of this.plot.center) grid.visible = false;
+    this.image = new B.ColumnDataSource({data: {image: [], x: [], y: [], dw: [], dh: []}});
+    const F = (/** @type {string} */ field) => ({field});
+    this.plot.add_renderers(new B.GlyphRenderer({data_source: this.image, glyph: new B.ImageRGBA({image: F("image"), x: F("x"), y: F("y"), dw: F("dw"), dh: F("dh")}), level: "image"}));
+    /** @type {Record<string, any>} */
+    this.curves = {};
+    for (const [name, dash] of /** @type {[string, number[]][]} */ ([["eq76", [7, 4]], ["exact", []]])) {
+      const source = new B.ColumnDataSource({data: {x: [], y: []}});
+      // A light line under the dark one: it is seen on every colour of the map.
+      for (const [width, ink] of /** @type {[number, string][]} */ ([[4.5, "#ffffff"], [2, "#b0390c"]])) {
+        this.plot.add_renderers(new B.GlyphRenderer({data_source: source, glyph: new B.Line({x: F("x"), y: F("y"), line_width: width, line_color: ink, line_alpha: width > 3 ? 0.75 : 1, line_dash: width > 3 ? [] : dash})}));
+      }
+      this.curves[name] = source;
+    }
+    this.at = new B.ColumnDataSource({data: {x: [], y: []}});
+    for (const [size, ink] of /** @type {[number, string][]} */ ([[17, "#ffffff"], [14, "#10243e"]])) {
+      this.plot.add_renderers(new B.GlyphRenderer({data_source: this.at, glyph: new B.Scatter({x: F("x"), y: F("y"), size, line_width: size > 15 ? 4 : 2, line_color: ink, fill_alpha: 0, marker: {value: "circle_cross"}})}));
+    }
+    this.bar = new B.ColorBar({color_mapper: new B.LinearColorMapper({palette: RAMP, low: 0, high: 1}), width: 12, title_text_font_style: "normal", padding: 6, visible: false});
+    this.plot.add_layout(this.bar, "right");
+    themed(() => this.bar.setv({background_fill_color: colour("paper"), major_label_text_color: colour("ink"), title_text_color: colour("ink"), major_tick_line_color: colour("ink")}));
+    this.plot.on_event("mousemove", (/** @type {any} */ event) => this.point(event.x, event.y));
+    this.plot.on_event("tap", (/** @type {any} */ event) => { this.put(event.x, event.y); void this.open(); });
+    B.Plotting.show(this.plot, one("map"));
+  }
+
+  drawAxes() {
+    if (!this.plot) this.build();
+    const {x, y} = this.about;
+    const label = (/** @type {any} */ axis) => (axis.unit ? `${axis.label} (${axis.unit})` : axis.label);
+    this.plot.below[0].axis_label = label(x);
+    this.plot.left[0].axis_label = label(y);
+    const [x0, x1, y0, y1] = this.box();
+    this.plot.x_range.setv({start: x0, end: x1});
+    this.plot.y_range.setv({start: y0, end: y1});
+    for (const [name, source] of Object.entries(this.curves ?? {})) {
+      const values = this.about.curves[name];
+      source.data = values ? {x: x.values, y: values.map((/** @type {number | null} */ each) => each ?? NaN)} : {x: [], y: []};
+    }
+    if (!(this.mark[0] >= x0 && this.mark[0] <= x1 && this.mark[1] >= y0 && this.mark[1] <= y1)) this.put(0.5 * (x0 + x1), 0.5 * (y0 + y1));
+    else this.put(this.mark[0], this.mark[1]);
+  }
+
+  /** Ends of the map, half a step beyond the outermost points. */
+  box() {
+    const {x, y} = this.about;
+    return [x.values, y.values].flatMap((values) => {
+      const half = 0.5 * ((values[values.length - 1] - values[0]) / Math.max(1, values.length - 1));
+      return [values[0] - half, values[values.length - 1] + half];
+    });
+  }
+
+  recolour() {
+    if (!this.about || !this.values) return;
+    const {map} = this.page.state;
+    const which = Math.max(0, this.about.quantities.indexOf(map.quantity));
+    const values = this.values[which];
+    const [rows, columns] = this.about.shape;
+    const colours = this.coloured(map.quantity, values);
+    const {ndarray} = bokeh().require("core/util/ndarray");
+    const [x0, x1, y0, y1] = this.box();
+    this.image.data = {image: [ndarray(colours, {shape: [rows, columns], dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]};
+    this.point(this.mark[0], this.mark[1]);
+  }
+
+  /** Colour of every point, and the legend or the bar that says what it means. @param {string} quantity @param {Float32Array} values */
+  coloured(quantity, values) {
+    const out = new Uint32Array(values.length);
+    const kinds = this.kinds(quantity);
+    if (kinds) {
+      const known = new Map(kinds.map(([value, , ink]) => [value, rgba(ink)]));
+      /** @type {Map<number, number>} */
+      const seen = new Map();
+      values.forEach((value, k) => {
+        if (Number.isNaN(value)) return;
+        const kind = quantity === "mode" && value > 2 ? 2 : value;
+        seen.set(kind, (seen.get(kind) ?? 0) + 1);
+        out[k] = known.get(kind) ?? 0;
+      });
+      this.bar.visible = false;
+      const share = (/** @type {number} */ value) => (this.complete ? `, ${short((100 * (seen.get(value) ?? 0)) / values.length, 2)} %` : "");
+      this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]));
+      return out;
+    }
+    const finite = values.filter((each) => Number.isFinite(each));
+    const sorted = finite.sort();
+    const logarithmic = quantity === "rest";
+    const scale = logarithmic ? Math.log10 : (/** @type {number} */ each) => each;
+    const low = quantity === "peak" || !logarithmic ? 0 : sorted[Math.floor(0.02 * sorted.length)] ?? 1e-3;
+    const high = quantity === "peak" ? 1 : sorted[Math.floor(0.995 * (sorted.length - 1))] ?? 1;
+    const inks = RAMP.map(rgba);
+    values.forEach((value, k) => {
+      if (Number.isNaN(value)) return;
+      if (value === Infinity) { out[k] = rgba("#c76b29"); return; }
+      const part = (scale(value) - scale(low)) / (scale(high) - scale(low) || 1);
+      out[k] = inks[Math.max(0, Math.min(RAMP.length - 1, Math.floor(part * RAMP.length)))];
+    });
+    const ends = {low, high: high > low ? high : low + 1};
+    const kind = logarithmic ? "LogColorMapper" : "LinearColorMapper";
+    if (this.bar.color_mapper.type === kind) this.bar.color_mapper.setv(ends);
+    else this.bar.color_mapper = new (bokeh()[kind])({palette: RAMP, ...ends});
+    const title = {rest: "s", peak: "peak / α"}[quantity] ?? this.select("quantity").selectedOptions[0].text;
+    this.bar.setv({title, visible: true});
+    const extra = quantity === "peak" ? [["overturns", "#c76b29"]] : quantity === "rest" ? [["never comes to rest", "rgba(0,0,0,0)"]] : [];
+    this.legend(/** @type {[string, string][]} */ (extra));
+    return out;
+  }
+
+  /** @param {string} quantity @returns {[number, string, string][] | null} */
+  kinds(quantity) {
+    if (quantity === "outcome") return this.about.outcomes.map((/** @type {string} */ text, /** @type {number} */ k) => [k, text, OUTCOMES[k]]);
+    if (quantity === "mode") return MODES;
+    if (quantity === "overturned") return [[0, "stays", "#d7e3f2"], [1, "overturns", "#c76b29"]];
+    return null;
+  }
+
+  /** @param {[string, string][]} entries */
+  legend(entries) {
+    const parts = entries.map(([text, ink]) => {
+      const key = make("i", {className: "key swatch"});
+      key.style.background = ink;
+      return make("span", {}, [key, text]);
+    });
+    if (this.about.curves.exact) parts.push(make("span", {}, [make("i", {className: "key exact"}), "exact critical amplitude (slender block)"]), make("span", {}, [make("i", {className: "key eq76"}), "Eq. 76"]));
+    one("map-legend").replaceChildren(...parts);
+  }
+
+  /** Row and column at a place. @param {number} x @param {number} y */
+  place(x, y) {
+    const nearest = (/** @type {number[]} */ values, /** @type {number} */ wanted) => values.reduce((best, each, k) => (Math.abs(each - wanted) < Math.abs(values[best] - wanted) ? k : best), 0);
+    return [nearest(this.about.y.values, y), nearest(this.about.x.values, x)];
+  }
+
+  /** Say what is at a place. @param {number} x @param {number} y */
+  point(x, y) {
+    if (!this.about || !this.values) return;
+    const [row, column] = this.place(x, y);
+    const at = `${this.about.x.label} ${short(this.about.x.values[column])}, ${this.about.y.label} ${short(this.about.y.values[row])}`;
+    const index = row * this.about.shape[1] + column;
+    const said = this.about.quantities.map((/** @type {string} */ name, /** @type {number} */ q) => this.said(name, /** @type {Float32Array[]} */ (this.values)[q][index])).filter(Boolean);
+    one("map-at").textContent = `${at}: ${said.join("; ")}.`;
+  }
+
+  /** @param {string} name @param {number} value */
+  said(name, value) {
+    if (Number.isNaN(value)) return "";
+    const kinds = this.kinds(name);
+    if (name === "mode" && value > 1) return `overturns after ${value} impacts`;
+    if (kinds) return kinds.find(([each]) => each === value)?.[1] ?? "";
+    if (name === "rest") return `rests ${short(value)} s after uplift`;
+    if (name === "peak") return value === Infinity ? "" : `peak ${short(value)} α`;
+    return `${name} ${short(value)}`;
+  }
+
+  /** @param {number} x @param {number} y */
+  put(x, y) {
+    const [row, column] = this.place(x, y);
+    this.mark = [this.about.x.values[column], this.about.y.values[row]];
+    this.at.data = {x: [this.mark[0]], y: [this.mark[1]]};
+    this.point(this.mark[0], this.mark[1]);
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const way = {ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [1, 0], ArrowDown: [-1, 0]}[event.key];
+    if (event.key === "Enter") { event.preventDefault(); void this.open(); }
+    if (!way || !this.about) return;
+    event.preventDefault();
+    const [row, column] = this.place(this.mark[0], this.mark[1]);
+    const step = event.shiftKey ? 10 : 1;
+    const clip = (/** @type {number} */ k, /** @type {number} */ size) => Math.min(size - 1, Math.max(0, k));
+    this.put(this.about.x.values[clip(column + step * way[1], this.about.shape[1])], this.about.y.values[clip(row + step * way[0], this.about.shape[0])]);
+  }
+
+  /** Open the case at the mark. */
+  async open() {
+    if (!this.about) return;
+    const at = {at_x: String(this.mark[0]), at_y: String(this.mark[1])};
+    const {map} = this.page.state;
+    try {
+      const found = await (this.study ? json("/api/study/point", {...map, ...at}) : json("/api/map/point", {...this.asked(), ...at}));
+      this.page.state.view = "response";
+      this.page.restate(found);
+      await this.page.go("response");
+    } catch (error) {
+      this.page.problem(error instanceof Error ? error.message : String(error));
+    }
+  }
+
+  /** The same block under a sine just below the critical amplitude. */
+  sine() {
+    const {shown} = this.page;
+    const [threshold] = shown?.header.block.thresholds_g ?? [0.2];
+    const p = shown?.header.block.sides[0].p ?? 3.6;
+    const {width, height, alpha, restitution, p: given, model} = this.page.state.texts;
+    const block = Object.fromEntries(Object.entries({width, height, alpha, restitution, p: given, model}).filter(([, value]) => value));
+    const motion = `sine:amplitude=${(1.03 * threshold).toPrecision(6)}g,frequency=${(p / Math.PI).toPrecision(6)},cycles=2.5`;
+    this.page.state.map = {};
+    this.page.restate({...block, motion});
+  }
+}
+
+/** Colour as the image takes it: red in the lowest byte. @param {string} ink */
+function rgba(ink) {
+  const number = parseInt(ink.slice(1), 16);
+  return ((0xff << 24) | ((number & 0xff) << 16) | (number & 0xff00) | (number >> 16)) >>> 0;
+}

@@ -1,0 +1,35 @@
+// Record files: chosen, or dropped anywhere on the page.
+
+import {Problem, json} from "./api.js";
+import {one} from "./words.js";
+
+const LARGEST = 16 * 2 ** 20;
+
+/** @param {File} file */
+async function sendFile(file) {
+  if (file.size > LARGEST) throw new Problem(`${file.name}: larger than 16 MiB; cut the record into smaller files`);
+  return json("/api/records", {name: file.name}, {method: "POST", body: file});
+}
+
+/** @param {(file: () => Promise<any>) => Promise<void>} take */
+export function acceptFiles(take) {
+  const input = /** @type {HTMLInputElement} */ (one("file"));
+  const dropping = one("dropping");
+  one("choose-file").addEventListener("click", () => input.click());
+  input.addEventListener("change", () => {
+    const file = input.files?.[0];
+    input.value = "";
+    if (file) void take(() => sendFile(file));
+  });
+  let depth = 0;
+  window.addEventListener("dragenter", () => { depth += 1; dropping.hidden = false; });
+  window.addEventListener("dragleave", () => { depth -= 1; dropping.hidden = depth <= 0; });
+  window.addEventListener("dragover", (event) => event.preventDefault());
+  window.addEventListener("drop", (event) => {
+    event.preventDefault();
+    depth = 0;
+    dropping.hidden = true;
+    const file = event.dataTransfer?.files?.[0];
+    if (file) void take(() => sendFile(file));
+  });
+}

@@ -1,0 +1,60 @@
+// Numbers and texts for people.
+
+/** @template {HTMLElement} T @param {string} id @returns {T} */
+export const one = (id) => /** @type {T} */ (document.getElementById(id));
+
+/** @param {string} name @param {Record<string, any>} [given] @param {(Node | string)[]} [inside] */
+export function make(name, given = {}, inside = []) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(given)) {
+    if (key === "on") for (const [event, act] of Object.entries(value)) made.addEventListener(event, /** @type {any} */ (act));
+    else if (key.startsWith("aria-") || key === "for" || key === "role") made.setAttribute(key, value);
+    else /** @type {any} */ (made)[key] = value;
+  }
+  made.append(...inside);
+  return made;
+}
+
+/** A number to so many digits, without needless zeros and with a real minus. @param {number} value @param {number} [digits] */
+export function short(value, digits = 3) {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  const text = size !== 0 && (size < 1e-4 || size >= 1e6) ? value.toExponential(digits - 1) : String(Number(value.toPrecision(digits)));
+  return text.replace("-", "−");
+}
+
+/** A number as its text is sent: so many digits, no exponent where that can be helped. @param {number} value */
+export const sent = (value) => String(Number(value.toPrecision(4)));
+
+const UNITS = /** @type {[number, string][]} */ ([[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"], [1e-12, "ps"]]);
+
+/** A short time with its unit. @param {number} seconds */
+export function span(seconds) {
+  if (seconds === 0) return "0 s";
+  const [unit, name] = UNITS.find(([each]) => Math.abs(seconds) >= 0.9995 * each) ?? UNITS[UNITS.length - 1];
+  return `${short(seconds / unit)} ${name}`;
+}
+
+/** Decimals of times in a window of this width. @param {number} width */
+export const decimals = (width) => Math.min(15, Math.max(2, 3 - Math.floor(Math.log10(width))));
+
+/** Say something to those who listen. @param {string} text */
+export function say(text) { one("said").textContent = text; }
+
+/** A "?" that opens an explanation. @param {string} words @param {string} about */
+export function what(words, about) {
+  const text = make("p", {className: "words", hidden: true}, [words]);
+  const button = make("button", {
+    type: "button", className: "what", "aria-expanded": "false", "aria-label": `What is ${about}?`,
+    on: {click: () => { text.hidden = !text.hidden; button.setAttribute("aria-expanded", String(!text.hidden)); }},
+  }, ["?"]);
+  return [button, text];
+}
+
+/** @param {HTMLTableElement} table @param {string[]} head @param {(string | Node)[][]} rows */
+export function fill(table, head, rows) {
+  table.replaceChildren(
+    make("thead", {}, [make("tr", {}, head.map((name) => (name ? make("th", {scope: "col"}, [name]) : make("td"))))]),
+    make("tbody", {}, rows.map((row) => make("tr", {}, row.map((cell) => make("td", {}, [cell]))))),
+  );
+}

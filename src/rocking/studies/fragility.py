@@ -1,0 +1,238 @@
+"""Fragility curves of a study: one for each block, or one for all."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.analysis.fragility.curve import Fragility, FragilityCurve
+from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility, passed
+from rocking.analysis.intensity import Measure
+from rocking.analysis.levels import described, several_motions
+from rocking.arrays import Floats
+from rocking.block import Blocks
+from rocking.errors import InvalidOption
+from rocking.product import Product, block_coordinates
+from rocking.progress import Progress
+from rocking.result import Result, table_of_some
+from rocking.studies.ratios import peak_ratios
+from rocking.studies.store import Store
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: What is kept of the curve of each block, and its units; those of the intensity are left out.
+_KEPT: Final[Mapping[str, str]] = {
+    "median": "intensity that half of the outcomes exceed the limit at",
+    "median_lower": "lower end of its confidence interval",
+    "median_upper": "upper end of its confidence interval",
+    "dispersion": "standard deviation of the logarithm of the intensity",
+    "dispersion_lower": "lower end of its confidence interval",
+    "dispersion_upper": "upper end of its confidence interval",
+    "exceeded": "outcomes that exceed the limit",
+}
+
+
+def pooled_fragility(
+    store: Store, measure: Measure, limits: Mapping[str, float] = OVERTURNING, confidence: float = 0.9
+) -> Fragility:
+    """Fit one curve to the outcomes of all blocks."""
+    product = store.product
+    units, which = np.unique(measure.unit_of(product.blocks, product.model), return_inverse=True)
+    motions, scales, _, _ = product.shape
+    counts = {name: np.zeros((motions, scales, len(units))) for name in limits}
+    trials = np.zeros((motions, scales, len(units)))
+    for blocks, ratios in peak_ratios(store):
+        belongs = which[blocks][:, None] == np.arange(len(units))
+        trials += ratios.shape[2] * belongs.sum(axis=0)
+        for name, limit in limits.items():
+            counts[name] += passed(ratios, limit, name).sum(axis=2) @ belongs
+    x = _intensities(product, measure)[:, :, None] / units
+    found = trials.ravel() > 0
+    return fit_fragility(
+        x.ravel()[found],
+        {name: count.ravel()[found] for name, count in counts.items()},
+        trials=trials.ravel()[found],
+        clusters=np.broadcast_to(np.arange(motions)[:, None, None], x.shape).ravel()[found],
+        **_words(measure),
+        confidence=confidence,
+        block=product.blocks[0] if len(product.blocks) == 1 else None,
+        description=f"{described(product.blocks)}, {motions} motions, {scales} scales",
+    )
+
+
+def block_fragilities(
+    store: Store,
+    measure: Measure,
+    limits: Mapping[str, float] = OVERTURNING,
+    confidence: float = 0.9,
+    progress: bool | None = None,
+) -> BlockFragilities:
+    """Fit a curve to the outcomes of each block."""
+    motions, scales, polarities, count = store.grid.shape
+    shape = len(limits), count
+    kept = {name: np.full(shape, np.nan) for name in _KEPT}
+    faults = np.full(shape, "", dtype=object)
+    intensities = _intensities(store.product, measure).ravel()
+    units = measure.unit_of(store.product.blocks, store.product.model)
+    options: dict[str, Any] = {
+        "clusters": np.repeat(np.arange(motions), scales),
+        "confidence": confidence,
+        **_words(measure),
+    }
+    with Progress("fitting", count * len(limits), show=progress) as bar:
+        for blocks, ratios in peak_ratios(store):
+            polarities = ratios.shape[2]
+            for (i, (name, limit)), j in itertools.product(enumerate(limits.items()), range(blocks.start, blocks.stop)):
+                exceeded = passed(ratios[..., j - blocks.start], limit, name).sum(axis=2).ravel()
+                kept["exceeded"][i, j] = exceeded.sum()
+                try:
+                    fitted = fit_fragility(intensities / units[j], {name: exceeded}, trials=polarities, **options)
+                except InvalidOption as error:  # no lognormal fits outcomes that are all alike, or separated
+                    faults[i, j] = str(error)
+                else:
+                    for quantity, value in _numbers(fitted.curves[0]).items():
+                        kept[quantity][i, j] = value
+                bar.advance()
+    about = {"outcomes": motions * scales * polarities, "confidence": confidence, "model": store.product.model}
+    return BlockFragilities(_dataset(store.product.blocks, tuple(limits), kept, faults, about | _words(measure)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BlockFragilities(Result):
+    """Lognormal fragility curves, one for each block and limit state; from `Study.block_fragilities`.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Over (limit_state, block): median with its confidence interval (median_lower, median_upper; SI units of the
+        measure), dispersion likewise, exceeded (how many outcomes exceed the limit), and fault: why there is no curve,
+        empty where there is one. Parameters of the blocks are coordinates.
+    """
+
+    TABLES = MappingProxyType({"curves": (*_KEPT, "fault")})
+
+    @property
+    def measure(self) -> Measure:
+        """Intensity measure."""
+        return Measure(
+            self.data.measure,
+            **{name: self.data.attrs[name] for name in ("period", "damping") if name in self.data.attrs},
+        )
+
+    def summary(self) -> str:
+        """Medians and dispersions of some blocks, and how many have no curve."""
+        data, scale = self.data, self.measure.scale
+        names = [str(name) for name in data.coords if data[name].dims == ("block",)]
+        header = ["limit state", "block", *names, "exceeded", "median", "between", "dispersion"]
+        rows = []
+        for i, j in itertools.product(range(data.sizes["limit_state"]), range(data.sizes["block"])):
+            one = {name: values[i, j] for name, values in ((name, data[name].values) for name in _KEPT)}
+            between = f"{scale * one['median_lower']:.4g} to {scale * one['median_upper']:.4g}"
+            rows.append(
+                [
+                    str(data.limit_state.values[i]),
+                    j,
+                    *(float(data[name].values[j]) for name in names),
+                    f"{one['exceeded']:.0f} of {data.outcomes}",
+                    scale * float(one["median"]),
+                    "-" if data.fault.values[i, j] else between,
+                    float(one["dispersion"]),
+                ]
+            )
+        without = int(np.count_nonzero(data.fault.values != ""))
+        text = (
+            f"fragility of {data.sizes['block']} blocks, {data.outcomes} outcomes each; intensity: {self.measure.label}"
+        )
+        text += f"; {without} curves cannot be fitted (fault says why)" if without else ""
+        return f"{text}\n\n{table_of_some(header, rows)}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Curves by name; intensities in SI units."""
+        data = self.data
+        return {
+            **data.attrs,
+            "intensity_units": self.measure.units,
+            "limit_state": data.limit_state.values,
+            "blocks": {str(name): data[name].values for name in data.coords if data[name].dims == ("block",)},
+            **{str(name): data[name].values for name in data.data_vars},
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw the median of each block over its frequency parameter and slenderness, a panel for each limit state.
+
+        Raises
+        ------
+        InvalidOption
+            If there are several limit states for the one `ax`.
+        """
+        from rocking.plot import blocks_figure
+
+        names = [str(name) for name in self.data.limit_state.values]
+        medians = self.measure.scale * self.data["median"].values
+        return blocks_figure(
+            *plane_of(self.data),
+            panels=dict(zip(names, medians, strict=True)),
+            value_label=f"median {self.measure.label}",
+            missing_label="no curve fits",
+            title=title or f"fragility of {self.data.sizes['block']} blocks, {self.data.outcomes} outcomes each",
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+def plane_of(data: xr.Dataset) -> tuple[Floats, Floats]:
+    """Frequency parameters and slendernesses of blocks: means of unequal sides."""
+    return _mean_of_sides(data, "p"), _mean_of_sides(data, "alpha")
+
+
+def _mean_of_sides(data: xr.Dataset, name: str) -> Floats:
+    sides = [data[one].values for one in (name, f"{name}_plus", f"{name}_minus") if one in data.coords]
+    return np.asarray(np.mean(sides, axis=0))
+
+
+def _numbers(curve: FragilityCurve) -> dict[str, float]:
+    """Return what is kept of a curve."""
+    ends = *curve.median_interval, *curve.dispersion_interval
+    names = "median_lower", "median_upper", "dispersion_lower", "dispersion_upper"
+    return {"median": curve.median, "dispersion": curve.dispersion, **dict(zip(names, ends, strict=True))}
+
+
+def _intensities(product: Product, measure: Measure) -> Floats:
+    """Return what every motion measures at every scale, shape (motions, scales)."""
+    scales = product.scales
+    motions, values = several_motions(product.motions, measure)
+    if (scales.measure, dict(scales.options)) == (measure.of_motion, measure.options()):
+        return np.tile(scales.values, (len(motions), 1))  # as they were given, to the last bit
+    factors = np.array([scales.factors(motion) for motion in motions])
+    return np.asarray(np.abs(factors) * values[:, None])
+
+
+def _words(measure: Measure) -> dict[str, Any]:
+    return {"measure": measure.name, **measure.options()}
+
+
+def _dataset(
+    blocks: Blocks,
+    limits: tuple[str, ...],
+    kept: Mapping[str, Floats],
+    faults: NDArray[Any],
+    about: Mapping[str, Any],
+) -> xr.Dataset:
+    import xarray as xr
+
+    dims = "limit_state", "block"
+    return xr.Dataset(
+        {name: (dims, values, {"long_name": _KEPT[name]}) for name, values in kept.items()}
+        | {"fault": (dims, faults.astype(str), {"long_name": "why there is no curve"})},
+        {"limit_state": list(limits), **block_coordinates(blocks)},
+        dict(about),
+    )

@@ -1,0 +1,82 @@
+"""Peak rotations of a study, a range of blocks at a time: all that its post-processing reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from rocking.arrays import Floats
+from rocking.engine import require_finished
+from rocking.errors import StudyError
+from rocking.studies.store import Store
+from rocking.studies.units import OUTCOMES
+
+#: Simulations that are held in memory at a time.
+_HELD: Final = 4_000_000
+
+
+def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
+    """Peak rotation over the slenderness, infinite where a block overturned, for a range of blocks after the other.
+
+    Parameters
+    ----------
+    store : Store
+        A complete one.
+
+    Yields
+    ------
+    blocks : slice
+        Which blocks.
+    ratios : ndarray, shape (motions, scales, polarities, blocks of the range)
+        Over the smaller one of two slendernesses; of symmetric blocks under motions in both polarities only the first,
+        since the second is no other outcome.
+
+    Raises
+    ------
+    StudyError
+        If units are missing or damaged, or the study's duration stopped simulations before their end.
+    Unfinished
+        If simulations were given up, so that their verdicts are not known.
+    """
+    grid = store.grid
+    missing = len(grid) - len(store.done())
+    if missing:
+        raise StudyError(f"{missing} of {len(grid)} units are missing: run the study to its end first")
+    motions, scales, polarities = grid.shape[:3]
+    shape = motions, scales, 1 if store.product.blocks.is_symmetric else polarities
+    width = max(1, _HELD // int(np.prod(shape)))
+    for unit in range(grid.cells[3]):
+        whole = grid.ranges((0, 0, 0, unit))[3]
+        for start in range(whole.start, whole.stop, width):
+            blocks = slice(start, min(start + width, whole.stop))
+            yield blocks, _read(store, shape, unit, blocks)
+
+
+def _require_whole(stopped: Floats) -> None:
+    """Check that no simulation was stopped while the block moved or the motion went on: what follows is not known."""
+    count = int(np.count_nonzero(stopped))
+    if count:
+        raise StudyError(
+            f"{count} of {stopped.size} simulations of a unit were stopped by the study's duration, while the block "
+            "moved or the motion went on, so that their verdicts are not known: make the study without a duration"
+        )
+
+
+def _read(store: Store, shape: tuple[int, int, int], unit: int, blocks: slice) -> Floats:
+    alpha = store.product.blocks.select(blocks).alpha.min(axis=1)
+    ratios = np.empty((*shape, len(alpha)))
+    for cell in np.ndindex(store.grid.cells[:3]):
+        key = *cell, unit
+        outcomes = store.outcomes(key)
+        if outcomes is None:
+            raise StudyError("units are gone since the report was begun: run the study again")
+        motions, scales, polarities, whole = store.grid.ranges(key)
+        named = dict(zip(OUTCOMES, outcomes[..., blocks.start - whole.start : blocks.stop - whole.start], strict=True))
+        require_finished(named["unfinished"].astype(bool))
+        _require_whole(named["stopped"])
+        there = ratios[motions, scales, polarities]
+        found = np.where(named["overturned"] != 0.0, np.inf, named["peak_rotation"] / alpha)
+        there[...] = found[:, :, : there.shape[2]]
+    return ratios

@@ -1,0 +1,34 @@
+"""What the trials share: a study of some dozens of short units, and the digest of all that a study is."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+
+import rocking
+from rocking.studies import Study
+
+BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.9)
+
+#: What may differ between two stores of the same study.
+_ITS_OWN = ("lock", "runs.jsonl")
+
+
+def made(folder: Path) -> Study:
+    """Make a study of 48 units of a hundredth of a second, or open it."""
+    motions = [rocking.records.load(name) for name in ("el-centro-meloland-270", "el-centro-meloland-360")]
+    return rocking.study(folder, BLOCKS, motions, pga=np.linspace(2.0, 9.0, 8), unit_blocks=512)
+
+
+def digest(folder: Path) -> str:
+    """Hash of every file of a study: its name and its bytes."""
+    total = hashlib.sha256()
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and path.name not in _ITS_OWN:
+            total.update(f"{path.relative_to(folder)}".encode() + b"\0" + path.read_bytes())
+    return total.hexdigest()
+
+
+def units(folder: Path) -> dict[str, bytes]:
+    """Bytes of every unit that is done, by its name."""
+    return {path.name: path.read_bytes() for path in (folder / "result").glob("c.*")}

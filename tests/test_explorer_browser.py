@@ -1,0 +1,683 @@
+"""The explorer's page in a browser: every view, every way in and out, against the package's own numbers."""
+
+import http.server
+import json
+import math
+import shlex
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+import pytest
+from explorer_browser import Watched, chromium, flags, missing, tool
+
+import rocking
+from rocking.chattering.families import sine
+from rocking.explorer.core import Explorer
+from rocking.explorer.launch import served
+from rocking.explorer.studies import StudyView
+
+try:
+    from playwright.sync_api import sync_playwright
+except ImportError:
+    sync_playwright = None
+
+pytestmark = pytest.mark.browser
+
+STATUE = "width=0.24&height=1.1&motion=ridgecrest-clc-090&pga=0.4g"
+SINE = "p=2&alpha=0.2&restitution=0.92&motion=sine:amplitude%3D2.02,frequency%3D0.6366197723675814,cycles%3D2.5"
+DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+#: All models of the plotting library on the page.
+MODELS = "Bokeh.documents.flatMap((each) => [...each._all_models.values()])"
+VIEWS = ("response", "block", "map", "compare")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if sync_playwright is None:
+        missing("playwright is not installed: pip install 'rocking[browser]'")
+    with sync_playwright() as player:
+        started = player.chromium.launch(executable_path=chromium(), args=flags())
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="module")
+def explorer():
+    return Explorer()
+
+
+@pytest.fixture(scope="module")
+def here(explorer):
+    running = served(explorer, {})
+    running.run_in_background()
+    yield running
+    running.server.should_exit = True
+
+
+@pytest.fixture
+def opened(browser, here):
+    """Open the page with a query; in the end nothing may have gone wrong on it."""
+    contexts, pages = [], []
+
+    def open_page(query="", viewport=DESK, scheme="light", server=here, allowed=(), **options):
+        context = browser.new_context(viewport=viewport, color_scheme=scheme, **options)
+        page = Watched(context.new_page(), allowed)
+        contexts.append(context)
+        pages.append((page, server))
+        page.page.goto(server.link() + (f"&{query}" if query else ""))
+        page.until("document.body.dataset.ready && document.body.dataset.rested", "the page is ready")
+        return page
+
+    yield open_page
+    for page, server in pages:
+        assert page.complaints == []
+        assert page.hosts <= {f"127.0.0.1:{server.port}", "data"}
+    for context in contexts:
+        context.close()
+
+
+def query_of(page):
+    page.page.wait_for_timeout(250)
+    return {name: values[0] for name, values in parse_qs(urlsplit(page.page.url).query).items()}
+
+
+def statue(**scale):
+    block = rocking.Block(width=0.24, height=1.1)
+    return rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled(**scale))
+
+
+def peak_shown(page):
+    return float(page.text("#figures div:first-child dd").split(" ")[0].replace("−", "-"))
+
+
+# The response
+
+
+def test_the_first_page_shows_a_block_that_chatters(opened):
+    page = opened()
+    response = statue(pga=0.4 * 9.80665)
+    assert page.text("#verdict") == "It rocks, comes to rest 4 times, and does not overturn."
+    assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+    assert len(page.page.query_selector_all("#sequences tbody tr")) == 4
+    rests = [
+        row.query_selector_all("td")[3].text_content() for row in page.page.query_selector_all("#sequences tbody tr")
+    ]
+    assert rests == [f"{time:.9f}" for time in response.chattering["end"]]
+
+
+def test_a_slider_changes_the_response(opened):
+    page = opened(STATUE)
+    slider = page.page.locator("#pga-slider")
+    page.rested(lambda: (slider.focus(), slider.press("ArrowRight")))
+    level = query_of(page)["pga"]
+    assert level != "0.4g"
+    response = statue(pga=float(level[:-1]) * 9.80665)
+    assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+    assert page.js("document.getElementById('pga').value") == level[:-1]
+    assert page.js("document.getElementById('pga-slider').getAttribute('aria-valuetext')") == f"{level[:-1]} g"
+
+
+def test_a_number_may_be_typed_and_a_bad_one_is_answered_with_a_sentence(opened):
+    page = opened(STATUE, allowed=["422"])
+    width = page.page.locator("#width")
+    page.rested(lambda: (width.fill("0.3"), width.press("Enter")))
+    assert query_of(page)["width"] == "0.3"
+    assert "α = 15.3°" in page.text("#derived")
+    width.fill("-1")
+    width.press("Enter")
+    page.until("!document.getElementById('problem').hidden")
+    assert "positive" in page.text("#problem")
+    page.rested(lambda: (width.fill("0.24"), width.press("Enter")))
+    assert page.js("document.getElementById('problem').hidden")
+
+
+def test_a_link_reproduces_what_is_shown(opened):
+    query = STATUE + "&model=linear&chattering=velocity%3D0.001&from=231&to=234"
+    page = opened(query)
+    again = query_of(page)
+    assert again == {
+        "width": "0.24",
+        "height": "1.1",
+        "motion": "ridgecrest-clc-090",
+        "pga": "0.4g",
+        "model": "linear",
+        "chattering": "velocity=0.001",
+        "from": "231",
+        "to": "234",
+    }
+    assert page.js("[document.getElementById('model').value, document.getElementById('treatment').value]") == [
+        "linear",
+        "velocity",
+    ]
+    block = rocking.Block(width=0.24, height=1.1)
+    motion = rocking.records.load("ridgecrest-clc-090").scaled(pga=0.4 * 9.80665)
+    response = rocking.simulate(block, motion, model="linear", chattering="velocity=0.001")
+    assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+
+
+def plotted(page, name="first", where="histories"):
+    """Times and heights of a line as it is plotted, the times in s."""
+    return page.js(
+        """([where, name]) => {
+          const sources = Bokeh.documents.map((each) => each.get_model_by_name(`${where}-${name}`)).filter(Boolean);
+          const {origin, unit} = document.getElementById(where).dataset;
+          const {x, y} = sources[0].data;
+          return {origin: Number(origin), unit: Number(unit), x: Array.from(x), y: Array.from(y)};
+        }""",
+        [where, name],
+    )
+
+
+@pytest.mark.parametrize("width", [10.0, 1e-2, 1e-6, 1e-9])
+def test_a_zoom_shows_the_engines_own_values(opened, width):
+    response = statue(pga=0.4 * 9.80665)
+    middle = float(response.impacts["time"][-30])
+    page = opened(f"{STATUE}&from={middle - 0.5 * width!r}&to={middle + 0.5 * width!r}")
+    line = plotted(page)
+    assert len(line["x"]) > 500
+    times = line["origin"] + np.array(line["x"]) * line["unit"]
+    assert times[-1] - times[0] == pytest.approx(width, rel=1e-3)
+    expected = response.rotation(times) / response.block.alpha
+    # The time at which the engine is asked is off by an ulp of 240 s; what is plotted is not.
+    slack = 3e-14 * np.abs(response.angular_velocity(times)).max() / response.block.alpha
+    assert np.abs(np.array(line["y"]) - expected).max() <= 2.0 * slack + 1e-16
+
+
+def test_ten_times_closer_again_and_again(opened):
+    page = opened(STATUE)
+    response = statue(pga=0.4 * 9.80665)
+    rest = float(response.chattering["end"][-1])
+    for _ in range(12):
+        before = page.text("#depth")
+        page.page.click("#deeper")
+        page.until(f"document.getElementById('depth').textContent !== {before!r}")
+    found = query_of(page)
+    assert float(found["from"]) < rest < float(found["to"])
+    assert float(found["to"]) - float(found["from"]) < 2e-10
+    assert "summed by the proof" in page.text("#depth")
+    page.page.click("[data-zoom=active]")
+    page.until("!new URLSearchParams(location.search).has('from')")
+
+
+def test_keys_move_and_zoom_the_plots(opened):
+    page = opened(f"{STATUE}&from=231&to=235")
+    plots = page.page.locator("#histories")
+    plots.focus()
+    plots.press("+")
+    page.until("new URLSearchParams(location.search).get('from') === '232'")
+    plots.press("ArrowRight")
+    page.until("new URLSearchParams(location.search).get('from') === '232.5'")
+    plots.press("-")
+    page.until("new URLSearchParams(location.search).get('from') === '231.5'")
+    plots.press("0")
+    page.until("!new URLSearchParams(location.search).has('from')")
+
+
+def test_dragging_across_a_plot_zooms_in(opened):
+    page = opened(f"{STATUE}&from=230&to=240")
+    box = page.page.locator("#histories").bounding_box()
+    page.page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 100)
+    page.page.mouse.down()
+    page.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 120, steps=4)
+    page.page.mouse.up()
+    page.until(
+        "((given) => Number(given.get('to')) - Number(given.get('from')) < 3)(new URLSearchParams(location.search))"
+    )
+    assert "θ =" in page.text("#cursor")
+
+
+def test_ratios_of_intervals_are_drawn_against_eta_squared(opened):
+    page = opened(STATUE)
+    response = statue(pga=0.4 * 9.80665)
+    lines = page.js(f"""() => {MODELS}
+        .filter((each) => each.type === 'Label').map((each) => each.text)""")
+    assert lines == [f"η² = {response.block.restitution**2:.4g}"]
+
+
+def test_all_numbers_in_words(opened):
+    page = opened(STATUE)
+    page.page.click("#in-words summary")
+    page.until("document.querySelectorAll('#words tr').length > 5")
+    expected = statue(pga=0.4 * 9.80665).summary().splitlines()
+    found = page.js(
+        "Array.from(document.querySelectorAll('#words tr'), (row) => Array.from(row.cells, (cell) => cell.textContent))"
+    )
+    assert found == [[line[:20].strip(), line[20:].strip()] for line in expected]
+
+
+# Ways in
+
+
+def test_a_pulse_is_chosen_and_changed(opened):
+    page = opened(STATUE)
+    page.rested(lambda: page.page.select_option("#kind", "pulse"))
+    page.rested(lambda: page.page.select_option("#pulse", "ricker"))
+    page.rested(lambda: page.page.select_option("#pulse-kind", "antisymmetric"))
+    amplitude = page.page.locator("#pulse-amplitude")
+    page.rested(lambda: (amplitude.fill("0.35"), amplitude.press("Enter")))
+    assert query_of(page)["motion"] == "ricker:amplitude=0.35g,frequency=1g,kind=antisymmetric".replace("1g", "1")
+    response = rocking.simulate(
+        rocking.Block(width=0.24, height=1.1), rocking.pulses.ricker(0.35 * 9.80665, 1.0, kind="antisymmetric")
+    )
+    assert page.text("#figures div:first-child dd").startswith("overturns") == response.overturned
+
+
+def test_a_block_by_its_parameters_with_two_sides(opened):
+    page = opened(STATUE)
+    page.rested(lambda: page.page.select_option("#shape", "parameters"))
+    page.rested(lambda: page.page.check("#two"))
+    left = page.page.locator("#\\31 alpha")
+    page.rested(lambda: (left.fill("9"), left.press("Enter")))
+    found = query_of(page)
+    assert found["alpha"].endswith(",9deg")
+    block = rocking.Block.from_parameters(
+        [float(each) for each in found["p"].split(",")],
+        [math.radians(float(each[:-3])) for each in found["alpha"].split(",")],
+        [float(each) for each in found["restitution"].split(",")],
+    )
+    response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled(pga=0.4 * 9.80665))
+    assert page.text("#figures div:first-child dd").startswith("overturns") == response.overturned
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "target"),
+    [
+        ("pgv", "0.25", {"pgv": 0.25}),
+        ("sa", "0.6", {"sa": 0.6 * 9.80665, "period": 1.0}),
+        ("scale", "1.3", {"factor": 1.3}),
+    ],
+)
+def test_a_record_is_scaled(opened, kind, value, target):
+    page = opened(STATUE)
+    page.rested(lambda: page.page.select_option("#scaled", kind))
+    field = page.page.locator(f"#{kind}")
+    page.rested(lambda: (field.fill(value), field.press("Enter")))
+    response = statue(**target)
+    shown = page.text("#figures div:first-child dd")
+    if response.overturned:
+        assert shown.startswith("overturns")
+    else:
+        assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+
+
+def test_a_block_is_released_from_a_rotation(opened):
+    page = opened(STATUE)
+    page.rested(lambda: page.page.select_option("#kind", "none"))
+    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), None, initial_rotation=math.radians(3.0))
+    assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+    assert page.text("#command").startswith("The command line does not do this case")
+
+
+def test_a_file_is_chosen_told_about_and_shown(opened, tmp_path):
+    samples = rocking.records.load("el-centro-meloland-270").samples[1]
+    file = tmp_path / "station 7.txt"
+    file.write_text("\n".join(f"{value / 9.80665:.12g}" for value in samples), "utf-8")
+    page = opened(STATUE, allowed=["422"])
+    page.page.set_input_files("#file", file)
+    page.until("getComputedStyle(document.getElementById('units').parentElement).display !== 'none'")
+    for step in ("0.02", "0.01"):
+        page.rested(lambda step=step: (page.page.locator("#dt").fill(step), page.page.locator("#dt").press("Enter")))
+    for units in ("m/s2", "g"):
+        page.rested(lambda units=units: page.page.select_option("#units", units))
+    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.records.load("el-centro-meloland-270"))
+    assert ("overturns" in page.text("#verdict")) == response.overturned
+    assert "'station 7.txt'" in page.text("#python")
+
+
+DROP = """async ([name, text]) => {
+  const given = new DataTransfer();
+  given.items.add(new File([text], name));
+  for (const kind of ['dragenter', 'dragover', 'drop'])
+    document.querySelector('main').dispatchEvent(
+      new DragEvent(kind, {dataTransfer: given, bubbles: true, cancelable: true}));
+}"""
+
+
+def test_a_file_of_several_channels_is_dropped(opened):
+    page = opened(STATUE)
+    text = (Path(__file__).parent / "data" / "formats" / "two.v2").read_text("latin-1")
+    page.rested(lambda: page.js(DROP, ["two.v2", text]))
+    assert page.js("document.getElementById('channel').options.length") == 2
+    assert query_of(page)["motion"].startswith("file:")
+    page.rested(lambda: page.page.select_option("#channel", index=1))
+    assert query_of(page)["channel"]
+
+
+def test_a_broken_file_is_answered_with_a_sentence(opened):
+    page = opened(STATUE, allowed=["422"])
+    page.js(DROP, ["broken.at2", "PEER NGA\nheading\nnothing\nNPTS= 100, DT= .01 SEC\n 0.1 0.2 x\n"])
+    page.until("!document.getElementById('problem').hidden")
+    assert page.text("#problem").startswith("broken.at2")
+    assert page.text("#verdict").startswith("It rocks")
+
+
+# Ways out
+
+
+def test_the_copied_command_and_the_script_have_the_same_peak(opened, tmp_path):
+    page = opened(
+        "width=0.3&height=1.2&motion=ridgecrest-clc-090&pga=0.45g&model=linear",
+        permissions=["clipboard-read", "clipboard-write"],
+    )
+    page.page.click("[data-copy=command]")
+    page.until("document.querySelector('[data-copy=command]').textContent === 'Copied'")
+    command = shlex.split(page.js("navigator.clipboard.readText()"))
+    code = "import sys; from rocking.cli import main; main(sys.argv[1:])"
+    ran = subprocess.run(
+        [sys.executable, "-c", code, *command[1:], "--json"], capture_output=True, text=True, check=True
+    )
+    script = tmp_path / "case.py"
+    script.write_text(page.text("#python") + "\nprint(response.peak_rotation)\n", "utf-8")
+    printed = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True).stdout
+    peak = json.loads(ran.stdout)["peak_rotation_rad"]
+    assert float(printed.splitlines()[-1]) == peak
+    assert peak_shown(page) == pytest.approx(json.loads(ran.stdout)["peak_over_slenderness"], rel=2e-3)
+
+
+def test_every_file_can_be_taken_away(opened):
+    page = opened(f"{SINE}&from=0.5&to=2")
+    links = page.page.locator("#exports a")
+    starts = {
+        "svg": b"<?xml",
+        "png": b"\x89PNG",
+        "csv": b"time_s,rotation_rad",
+        "events.csv": b"time_s,kind",
+        "impacts.csv": b"time_s,side",
+        "nc": b"\x89HDF",
+    }
+    assert links.count() == len(starts)
+    for k, (form, start) in enumerate(starts.items()):
+        with page.page.expect_download() as download:
+            links.nth(k).click()
+        assert download.value.suggested_filename == f"rocking-response.{form}"
+        assert Path(download.value.path()).read_bytes().startswith(start)
+
+
+# The block
+
+
+def test_the_block_plays_and_stops_in_step_with_the_plots(opened):
+    page = opened(f"view=block&{STATUE}")
+    seconds = "Number(document.getElementById('clock').textContent.replace(' s', ''))"
+    start = page.js(seconds)
+    picture = "document.getElementById('stage').toDataURL()"
+    before = page.js(picture)
+    page.page.select_option("#speed", "2")
+    page.page.uncheck("#slow")
+    page.page.click("#play")
+    page.until(f"{seconds} > {start} + 1.5")
+    page.page.click("#play")
+    assert page.text("#play") == "Play"
+    assert page.js(picture) != before
+    time = page.js(seconds)
+    spans = page.js(f"""() => {MODELS}
+        .filter((each) => each.type === 'Span' && each.dimension === 'height' && each.visible)
+        .map((each) => each.location)""")
+    assert len(spans) == 2
+    assert spans == pytest.approx([time, time], abs=0.02)
+
+
+def test_the_block_is_scrubbed_to_a_time_and_says_its_rotation(opened):
+    page = opened(f"view=block&{STATUE}&from=232&to=233")
+    page.js(
+        """() => {
+          const scrub = document.getElementById('scrub');
+          scrub.value = 6691;
+          scrub.dispatchEvent(new Event('input'));
+        }"""
+    )
+    page.until("document.getElementById('clock').textContent.startsWith('232.669')")
+    assert page.js("document.getElementById('scrub').getAttribute('aria-valuetext')").startswith("232.669")
+    page.page.click("#to-rest")
+    page.until("Number(document.getElementById('clock').textContent.replace(' s', '')) > 235")
+
+
+# The map
+
+
+def complete(page, axes=""):
+    page.until("document.body.dataset.map === 'complete'", f"the map is complete {axes}", timeout=240.0)
+
+
+def test_a_map_is_drawn_and_a_click_opens_the_case(opened):
+    page = opened(f"view=map&{SINE}&points=100&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=1.1")
+    complete(page)
+    assert "complete" in page.text("#map-legend")
+    assert "exact critical amplitude" in page.text("#map-legend")
+    box = page.page.locator("#map").bounding_box()
+    page.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.8 * box["height"])
+    page.until("/complete/.test(document.getElementById('map-at').textContent)")
+    page.rested(lambda: page.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.8 * box["height"]))
+    found = query_of(page)
+    assert "view" not in found
+    numbers = dict(part.split("=") for part in found["motion"].split(":")[1].split(","))
+    block = rocking.Block.from_parameters(2.0, 0.2, 0.92)
+    omega, a = (
+        2.0 * math.pi * float(numbers["frequency"]) / 2.0,
+        float(numbers["amplitude"]) / (9.80665 * math.tan(0.2)),
+    )
+    assert 2.0 < omega < 3.0
+    assert 1.0 < a < 1.03
+    response = rocking.simulate(block, sine(block)(a, omega).motion)
+    assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+
+
+def test_a_map_is_read_by_keys_and_by_another_quantity(opened):
+    page = opened(f"view=map&{SINE}&points=100&quantity=rest&x=restitution&y=omega")
+    complete(page)
+    page.page.locator("#map").focus()
+    before = page.text("#map-at")
+    page.page.keyboard.press("Shift+ArrowUp")
+    page.page.keyboard.press("ArrowRight")
+    assert page.text("#map-at") != before
+    assert "rests" in page.text("#map-at")
+    page.page.select_option("#map-quantity", "peak")
+    complete(page, "by peak")
+    page.rested(lambda: page.page.keyboard.press("Enter") if page.page.locator("#map").focus() is None else None)
+    assert "restitution" in query_of(page)
+
+
+def test_a_map_of_a_record_offers_a_sine_whose_critical_amplitude_is_known(opened):
+    page = opened(f"view=map&{STATUE}&points=100")
+    page.page.click("#map-sine")
+    page.until("/exact critical amplitude/.test(document.getElementById('map-legend').textContent)")
+    assert query_of(page)["motion"].startswith("sine:")
+
+
+def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study") / "museum"
+    blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 12), alpha=np.linspace(0.1, 0.3, 10), restitution=[0.9])
+    made = rocking.study(
+        folder, blocks, rocking.records.load("el-centro-meloland-270"), pga=[2.0, 4.0], unit_blocks=512
+    )
+    made.run(progress=False)
+    running = served(Explorer(), {"view": "map"}, StudyView(folder))
+    running.run_in_background()
+    page = opened(server=running)
+    complete(page)
+    assert "Study museum" in page.text("#study-tools")
+    assert "overturns" in page.text("#map-legend")
+    page.rested(lambda: page.page.click("#map-open"))
+    texts = query_of(page)
+    response = rocking.simulate(
+        rocking.Block.from_parameters(float(texts["p"]), float(texts["alpha"]), 0.9),
+        rocking.records.load("el-centro-meloland-270").scaled(float(texts["scale"])),
+    )
+    assert ("overturns" in page.text("#verdict")) == response.overturned
+    running.server.should_exit = True
+
+
+# Comparing
+
+
+def test_a_thresholds_wrong_answer_is_seen(opened):
+    page = opened(f"view=compare&{STATUE}")
+    page.until("document.body.dataset.compared && document.querySelectorAll('#schemes tbody tr').length > 5")
+    first, second = plotted(page, "first", "compare-plots"), plotted(page, "second", "compare-plots")
+    assert max(first["y"]) > 2.0 * max(second["y"])
+    assert "7 by the treatment" in page.text("#compare-verdict")
+    wrong = page.page.locator("#schemes tr", has_text="velocity 0.05")
+    assert "false rest" in wrong.text_content()
+
+
+@pytest.mark.parametrize("what", ["block", "motion"])
+def test_two_blocks_or_two_motions_are_compared(opened, what):
+    page = opened(f"view=compare&{STATUE}")
+    page.page.select_option("#compare-with", what)
+    page.until("[...new URLSearchParams(location.search).keys()].some((name) => name.startsWith('other.'))")
+    other = {name[6:]: value for name, value in query_of(page).items() if name.startswith("other.")}
+    block = rocking.Block(width=float(other.get("width", 0.24)), height=float(other.get("height", 1.1)))
+    motion = rocking.records.load(other.get("motion", "ridgecrest-clc-090")).scaled(pga=0.4 * 9.80665)
+    response = rocking.simulate(block, motion)
+    rests = int(np.sum(response.events["kind"] == "rest"))
+    words = (
+        "overturns"
+        if response.overturned
+        else {0: "does not come to rest", 1: "once", 2: "twice"}.get(rests, f"{rests} times")
+    )
+    page.until(f"document.getElementById('compare-verdict').textContent.includes({words!r})")
+
+
+# People
+
+
+@pytest.mark.parametrize(("viewport", "scheme"), [(DESK, "light"), (PHONE, "dark")], ids=["desk", "phone"])
+def test_no_view_has_a_barrier(opened, viewport, scheme):
+    axe = tool("axe-core/axe.min.js").read_text("utf-8")
+    # The checker itself writes styles that the page's policy does not admit.
+    page = opened(f"view=response&points=100&{SINE}", viewport, scheme, bypass_csp=True)
+    page.js(axe + "; 1")
+    for view in VIEWS:
+        page.page.click(f"[data-view={view}]")
+        if view == "map":
+            complete(page)
+        if view == "compare":
+            page.until("document.querySelectorAll('#schemes tbody tr').length > 5")
+        page.page.wait_for_timeout(300)
+        found = page.js("axe.run(document, {resultTypes: ['violations']})")
+        violations = [(each["id"], [node["target"] for node in each["nodes"]][:4]) for each in found["violations"]]
+        assert violations == [], view
+        assert page.js("document.documentElement.scrollWidth") <= viewport["width"], view
+
+
+def test_the_page_follows_the_systems_colours(opened):
+    page = opened(STATUE)
+    fill = f"{MODELS}.find((each) => each.type === 'Figure').background_fill_color"
+    light = page.js(fill)
+    page.page.emulate_media(color_scheme="dark")
+    page.until(f"{fill} !== {light!r}")
+
+
+def test_everything_can_be_reached_by_keyboard(opened):
+    page = opened(STATUE)
+    reached = set()
+    for _ in range(70):
+        page.page.keyboard.press("Tab")
+        reached.add(
+            page.js(
+                "(({id, dataset}) => id || dataset.view || dataset.zoom || dataset.copy || '')(document.activeElement)"
+            )
+        )
+    assert {
+        "response",
+        "block",
+        "map",
+        "compare",
+        "width",
+        "width-slider",
+        "kind",
+        "record",
+        "model",
+        "treatment",
+        "histories",
+        "deeper",
+        "python",
+        "command",
+    } <= reached
+
+
+def test_explanations_open_where_they_stand(opened):
+    page = opened(STATUE)
+    page.page.click("[aria-label='What is chattering?']")
+    assert "accumulation point" in page.text("#chattering-words")
+    assert page.page.locator("#chattering-words").is_visible()
+    page.page.click("[aria-label='What is Width?']")
+    assert page.page.get_by_text("Full width 2b of a rectangular block.").is_visible()
+
+
+def test_a_finger_scrolls_the_page_over_the_plots(opened):
+    page = opened(STATUE, PHONE, has_touch=True, is_mobile=True)
+    assert page.js(f"{MODELS}.filter((each) => each.type === 'BoxZoomTool').length") == 0
+
+
+# A notebook
+
+
+@contextmanager
+def notebook(html):
+    """Serve a page that shows a frame, as a notebook does, on a port of its own."""
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("content-type", "text/html; charset=utf-8")
+            self.end_headers()
+            if self.path == "/":
+                self.wfile.write(f"<!doctype html><title>notebook</title><body><div>{html}</div></body>".encode())
+
+        def log_message(self, *_):
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield server.server_address[1]
+        server.shutdown()
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
+def test_a_response_is_explored_in_a_notebooks_frame(browser, host):
+    block = rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4)
+    response = rocking.simulate(block, rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.one_sine(1.0, 3.0))
+    frame = rocking.explore(response)
+    with notebook(frame._repr_html_()) as port:
+        context = browser.new_context(viewport=DESK)
+        page = context.new_page()
+        page.goto(f"http://{host}:{port}/")
+        inside = page.frame_locator("iframe")
+        inside.locator("#figures dd").first.wait_for(timeout=60_000)
+        shown = inside.locator("#figures dd").first.text_content()
+        context.close()
+    assert shown.startswith("overturns") == response.overturned
+    if not response.overturned:
+        assert float(shown.split(" ")[0]) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+
+
+def test_a_foreign_page_cannot_show_the_explorer_in_a_frame(browser, here, opened):
+    page = opened(STATUE)
+    context = page.page.context
+    with notebook(f'<iframe src="http://127.0.0.1:{here.port}/"></iframe>') as port:
+        other = context.new_page()
+        other.goto(f"http://127.0.0.1:{port}/")
+        other.wait_for_timeout(500)
+        assert other.frames[1].evaluate("document.body?.textContent.includes('Ground motion') ?? false") is False
+
+
+# The modules
+
+
+def test_the_modules_pass_the_type_checker():
+    compiler = tool("typescript/bin/tsc")
+    folder = Path(rocking.__file__).parent / "explorer" / "page"
+    options = (
+        "--noEmit --allowJs --checkJs --strict --target es2022 --module esnext --moduleResolution bundler "
+        "--lib es2023,dom,dom.iterable"
+    )
+    found = subprocess.run(
+        ["node", compiler, *options.split(), *sorted(folder.glob("*.js"))], capture_output=True, text=True
+    )
+    assert found.returncode == 0, found.stdout

@@ -1,0 +1,573 @@
+"""The explorer's core: cases from texts and back, arrays of windows, maps; against the package's own functions."""
+
+import math
+import runpy
+import shlex
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.chattering import chattering_map, critical_amplitude, families
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord
+from rocking.explorer import maps
+from rocking.explorer.case import DEFAULT, NAMES, as_command, as_python, read_case, texts_of
+from rocking.explorer.core import Explorer, thinned
+from rocking.explorer.pulses import FAMILIES, pulse_as_text, pulse_of
+from rocking.explorer.shelf import LARGEST, MOST, Shelf, bare_name
+from rocking.explorer.studies import StudyView
+
+STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
+SINE = {
+    "p": "1",
+    "alpha": "0.2",
+    "restitution": "0.92",
+    "model": "linear",
+    "motion": "sine:amplitude=2.02,frequency=0.3,cycles=2.5",
+}
+PULSES = {
+    "sine": "amplitude=0.3g,frequency=1,cycles=2.5,phase=30deg",
+    "half-sine": "amplitude=3,frequency=1",
+    "one-sine": "amplitude=0.3g,frequency=2",
+    "one-cosine": "amplitude=0.3g,frequency=2",
+    "ricker": "amplitude=0.3g,frequency=2,kind=antisymmetric",
+    "mavroeidis-papageorgiou": "amplitude=0.6,frequency=1,phase=90deg,gamma=2",
+    "rectangular": "amplitude=0.3g,duration=0.5",
+    "triangular": "amplitude=0.3g,duration=0.5",
+}
+
+
+@pytest.fixture(scope="module")
+def explorer():
+    return Explorer()
+
+
+# Cases
+
+
+def test_a_case_is_what_the_package_makes_of_the_same_numbers():
+    case = read_case({**STATUE, "model": "linear", "chattering": "velocity=1e-3"}, Shelf())
+    expected = rocking.simulate(
+        rocking.Block(width=0.24, height=1.1),
+        rocking.records.load("ridgecrest-clc-090").scaled(pga=0.4 * 9.80665),
+        model="linear",
+        chattering="velocity=1e-3",
+    )
+    response = case.simulate()
+    assert response.peak_rotation == expected.peak_rotation
+    assert np.array_equal(response.impacts, expected.impacts)
+
+
+@pytest.mark.parametrize(
+    ("scale", "measure"),
+    [
+        ({"pga": "0.3g"}, lambda motion: motion.pga / (0.3 * 9.80665)),
+        ({"pgv": "0.2"}, lambda motion: motion.pgv / 0.2),
+        ({"sa": "0.4g@0.8"}, lambda motion: motion.spectral_acceleration(0.8) / (0.4 * 9.80665)),
+        ({"scale": "-2"}, lambda motion: motion.pga / (2.0 * rocking.records.load("ridgecrest-clc-090").pga)),
+    ],
+)
+def test_a_motion_is_scaled_to_what_the_text_says(scale, measure):
+    texts = {name: value for name, value in STATUE.items() if name != "pga"}
+    motion = read_case({**texts, **scale}, Shelf()).motion
+    assert measure(motion) == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("family", PULSES)
+def test_every_pulse_of_the_package_can_be_written_and_read_back(family):
+    assert set(PULSES) == set(FAMILIES)
+    motion = pulse_of(f"{family}:{PULSES[family]}")
+    again = pulse_of(pulse_as_text(motion))
+    assert np.array_equal(again.coefficients, motion.coefficients)
+
+
+def test_a_motion_that_is_no_pulse_any_more_is_not_written_as_one():
+    assert pulse_as_text(rocking.pulses.one_sine(3.0, 1.0).delayed(1.0)) is None
+    assert pulse_as_text(rocking.records.load("ridgecrest-clc-090")) is None
+
+
+@pytest.mark.parametrize(
+    ("texts", "error", "words"),
+    [
+        ({"width": "0.2"}, InvalidBlock, "either width and height"),
+        ({**STATUE, "p": "3"}, InvalidBlock, "either width and height"),
+        ({**STATUE, "width": "wide"}, InvalidOption, "width takes a number"),
+        ({**STATUE, "width": "-1"}, InvalidBlock, "positive"),
+        ({**STATUE, "width": "nan"}, InvalidBlock, "positive"),
+        ({**STATUE, "colour": "red"}, InvalidOption, "no 'colour'"),
+        ({**STATUE, "pgv": "1"}, InvalidOption, "give one of them"),
+        ({**STATUE, "motion": "ridgecrest-cls-090"}, UnreadableRecord, "did you mean"),
+        ({**STATUE, "motion": "/etc/passwd"}, UnreadableRecord, "no shipped record"),
+        ({**STATUE, "motion": "file:../../etc/passwd"}, UnreadableRecord, "drop its file"),
+        ({**STATUE, "motion": "none"}, InvalidOption, "no motion to scale"),
+        ({**STATUE, "motion": "sine:amplitude=1"}, InvalidOption, "needs frequency and cycles"),
+        ({**STATUE, "motion": "sine:amplitude=1,frequency=1,cycles=1e9"}, InvalidMotion, "1000 here at most"),
+        ({**STATUE, "restitution": "0.9999"}, InvalidOption, "hardly comes to rest"),
+        ({**STATUE, "chattering": "never"}, InvalidOption, "chattering must be one of"),
+        ({**STATUE, "model": "x" * 400}, InvalidOption, "at most 300"),
+    ],
+)
+def test_an_impossible_case_is_refused_with_one_sentence(texts, error, words):
+    with pytest.raises(error, match=words) as caught:
+        read_case(texts, Shelf()).simulate()
+    assert "\n" not in str(caught.value)
+
+
+def test_the_default_case_chatters():
+    response = read_case(DEFAULT, Shelf()).simulate()
+    assert len(response.chattering) >= 3
+    assert not response.overturned
+
+
+# As Python, and as a command
+
+CASES = [
+    STATUE,
+    {**STATUE, "model": "linear", "restitution": "0.9"},
+    {
+        "p": "2.5,2.2",
+        "alpha": "7deg,11deg",
+        "restitution": "0.9,0.85",
+        "motion": "el-centro-meloland-270",
+        "scale": "0.6",
+    },
+    {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "sa": "0.5g@1", "chattering": "interval=1e-3"},
+    {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "duration": "235"},
+]
+
+
+@pytest.mark.parametrize(
+    "texts", [*CASES, {**SINE, "initial_rotation": "1deg"}, {**SINE, "motion": "none", "initial_rotation": "2deg"}]
+)
+def test_the_case_as_python_runs_and_has_the_same_peak(texts, tmp_path, capsys):
+    case = read_case(texts, Shelf())
+    script = tmp_path / "case.py"
+    script.write_text(as_python(case), "utf-8")
+    found = runpy.run_path(str(script))
+    assert found["response"].peak_rotation == case.simulate().peak_rotation
+    assert "verdict" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("texts", CASES)
+def test_the_case_as_a_command_runs_and_has_the_same_peak(texts, run):
+    case = read_case(texts, Shelf())
+    program, *arguments = shlex.split(as_command(case))
+    code, out, err = run(*arguments, "--json")
+    assert (program, code, err) == ("rocking", 0, "")
+    peak = float(out.split('"peak_rotation_rad": ')[1].split(",")[0])
+    assert peak == case.simulate().peak_rotation
+
+
+def test_a_file_is_named_in_code_as_it_was_called(tmp_path, monkeypatch, run):
+    record = rocking.records.load("el-centro-meloland-270")
+    text = "\n".join(f"{value:.10g}" for value in record.samples[1])
+    (tmp_path / "my record.txt").write_text(text, "utf-8")
+    shelf = Shelf()
+    key = shelf.put("C:\\data\\my record.txt", text.encode())
+    case = read_case({"width": "0.24", "height": "1.1", "motion": f"file:{key}", "dt": "0.01", "units": "m/s2"}, shelf)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.py").write_text(as_python(case), "utf-8")
+    assert runpy.run_path("case.py")["response"].peak_rotation == case.simulate().peak_rotation
+    code, _, err = run(*shlex.split(as_command(case))[1:], "--quiet")
+    assert (code, err) == (0, "")
+
+
+def test_what_the_command_line_cannot_do_is_not_given_as_a_command():
+    assert as_command(read_case({**SINE, "motion": "none", "initial_rotation": "2deg"}, Shelf())) is None
+    assert as_command(read_case({**STATUE, "gravity": "1.62"}, Shelf())) is None
+
+
+RESPONSES = {
+    "sizes": lambda: rocking.simulate(rocking.Block(0.12, 0.55), rocking.records.load("ridgecrest-clc-090")),
+    "scaled": lambda: rocking.simulate(
+        rocking.Block(0.12, 0.55, restitution=0.8), rocking.records.load("ridgecrest-clc-090").scaled(pga=3.0)
+    ),
+    "two-sided": lambda: rocking.simulate(
+        rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4), rocking.pulses.one_sine(4.0, 1.0), model="linear"
+    ),
+    "free": lambda: rocking.simulate(
+        rocking.Block(0.12, 0.55, gravity=1.62), None, initial_rotation=0.05, initial_velocity=-0.1
+    ),
+    "own motion": lambda: rocking.simulate(
+        rocking.Block(0.12, 0.55), rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.ricker(1.0, 2.0),
+        chattering="velocity", duration=3.0,
+    ),
+    "processed": lambda: rocking.simulate(
+        rocking.Block(0.12, 0.55), rocking.records.load("ridgecrest-clc-090").processed(trim=(200.0, 250.0))
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RESPONSES)
+def test_a_response_written_as_a_case_is_the_same_response_bit_for_bit(name):
+    response = RESPONSES[name]()
+    shelf = Shelf()
+    texts = texts_of(response, shelf)
+    again = read_case(texts, shelf).simulate()
+    assert np.array_equal(again.impacts, response.impacts)
+    assert np.array_equal(again.events, response.events)
+    assert again.peak_rotation == response.peak_rotation
+    assert again.duration == response.duration
+
+
+# Windows
+
+
+@pytest.mark.parametrize("width", [300.0, 3.0, 1e-3, 1e-6, 1e-9])
+def test_a_window_has_the_engines_own_values_however_narrow_it_is(explorer, width):
+    response = explorer.show(STATUE).response
+    middle = float(response.impacts["time"][-20])
+    start, end = max(0.0, middle - 0.4 * width), min(response.duration, middle + 0.6 * width)
+    arrays = explorer.window(STATUE, (start, end)).arrays
+    times = start + arrays["time"]
+    assert times[0] >= start
+    assert times[-1] <= end
+    # The offsets are exact but for the rounding of start + offset, which is at most one ulp of the time.
+    slack = 2.0 * np.spacing(end) * np.abs(response.angular_velocity(times)).max() + 1e-300
+    assert np.abs(arrays["rotation"] - response.rotation(times)).max() <= slack
+    struck = response.impacts["time"]
+    inside = struck[(struck >= start) & (struck <= end)]
+    assert np.array_equal(start + arrays["impact"], inside) or len(inside) > 2000
+    assert len(arrays["time"]) <= 3000 + 2
+
+
+@pytest.mark.parametrize("width", [1e-4, 1e-6, 1e-8])
+def test_a_window_close_to_a_rest_is_resolved_as_far_as_it_shows(explorer, width):
+    case = explorer.show(STATUE).case
+    fine = rocking.simulate(case.block, case.motion, chattering=rocking.Certified(1e-40))
+    rest = float(explorer.show(STATUE).response.chattering["end"][-1])
+    payload = explorer.window(STATUE, (rest - width, rest + 0.1 * width))
+    start, arrays = payload.header["window"]["from"], payload.arrays
+    assert len(arrays["impact"]) == payload.header["window"]["impacts"] > 10
+    assert np.array_equal(arrays["rotation"], fine.rotation(start + arrays["time"]))
+    assert np.abs(arrays["rotation"]).max() > 0.0
+    # What is resolved in both is the same to rounding.
+    coarse = explorer.show(STATUE).response.impacts["time"]
+    nearest = np.abs(fine.impacts["time"][:, None] - coarse).min(axis=0)
+    assert nearest.max() < 1e-12
+    assert fine.chattering["end"] == pytest.approx(explorer.show(STATUE).response.chattering["end"], abs=1e-12)
+
+
+def test_peaks_survive_the_thinning_of_a_wide_window(explorer):
+    shown = explorer.show(STATUE)
+    arrays = explorer.window(STATUE, (0.0, shown.response.duration)).arrays
+    assert arrays["rotation"].max() > 0.98 * shown.response.peak_rotation
+    assert np.abs(arrays["ground_g"]).max() == pytest.approx(0.4, rel=1e-12)
+
+
+def test_a_thinned_line_keeps_its_extremes_and_its_order():
+    rng = np.random.default_rng(1)
+    time, values = np.sort(rng.uniform(size=50_001)), rng.normal(size=50_001)
+    kept_time, kept = thinned(time, values, 1000)
+    assert len(kept) <= 1000
+    assert (kept.min(), kept.max()) == (values.min(), values.max())
+    assert (np.diff(kept_time) > 0.0).all()
+
+
+def test_ratios_of_intervals_tend_to_the_product_of_both_restitutions(explorer):
+    texts = {
+        "p": "2.5,2.2",
+        "alpha": "7deg,11deg",
+        "restitution": "0.9,0.8",
+        "motion": "none",
+        "initial_rotation": "3deg",
+    }
+    arrays = explorer.case(texts).arrays
+    ratios = arrays["ratio"][np.isfinite(arrays["ratio"])]
+    assert ratios[-1] == pytest.approx(0.9 * 0.8, rel=1e-4)
+
+
+def test_intervals_do_not_reach_across_a_rest(explorer):
+    arrays = explorer.case(STATUE).arrays
+    finite = np.flatnonzero(np.isfinite(arrays["interval"]))
+    ends = arrays["impact_time"][finite] + arrays["interval"][finite]
+    for uplift in arrays["uplift"]:
+        assert not ((arrays["impact_time"][finite] < uplift) & (ends > uplift)).any()
+
+
+@pytest.mark.parametrize("window", [(5.0, 5.0), (6.0, 5.0), (math.nan, 1.0), (0.0, math.inf), (400.0, 500.0)])
+def test_a_window_that_is_none_is_refused(explorer, window):
+    with pytest.raises(InvalidOption, match="window"):
+        explorer.window(STATUE, window)
+
+
+def test_verdicts_are_those_of_the_response(explorer):
+    assert "does not move" in explorer.case({**STATUE, "pga": "0.1g"}).header["verdict"]
+    assert "overturns" in explorer.case({**STATUE, "pga": "0.8g"}).header["verdict"]
+    stopped = explorer.case({**STATUE, "duration": "232"}).header["verdict"]
+    assert stopped.startswith("Still rocking at 232 s, where the simulation was stopped")
+    header = explorer.case(STATUE).header
+    assert f"comes to rest {header['rests']} times, and does not overturn" in header["verdict"]
+
+
+def test_a_comparison_holds_both_cases(explorer):
+    payload = explorer.compare(STATUE, {"chattering": "velocity=0.05"})
+    first, second = payload.header["cases"]
+    assert first["peak_rotation"] == explorer.show(STATUE).response.peak_rotation
+    assert second["peak_rotation"] == explorer.show({**STATUE, "chattering": "velocity=0.05"}).response.peak_rotation
+    assert first["peak_rotation"] > 2.0 * second["peak_rotation"]
+    larger = explorer.compare(STATUE, {"p": "2", "alpha": "0.2"}).header["cases"][1]
+    assert larger["block"]["sides"][0]["p"] == 2.0
+
+
+def test_schemes_tell_where_each_is_wrong(explorer):
+    rows = {row["text"]: row for row in explorer.schemes(STATUE)}
+    assert rows["velocity=0.05"]["right"] is False
+    assert "false rest" in rows["velocity=0.05"]["verdict"]
+    assert rows["time=eq76"]["right"] is None
+
+
+@pytest.mark.parametrize(
+    ("form", "start"),
+    [
+        ("svg", b"<?xml"),
+        ("png", b"\x89PNG"),
+        ("csv", b"time_s,rotation_rad"),
+        ("events.csv", b"time_s,kind,side"),
+        ("impacts.csv", b"time_s,side"),
+        ("nc", b"\x89HDF"),
+    ],
+)
+def test_every_export_is_a_file_of_its_kind(explorer, form, start):
+    texts = {**SINE, "motion": "one-sine:amplitude=2.5,frequency=1"}
+    assert explorer.export(texts, form).startswith(start)
+
+
+def test_responses_are_kept_so_many_at_most():
+    explorer = Explorer()
+    for k in range(80):
+        explorer.show({**SINE, "restitution": f"{0.7 + 0.001 * k:.3f}"})
+    assert len(explorer._kept) <= 48
+
+
+# Files
+
+
+def test_a_file_that_needs_no_word_is_read_at_once(explorer):
+    text = "time (s), a (g)\n" + "\n".join(f"{0.01 * k:.2f}, {math.sin(0.1 * k):.6f}" for k in range(500))
+    found = explorer.shelf.contents(explorer.shelf.put("pulse.csv", text.encode()))
+    assert [each["number"] for each in found["channels"]] == [1]
+    assert "dt" not in found["missing"]
+
+
+def test_a_file_says_what_must_be_told(explorer):
+    key = explorer.shelf.put("one column.txt", "\n".join(["0.1", "-0.2", "0.3"] * 50).encode())
+    assert explorer.shelf.contents(key)["missing"] == ["units", "dt"] or set(
+        explorer.shelf.contents(key)["missing"]
+    ) == {"units", "dt"}
+    texts = {"width": "0.24", "height": "1.1", "motion": f"file:{key}", "dt": "0.02", "units": "g"}
+    assert read_case(texts, explorer.shelf).motion.duration == pytest.approx(149 * 0.02)
+
+
+def test_messages_about_a_file_name_it_and_no_path(explorer):
+    key = explorer.shelf.put("/home/somebody/bad.txt", b"1.0\n2.0\nthree\n")
+    with pytest.raises(RockingError) as caught:
+        explorer.shelf.contents(key)
+    assert "bad.txt" in str(caught.value)
+    assert "/" not in str(caught.value).replace("m/s2", "").replace("m/s", "").replace("cm/s2", "")
+
+
+def test_files_are_known_by_their_content_and_so_many_at_most():
+    shelf = Shelf()
+    assert shelf.put("a.txt", b"1 2 3") == shelf.put("b.txt", b"1 2 3")
+    for k in range(3 * MOST):
+        shelf.put("x", str(k).encode())
+    assert len(shelf._files) == MOST
+    with pytest.raises(UnreadableRecord, match="larger than 16 MiB"):
+        shelf.put("big", bytes(LARGEST + 1))
+
+
+@pytest.mark.parametrize("name", ["../../x", "..\\..\\x", "/etc/x", "C:\\x", "a/b/../x", "\x00x\n"])
+def test_no_folder_is_left_of_a_files_name(name):
+    assert bare_name(name) == "x"
+
+
+# Maps
+
+
+def filled(grid):
+    values = np.full((len(maps.QUANTITIES), grid.shape[0] * grid.shape[1]), -9.0)
+    count = np.zeros(values.shape[1], int)
+    for part in maps.parts(grid):
+        values[:, part.points] = part.values
+        count[part.points] += 1
+    assert (count == 1).all()
+    return dict(zip(maps.QUANTITIES, values.reshape(len(values), *grid.shape), strict=True))
+
+
+def test_a_map_of_a_sine_is_the_packages_chattering_map():
+    case = read_case(SINE, Shelf())
+    grid = maps.grid_of(
+        case, {"x": "omega", "y": "a", "x_from": "0.7", "x_to": "5", "y_from": "0.95", "y_to": "1.3", "points": "12"}
+    )
+    found = filled(grid)
+    expected = chattering_map(families.sine(case.block, model="linear"), {"a": grid.y.values, "omega": grid.x.values})
+    assert np.array_equal(found["outcome"], expected.outcome.values)
+    times = (expected.rest - expected.uplift).values
+    assert np.array_equal(np.isnan(found["rest"]), np.isnan(times))
+    assert found["rest"] == pytest.approx(times, rel=2e-6, nan_ok=True)
+
+
+def test_a_map_of_a_record_is_the_packages_chattering_map():
+    case = read_case({"p": "3", "alpha": "0.2", "restitution": "0.9", "motion": "el-centro-meloland-270"}, Shelf())
+    grid = maps.grid_of(
+        case, {"x": "p", "y": "a", "x_from": "2", "x_to": "6", "y_from": "0.9", "y_to": "2", "points": "8"}
+    )
+    found = filled(grid)
+    family = families.record(rocking.records.load("el-centro-meloland-270"), 0.2, 0.9)
+    expected = chattering_map(family, {"a": grid.y.values, "p": grid.x.values})
+    assert np.array_equal(found["outcome"], expected.outcome.values)
+
+
+def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
+    case = read_case({**SINE, "motion": "one-sine:amplitude=2,frequency=0.5"}, Shelf())
+    grid = maps.grid_of(
+        case, {"x": "omega", "y": "a", "x_from": "1", "x_to": "4", "y_from": "0.9", "y_to": "6", "points": "8"}
+    )
+    found = filled(grid)
+    expected = rocking.overturning_map(
+        "one-sine", case.block, amplitudes=grid.y.values, frequencies=grid.x.values, model="linear", tolerance=0.4
+    )
+    modes = np.where(found["mode"] == maps.OVERTURNS_AFTER_REST, expected.mode.values, found["mode"])
+    assert np.array_equal(modes, expected.mode.values)
+    stays = found["mode"] < 0
+    assert found["peak"][stays] == pytest.approx(expected.peak_rotation.values[stays] / 0.2, rel=1e-6)
+    assert np.isinf(found["peak"][found["mode"] >= 0]).all()
+
+
+@pytest.mark.parametrize(
+    ("x", "y"),
+    [("omega", "a"), ("alpha", "pga"), ("restitution", "a"), ("omega", "restitution"), ("p", "alpha"), ("alpha", "a")],
+)
+def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
+    case = read_case({**SINE, "model": "nonlinear"}, Shelf())
+    grid = maps.grid_of(case, {"x": x, "y": y, "points": "8"})
+    found = filled(grid)
+    for row, column in ((1, 2), (5, 6), (7, 0)):
+        texts = maps.texts_at(grid, float(grid.x.values[column]), float(grid.y.values[row]))
+        response = read_case(texts, Shelf()).simulate()
+        peak = math.inf if response.overturned else response.peak_over_slenderness
+        assert found["peak"][row, column] == pytest.approx(peak, rel=1e-5, abs=1e-12)
+        if len(response.chattering):
+            rest = response.chattering["end"][0] - response.events["time"][0]
+            assert found["rest"][row, column] == pytest.approx(rest, rel=1e-5)
+
+
+def test_the_case_at_a_point_of_a_map_of_a_record():
+    case = read_case(STATUE, Shelf())
+    grid = maps.grid_of(case, {"x": "p", "y": "pga", "points": "8"})
+    texts = maps.texts_at(grid, float(grid.x.values[3]), float(grid.y.values[2]))
+    response = read_case(texts, Shelf()).simulate()
+    assert response.motion.pga == pytest.approx(grid.y.values[2] * 9.80665)
+    assert response.block.p == pytest.approx(grid.x.values[3])
+    peak = math.inf if response.overturned else response.peak_over_slenderness
+    assert filled(grid)["peak"][2, 3] == pytest.approx(peak, rel=1e-6)
+
+
+def test_the_curves_over_a_map_are_the_critical_amplitudes():
+    case = read_case(SINE, Shelf())
+    grid = maps.grid_of(case, {"x": "omega", "y": "a", "x_from": "0.3", "x_to": "9", "points": "20"})
+    found = maps.curves(grid)
+    assert np.array_equal(found["exact"], critical_amplitude(grid.x.values, 0.92))
+    inside = (grid.x.values >= 0.5) & (grid.x.values <= 8.0)
+    assert np.array_equal(np.isfinite(found["eq76"]), inside)
+    assert np.array_equal(found["eq76"][inside], critical_amplitude(grid.x.values[inside], 0.92, method="eq76"))
+    assert maps.curves(maps.grid_of(case, {"x": "omega", "y": "restitution", "points": "8"})) == {}
+
+
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        ({"x": "omega", "y": "p"}, "vary the same"),
+        ({"x": "a", "y": "p"}, "amplitudes go upwards"),
+        ({"x": "mass", "y": "a"}, "mapped over"),
+        ({"x": "omega", "y": "a", "points": "4000"}, "from 8 to 400"),
+        ({"x": "omega", "y": "a", "points": "10.5"}, "from 8 to 400"),
+        ({"x": "omega", "y": "a", "x_from": "3", "x_to": "2"}, "positive start below its end"),
+        ({"x": "omega", "y": "a", "x_from": "-1", "x_to": "2"}, "positive start below its end"),
+    ],
+)
+def test_axes_that_are_none_are_refused(axes, words):
+    with pytest.raises(InvalidOption, match=words):
+        maps.grid_of(read_case(SINE, Shelf()), axes)
+
+
+def test_a_map_that_is_not_read_on_stops():
+    grid = maps.grid_of(read_case(SINE, Shelf()), {"x": "omega", "y": "a", "points": "400"})
+    found = maps.parts(grid)
+    next(found)
+    found.close()
+    with pytest.raises(StopIteration):
+        next(found)
+
+
+# Studies
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("studies") / "museum"
+    blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 7), alpha=np.linspace(0.1, 0.3, 5), restitution=[0.85, 0.9])
+    motions = [rocking.pulses.one_sine(1.0, 1.0), rocking.records.load("el-centro-meloland-270")]
+    made = rocking.study(folder, blocks, motions, pga=[2.0, 4.0], polarity="both", unit_blocks=512)
+    made.run(progress=False)
+    return StudyView(folder)
+
+
+def test_a_slice_of_a_study_is_its_results(study):
+    results = study.study.results()
+    texts = {
+        "x": "p",
+        "y": "alpha",
+        "quantity": "peak_rotation",
+        "motion_index": "1",
+        "scale_index": "1",
+        "polarity_index": "1",
+        "fix_restitution": "0.9",
+    }
+    payload = study.slice(texts)
+    rows, columns = payload.header["shape"]
+    values = payload.arrays["values"].reshape(rows, columns)
+    for row in range(rows):
+        for column in range(columns):
+            chosen = (
+                (results.p == payload.header["x"]["values"][column])
+                & (results.alpha == payload.header["y"]["values"][row])
+                & (results.restitution == 0.9)
+            )
+            assert values[row, column] == results.peak_rotation[1, 1, 1, np.flatnonzero(chosen.values)[0]]
+
+
+def test_a_point_of_a_study_is_its_simulation(study):
+    payload = study.slice({"x": "p", "y": "scale", "quantity": "peak_rotation", "motion_index": "1"})
+    shelf = Shelf()
+    texts = study.texts_at({"x": "p", "y": "scale", "at_x": "3.5", "at_y": "4", "motion_index": "1"}, shelf)
+    response = read_case(texts, shelf).simulate()
+    rows, columns = payload.header["shape"]
+    column = int(np.argmin(np.abs(np.array(payload.header["x"]["values"]) - 3.5)))
+    assert payload.arrays["values"].reshape(rows, columns)[1, column] == pytest.approx(
+        response.peak_rotation, rel=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [
+        {"x": "p", "y": "p"},
+        {"x": "p", "y": "mass"},
+        {"x": "p", "y": "alpha", "quantity": "colour"},
+        {"x": "p", "y": "alpha", "motion_index": "7"},
+    ],
+)
+def test_a_slice_that_is_none_is_refused(study, texts):
+    with pytest.raises(InvalidOption):
+        study.slice(texts)
+
+
+def test_names_of_texts_are_options_of_the_command():
+    from rocking.cli import app
+
+    command = app["simulate"]
+    options = {name for argument in command.assemble_argument_collection() for name in argument.names}
+    for name in set(NAMES) - {"gravity", "motion"}:
+        assert f"--{name.replace('_', '-')}" in options

@@ -1,0 +1,594 @@
+"""The server: what it answers, byte by byte; what it refuses; how much it takes."""
+
+import json
+import math
+import os
+import random
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from urllib.parse import parse_qs, urlencode, urlsplit
+
+import httpx
+import numpy as np
+import pytest
+from explorer_client import Client, clients
+
+import rocking
+from rocking.errors import InvalidOption, StudyError
+from rocking.explorer import assets
+from rocking.explorer.core import Explorer
+from rocking.explorer.guard import Guard
+from rocking.explorer.launch import served
+from rocking.explorer.server import App
+from rocking.explorer.shelf import LARGEST, MOST
+from rocking.explorer.studies import StudyView
+
+PORT = 8123
+OURS = f"http://127.0.0.1:{PORT}"
+STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
+SINE = {"p": "1", "alpha": "0.2", "restitution": "0.92", "motion": "sine:amplitude=2.02,frequency=0.3,cycles=2.5"}
+
+
+@pytest.fixture(scope="module")
+def explorer():
+    return Explorer()
+
+
+@pytest.fixture(scope="module")
+def opened():
+    """Open the page of an application as a browser."""
+    with clients() as portal:
+
+        def open_page(app):
+            guard = Guard(app.asgi, PORT)
+            browser = Client(portal, guard, OURS, {"sec-fetch-site": "same-origin"}, follow=True)
+            assert browser.get("/", params={"token": guard.new_token()}).status_code == 200
+            return browser
+
+        yield open_page
+
+
+@pytest.fixture(scope="module")
+def page(explorer, opened):
+    return opened(App(explorer, {}))
+
+
+def unpacked(data):
+    (length,) = struct.unpack_from("<I", data)
+    header = json.loads(data[4 : 4 + length])
+    arrays, at = {}, 4 + length
+    assert at % 8 == 0
+    for name, size in header["arrays"].items():
+        arrays[name] = np.frombuffer(data, "<f8", size, at)
+        at += 8 * size
+    assert at == len(data)
+    return header, arrays
+
+
+def frames(data):
+    at = 0
+    while at < len(data):
+        (length,) = struct.unpack_from("<I", data, at)
+        assert length % 4 == 0
+        yield data[at + 4 : at + 4 + length]
+        at += 4 + length
+
+
+# What is answered
+
+
+def test_a_case_comes_as_header_and_aligned_arrays(page, explorer):
+    header, arrays = unpacked(page.get("/api/case", params=STATUE).content)
+    response = explorer.show(STATUE).response
+    assert header["peak_rotation"] == response.peak_rotation
+    assert np.array_equal(arrays["impact_time"], response.impacts["time"])
+    assert header["command"].startswith("rocking simulate ridgecrest-clc-090")
+
+
+def test_a_window_comes_with_times_from_its_start(page, explorer):
+    texts = {**STATUE, "from": "232", "to": "233", "ground": "1", "points": "300"}
+    header, arrays = unpacked(page.get("/api/window", params=texts).content)
+    assert header["window"] == {"from": 232.0, "to": 233.0, "impacts": 3, "unresolved": None}
+    assert arrays["time"][0] == 0.0
+    response = explorer.show(STATUE).response
+    assert arrays["rotation"] == pytest.approx(response.rotation(232.0 + arrays["time"]), abs=1e-12)
+    assert len(arrays["displacement"]) > 100
+
+
+def test_what_is_not_finite_is_null_in_a_header(page):
+    header, _ = unpacked(page.get("/api/case", params={**STATUE, "pga": "0.05g"}).content)
+    assert header["overturn_time"] is None
+    assert header["share_at_rest"] is None
+
+
+def test_a_map_comes_coarse_to_fine_and_whole(page):
+    axes = {"x": "omega", "y": "a", "points": "24"}
+    first, *parts = frames(page.get("/api/map", params={**SINE, **axes}).content)
+    about = json.loads(first)
+    assert about["shape"] == [24, 24]
+    assert about["outcomes"][1] == "complete"
+    assert len(about["curves"]["exact"]) == 24
+    seen, strides = np.zeros(576, int), []
+    for part in parts:
+        stride, count = struct.unpack_from("<II", part)
+        strides.append(stride)
+        seen[np.frombuffer(part, "<u4", count, 8)] += 1
+        assert len(part) == 8 + 4 * count + 16 * count
+    assert (seen == 1).all()
+    assert strides[0] == 8
+    assert strides[-1] == 1
+
+
+def test_the_case_at_a_point_of_a_map(page):
+    params = {**SINE, "x": "omega", "y": "a", "at_x": "2", "at_y": "1.03"}
+    texts = page.get("/api/map/point", params=params).json()
+    header, _ = unpacked(page.get("/api/case", params=texts).content)
+    assert header["motion"]["pga_g"] == pytest.approx(1.03 * math.tan(0.2), rel=1e-9)
+
+
+def test_a_comparison_takes_what_is_other_under_a_prefix(page):
+    header, arrays = unpacked(page.get("/api/compare", params={**STATUE, "other.chattering": "velocity=0.05"}).content)
+    assert header["cases"][1]["treatment"] == "velocity 0.05"
+    assert {"first_rotation", "second_rotation"} <= arrays.keys()
+
+
+@pytest.mark.parametrize("form", ["svg", "png", "csv", "events.csv", "impacts.csv", "nc"])
+def test_every_export_is_a_download(page, form):
+    answer = page.get("/api/export", params={**SINE, "form": form})
+    assert answer.status_code == 200
+    assert answer.headers["content-disposition"] == f"attachment; filename=rocking-response.{form}"
+    assert len(answer.content) > 200
+
+
+def test_the_page_has_a_policy_with_a_nonce_of_its_own(page):
+    first, second = (page.get("/") for _ in range(2))
+    nonces = [
+        re.search(r"'nonce-([\w-]+)'", answer.headers["content-security-policy"])[1] for answer in (first, second)
+    ]
+    assert nonces[0] != nonces[1]
+    assert f'data-nonce="{nonces[0]}"' in first.text
+    policy = dict(part.strip().split(" ", 1) for part in first.headers["content-security-policy"].split(";"))
+    assert policy["default-src"] == "'none'"
+    assert policy["script-src"] == "'self'"
+    assert policy["connect-src"] == "'self'"
+    assert policy["frame-ancestors"] == "'none'"
+    assert "unsafe" not in first.headers["content-security-policy"]
+
+
+def test_the_page_loads_nothing_from_elsewhere():
+    for name, content in assets.page_files().items():
+        text = content.decode()
+        addresses = set(re.findall(r"https?://[^\s\"'`)]+", text)) - {"http://www.w3.org/2000/svg"}
+        assert not addresses, name
+        assert "innerHTML" not in text, name
+        assert not re.search(r"\beval\(|new Function", text), name
+
+
+def test_every_module_that_is_imported_is_served(page):
+    files = assets.page_files()
+    for name, content in files.items():
+        for imported in re.findall(r'from "\./([\w.]+)"|import\(`\./\$\{name\}\.js`\)', content.decode()):
+            assert not imported or imported in files, name
+    for name in re.findall(r'(?:src|href)="(/[^"]+)"', files["index.html"].decode()):
+        answer = page.get(name)
+        assert answer.status_code == 200
+        assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_an_error_is_one_sentence(page):
+    answer = page.get("/api/case", params={**STATUE, "width": "-1"})
+    assert answer.status_code == 422
+    assert (
+        answer.json()["problem"] == "width must be a positive number in m, not -1"
+        or "width" in answer.json()["problem"]
+    )
+
+
+def test_what_went_wrong_inside_says_nothing_of_the_inside(page, explorer, monkeypatch):
+    monkeypatch.setattr(explorer, "words", lambda texts: 1 / 0)
+    answer = page.get("/api/words", params=STATUE)
+    assert answer.status_code == 500
+    assert answer.json() == {"problem": "this could not be computed (ZeroDivisionError); please report it"}
+
+
+# Uploads
+
+
+def test_a_record_is_uploaded_told_about_and_simulated(page):
+    samples = rocking.records.load("el-centro-meloland-270").samples[1]
+    body = "\n".join(f"{value / 9.80665:.12g}" for value in samples)
+    answer = page.post("/api/records", params={"name": "el centro.txt"}, content=body)
+    found = answer.json()
+    assert set(found["missing"]) == {"dt", "units"}
+    assert found["name"] == "el centro.txt"
+    texts = {"width": "0.24", "height": "1.1", "motion": f"file:{found['key']}", "dt": "0.01", "units": "g"}
+    header, _ = unpacked(page.get("/api/case", params=texts).content)
+    block = rocking.Block(width=0.24, height=1.1)
+    expected = rocking.simulate(block, rocking.records.load("el-centro-meloland-270"))
+    assert header["peak_rotation"] == pytest.approx(expected.peak_rotation, rel=1e-6)
+    assert page.get(f"/api/records/{found['key']}", params={"dt": "0.01", "units": "g"}).json()["missing"] == []
+
+
+@pytest.mark.parametrize("name", ["nga.at2", "single.v2c", "two.v2", "knet.ns", "esm.asc", "even.smc"])
+def test_files_of_every_format_are_taken(page, name):
+    content = (Path(__file__).parent / "data" / "formats" / name).read_bytes()
+    answer = page.post("/api/records", params={"name": name}, content=content)
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["channels"]
+
+
+def test_a_body_that_is_too_large_is_refused_before_and_while_it_comes(page):
+    answer = page.post("/api/records", params={"name": "x"}, content=b"", headers={"content-length": str(LARGEST + 1)})
+    assert answer.status_code == 413
+
+    async def endless():
+        while True:
+            yield bytes(2**20)
+
+    tracemalloc.start()
+    assert page.post("/api/records", params={"name": "x"}, content=endless()).status_code == 413
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 4 * LARGEST
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/page/../server.py",
+        "/page/..%2fserver.py",
+        "/page/%2e%2e/server.py",
+        "/page//etc/passwd",
+        "/page/index.html",
+        "/library/../bokeh.js",
+        "/library/..%5c..%5cx.js",
+        "/page/main.js%00",
+        "/page/.",
+        "/page/",
+        "/api/records/..%2f..%2fetc%2fpasswd",
+        "//etc/passwd",
+        "/file:///etc/passwd",
+    ],
+)
+def test_no_path_leads_anywhere_else(page, path):
+    answer = page.get(path)
+    assert answer.status_code in (404, 405, 422), answer.text
+    assert "import" not in answer.text
+    assert "root:" not in answer.text
+
+
+# Hostile
+
+
+def malformed(rng):
+    """One file that is none: cut, spoilt, or noise."""
+    kind = rng.randrange(6)
+    if kind == 0:
+        return rng.randbytes(rng.randrange(2000))
+    folder = Path(__file__).parent / "data" / "formats"
+    data = bytearray((rng.choice(sorted(folder.iterdir()))).read_bytes())
+    if kind == 1:
+        return bytes(data[: rng.randrange(len(data))])
+    if kind == 2:
+        for _ in range(rng.randrange(1, 40)):
+            data[rng.randrange(len(data))] = rng.randrange(256)
+        return bytes(data)
+    if kind == 3:
+        start = rng.randrange(len(data))
+        return bytes(data[:start] + data[start:] * rng.randrange(2, 5))
+    if kind == 4:
+        return b"\x80\x04\x95" + rng.randbytes(100) + b"cos\nsystem\n(S'touch x'\ntR."
+    return ("\n".join(rng.choice(["nan", "inf", "1e999", "-", "0x1", "1" * 400, "1.0"]) for _ in range(50))).encode()
+
+
+def test_a_thousand_malformed_files_links_and_headers(page, explorer, tmp_path, monkeypatch):
+    rng = random.Random(7)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "private"))
+    (tmp_path / "private").mkdir()
+    monkeypatch.chdir(tmp_path)
+    names = ["x", "../x", "/etc/cron.d/x", "C:\\x", "a" * 5000, "\x00", "é" * 50, "<script>", "x\r\nset-cookie: a=b"]
+    values = [
+        "",
+        "nan",
+        "-inf",
+        "1e999",
+        "0",
+        "-1",
+        "9" * 200,
+        "../../etc/passwd",
+        "{}",
+        "%00",
+        "1,2,3",
+        "sine:amplitude=1e300,frequency=1,cycles=1",
+        "sine:" + "a=1," * 50,
+        "given:x",
+        "file:" + "f" * 24,
+        "1deg",
+        "velocity=-1",
+        "ricker:amplitude=1,frequency=1e9,kind=x",
+    ]
+    paths = [
+        "/api/case",
+        "/api/window",
+        "/api/words",
+        "/api/schemes",
+        "/api/compare",
+        "/api/map",
+        "/api/map/point",
+        "/api/export",
+        "/api/study",
+        "/api/records/x",
+    ]
+    keys = [
+        *STATUE,
+        "p",
+        "alpha",
+        "restitution",
+        "model",
+        "chattering",
+        "duration",
+        "from",
+        "to",
+        "points",
+        "x",
+        "y",
+        "form",
+        "at_x",
+        "at_y",
+        "initial_rotation",
+        "other.width",
+    ]
+    statuses = set()
+    for _ in range(350):
+        answer = page.post("/api/records", params={"name": rng.choice(names)}, content=malformed(rng))
+        statuses.add(answer.status_code)
+        if answer.status_code == 422:
+            assert str(tmp_path) not in answer.text
+            assert set(answer.json()) == {"problem"}
+    for _ in range(350):
+        texts = dict(STATUE) if rng.random() < 0.5 else {}
+        texts |= {rng.choice(keys): rng.choice(values) for _ in range(rng.randrange(1, 4))}
+        answer = page.get(rng.choice(paths), params=texts)
+        statuses.add(answer.status_code)
+    for _ in range(300):
+        headers = {
+            rng.choice(
+                [
+                    "range",
+                    "accept",
+                    "cookie",
+                    "x-forwarded-host",
+                    "content-length",
+                    "if-none-match",
+                    "transfer-encoding",
+                    "upgrade",
+                    "content-type",
+                ]
+            ): rng.choice(
+                [
+                    "",
+                    "bytes=0-99999999999",
+                    "*/*;q=-1",
+                    "a=b; " * 500,
+                    "evil.example",
+                    "-5",
+                    "1e9",
+                    "websocket",
+                    "multipart/form-data",
+                ]
+            )
+        }
+        answer = page.get("/api/start", headers=headers)
+        statuses.add(answer.status_code)
+    assert statuses <= {200, 303, 400, 403, 404, 405, 413, 422}, statuses
+    assert 200 in statuses and 422 in statuses
+    assert len(explorer.shelf._files) <= MOST
+    assert len(explorer._kept) <= 48
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["private"]
+
+
+def test_twenty_clients_at_once_are_all_answered(page):
+    def ask(k):
+        answer = page.get("/api/case", params={**STATUE, "pga": f"{0.3 + 0.01 * k:.2f}g"})
+        return unpacked(answer.content)[0]["motion"]["pga_g"]
+
+    with ThreadPoolExecutor(20) as pool:
+        found = list(pool.map(ask, range(20)))
+    assert found == pytest.approx([0.3 + 0.01 * k for k in range(20)])
+
+
+# Over a socket
+
+
+@pytest.fixture(scope="module")
+def running():
+    here = served(Explorer(), {"motion": "one-sine:amplitude=0.3g,frequency=1"})
+    here.run_in_background()
+    yield here
+    here.server.should_exit = True
+
+
+@pytest.fixture(scope="module")
+def browser(running):
+    with httpx.Client(follow_redirects=True, headers={"sec-fetch-site": "same-origin"}, timeout=60) as client:
+        assert client.get(running.link()).status_code == 200
+        yield client
+
+
+def test_the_server_answers_over_a_socket_and_compiles_ahead(running, browser):
+    base = f"http://127.0.0.1:{running.port}"
+    start = browser.get(f"{base}/api/start").json()
+    assert start["opening"] == {"motion": "one-sine:amplitude=0.3g,frequency=1"}
+    deadline = time.monotonic() + 240.0
+    while not start["warming"]["done"] and time.monotonic() < deadline:
+        time.sleep(0.2)
+        start = browser.get(f"{base}/api/start").json()
+    assert start["warming"]["done"]
+
+
+def test_a_map_that_nobody_reads_any_more_stops(running, browser):
+    base = f"http://127.0.0.1:{running.port}"
+    params = urlencode({**SINE, "x": "omega", "y": "a", "points": "400"})
+    for _ in range(3):
+        with browser.stream("GET", f"{base}/api/map?{params}") as answer:
+            next(answer.iter_bytes())
+    deadline = time.monotonic() + 10.0
+    while time.monotonic() < deadline:
+        busy = [thread for thread in threading.enumerate() if thread.name.startswith("ThreadPoolExecutor")]
+        if not busy:
+            break
+        time.sleep(0.1)
+    assert not busy
+    start = time.monotonic()
+    assert browser.get(f"{base}/api/case", params=STATUE).status_code == 200
+    assert time.monotonic() - start < 5.0
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: evil.example\r\nHost: 127.0.0.1\r\n\r\n",
+        b"POST /api/records HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\ncontent-length: 0\r\n\r\n",
+        b"GET http://evil.example/ HTTP/1.1\r\nHost: evil.example\r\n\r\n",
+        b"CONNECT evil.example:80 HTTP/1.1\r\nHost: evil.example:80\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"x: y\r\n" * 20000 + b"\r\n",
+        b"\x00\x01\x02\x03\r\n\r\n",
+        b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n",
+    ],
+)
+def test_raw_requests_that_are_none_are_refused(running, raw):
+    import socket
+
+    with socket.create_connection(("127.0.0.1", running.port), timeout=10) as connection:
+        connection.sendall(raw)
+        connection.settimeout(10)
+        answer = connection.recv(4096)
+    assert re.match(rb"HTTP/1\.1 (400|403|421|431)", answer), answer[:60]
+
+
+# The command
+
+
+def test_the_command_prints_one_line_and_listens_here_alone():
+    command = (
+        [sys.executable, "-m", "rocking.cli.__main__"]
+        if False
+        else [sys.executable, "-c", "from rocking.cli import main; main()"]
+    )
+    process = subprocess.Popen(
+        [*command, "explore", "el-centro-meloland-270", "--no-open"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    try:
+        line = process.stdout.readline()
+        link = re.search(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+", line)[0]
+        with httpx.Client(follow_redirects=True, timeout=60) as client:
+            assert "rocking explorer" in client.get(link).text
+            assert client.get(link.split("/?")[0] + "/api/start").json()["opening"] == {
+                "motion": "el-centro-meloland-270"
+            }
+        assert httpx.get(link, timeout=60).status_code == 403
+    finally:
+        process.send_signal(2)
+        out, err = process.communicate(timeout=30)
+    assert out == ""
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("nowhere.txt",), "could not be read"),
+        (("ridgecrest-cls-090",), "did you mean ridgecrest-clc-090"),
+        (("--port", "70000"), "from 0 to 65535"),
+        (("--address", "0.0.0.0"), "every address"),
+        (("--address", "192.0.2.1"), "cannot be used"),
+        (("sine:amplitude=1",), "needs frequency and cycles"),
+    ],
+)
+def test_the_command_refuses_with_one_line(run, arguments, words):
+    code, out, err = run("explore", "--no-open", *arguments)
+    assert (code, out) == (2, "")
+    assert words in err.splitlines()[-1]
+
+
+def test_a_missing_package_is_named(run, monkeypatch):
+    monkeypatch.setattr(assets.util, "find_spec", lambda name: None)
+    code, _, err = run("explore", "--no-open")
+    assert code == 2
+    assert "pip install 'rocking[explorer]'" in err
+
+
+def test_the_library_is_found_without_importing_it():
+    assert (assets.library_folder() / "bokeh.min.js").is_file()
+    code = "import sys; from rocking.explorer import assets; assets.library_folder(); print('bokeh' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
+
+
+def test_a_port_that_is_taken_is_said_so():
+    here = served(Explorer(), {})
+    try:
+        with pytest.raises(InvalidOption, match="cannot be used"):
+            served(Explorer(), {}, port=here.port)
+    finally:
+        here.socket.close()
+
+
+# A study, and a notebook
+
+
+def test_a_study_is_shown_and_a_point_of_it_opened(tmp_path, opened):
+    blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 4), alpha=np.linspace(0.1, 0.3, 5), restitution=[0.9])
+    made = rocking.study(
+        tmp_path / "museum", blocks, rocking.pulses.one_sine(1.0, 1.0), pga=[2.0, 4.0], unit_blocks=512
+    )
+    with pytest.raises(StudyError, match="nothing of the study"):
+        StudyView(tmp_path / "museum")
+    made.run(progress=False)
+    browser = opened(App(Explorer(), {"view": "map"}, StudyView(tmp_path / "museum")))
+    assert [axis["name"] for axis in browser.get("/api/start").json()["study"]["axes"]] == ["p", "alpha", "scale"]
+    header, arrays = unpacked(
+        browser.get("/api/study", params={"x": "p", "y": "alpha", "quantity": "overturned"}).content
+    )
+    assert header["shape"] == [5, 4]
+    assert set(arrays["values"]) <= {0.0, 1.0}
+    point = {"x": "p", "y": "alpha", "at_x": "3", "at_y": "0.2", "scale_index": "1"}
+    texts = browser.get("/api/study/point", params=point).json()
+    header, _ = unpacked(browser.get("/api/case", params=texts).content)
+    outcome = made.results().peak_rotation.sel(scale=4.0)
+    chosen = np.flatnonzero((blocks.p[:, 0] == 3.0) & (blocks.alpha[:, 0] == 0.2))[0]
+    assert header["peak_rotation"] == float(outcome.values.ravel()[chosen])
+
+
+def test_a_response_is_explored_in_a_frame():
+    response = rocking.simulate(
+        rocking.Block.from_parameters(2.0, 0.2, 0.9),
+        rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.one_sine(1.0, 3.0),
+    )
+    frame = rocking.explore(response)
+    html = frame._repr_html_()
+    assert "<iframe" in html
+    assert re.search(r"token=[\w-]+", html)
+    with httpx.Client(follow_redirects=True, timeout=60) as client:
+        answer = client.get(frame.link)
+        assert answer.status_code == 200
+        assert "frame-ancestors http://localhost:* http://127.0.0.1:*" in answer.headers["content-security-policy"]
+        texts = {name: values[0] for name, values in parse_qs(urlsplit(str(answer.url)).query).items()}
+        base = str(answer.url).split("/?")[0]
+        header, arrays = unpacked(client.get(f"{base}/api/case", params=texts).content)
+    assert header["peak_rotation"] == response.peak_rotation
+    assert np.array_equal(arrays["impact_time"], response.impacts["time"])
+    with pytest.raises(InvalidOption, match="a Response is needed"):
+        rocking.explore(response.motion)

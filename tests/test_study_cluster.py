@@ -1,0 +1,295 @@
+"""Studies on dask.distributed: real schedulers and workers, on 127.0.0.1 only; killed, and nothing is lost."""
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.studies import cluster as clusters
+from rocking.studies.cluster import scheduler_executor
+from rocking.studies.units import compute
+
+pytest.importorskip("distributed")
+psutil = pytest.importorskip("psutil")
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="processes are killed the POSIX way")
+
+HERE = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
+ROCKING = [sys.executable, "-c", "from rocking.cli import main; main()"]
+BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 2048), alpha=0.2, restitution=0.9)
+UNITS = 20
+
+
+def made(folder):
+    """Make a study of 20 units of a few hundredths of a second."""
+    motion = rocking.records.load("el-centro-meloland-270")
+    return rocking.study(folder, BLOCKS, motion, pga=np.linspace(2.0, 8.0, UNITS), unit_blocks=2048)
+
+
+def digest(folder):
+    total = hashlib.sha256()
+    for path in sorted(Path(folder).rglob("*")):
+        if path.is_file() and path.name not in ("lock", "runs.jsonl"):
+            total.update(f"{path.relative_to(folder)}".encode() + path.read_bytes())
+    return total.hexdigest()
+
+
+def wait_until(true, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def complete(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("complete")
+    made(folder).run(threads=1)
+    return digest(folder)
+
+
+class Cluster:
+    """A scheduler, and workers that come and go, as processes."""
+
+    def __init__(self, stack, folder):
+        self.stack, self.file, self.workers = stack, folder / "scheduler.json", []
+        self.scheduler = self.started("scheduler", "--port", 0, "--scheduler-file", self.file)
+        wait_until(self.file.exists)
+        self.address = json.loads(self.file.read_text())["address"]
+
+    def started(self, *arguments):
+        command = [sys.executable, "-m", "dask", *map(str, arguments), *HERE]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.stack.callback(process.wait)
+        self.stack.callback(process.kill)
+        return process
+
+    def start_worker(self):
+        self.workers.append(self.started("worker", "--scheduler-file", self.file, "--nthreads", 1, "--no-nanny"))
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    with contextlib.ExitStack() as stack:
+        found = Cluster(stack, tmp_path)
+        found.start_worker()
+        found.start_worker()
+        yield found
+
+
+def after_the_first_unit(monkeypatch, study, action):
+    """Do something once the first unit of a study is stored."""
+    put = study.store.put
+
+    def first(key, data):
+        put(key, data)
+        monkeypatch.setattr(study.store, "put", put)
+        action()
+
+    monkeypatch.setattr(study.store, "put", first)
+
+
+def test_a_cluster_loses_a_unit_a_worker_and_its_scheduler_but_no_result(complete, tmp_path, cluster, run, monkeypatch):
+    # All is well.
+    made(tmp_path / "well")
+    code, out, err = run("study", "run", tmp_path / "well", "--scheduler", cluster.address)
+    assert (code, err) == (0, "") or "no worker has come" in err
+    assert "20 of 20 units done" in out
+    assert digest(tmp_path / "well") == complete
+
+    # A worker is killed: the other one takes over its units.
+    study = made(tmp_path / "worker")
+    with scheduler_executor(cluster.address) as pool:
+        wait_until(lambda: len(pool._client.nthreads()) == 2)
+        after_the_first_unit(monkeypatch, study, cluster.workers[0].kill)
+        assert not study.run(executor=pool).failed
+        assert len(pool._client.nthreads()) == 1
+    assert digest(tmp_path / "worker") == complete
+
+    # A unit kills its worker, every time: it fails, alone, and can be computed later.
+    study = made(tmp_path / "unit")
+    poison = study.store.work((0, 7, 0, 0)).factors[0, 0, 0]
+
+    def deadly(work):
+        if work.factors[0, 0, 0] == poison:
+            os._exit(1)
+        return compute(work)
+
+    cluster.start_worker()
+    with scheduler_executor(cluster.address) as pool:
+        wait_until(lambda: len(pool._client.nthreads()) == 2)
+        pool._client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 0))
+        monkeypatch.setattr("rocking.studies.workers.compute", deadly)
+        report = study.run(executor=pool)
+        monkeypatch.undo()
+    assert report.failed == study.status.failed
+    assert report.failed["c.0.0.7.0.0"] == "its worker died 1 times"
+    assert len(report.failed) <= 2  # with the one that waited behind it
+    study.run(threads=1)
+    assert digest(tmp_path / "unit") == complete
+
+    # The scheduler is killed: one sentence, within a second.
+    study, killed = made(tmp_path / "scheduler"), []
+
+    def kill_the_scheduler():
+        cluster.scheduler.kill()
+        killed.append(time.monotonic())
+
+    after_the_first_unit(monkeypatch, study, kill_the_scheduler)
+    gone = pytest.raises(rocking.StudyError, match="the workers are gone: no connection to the scheduler")
+    with gone, scheduler_executor(cluster.address) as pool:
+        study.run(executor=pool)
+    assert time.monotonic() - killed[0] < 1.0
+    assert 0 < study.status.done < UNITS
+    study.run(threads=1)
+    assert digest(tmp_path / "scheduler") == complete
+
+
+def test_local_workers_are_reached_from_here_alone_and_leave_signals_to_the_run(complete, tmp_path):
+    made(tmp_path)
+    command = [*ROCKING, "study", "run", str(tmp_path), "--workers", "2"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+        wait_until(lambda: list((tmp_path / "result").glob("c.*")))
+        family = [psutil.Process(process.pid), *psutil.Process(process.pid).children(recursive=True)]
+        sockets = [one for each in family for one in each.net_connections("inet") if one.status == "LISTEN"]
+        assert len(sockets) >= 4
+        assert {one.laddr.ip for one in sockets} == {"127.0.0.1"}
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        out = process.communicate(timeout=60)[0]
+    assert process.returncode == 130
+    assert "stopped, go on with another run" in out
+    assert "units failed" not in out
+    made(tmp_path).run(threads=1)
+    assert digest(tmp_path) == complete
+
+
+@pytest.mark.slow
+def test_local_workers_go_with_the_run_that_is_killed(complete, tmp_path):
+    made(tmp_path)
+    command = [*ROCKING, "study", "run", str(tmp_path), "--workers", "2"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        wait_until(lambda: list((tmp_path / "result").glob("c.*")))
+        children = psutil.Process(process.pid).children(recursive=True)
+        process.kill()
+    assert not psutil.wait_procs(children, timeout=10.0)[1]
+    made(tmp_path).run(threads=1)
+    assert digest(tmp_path) == complete
+
+
+def test_a_worker_with_another_program_is_told_so(tmp_path):
+    work = made(tmp_path).store.work((0, 0, 0, 0))
+    with pytest.raises(rocking.StudyError, match=r"has rocking .*, the study needs rocking 9\.9\.9"):
+        compute(replace(work, program="rocking 9.9.9 (kernels 0)"))
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--scheduler", "tcp://127.0.0.1:1"], "there is no scheduler at tcp://127.0.0.1:1"),
+        (["--scheduler", "nonsense://x"], "there is no scheduler at nonsense://x"),
+        (["--workers", "0"], "--workers must be"),
+        (["--workers", "2", "--threads", "2"], "--threads and --workers both say who computes"),
+    ],
+)
+def test_what_is_wrong_with_a_cluster_is_one_sentence(tmp_path, run, monkeypatch, options, sentence):
+    monkeypatch.setattr(clusters, "_ANSWER", 0.2)
+    made(tmp_path)
+    code, out, err = run("study", "run", tmp_path, *options)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert sentence in err
+
+
+def test_without_dask_it_says_what_to_install(tmp_path, run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    made(tmp_path)
+    assert "install rocking[cluster]" in run("study", "run", tmp_path, "--workers", 2)[2]
+
+
+# The page
+
+SCHEDULED = "rocking study run museum --sch"
+PAGE = (Path(__file__).parents[1] / "docs" / "howto" / "study-cluster.md").read_text("utf-8")
+
+
+def commands(*beginnings):
+    """Commands of the page that begin so, in order."""
+    lines = re.findall(r"^\$ (.*)$", PAGE, re.MULTILINE)
+    return [next(line for line in lines if line.startswith(beginning)) for beginning in beginnings]
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="the page makes a certificate with openssl")
+def test_the_commands_of_the_page_run_a_study_over_tls(complete, tmp_path, monkeypatch):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=os.pathsep)
+    certificate, settings, scheduler, worker, run = (
+        line.replace("8786", port)
+        for line in commands("openssl", "export DASK_CONFIG", "dask scheduler", "dask worker", SCHEDULED)
+    )
+    (tmp_path / "dask.yaml").write_text(re.search(r"```yaml\n(.*?)```", PAGE, re.DOTALL)[1])
+    subprocess.run(certificate, shell=True, check=True, stderr=subprocess.DEVNULL)
+    made(tmp_path / "museum")
+    with contextlib.ExitStack() as stack:
+        for command in (scheduler, worker):
+            shell = f"{settings}; exec {command}"
+            quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            process = subprocess.Popen(shell, shell=True, executable="/bin/bash", start_new_session=True, **quiet)
+            stack.callback(process.wait)
+            stack.callback(os.killpg, process.pid, signal.SIGKILL)
+        wait_until(lambda: answers(port))
+        done = subprocess.run(f"{settings}; {run}", shell=True, executable="/bin/bash", capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert "20 of 20 units done" in done.stdout
+        # Who has no certificate is not let in.
+        plain = run.replace("tls://$HEAD", "tls://127.0.0.1")
+        refused = subprocess.run(plain, shell=True, executable="/bin/bash", capture_output=True, text=True)
+        assert refused.returncode == 2
+        assert "there is no scheduler at tls://127.0.0.1" in refused.stderr
+        assert refused.stderr.count("\n") == 1
+    assert digest(tmp_path / "museum") == complete
+
+
+def answers(port):
+    with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", int(port)), timeout=1.0):
+        return True
+    return False
+
+
+def test_the_script_of_the_page_submits_what_it_says(tmp_path, monkeypatch):
+    pytest.importorskip("dask_jobqueue")
+    script = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)[1]
+    monkeypatch.chdir(tmp_path)
+    scope = {}
+    exec(script[: script.index("cluster.scale")], scope)
+    with scope["cluster"] as cluster:
+        job = cluster.job_script()
+        assert cluster.scheduler_address.startswith("tls://127.0.0.1:")
+    lines = ["#SBATCH -p normal", "#SBATCH -t 04:00:00", "#SBATCH --cpus-per-task=16", "source ~/venv/bin/activate"]
+    assert set(lines) <= set(job.splitlines())
+    words = ["--nthreads 1", "--nworkers 16", "--dashboard-address 127.0.0.1:0", "--lifetime 230m", "--tls-cert"]
+    assert all(word in job for word in words)
+
+
+def test_every_command_of_the_page_that_is_not_run_here_is_known():
+    ran = commands("openssl", "export DASK_CONFIG", "dask scheduler", "dask worker", SCHEDULED)
+    others = set(re.findall(r"^\$ (.*)$", PAGE, re.MULTILINE)) - set(ran)
+    assert others == {
+        "rocking study run museum --workers 2",  # above
+        "export AWS_ACCESS_KEY_ID=... AWS_SECRET_ACCESS_KEY=... AWS_REGION=eu-central-1",
+        "rocking study run museum.toml s3://bucket/museum",  # tests/test_study_objects.py
+        "rocking study report s3://bucket/museum report",
+    }

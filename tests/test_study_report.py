@@ -1,0 +1,202 @@
+"""What is made of a complete study: the same curves as from its simulations at once, by two commands."""
+
+import itertools
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.studies import ratios as reading
+from rocking.studies import read_study
+
+BLOCKS = rocking.Blocks.grid(p=[1.5, 2.0, 3.0], alpha=[0.1, 0.15, 0.2, 0.25], restitution=[0.9])
+MOTIONS = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.6, 9)]
+LEVELS = np.linspace(1.0, 9.0, 8)
+LIMITS = {"overturning": math.inf, "half": 0.5}
+
+TEXT = """\
+[blocks]
+p = [1.5, 2.0, 3.0]
+alpha = [0.1, 0.2]
+restitution = 0.9
+
+[[motions.pulses]]
+family = "one_sine"
+amplitude = 1.0
+frequency = "0.3:1.6:9"
+
+[scales]
+pga = "1:9:8"
+
+[report.fragility]
+measure = "pga"
+limits = { overturning = inf, half = 0.5 }
+
+[report.spectrum]
+fractiles = [0.25, 0.5]
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    made = rocking.study(tmp_path_factory.mktemp("study"), BLOCKS, MOTIONS, pga=LEVELS, unit_blocks=512)
+    made.run()
+    return made
+
+
+def test_a_study_that_stops_its_simulations_early_gives_no_verdicts(tmp_path):
+    short = rocking.study(tmp_path / "short", BLOCKS, MOTIONS, pga=LEVELS, duration=0.5)
+    short.run()
+    for report in (short.block_fragilities, short.spectrum):
+        with pytest.raises(rocking.StudyError, match="without a duration"):
+            report()
+
+
+def test_the_curve_of_each_block_is_that_of_its_simulations(study):
+    found = study.block_fragilities(limits=LIMITS)
+    fitted = 0
+    for j, name in itertools.product((0, 1, 5, 11), LIMITS):
+        one = found.data.sel(limit_state=name).isel(block=j)
+        limits = {name: LIMITS[name]}
+        try:
+            curve = rocking.fragility(BLOCKS[j], MOTIONS, levels=LEVELS, limits=limits).curve(name)
+        except rocking.InvalidOption as error:
+            assert str(one.fault.values) == str(error)
+            continue
+        fitted += 1
+        ends = [float(one[name]) for name in ("median_lower", "median_upper", "dispersion_lower", "dispersion_upper")]
+        assert [float(one["median"]), float(one.dispersion)] == pytest.approx(
+            [curve.median, curve.dispersion], rel=1e-12
+        )
+        assert ends == pytest.approx([*curve.median_interval, *curve.dispersion_interval])
+        assert float(one.exceeded) == curve.exceeded.sum()
+    assert fitted >= 4
+
+
+@pytest.mark.parametrize("measure", ["pga", "pgv", "pga_ratio", "pgv_ratio"])
+def test_one_curve_for_all_blocks_is_fitted_to_all_their_simulations(study, measure):
+    table = rocking.simulate_many(BLOCKS, MOTIONS, pga=LEVELS)
+    of_motion = [motion.pga if measure.startswith("pga") else motion.pgv for motion in MOTIONS]
+    per_pga = np.array(of_motion) / [motion.pga for motion in MOTIONS]
+    unit = np.ones(len(BLOCKS))
+    if measure.endswith("ratio"):
+        unit = 9.80665 * np.tan(BLOCKS.alpha[:, 0]) / (1.0 if measure == "pga_ratio" else BLOCKS.p[:, 0])
+    x = np.broadcast_to((per_pga[:, None] * LEVELS)[:, :, None] / unit, table.overturned.shape)
+    motion = np.broadcast_to(np.arange(len(MOTIONS))[:, None, None], x.shape)
+    reference = rocking.fit_fragility(
+        x.ravel(), table.overturned.values.ravel(), clusters=motion.ravel(), measure=measure
+    ).curves[0]
+    found = study.fragility(measure=measure).curves[0]
+    assert found.median == pytest.approx(reference.median, rel=1e-9)
+    assert found.dispersion == pytest.approx(reference.dispersion, rel=1e-9)
+    assert found.median_interval == pytest.approx(reference.median_interval, rel=1e-6)
+    assert found.trials.sum() == reference.trials.sum()
+
+
+def test_a_spectrum_is_the_fractiles_of_the_simulations(study):
+    table = rocking.simulate_many(BLOCKS, MOTIONS, pga=LEVELS)
+    found = study.spectrum([0.5])
+    ratio = np.where(table.overturned, np.inf, table.peak_rotation / BLOCKS.alpha[:, 0])
+    np.testing.assert_array_equal(found.fractile_over_alpha.values[0], np.median(ratio, axis=0))
+    np.testing.assert_array_equal(found.overturned_share.values, table.overturned.values.mean(axis=0))
+
+
+def test_what_is_read_in_small_parts_is_the_same(study, monkeypatch):
+    whole = study.block_fragilities(limits=LIMITS), study.spectrum(), study.fragility(measure="pga_ratio")
+    monkeypatch.setattr(reading, "_HELD", 5 * len(MOTIONS) * len(LEVELS))
+    parts = study.block_fragilities(limits=LIMITS), study.spectrum(), study.fragility(measure="pga_ratio")
+    assert whole[0].data.identical(parts[0].data)
+    assert whole[1].data.identical(parts[1].data)
+    assert whole[2].to_dict() == parts[2].to_dict()
+
+
+def test_both_polarities_of_symmetric_blocks_are_one_outcome(study, tmp_path):
+    both = rocking.study(tmp_path, BLOCKS, MOTIONS, pga=LEVELS, polarity="both", unit_blocks=512)
+    both.run()
+    assert both.block_fragilities().data.identical(study.block_fragilities().data)
+
+
+def test_a_block_that_no_curve_fits_says_why(tmp_path):
+    blocks = rocking.Blocks(p=[2.0, 2.0], alpha=[0.2, 1.2], restitution=[0.9, 0.9])
+    study = rocking.study(tmp_path, blocks, MOTIONS, pga=LEVELS, unit_blocks=512)
+    study.run()
+    found = study.block_fragilities()
+    assert found.fault.values[0, 0] == ""
+    assert "none of the 72 outcomes exceeds the limit" in found.fault.values[0, 1]
+    assert np.isnan(found["median"].values[0, 1])
+    assert "1 curves cannot be fitted" in found.summary()
+
+
+def test_a_study_that_is_not_complete_has_no_report(tmp_path):
+    study = rocking.study(tmp_path, BLOCKS, MOTIONS, pga=LEVELS, unit_blocks=512)
+    with pytest.raises(rocking.StudyError, match="72 of 72 units are missing"):
+        study.fragility()
+
+
+def test_two_commands_go_from_a_file_to_fragility_curves(run, tmp_path):
+    file = tmp_path / "museum.toml"
+    file.write_text(TEXT)
+    code, out, _ = run("study", "run", file)
+    assert code == 0
+    assert re.search(r"(\d+) of \1 units done", out)
+    code, out, err = run("study", "report", tmp_path / "museum")
+    assert (code, err) == (0, "")
+    assert "fragility of 6 blocks, 72 outcomes each" in out
+    made = {path.name for path in (tmp_path / "museum" / "report").iterdir()}
+    tables = {"fragility.csv", "fragility.pdf", "fragility.png", "spectrum.csv", "spectrum.pdf", "spectrum.png"}
+    assert made == tables | {"result.json"}
+    result = json.loads((tmp_path / "museum" / "report" / "result.json").read_text())
+    assert result["fragility"]["limit_state"] == ["overturning", "half"]
+    assert len((tmp_path / "museum" / "report" / "fragility.csv").read_text().splitlines()) == 13
+    # What is wanted may change; what is simulated may not.
+    file.write_text(TEXT.replace('measure = "pga"', 'measure = "pga_ratio"\nblocks = "together"'))
+    assert run("study", "run", file)[0] == 0
+    code, out, _ = run("study", "report", tmp_path / "museum", tmp_path / "out")
+    assert code == 0
+    assert "PGA / (g tan α)" in out
+    assert (tmp_path / "out" / "fragility.png").is_file()
+
+
+def test_a_study_without_a_report_says_how_to_ask_for_one(run, tmp_path):
+    file = tmp_path / "plain.toml"
+    file.write_text(TEXT[: TEXT.index("[report")])
+    run("study", "run", file, tmp_path / "elsewhere")
+    code, _, err = run("study", "report", tmp_path / "elsewhere")
+    assert code == 2
+    assert "add [report.fragility] to its file" in err
+    assert not (tmp_path / "elsewhere" / "report").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "sentence"),
+    [
+        ('measure = "pga"', 'measure = "pgd"', 15, "measure must be one of"),
+        ('measure = "pga"', 'measure = "sa"', 15, "period="),
+        ("half = 0.5", "half = -1", 16, "limits.half must be"),
+        ("[report.spectrum]", "[report.spectra]", 18, "has no spectra; it takes fragility, spectrum"),
+        ("[0.25, 0.5]", "[0.25, 1.5]", 19, "fractiles"),
+        ('measure = "pga"', 'measures = "pga"', 15, "has no measures; it takes measure"),
+        ('measure = "pga"', 'blocks = "all"', 15, "blocks must be one of each, together"),
+    ],
+)
+def test_a_mistake_in_what_is_wanted_is_a_sentence_with_its_line(tmp_path, old, new, line, sentence):
+    file = tmp_path / "study.toml"
+    assert old in TEXT
+    file.write_text(TEXT.replace(old, new))
+    with pytest.raises(rocking.StudyError, match=sentence) as caught:
+        read_study(file)
+    assert f"line {line}" in str(caught.value)
+
+
+def test_the_figures_draw_every_block(study):
+    figure = study.block_fragilities(limits=LIMITS).plot()
+    for axes in figure.axes[:2]:
+        assert sum(len(one.get_offsets()) for one in axes.collections) == 12
+    with pytest.raises(rocking.InvalidOption, match="a figure of their own"):
+        study.spectrum().plot(ax=figure.axes[0])
+    spectrum = study.spectrum().plot()
+    marks = sum(len(one.get_offsets()) for axes in spectrum.axes[:4] for one in axes.collections)
+    assert marks == 4 * 12
