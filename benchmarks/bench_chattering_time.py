@@ -39,7 +39,7 @@ def scipy_chattering_time(a, omega, eta):
         def impact(t, state):
             return state[0]
 
-        impact.terminal, impact.direction = True, -1.0
+        impact.terminal, impact.direction = True, -1.0  # type: ignore[attr-defined]
         solution = solve_ivp(
             equation,
             (0.0, math.pi / omega),

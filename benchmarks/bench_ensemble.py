@@ -24,8 +24,9 @@ from rocking.kernels.ground import Ground, last_piece
 from rocking.kernels.lanes import crew, scheduler
 from rocking.kernels.lanes.linear import step_linear
 from rocking.kernels.state import Record
-from rocking.problem import Model, ground_of, records_of, rules_of
+from rocking.problem import ground_of, records_of, rules_of
 from rocking.treatment import Certified
+from rocking.treatment.base import Model
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -87,6 +88,7 @@ def shortest(work: Callable[[], object]) -> float:
 
 def scipy_time(model: str, acceleration: np.ndarray, motion: rocking.Motion, blocks: rocking.Blocks) -> float:
     """Mean processor time of SciPy's event loop per block, over a random sample of the blocks."""
+    assert motion.step is not None
     chosen = np.random.default_rng(0).choice(len(blocks), SCIPY_SAMPLE, replace=False)
     total = 0.0
     for index in chosen:
@@ -156,6 +158,7 @@ def lane_steps(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     ground = ground_of(motion, blocks.gravity)
     bodies = records_of(blocks, model, how.limits(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
+    assert motion.step is not None, "lanes take even samples"
     width = motion.step * float(blocks.p.max())
     substeps = math.ceil(width / crew.LONGEST_SUBSTEP) if model == "nonlinear" else 0
     whole = crew.crew_of(bodies, states, len(motion.coefficients), motion.step, substeps)

@@ -38,9 +38,10 @@ def main():
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        sync_playwright = None
-    if sync_playwright is None or shutil.which("chromium") is None:
-        print("no browser: install rocking[browser] and Chromium")
+        print("no browser: install rocking[browser]")
+        return
+    if shutil.which("chromium") is None:
+        print("no browser: install Chromium")
         return
     here = served(Explorer(), {})
     here.run_in_background()

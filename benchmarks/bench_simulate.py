@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import rocking
+from rocking.treatment.base import Model
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -27,7 +28,7 @@ from oracles.scipy_events import integrate_as_practised  # noqa: E402
 EL_CENTRO = ROOT.parent / "shared" / "records" / "test_only" / "RSN6_IMPVALL.I_I-ELC180-hor1.AT2"
 SHIPPED = "el-centro-meloland-270"
 SAME_PEAK = 1e-6
-BLOCKS = {
+BLOCKS: dict[Model, dict[str, float]] = {
     "linear": {"p": 1.2, "alpha": 0.22, "restitution": 0.88},
     "nonlinear": {"p": 2.0, "alpha": 0.15, "restitution": 0.92},
 }
@@ -51,7 +52,7 @@ def main() -> None:
     print(f"rocking --help                 {1e3 * command_help():7.0f} ms")
 
 
-def compare(motion: rocking.Motion, samples: np.ndarray, model: str, parameters: dict[str, float]) -> str:
+def compare(motion: rocking.Motion, samples: np.ndarray, model: Model, parameters: dict[str, float]) -> str:
     """One row of the table."""
     block = rocking.Block.from_parameters(**parameters)
     response = rocking.simulate(block, motion, model=model)

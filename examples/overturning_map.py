@@ -24,9 +24,10 @@ def closed_form(ratio: float) -> float:
 def main() -> float:
     """Draw the map; return the largest difference between its upper boundary and the closed form."""
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    grid = {"amplitudes": np.linspace(0.5, 15.0, 59), "frequencies": np.linspace(0.4, 9.0, 87)}
+    amplitudes, frequencies = np.linspace(0.5, 15.0, 59), np.linspace(0.4, 9.0, 87)
     OUT.mkdir(exist_ok=True)
-    overturning_map("one-sine", block, **grid).plot().savefig(OUT / "map.png", dpi=160)
+    found = overturning_map("one-sine", block, amplitudes=amplitudes, frequencies=frequencies)
+    found.plot().savefig(OUT / "map.png", dpi=160)
 
     # So slender that pi/2, where a block has fallen, is too many times alpha to be reached before the pulse is over.
     slender = rocking.Block.from_parameters(p=2.0, alpha=1e-5, restitution=0.9)

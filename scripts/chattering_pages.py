@@ -183,7 +183,7 @@ def table_of_comparison(comparison):
     """Rests, errors and verdict of each scheme."""
     certified = comparison.certified
     rests = int(np.sum(certified.events["kind"] == "rest"))
-    rows = [("certified", rests, "", "", "", "")]
+    rows: list[tuple[str | int, ...]] = [("certified", rests, "", "", "", "")]
     for outcome in comparison.outcomes:
         worst = outcome.largest_error
         rows.append(

@@ -97,8 +97,8 @@ def film(page: Page) -> None:
         page.wait_for_timeout(60 if k else 1000)
         box = page.locator("#view-block").bounding_box()
         assert box is not None
-        clip = {"x": box["x"], "y": box["y"], "width": box["width"], "height": 860}
-        frame = Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB")
+        shown = page.screenshot(clip={"x": box["x"], "y": box["y"], "width": box["width"], "height": 860})
+        frame = Image.open(io.BytesIO(shown)).convert("RGB")
         frames.append(frame.resize((SIZE[0], round(frame.height * SIZE[0] / frame.width)), Image.Resampling.LANCZOS))
     file = IMAGES / "explorer.webp"
     frames[0].save(

@@ -88,17 +88,17 @@ class Blocks:
     def grid(
         cls,
         *,
-        p: Sequence[float] | Floats,
-        alpha: Sequence[float] | Floats,
-        restitution: Sequence[float] | Floats | None = None,
+        p: float | Sequence[float] | Floats,
+        alpha: float | Sequence[float] | Floats,
+        restitution: float | Sequence[float] | Floats | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> Blocks:
         """Symmetric blocks for every combination of parameters, the last one varying fastest.
 
         Parameters
         ----------
-        p, alpha, restitution : sequence of float
-            Values of each parameter; without restitution, Housner's from alpha.
+        p, alpha, restitution : float or sequence of float
+            Value or values of each parameter; without restitution, Housner's from alpha.
         gravity : float
             Acceleration of gravity, m/s^2.
 
