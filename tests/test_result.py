@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import rocking
-from rocking import engine
+from rocking import chattering, engine
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.errors import Unfinished
 
@@ -204,3 +204,29 @@ def test_the_nonlinear_critical_amplitude_is_not_read_off_an_unfinished_simulati
     monkeypatch.setattr(engine, "BUDGET", 0)
     with pytest.raises(Unfinished):
         critical_amplitude_nonlinear(2.0, 0.99999, 0.2)
+
+
+def _sine() -> rocking.Motion:
+    return rocking.pulses.sine(1.03 * 0.2 * 9.80665, 0.6, cycles=2)
+
+
+@pytest.mark.parametrize(
+    "find",
+    [
+        lambda: chattering.paper_figure(2),
+        lambda: chattering.paper_figure(8),
+        lambda: chattering.sequence(1.03, 2.0, 0.92),
+        lambda: chattering.sequence(1.2, 2.0, 0.92),
+        lambda: chattering.chattering_report(1.03, 2.0, 0.92),
+        lambda: chattering.critical_report(2.0, 0.92),
+        lambda: chattering.compare_schemes(BLOCK, _sine()),
+        lambda: chattering.compare_schemes(BLOCK, _sine()).outcomes[0],
+        lambda: chattering.chattering_episodes(rocking.simulate(BLOCK, _sine())),
+        lambda: chattering.series_diagnosis(1.01, 2.0, 0.92),
+    ],
+)
+def test_whatever_is_returned_shows_itself_in_a_few_lines(find):
+    found = find()
+    assert type(found).__name__ in repr(found)
+    assert len(repr(found)) < 400
+    assert repr(found).count("\n") < 4

@@ -48,6 +48,9 @@ class ChatteringEpisodes:
     shaking: tuple[float, float]
     at_rest: float
 
+    def __repr__(self) -> str:
+        return f"<ChatteringEpisodes: {len(self.episodes)}, at rest for {self.at_rest:.3f} s of the shaking>"
+
     @property
     def share_at_rest(self) -> float:
         """Share of the bracketed duration during which the block is at rest; NaN where there is none."""

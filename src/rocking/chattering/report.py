@@ -52,6 +52,10 @@ class ChatteringReport:
     cycles: NDArray[np.void] | None
     p: float | None
 
+    def __repr__(self) -> str:
+        case = ", ".join(f"{name} = {self.values[name]:g}" for name in ("a", "omega", "eta"))
+        return f"<ChatteringReport: {case}: {self._verdict()}>"
+
     def to_dict(self) -> dict[str, Any]:
         """Return all numbers by name."""
         return self.values

@@ -69,6 +69,9 @@ class SchemeOutcome:
     rotation_error: float
     overturns_wrongly: bool
 
+    def __repr__(self) -> str:
+        return f"<SchemeOutcome: {self.treatment.label}: {self.verdict}>"
+
     @property
     def false_rests(self) -> Floats:
         """Times of rests that are none, s."""
@@ -117,6 +120,13 @@ class SchemeComparison:
     certified: Response
     outcomes: tuple[SchemeOutcome, ...]
     not_applicable: tuple[tuple[Treatment, str], ...]
+
+    def __repr__(self) -> str:
+        right = sum(outcome.is_right for outcome in self.outcomes)
+        return (
+            f"<SchemeComparison: {right} of {len(self.outcomes)} schemes find what the certified one finds; "
+            f"{len(self.not_applicable)} not applicable>"
+        )
 
     def __str__(self) -> str:
         """Table for people."""

@@ -91,6 +91,11 @@ class PaperFigure:
     statements: tuple[Statement, ...]
     drawings: Mapping[str, Callable[[], Figure]]
 
+    def __repr__(self) -> str:
+        conditions = f" ({self.conditions})" if self.conditions else ""
+        tables = ", ".join(self.tables) or "none"
+        return f"<PaperFigure {self.number}: {self.title}{conditions}; tables: {tables}; {len(self.statements)} statements>"
+
     @property
     def caption(self) -> str:
         """Number, title and conditions."""

@@ -179,6 +179,10 @@ class ChatteringSequence:
     lower: float
     upper: float
 
+    def __repr__(self) -> str:
+        end = f"complete, at rest at p t = {self.time:.9g}" if self.complete else "incomplete"
+        return f"<ChatteringSequence: {len(self.impacts)} impacts resolved; {end}>"
+
 
 def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) -> ChatteringSequence:
     """Resolve one sequence impact by impact until its time of rest is bracketed.
