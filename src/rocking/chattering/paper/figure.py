@@ -93,8 +93,8 @@ class PaperFigure:
 
     def __repr__(self) -> str:
         conditions = f" ({self.conditions})" if self.conditions else ""
-        tables = ", ".join(self.tables) or "none"
-        return f"<PaperFigure {self.number}: {self.title}{conditions}; tables: {tables}; {len(self.statements)} statements>"
+        contents = f"tables: {', '.join(self.tables) or 'none'}; {len(self.statements)} statements"
+        return f"<PaperFigure {self.number}: {self.title}{conditions}; {contents}>"
 
     @property
     def caption(self) -> str:
