@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+import queue
 import signal
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 from dataclasses import dataclass
+from typing import IO
 
 MEMORY = 12 * 2**30
 STARTING = 300.0
 """Seconds to import and to compile the kernels where nobody has yet; not part of a run's time."""
 
-_BEFORE = """
-import json, math, resource, warnings
+_PROGRAM = """
+import json, math, resource, sys, warnings
 resource.setrlimit(resource.RLIMIT_AS, ({memory}, {memory}))
 import numpy as np, rocking
 warnings.simplefilter("ignore")
@@ -41,48 +46,102 @@ def attempt(evaluate):
         return {{"refused": f"{{type(error).__name__}}: {{error}}"}}
 
 print("ready", flush=True)
-found = attempt(lambda: (
-"""
-_AFTER = """
-))
-print(json.dumps(found), flush=True)
+for line in sys.stdin:
+    print(json.dumps(attempt(lambda: eval(line))), flush=True)
 """
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run went: its output (after "ready") and errors, how long it took, and whether it had to be stopped."""
+    """How a run went: its output and errors, how long it took, and whether it had to be stopped."""
 
     output: str
     errors: str
+    status: int
     seconds: float
     stopped: bool
-    status: int
 
 
-def run(expression: str, *, limit: float, interrupt_after: float | None = None) -> Outcome:
-    """Evaluate an expression (`of_response(...)`, `of_dataset(...)`) with `rocking`, `np` and `block` at hand.
+class Place:
+    """A process that evaluates expressions, one after the other; a new one is started where the last one has ended."""
 
-    An interrupt may be sent some seconds after the start; then `seconds` counts from it, as `limit` does.
-    """
-    code = _BEFORE.format(memory=MEMORY) + expression + _AFTER
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, bufsize=0
-    ) as process:
-        assert process.stdout is not None
-        line = process.stdout.readline()  # unbuffered, so that the rest is left to `communicate`
-        if line != b"ready\n":
-            raise AssertionError(process.communicate(timeout=STARTING)[1].decode())
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._errors: IO[bytes] | None = None
+
+    def run(self, expression: str, *, limit: float, interrupt_after: float | None = None) -> Outcome:
+        """Evaluate an expression (`of_response(...)`, `of_dataset(...)`) with `rocking`, `np` and `block` at hand.
+
+        An interrupt may be sent some seconds after the start; then `seconds` counts from it, as `limit` does.
+        """
+        process = self._ready()
+        assert process.stdin is not None
+        process.stdin.write(expression.encode() + b"\n")
+        answers = self._answers(process)
+        output, start = b"", time.monotonic()
         if interrupt_after is not None:
-            try:
-                process.wait(timeout=interrupt_after)
-            except subprocess.TimeoutExpired:
+            with contextlib.suppress(queue.Empty):
+                output = answers.get(timeout=interrupt_after)
+            if not output:
                 process.send_signal(signal.SIGINT)
-        start, stopped = time.monotonic(), False
+                start = time.monotonic()
+        stopped = False
         try:
-            output, errors = process.communicate(timeout=limit)
-        except subprocess.TimeoutExpired:
+            output = output or answers.get(timeout=limit)
+        except queue.Empty:
             stopped = True
+        seconds = time.monotonic() - start
+        outcome = Outcome(output.decode(), *self._left(process, output), seconds, stopped)
+        if interrupt_after is not None:
+            self.close()  # The interrupt may have come too late, and meet the next one.
+        return outcome
+
+    def close(self) -> None:
+        """End the process, if there is one."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+        if self._errors is not None:
+            self._errors.close()
+        self._process = self._errors = None
+
+    def _ready(self) -> subprocess.Popen[bytes]:
+        if self._process is not None:
+            return self._process
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
+        process = subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM.format(memory=MEMORY)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            bufsize=0,
+        )
+        self._process = process
+        if self._answers(process).get(timeout=STARTING) != b"ready\n":
+            raise AssertionError(self._left(process, b"")[0])
+        return process
+
+    @staticmethod
+    def _answers(process: subprocess.Popen[bytes]) -> queue.Queue[bytes]:
+        """One line of the process, empty where it has ended, as soon as it is there."""
+        answers: queue.Queue[bytes] = queue.Queue()
+        assert process.stdout is not None
+        threading.Thread(target=lambda out: answers.put(out.readline()), args=(process.stdout,), daemon=True).start()
+        return answers
+
+    def _left(self, process: subprocess.Popen[bytes], output: bytes) -> tuple[str, int]:
+        """Errors and exit status: none of either while the process answers; else it is ended."""
+        if output:
+            return "", 0
+        assert self._errors is not None
+        if process.poll() is None:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(timeout=0.5)
+        status = process.poll()
+        if status is None:
             process.kill()
-            output, errors = process.communicate()
-        return Outcome(output.decode(), errors.decode(), time.monotonic() - start, stopped, process.returncode)
+            status = process.wait()
+        self._errors.seek(0)
+        errors = self._errors.read().decode()
+        self.close()
+        return errors, status
