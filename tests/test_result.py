@@ -29,13 +29,14 @@ def small_budget(monkeypatch):
         lambda: rocking.rocking_spectrum(PULSE.scaled(0.4), alpha=[0.2], p=[2.0], restitution=[1.0 - 1e-9]),
         lambda: rocking.overturning_map("one-sine", RESTLESS, amplitudes=[1.2, 1.4], frequencies=[3.0]),
         lambda: rocking.incremental_dynamic_analysis(RESTLESS, PULSE, levels=[2.2, 2.4]),
+        lambda: rocking.compare_measures(RESTLESS, [PULSE, PULSE]),
         lambda: rocking.fragility(RESTLESS, PULSE, levels=[2.2, 2.4]),
         lambda: rocking.fragility(RESTLESS, PULSE.scaled(0.4)),
         lambda: rocking.calibrate(
             [PULSE.scaled(0.35), PULSE], [False, True], candidates=128, restitution=(1.0 - 2e-9, 1.0 - 1e-9)
         ),
     ],
-    ids=["spectrum", "map", "scaling", "stripes", "cloud", "calibration"],
+    ids=["spectrum", "map", "scaling", "measures", "stripes", "cloud", "calibration"],
 )
 def test_a_simulation_that_was_given_up_is_no_verdict(analysis):
     with pytest.raises(Unfinished, match="were given up"):
@@ -65,6 +66,7 @@ def results(spectrum):
         "RockingSpectrum": spectrum,
         "OverturningMap": rocking.overturning_map("one-sine", BLOCK, amplitudes=[1.0, 4.0], frequencies=[2.0, 3.0]),
         "IncrementalDynamicAnalysis": rocking.incremental_dynamic_analysis(BLOCK, PULSE),
+        "MeasureComparison": rocking.compare_measures(BLOCK, [PULSE, rocking.pulses.one_sine(6.0, 2.0)]),
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
     }
 
@@ -125,6 +127,9 @@ HEADERS = {
     ("IncrementalDynamicAnalysis", "levels"): "motion,level_m_s2,block,p_rad_s,alpha_rad,restitution,"
     "peak_rotation_rad,peak_over_alpha,overturned",
     ("IncrementalDynamicAnalysis", "bands"): "band_motion,band_block,band_start_m_s2,band_end_m_s2",
+    ("MeasureComparison", "measures"): "measure,unit,median_intensity,dispersion,dispersion_low,dispersion_high,"
+    "dispersion_of_all",
+    ("MeasureComparison", "intensities"): "measure,motion,block,unit,intensity",
     ("ChatteringMap", "outcomes"): "a,omega,outcome,complete,uplift_s,rest_s,lower_s,upper_s,rests,overturned",
 }
 

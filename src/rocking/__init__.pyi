@@ -1,5 +1,7 @@
 from . import chattering
+from .analysis import rules
 from .analysis.calibration import Calibration, HistoryCalibration, calibrate, calibrate_history
+from .analysis.efficiency import compare_measures
 from .analysis.fragility import Fragility, fit_fragility, fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
@@ -50,6 +52,7 @@ __all__ = [
     "calibrate",
     "calibrate_history",
     "chattering",
+    "compare_measures",
     "explore",
     "fit_fragility",
     "fragility",
@@ -59,6 +62,7 @@ __all__ = [
     "read",
     "records",
     "rocking_spectrum",
+    "rules",
     "simulate",
     "simulate_many",
     "study",

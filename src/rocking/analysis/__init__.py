@@ -1,1 +1,5 @@
-"""What engineers ask of many simulations: spectra, overturning maps, scaling, fragility, calibration."""
+"""What engineers ask of many simulations: spectra, overturning maps, scaling, fragility, calibration, rules."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -34,6 +34,8 @@ for _command, _help in {
     "map": "Map what a pulse does to a block, over amplitude and frequency.",
     "ida": "Scale motions up until the block overturns and beyond (incremental dynamic analysis).",
     "fragility": "Fit the probability that a block overturns against the intensity of the motions.",
+    "measures": "Compare intensity measures: which tells best when motions overturn a block.",
+    "check": "Say what rules of thumb make of a block, beside the exact answer.",
     "calibrate": "Find the block behind observed outcomes, or behind a measured rotation history.",
     "explore": "Open a page on which a block is seen to rock, chatter, rest and fall.",
     "study": "Run a study too long for one sitting: created once, resumed after anything.",

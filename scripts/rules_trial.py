@@ -1,0 +1,157 @@
+"""Measure how often each rule of thumb is unsafe, and how often over-conservative, on the shipped records.
+
+Run ``python scripts/rules_trial.py`` from the repository's root (some minutes): it writes the tables of
+docs/howto/rules.md and its figure.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import rocking
+from rocking import rules
+from rocking.analysis.rules.check import TITLES
+from rocking.plot.canvas import add_labels, add_legend, figure_for, labelled
+from rocking.plot.style import CURVES
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+TABLES = DOCS / "_tables"
+IMAGE = DOCS / "_static" / "rules.png"
+
+#: Heights, m, and slendernesses of the blocks: from a bottle to a monument.
+HEIGHTS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+SLENDERNESSES = (0.1, 0.15, 0.2, 0.3, 0.4)
+
+#: As many lines as rules.
+STYLES = (*CURVES, {"color": "0.45", "linestyle": (0, (3, 1, 1, 1, 1, 1))})
+
+#: Peak accelerations that every record is scaled to, over gravity.
+LEVELS = np.geomspace(0.1, 2.0, 40)
+
+
+def main() -> None:
+    """Write the tables and the figure."""
+    blocks, motions = all_blocks(), all_motions()
+    ratios = ratings(blocks, motions)
+    TABLES.mkdir(exist_ok=True)
+    verdicts = exact_verdicts(blocks, motions)
+    (TABLES / "rules-verdicts.txt").write_text(verdict_table(blocks, motions, ratios, verdicts), encoding="utf-8")
+    capacities = exact_capacities(blocks, motions)
+    (TABLES / "rules-capacities.txt").write_text(capacity_table(ratios, capacities), encoding="utf-8")
+    figure(ratios, capacities).savefig(IMAGE, dpi=110)
+
+
+def all_blocks():
+    """Rectangular blocks of all heights and slendernesses."""
+    return rocking.Blocks.of(
+        [
+            rocking.Block(width=height * float(np.tan(alpha)), height=height)
+            for height in HEIGHTS
+            for alpha in SLENDERNESSES
+        ]
+    )
+
+
+def all_motions():
+    """Shipped horizontal records, from 5 s before their strong shaking to 10 s after it, with a PGA of 1 g."""
+    found = []
+    for name in rocking.records.names():
+        if name.endswith("-up"):
+            continue
+        record = rocking.records.load(name)
+        start, end = strong_part(record)
+        trimmed = record.processed(trim=(max(start - 5.0, 0.0), min(end + 10.0, record.duration)))
+        found.append(trimmed.scaled(pga=rocking.Block(1.0, 1.0).gravity))
+    return found
+
+
+def strong_part(record):
+    """Find the times between which 5 and 95 % of the Arias intensity arrive."""
+    times, samples = record.samples
+    energy = np.cumsum(samples**2)
+    return tuple(float(times[np.searchsorted(energy, share * energy[-1])]) for share in (0.05, 0.95))
+
+
+def ratings(blocks, motions):
+    """Demand over capacity by every rule under a PGA of 1 g, shape (motion, block)."""
+    found = {name: [] for name in rules.RULES}
+    for motion in motions:
+        for name, rating in rules.rate(blocks, motion).items():
+            found[name].append(rating.ratio)
+        sys.stdout.write(f"{motion.name}\n")
+        sys.stdout.flush()
+    return {name: np.array(rows) for name, rows in found.items()}
+
+
+def exact_verdicts(blocks, motions):
+    """Whether each block overturns under each motion at every level, shape (motion, level, block)."""
+    found = rocking.simulate_many(blocks, motions, pga=LEVELS * blocks.gravity, progress=False)
+    return found.overturned.transpose("motion", "scale", "block").values
+
+
+def exact_capacities(blocks, motions):
+    """Lowest PGA, over gravity, that overturns each block under each motion, shape (motion, block)."""
+    found = rocking.incremental_dynamic_analysis(blocks, motions, tolerance=1e-3, progress=False)
+    return found.overturning_level.transpose("motion", "block").values / blocks.gravity
+
+
+def verdict_table(blocks, motions, ratios, fell):
+    """Verdicts of each rule against the exact ones, over all cases in which the block is lifted."""
+    lifted = np.broadcast_to(LEVELS[:, None] >= np.tan(blocks.alpha[:, 0]), fell.shape)
+    rows = []
+    for name, ratio in ratios.items():
+        said = ratio[:, None, :] * LEVELS[:, None] >= 1.0
+        unsafe, wary = (int(np.sum(lifted & wrong)) for wrong in (fell & ~said, ~fell & said))
+        falls, stands = int(np.sum(lifted & fell)), int(np.sum(lifted & ~fell))
+        right = 1.0 - (unsafe + wary) / (falls + stands)
+        rows.append(
+            (TITLES[name], f"{100 * unsafe / falls:.1f}", f"{100 * wary / stands:.1f}", f"{100 * right:.1f}", unsafe)
+        )
+    head = ("rule", "unsafe, % of the falls", "over-conservative, % of the others", "right, % of all", "unsafe cases")
+    total = (f"{len(motions)} records, {len(blocks)} blocks", f"{falls} falls", f"{stands} others", "", "")
+    return markdown(head, [*rows, total])
+
+
+def capacity_table(ratios, capacities):
+    """Peak acceleration that overturns by each rule, over the exact one."""
+    rows = []
+    for name, ratio in ratios.items():
+        share = (1.0 / ratio / capacities)[np.isfinite(capacities)]
+        low, median, high = np.quantile(share, [0.05, 0.5, 0.95])
+        numbers = (f"{value:.2f}" for value in (low, median, high, share.max()))
+        rows.append((TITLES[name], *numbers, f"{100.0 * np.mean(share > 1.0):.0f}"))
+    return markdown(("rule", "5 %", "median", "95 %", "largest", "above 1, %"), rows)
+
+
+def figure(ratios, capacities):
+    """Distribution of the rules' overturning accelerations over the exact ones."""
+    with figure_for(None, (5.6, 3.9)) as drawn:
+        axes = drawn.add_subplot()
+        for (name, ratio), curve in zip(ratios.items(), STYLES, strict=True):
+            share = np.sort((1.0 / ratio / capacities)[np.isfinite(capacities)])
+            axes.step(share, np.arange(1, share.size + 1) / share.size, where="post", label=TITLES[name], **curve)
+        axes.axvline(1.0, color="0.35", linewidth=0.8)
+        axes.set_xscale("log")
+        ticks = [0.1, 0.2, 0.5, 1.0, 2.0, 3.0]
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
+        axes.set_xlim(0.1, 3.0)
+        axes.set_ylim(0.0, 1.0)
+        axes.text(0.97, 0.02, "safe side", ha="right", color="0.35", fontsize=8)
+        axes.text(1.03, 0.02, "unsafe side", ha="left", color="0.35", fontsize=8)
+        add_labels(axes, "overturning PGA by the rule over the exact one", "share of blocks and records")
+        add_legend(drawn, None, labelled(axes))
+    return drawn
+
+
+def markdown(heading, rows):
+    """Write a table as Markdown, numbers to the right."""
+    lines = [heading, ("---", *["---:"] * (len(heading) - 1)), *rows]
+    return "".join("| " + " | ".join(str(cell) for cell in line) + " |\n" for line in lines)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,263 @@
+"""Efficiency of intensity measures: which one tells best from what strength on motions overturn a block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.analysis.incremental import incremental_dynamic_analysis
+from rocking.analysis.intensity import Measure
+from rocking.analysis.levels import described
+from rocking.arrays import Floats
+from rocking.block import Block, Blocks
+from rocking.errors import InvalidOption
+from rocking.motion import accepted
+from rocking.motion.motion import Motion
+from rocking.result import Result
+from rocking.tables import text_table
+from rocking.treatment.base import Model
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Probability of the interval of a dispersion.
+_CONFIDENCE: Final = 0.9
+
+
+def compare_measures(
+    blocks: Blocks | Block | Sequence[Block],
+    motions: Motion | Sequence[Motion],
+    *,
+    periods: ArrayLike = (0.5, 1.0, 2.0),
+    damping: float = 0.05,
+    model: Model = "nonlinear",
+    tolerance: float = 1e-4,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> MeasureComparison:
+    """Compare how widely motions scatter, by several intensity measures, at which they first overturn blocks.
+
+    Parameters
+    ----------
+    blocks : Blocks, Block or sequence of Block
+        n blocks.
+    motions : sequence of Motion
+        m motions, two at least.
+    periods : array_like
+        Periods of spectral accelerations, s.
+    damping : float
+        Their fraction of critical damping.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    tolerance : float
+        Width of the intensities at overturning, relative to them.
+    threads, progress
+        As for `simulate_many`.
+
+    Returns
+    -------
+    MeasureComparison
+        For PGA, PGV, each spectral acceleration, and PGA and PGV in a block's own units.
+
+    Raises
+    ------
+    InvalidOption
+        If an argument is out of its range, fewer than two motions overturn a block, or a block never comes to rest.
+    InvalidMotion
+        If a motion is zero throughout.
+
+    Notes
+    -----
+    Every motion is scaled up until it overturns the block (`incremental_dynamic_analysis`). The logarithm of its
+    intensity there, ln x, has the standard deviation beta over the motions: the dispersion of the fragility that is the
+    distribution of x, and the less, the more efficient the measure. The interval of beta is that of a normal sample.
+    Over several blocks beta is pooled from the deviations from each block's own mean; a measure that is to serve them
+    all must also have a small deviation from one mean.
+
+    References
+    ----------
+    Vamvatsikos, D. and Cornell, C. A. (2002). Incremental dynamic analysis. Earthquake Engineering and Structural
+    Dynamics 31(3), 491-514.
+
+    Examples
+    --------
+    Rectangular pulses overturn a small block by their velocity, whatever their length:
+
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=0.5, alpha=0.1, restitution=0.5)
+    >>> pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.05, 0.1, 0.2)]
+    >>> found = compare_measures(block, pulses, periods=[1.0])
+    >>> [f"{name} {beta:.2f}" for name, beta in zip(found.measure.values, found.dispersion.values)]
+    ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / (g tan α) 0.67', 'p PGV / (g tan α) 0.02']
+    """
+    many, shaken = Blocks.of(blocks), accepted.several_motions(motions)
+    times = checks.positive_numbers(periods, "periods", InvalidOption)
+    scaled = incremental_dynamic_analysis(
+        many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress
+    )
+    measures = [
+        Measure("pga"),
+        Measure("pgv"),
+        *(Measure("sa", float(time), damping) for time in times),
+        Measure("pga_ratio"),
+        Measure("pgv_ratio"),
+    ]
+    lifting = Measure("pga_ratio").unit_of(many, model)
+    level = scaled.overturning_level.transpose("motion", "block").values
+    factors = level * lifting / np.array([motion.pga for motion in shaken])[:, None]
+    intensity = np.stack(
+        [
+            factors * np.array([measure.of(motion) for motion in shaken])[:, None] / measure.unit_of(many, model)
+            for measure in measures
+        ]
+    )
+    if np.any(np.isfinite(level).sum(axis=0) < 2):
+        raise InvalidOption("fewer than two motions overturn a block, however strong; a dispersion needs more")
+    found = _dataset(measures, intensity, scaled.motion.values)
+    return MeasureComparison(found.assign_attrs(blocks=described(blocks), model=model))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasureComparison(Result):
+    """Intensity measures side by side; from `compare_measures`.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Over (measure, motion, block): intensity, the lowest that overturns, in the measure's unit; NaN where none does.
+        Over (measure): median_intensity; dispersion (standard deviation of the logarithm about each block's own mean),
+        with dispersion_low and dispersion_high, its 90 % interval; dispersion_of_all, about one mean of all blocks;
+        unit.
+    """
+
+    TABLES = MappingProxyType(
+        {
+            "measures": ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"),
+            "intensities": ("intensity",),
+        }
+    )
+
+    def summary(self) -> str:
+        """Measures in a table, the most efficient first."""
+        data = self.data
+        several = data.sizes["block"] > 1
+        order = np.argsort(data.dispersion_of_all.values, kind="stable")
+        best = data.dispersion_of_all.values.min()
+        rows = [
+            [
+                str(data.measure.values[k]),
+                f"{data.median_intensity.values[k]:.3g} {data.unit.values[k]}".removesuffix(" 1"),
+                f"{data.dispersion.values[k]:.3f}",
+                f"{data.dispersion_low.values[k]:.3f} to {data.dispersion_high.values[k]:.3f}",
+                *([f"{data.dispersion_of_all.values[k]:.3f}"] if several else []),
+                f"{data.dispersion_of_all.values[k] / best:.2f}" if best > 0.0 else "-",
+            ]
+            for k in order
+        ]
+        head = f"{data.blocks}, {data.model} model: intensities at which {data.sizes['motion']} motions overturn"
+        columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if several else [])]
+        text = [head, "", text_table([*columns, "over the best"], rows)]
+        spared = int(np.sum(np.isnan(data.intensity.values[0])))
+        if spared:
+            text.append(f"left out: {spared} pairs of block and motion that overturn at no level looked at")
+        return "\n".join(text)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Measures and their dispersions by name."""
+        data = self.data
+        names = self.TABLES["measures"]
+        return {
+            "blocks": data.blocks,
+            "model": data.model,
+            "motions": [str(name) for name in data.motion.values],
+            "measures": [
+                {
+                    "measure": str(data.measure.values[k]),
+                    "unit": str(data.unit.values[k]),
+                    **{name: float(data[name].values[k]) for name in names},
+                    "intensity": data.intensity.values[k],
+                }
+                for k in range(data.sizes["measure"])
+            ],
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw the dispersion of each measure with its interval.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default in a new figure.
+        title : str
+            Title; by default the blocks and the model.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+        """
+        from rocking.plot import dispersions_figure
+
+        data = self.data
+        return dispersions_figure(
+            names=[str(name) for name in data.measure.values],
+            dispersion=data.dispersion.values,
+            low=data.dispersion_low.values,
+            high=data.dispersion_high.values,
+            title=title or f"{data.blocks}, {data.model} model, {data.sizes['motion']} motions",
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+def _dataset(measures: Sequence[Measure], intensity: Floats, motions: Floats) -> xr.Dataset:
+    import xarray as xr
+
+    logarithm = np.log(intensity)
+    count = np.isfinite(logarithm[0]).sum(axis=0)
+    within = logarithm - np.nanmean(logarithm, axis=1, keepdims=True)
+    pooled = np.sqrt(np.nansum(within**2, axis=(1, 2)) / (count.sum() - count.size))
+    # Motions are what is drawn: those of several blocks are the same.
+    low, high = _interval_factors(int(count.min()) - 1)
+    spread = "standard deviation of the logarithm of the intensity at overturning"
+    return xr.Dataset(
+        {
+            "intensity": (("measure", "motion", "block"), intensity, {"long_name": "lowest intensity that overturns"}),
+            "median_intensity": (
+                "measure",
+                np.exp(np.nanmean(logarithm, axis=(1, 2))),
+                {"long_name": "median of the intensities at overturning, in the measure's unit"},
+            ),
+            "dispersion": ("measure", pooled, {"units": "1", "long_name": f"{spread} about each block's own mean"}),
+            "dispersion_low": ("measure", low * pooled, {"units": "1", "long_name": "lower end of its interval"}),
+            "dispersion_high": ("measure", high * pooled, {"units": "1", "long_name": "upper end of its interval"}),
+            "dispersion_of_all": (
+                "measure",
+                np.nanstd(logarithm, axis=(1, 2), ddof=1),
+                {"units": "1", "long_name": f"{spread} about one mean of all blocks"},
+            ),
+        },
+        {
+            "measure": [_name(measure) for measure in measures],
+            "unit": ("measure", [measure.units for measure in measures]),
+            "motion": motions,
+        },
+    )
+
+
+def _interval_factors(freedom: int) -> tuple[float, float]:
+    """Return the ends of a standard deviation's interval over its estimate, for a normal sample."""
+    from scipy.special import chdtri
+
+    tail = 0.5 * (1.0 - _CONFIDENCE)
+    return float(np.sqrt(freedom / chdtri(freedom, tail))), float(np.sqrt(freedom / chdtri(freedom, 1.0 - tail)))
+
+
+def _name(measure: Measure) -> str:
+    short = {"pga": "PGA", "pgv": "PGV", "sa": f"SA({measure.period:g} s)" if measure.period else ""}
+    return short.get(measure.name, measure.quantity)

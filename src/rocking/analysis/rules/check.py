@@ -1,0 +1,216 @@
+"""A block under records: what each rule of thumb says of it, beside the exact answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from rocking.analysis.incremental import incremental_dynamic_analysis
+from rocking.analysis.rules.criteria import rate
+from rocking.block import Block
+from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import InvalidOption
+from rocking.motion.motion import Motion
+from rocking.progress import Progress
+from rocking.response import Response
+from rocking.response.verdict import in_brief
+from rocking.simulation import simulate
+from rocking.tables import named, text_table, write_text
+from rocking.treatment.base import Model
+
+#: Names of the rules for people.
+TITLES: Final = MappingProxyType(
+    {
+        "west": "West",
+        "ishiyama": "Ishiyama",
+        "housner": "Housner",
+        "asce_43_05": "ASCE 43-05",
+        "priestley": "Priestley",
+    }
+)
+
+#: Width, relative to it, of the level that overturns first: a margin is read to three digits.
+_TOLERANCE: Final = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """Rules of thumb beside the exact answer, for a block under several motions; from `check`.
+
+    Attributes
+    ----------
+    block : Block
+        What rocks.
+    records : tuple of str
+        Name of each motion.
+    responses : tuple of Response
+        Exact response to each.
+    ratios : tuple of mapping of str to float
+        For each motion, demand over capacity by each rule.
+    margins : tuple of float
+        For each motion, one over the lowest factor on it at which the block is found to overturn: what the ratio of a
+        perfect rule is. NaN if it overturns at none.
+    """
+
+    block: Block
+    records: tuple[str, ...]
+    responses: tuple[Response, ...]
+    ratios: tuple[Mapping[str, float], ...]
+    margins: tuple[float, ...]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return demand, ratios and the exact answer for each record; units are in the names."""
+        return [
+            {
+                "record": name,
+                named("pga", "g"): _motion(response).pga / STANDARD_GRAVITY,
+                named("pgv", "m/s"): _motion(response).pgv,
+                **ratios,
+                "exact": margin,
+                "peak_over_slenderness": response.peak_over_slenderness,
+                "overturned": response.overturned,
+                "verdict": in_brief(response),
+            }
+            for name, response, ratios, margin in zip(
+                self.records, self.responses, self.ratios, self.margins, strict=True
+            )
+        ]
+
+    def summary(self) -> str:
+        """Return the table for people."""
+        rules = [*self.ratios[0]]
+        shown = {
+            "record": "record",
+            named("pga", "g"): "PGA, g",
+            named("pgv", "m/s"): "PGV, m/s",
+            **{rule: TITLES[rule] for rule in rules},
+            "exact": "exact",
+            "peak_over_slenderness": "peak/slenderness",
+            "verdict": "exact verdict",
+        }
+        rows = self.rows()
+        table = text_table(list(shown.values()), [[_short(row[name]) for name in shown] for row in rows])
+        return "\n".join(
+            [
+                str(self.block),
+                "demand over capacity by each rule, and exactly: from 1 on the block overturns",
+                "",
+                table,
+                *(["", *self._disagreements(rules)] if rules else []),
+            ]
+        )
+
+    def _disagreements(self, rules: list[str]) -> list[str]:
+        """Say of each rule how often it is wrong, and how."""
+        lines = []
+        for rule in rules:
+            said = [ratios[rule] >= 1.0 for ratios in self.ratios]
+            fell = [response.overturned for response in self.responses]
+            unsafe = sum(not yes and real for yes, real in zip(said, fell, strict=True))
+            wary = sum(yes and not real for yes, real in zip(said, fell, strict=True))
+            right = len(said) - unsafe - wary
+            lines.append(f"{TITLES[rule]}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(said)}")
+        return lines
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table for machines."""
+        return {"block": str(self.block), "records": self.rows()}
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the table as text columns with a header.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        import pandas
+
+        write_text(path, pandas.DataFrame(self.rows()).to_csv(index=False, lineterminator="\n"))
+
+
+def check(
+    block: Block,
+    motions: Mapping[str, Motion],
+    *,
+    rules: Iterable[str] | None = None,
+    model: Model = "nonlinear",
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Check:
+    """Apply rules of thumb to a block under motions, and compute what it really does.
+
+    Parameters
+    ----------
+    block : Block
+        What rocks.
+    motions : mapping of str to Motion
+        Motions by the names that the table shows.
+    rules : iterable of str, optional
+        Names in `RULES`; by default all.
+    model : {"nonlinear", "linear"}
+        Equation of motion of the exact answer.
+    threads, progress
+        As for `simulate_many`.
+
+    Returns
+    -------
+    Check
+
+    Raises
+    ------
+    InvalidOption
+        If there is no motion, or no rule of a name, or the block never comes to rest (restitution 1).
+    InvalidBlock, InvalidMotion
+        As the rules, and if a motion is zero throughout.
+
+    Notes
+    -----
+    The exact margin comes from `incremental_dynamic_analysis`, whose levels are 5 % apart: a thinner band of levels
+    that overturn may lie below it.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> tombstone = rocking.Block(width=0.3, height=0.9)
+    >>> records = {name: rocking.records.load(name) for name in ["el-centro-meloland-270", "el-centro-meloland-360"]}
+    >>> found = check(tombstone, records, rules=["west", "ishiyama"])
+    >>> for row in found.rows():
+    ...     print(f"{row['west']:.2f} {row['ishiyama']:.2f} {row['exact']:.2f} {row['verdict']}")
+    0.90 0.90 0.71 does not move
+    0.93 0.93 0.64 does not move
+    """
+    if not motions:
+        raise InvalidOption("motions must hold at least one motion")
+    names = None if rules is None else [*rules]
+    responses, ratios, margins = [], [], []
+    with Progress("checking", total=len(motions), show=progress) as bar:
+        for motion in motions.values():
+            ratings = rate(block, motion, names)
+            ratios.append({name: float(rating.ratio[0]) for name, rating in ratings.items()})
+            responses.append(simulate(block, motion, model=model))
+            margins.append(_margin(responses[-1], block, motion, model, threads))
+            bar.advance()
+    return Check(block, tuple(motions), tuple(responses), tuple(ratios), tuple(margins))
+
+
+def _margin(response: Response, block: Block, motion: Motion, model: Model, threads: int | None) -> float:
+    """One over the lowest factor on the motion that overturns the block; 1 at least where the motion itself does."""
+    scaled = incremental_dynamic_analysis(
+        block, motion, model=model, tolerance=_TOLERANCE, threads=threads, progress=False
+    )
+    margin = motion.pga / float(scaled.overturning_level[0, 0])
+    return float(max(margin, 1.0)) if response.overturned else margin
+
+
+def _motion(response: Response) -> Motion:
+    assert response.motion is not None
+    return response.motion
+
+
+def _short(entry: Any) -> Any:
+    """Numbers to three digits: no rule of thumb is better than that."""
+    return float(f"{entry:.3g}") if isinstance(entry, float) else entry

@@ -1,0 +1,436 @@
+"""Rules of thumb of the practice: what each makes of a block and a motion, as demand over capacity.
+
+Every demand here grows in proportion with the motion, so a ratio of 0.5 says that by the rule the motion may double.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.block import Block, Blocks
+from rocking.errors import InvalidBlock, InvalidOption
+from rocking.motion.accepted import several_motions
+from rocking.motion.motion import Motion
+
+#: Share of the velocity that would overturn a block at one blow, from which on Ishiyama sees blocks overturn.
+_ISHIYAMA: Final = 0.4
+
+#: Periods, s, over which Housner (1952) takes the mean of a spectrum.
+_HOUSNER_PERIODS: Final = np.linspace(0.1, 2.5, 97)
+
+#: Rotations over slenderness at which a spectrum is compared with the block: at the first the oscillators are stiff, at
+#: the last a rocking period is 30/p.
+_SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False), np.linspace(0.5, 0.999, 26))
+
+#: Damping over -ln e^2 (Makris and Konstantinidis 2003).
+_DAMPING: Final = 0.34
+
+
+@dataclass(frozen=True, eq=False)
+class Rating:
+    """What a rule makes of n blocks under one motion.
+
+    Attributes
+    ----------
+    rule : str
+        Name of the rule.
+    demand, capacity : ndarray, shape (n,)
+        What the motion asks of the weaker side of each block, and what that side has.
+    unit : str
+        Their unit; "1" if they have none.
+    """
+
+    rule: str
+    demand: Floats
+    capacity: Floats
+    unit: str
+
+    @property
+    def ratio(self) -> Floats:
+        """Demand over capacity, shape (n,)."""
+        return np.asarray(self.demand / self.capacity)
+
+    @property
+    def overturns(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """Whether the rule says that the block may overturn: a ratio of 1 or more, shape (n,)."""
+        return np.asarray(self.ratio >= 1.0)
+
+
+def west(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+    """Compare the peak acceleration with the static threshold g tan(alpha): West's formula.
+
+    Parameters
+    ----------
+    blocks : Blocks, Block or iterable of Block
+        n blocks.
+    motion : Motion
+        Ground motion.
+
+    Returns
+    -------
+    Rating
+        PGA, m/s^2, over g tan(alpha).
+
+    Notes
+    -----
+    It is the acceleration that lifts the block, which is necessary for overturning but not sufficient.
+
+    References
+    ----------
+    Milne, J. and Omori, F. (1893). On the overturning and fracturing of brick and other columns by horizontally applied
+    motion. Seismological Journal of Japan 1, 59-86; the formula is attributed to C. D. West.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, gravity=10.0)
+    >>> round(float(west(block, rocking.pulses.half_sine(1.0, 0.5)).capacity[0]), 4)
+    2.0271
+    """
+    many = Blocks.of(blocks)
+    return _weaker("west", _shaking(motion).pga, many.gravity * np.tan(many.alpha), "m/s^2")
+
+
+def ishiyama(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+    """Ask for a peak acceleration as well as a peak velocity: Ishiyama's criteria.
+
+    Parameters
+    ----------
+    blocks, motion
+        As for `west`.
+
+    Returns
+    -------
+    Rating
+        The lesser of PGA/(g tan(alpha)) and PGV/(0.4 V), over 1.
+
+    Notes
+    -----
+    V = 2 g sin(alpha/2)/(p cos(alpha)) is the sudden velocity of the ground after which a block at rest just reaches
+    its balance point: the momentum about the pivot, m V R cos(alpha) = I theta', gives it the energy
+    I theta'^2/2 = m g R (1 - cos(alpha)), with I = m g R/p^2. For a rectangle that is Ishiyama's
+    V^2 = 8 g R (1 - cos(alpha))/(3 cos(alpha)^2), and 0.4 V is close to 10 B/sqrt(H) cm/s, with width B and height H in
+    cm. The factor 0.4 comes from his simulations; both criteria are lower limits.
+
+    References
+    ----------
+    Ishiyama, Y. (1982). Motions of rigid bodies and criteria for overturning by earthquake excitations. Earthquake
+    Engineering and Structural Dynamics 10(5), 635-650.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> tombstone = rocking.Block(width=0.3, height=0.9)
+    >>> record = rocking.records.load("el-centro-meloland-270")
+    >>> f"{ishiyama(tombstone, record).ratio[0]:.3f}"
+    '0.895'
+    """
+    many = Blocks.of(blocks)
+    shaking = _shaking(motion)
+    acceleration = shaking.pga / (many.gravity * np.tan(many.alpha))
+    velocity = shaking.pgv / (_ISHIYAMA * overturning_velocity(many))
+    return _weaker("ishiyama", np.minimum(acceleration, velocity), np.ones_like(velocity), "1")
+
+
+def overturning_velocity(blocks: Blocks) -> Floats:
+    """Sudden ground velocity after which a block at rest just reaches its balance point, m/s, shape (n, 2).
+
+    Examples
+    --------
+    By energy and angular momentum of a rectangle, V^2 = 8 g R (1 - cos(alpha))/(3 cos(alpha)^2):
+
+    >>> import rocking
+    >>> block = rocking.Block(half_width=0.15, half_height=0.45)
+    >>> squared = 8.0 * 9.80665 * block.radius * (1.0 - math.cos(block.alpha)) / (3.0 * math.cos(block.alpha) ** 2)
+    >>> bool(abs(overturning_velocity(Blocks.of(block))[0, 0] ** 2 / squared - 1.0) < 1e-12)
+    True
+    """
+    return np.asarray(2.0 * blocks.gravity * np.sin(0.5 * blocks.alpha) / (blocks.p * np.cos(blocks.alpha)))
+
+
+def housner(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+    """Compare energies: one block in two overturns where alpha = S_v sqrt(m R/(g I)) = p S_v/g (Housner).
+
+    Parameters
+    ----------
+    blocks, motion
+        As for `west`.
+
+    Returns
+    -------
+    Rating
+        p S_v/g, rad, over alpha.
+
+    Raises
+    ------
+    InvalidMotion
+        As `Motion.spectral_acceleration`.
+
+    Notes
+    -----
+    The mean energy of a block under white noise is set equal to what takes it to its balance point, m g R alpha^2/2 of
+    a slender one. The undamped velocity spectrum S_v of white noise does not depend on the period; that of a motion
+    does, and is taken here as the mean of 2 pi S_d/T over periods T of 0.1 to 2.5 s, Housner's spectrum intensity over
+    its range.
+
+    References
+    ----------
+    Housner, G. W. (1963). The behavior of inverted pendulum structures during earthquakes. Bulletin of the
+    Seismological Society of America 53(2), 403-417.
+
+    Housner, G. W. (1952). Spectrum intensities of strong-motion earthquakes. Symposium on Earthquake and Blast Effects
+    on Structures, 20-36.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> tombstone = rocking.Block(width=0.3, height=0.9)
+    >>> record = rocking.records.load("el-centro-meloland-270")
+    >>> f"{housner(tombstone, record).ratio[0]:.3f}"
+    '1.840'
+    """
+    many = Blocks.of(blocks)
+    return _weaker("housner", many.p * mean_spectral_velocity(_shaking(motion)) / many.gravity, many.alpha, "rad")
+
+
+def mean_spectral_velocity(motion: Motion) -> float:
+    """Mean of the undamped pseudo-velocity over periods of 0.1 to 2.5 s, m/s (Housner 1952)."""
+    periods = _HOUSNER_PERIODS
+    velocities = motion.spectral_acceleration(periods, 0.0) * periods / (2.0 * np.pi)
+    return float(np.trapezoid(velocities, periods) / (periods[-1] - periods[0]))
+
+
+def asce_43_05(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+    """Replace the block by an oscillator with its energy and damping: the approximate method of ASCE/SEI 43-05.
+
+    Parameters
+    ----------
+    blocks, motion
+        As for `west`.
+
+    Returns
+    -------
+    Rating
+        Spectral acceleration over the block's capacity, both m/s^2, at the balance point.
+
+    Raises
+    ------
+    InvalidMotion
+        As `Motion.spectral_acceleration`.
+
+    Notes
+    -----
+    For a rotation theta_0, with a = tan(alpha), f_1 = cos(theta_0) + a sin(theta_0) - 1 and C_I = I/(m h^2):
+
+    - capacity 2 g f_1/theta_0: the work of a steady acceleration up to theta_0 that raises the block, m g h f_1, taken
+      as that of a spring;
+    - frequency (1/2 pi) sqrt(2 f_1 g/(C_I theta_0^2 h)) = (p/2 pi) sqrt(2 f_1 cos(alpha))/theta_0;
+    - damping gamma/sqrt(4 pi^2 + gamma^2), gamma = -2 ln C_R: an oscillator that loses in one cycle what two impacts
+      take. C_R is the block's restitution; the standard's 1 - 2 a^2/C_I is Housner's.
+
+    The rocking angle is the largest at which the spectrum meets the capacity, that of the lowest frequency. Where the
+    spectrum is above the capacity at the balance point, theta_0 = alpha, there is none: by the method the block
+    overturns. The motion is horizontal alone, and the mass that is shaken is the mass that resists, so the standard's
+    correction for vertical motion and its ratio of masses are 1. No factor of safety is applied.
+
+    References
+    ----------
+    ASCE (2005). Seismic Design Criteria for Structures, Systems, and Components in Nuclear Facilities. ASCE/SEI 43-05,
+    Appendix A, section A.2.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> tombstone = rocking.Block(width=0.3, height=0.9)
+    >>> record = rocking.records.load("el-centro-meloland-270")
+    >>> f"{asce_43_05(tombstone, record).ratio[0]:.3f}"
+    '1.579'
+    """
+    return _along_rotations("asce_43_05", blocks, _shaking(motion), _reserve_energy, "m/s^2")
+
+
+def priestley(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+    """Replace the block by an oscillator with the period of free rocking: Priestley, Evison and Carr, in FEMA 356.
+
+    Parameters
+    ----------
+    blocks, motion
+        As for `west`.
+
+    Returns
+    -------
+    Rating
+        Spectral displacement over that of the block's centre of mass, both m, at the rotation below the balance point
+        where their ratio is least. Below 1 the method finds a rocking angle, from 1 on none: by it the block overturns.
+
+    Raises
+    ------
+    InvalidBlock
+        If a restitution is so low (below 0.23) that the damping would be critical.
+    InvalidMotion
+        As `Motion.spectral_acceleration`.
+
+    Notes
+    -----
+    For a rotation theta_0:
+
+    - period (4/p) acosh(1/(1 - theta_0/alpha)), Housner's of free rocking of a slender block;
+    - damping -0.34 ln r, r = e^2, the line that Makris and Konstantinidis put through the decay of free rocking;
+    - displacement R (sin(alpha) - sin(alpha - theta_0)), half the width at the balance point; R = 3 g/(4 p^2), so the
+      block counts as rectangular.
+
+    References
+    ----------
+    Priestley, M. J. N., Evison, R. J. and Carr, A. J. (1978). Seismic response of structures free to rock on their
+    foundations. Bulletin of the New Zealand National Society for Earthquake Engineering 11(3), 141-150.
+
+    Makris, N. and Konstantinidis, D. (2003). The rocking spectrum and the limitations of practical design
+    methodologies. Earthquake Engineering and Structural Dynamics 32(2), 265-289.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> tombstone = rocking.Block(width=0.3, height=0.9)
+    >>> record = rocking.records.load("el-centro-meloland-270")
+    >>> f"{priestley(tombstone, record).ratio[0]:.3f}"
+    '1.070'
+    """
+    many = Blocks.of(blocks)
+    lowest = math.exp(-0.5 / _DAMPING)
+    if many.restitution.min() <= lowest:
+        raise InvalidBlock(
+            f"priestley needs a restitution above {lowest:.2g}, from where on its damping is below critical, not "
+            f"{many.restitution.min():g}; leave that rule out"
+        )
+    return _along_rotations("priestley", many, _shaking(motion), _free_rocking, "m")
+
+
+#: Rules by name.
+RULES: Final[Mapping[str, Callable[[Blocks | Block | Iterable[Block], Motion], Rating]]] = MappingProxyType(
+    {rule.__name__: rule for rule in (west, ishiyama, housner, asce_43_05, priestley)}
+)
+
+
+def rate(
+    blocks: Blocks | Block | Iterable[Block], motion: Motion, rules: Iterable[str] | None = None
+) -> dict[str, Rating]:
+    """Apply several rules to blocks under a motion.
+
+    Parameters
+    ----------
+    blocks, motion
+        As for `west`.
+    rules : iterable of str, optional
+        Names in `RULES`; by default all.
+
+    Returns
+    -------
+    dict of str to Rating
+        By the rule's name.
+
+    Raises
+    ------
+    InvalidOption
+        If there is no rule of a name.
+    InvalidBlock, InvalidMotion
+        As the rules do.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> record = rocking.records.load("el-centro-meloland-270")
+    >>> [*rate(rocking.Block(width=0.3, height=0.9), record, ["west", "ishiyama"])]
+    ['west', 'ishiyama']
+    """
+    names = [*RULES] if rules is None else [checks.one_of(name, "rules", InvalidOption, [*RULES]) for name in rules]
+    many = Blocks.of(blocks)
+    return {name: RULES[name](many, motion) for name in names}
+
+
+@dataclass(frozen=True)
+class _Oscillator:
+    """Oscillators that stand for one side of a block at some rotations.
+
+    Attributes
+    ----------
+    periods : ndarray
+        Their periods, s.
+    damping : float
+        Fraction of critical.
+    capacities : ndarray
+        What the side has there.
+    per_acceleration : ndarray
+        Demand for a spectral acceleration of 1 m/s^2.
+    """
+
+    periods: Floats
+    damping: float
+    capacities: Floats
+    per_acceleration: Floats
+
+
+def _reserve_energy(p: float, alpha: float, restitution: float, gravity: float, share: float = 1.0) -> _Oscillator:
+    """ASCE/SEI 43-05, Appendix A.2, at one rotation over slenderness: by default at the balance point."""
+    rotation = np.array([share * alpha])
+    # cos(t) + a sin(t) - 1 without the difference of numbers next to 1.
+    raised = 2.0 * np.sin(0.5 * rotation) * (math.tan(alpha) * np.cos(0.5 * rotation) - np.sin(0.5 * rotation))
+    periods = 2.0 * np.pi * rotation / (p * np.sqrt(2.0 * raised * math.cos(alpha)))
+    decay = -2.0 * math.log(restitution)
+    damping = decay / math.hypot(2.0 * math.pi, decay)
+    return _Oscillator(periods, damping, 2.0 * gravity * raised / rotation, np.ones_like(rotation))
+
+
+def _free_rocking(p: float, alpha: float, restitution: float, gravity: float) -> _Oscillator:
+    """Priestley, Evison and Carr (1978)."""
+    periods = 4.0 / p * np.arccosh(1.0 / (1.0 - _SHARES))
+    radius = 0.75 * gravity / p**2
+    displacements = radius * (math.sin(alpha) - np.sin(alpha * (1.0 - _SHARES)))
+    per_acceleration = (periods / (2.0 * np.pi)) ** 2
+    return _Oscillator(periods, -2.0 * _DAMPING * math.log(restitution), displacements, per_acceleration)
+
+
+def _along_rotations(
+    rule: str,
+    blocks: Blocks | Block | Iterable[Block],
+    motion: Motion,
+    oscillator_of: Callable[[float, float, float, float], _Oscillator],
+    unit: str,
+) -> Rating:
+    """Rating at the rotation where the demand on the oscillators is least, over their capacity."""
+    many = Blocks.of(blocks)
+    sides = np.stack([many.p, many.alpha, many.restitution], axis=-1).reshape(-1, 3)
+    # Both sides of a symmetric block, and blocks that repeat, are looked at once.
+    distinct, place = np.unique(sides, axis=0, return_inverse=True)
+    found = np.empty((len(distinct), 2))
+    for k, (p, alpha, restitution) in enumerate(distinct.tolist()):
+        here = oscillator_of(p, alpha, restitution, many.gravity)
+        demands = here.per_acceleration * motion.spectral_acceleration(here.periods, here.damping)
+        least = int(np.argmin(demands / here.capacities))
+        found[k] = demands[least], here.capacities[least]
+    demand, capacity = found[place.reshape(-1)].reshape(len(many), 2, 2).transpose(2, 0, 1)
+    return _weaker(rule, demand, capacity, unit)
+
+
+def _shaking(motion: Motion) -> Motion:
+    (shaking,) = several_motions([motion])
+    return shaking
+
+
+def _weaker(rule: str, demand: float | Floats, capacity: Floats, unit: str) -> Rating:
+    """Rating of the side of each block, shape (n, 2), with the larger ratio."""
+    demands, capacities = np.broadcast_arrays(demand, capacity)
+    side = np.argmax(demands / capacities, axis=1)[:, None]
+    return Rating(
+        rule,
+        np.take_along_axis(demands, side, axis=1)[:, 0],
+        np.take_along_axis(capacities, side, axis=1)[:, 0],
+        unit,
+    )

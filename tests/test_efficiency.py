@@ -1,0 +1,97 @@
+"""Efficiency of intensity measures: against closed forms of pulses and a sample of known dispersion."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+import rocking
+from rocking import compare_measures
+from rocking.constants import STANDARD_GRAVITY as G
+
+SLENDER = rocking.Block.from_parameters(p=1.0, alpha=1e-3, restitution=0.5)
+LENGTHS = np.array([0.3, 0.6, 1.2, 2.4, 4.8])
+
+
+@pytest.fixture(scope="module")
+def rectangles():
+    pulses = [rocking.pulses.rectangular(1.0, length) for length in LENGTHS]
+    return compare_measures(SLENDER, pulses, periods=[0.7], model="linear", tolerance=1e-9, progress=False)
+
+
+def test_dispersions_are_those_of_the_closed_form_of_rectangular_pulses(rectangles):
+    amplitude = G * 1e-3 / -np.expm1(-LENGTHS)
+    names = {"PGA": amplitude, "PGV": amplitude * LENGTHS, "PGA / (g tan α)": amplitude}
+    for name, capacity in names.items():
+        found = rectangles.sel(measure=name)
+        assert float(found.dispersion) == pytest.approx(np.std(np.log(capacity), ddof=1), rel=1e-7)
+        assert float(found.dispersion_of_all) == pytest.approx(float(found.dispersion), rel=1e-12)
+    np.testing.assert_allclose(rectangles.intensity.sel(measure="PGA").values[:, 0], amplitude, rtol=1e-8)
+    np.testing.assert_allclose(
+        rectangles.intensity.sel(measure="p PGV / (g tan α)").values[:, 0], amplitude * LENGTHS / (G * 1e-3), rtol=1e-8
+    )
+
+
+def test_the_interval_is_that_of_a_normal_sample(rectangles):
+    beta = rectangles.dispersion.values
+    low, high = (np.sqrt(4.0 / chi2.ppf(share, 4)) for share in (0.95, 0.05))
+    np.testing.assert_allclose(rectangles.dispersion_low.values, low * beta, rtol=1e-12)
+    np.testing.assert_allclose(rectangles.dispersion_high.values, high * beta, rtol=1e-12)
+
+
+def test_a_measure_that_was_scattered_by_hand_gets_its_scatter_back():
+    # The same pulse, each time with another sudden, harmless burst that only the peak acceleration sees.
+    rng = np.random.default_rng(3)
+    scatter = rng.lognormal(0.0, 0.4, 12)
+    motions = []
+    for factor in scatter:
+        peak = 60.0 * factor
+        motions.append(
+            rocking.Motion.from_points(
+                [0.0, 1e-5, 2e-5, 4e-5, 6e-5, 7e-5, 8e-5, 0.5, 1.0, 1.5],
+                [0.0, peak, 0.0, -0.0, -0.0, -peak, 0.0, 0.0, 4.0, 0.0],
+            )
+        )
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2)
+    found = compare_measures(block, motions, periods=[1.0], tolerance=1e-6, progress=False)
+    expected = float(np.std(np.log(scatter), ddof=1))
+    assert float(found.dispersion.sel(measure="PGA")) == pytest.approx(expected, rel=0.02)
+    assert float(found.dispersion.sel(measure="PGV")) < 0.02
+    assert found.summary().splitlines()[3].startswith(("PGV", "SA(1 s)", "p PGV"))
+
+
+def test_a_measure_in_the_blocks_own_units_serves_blocks_of_all_sizes():
+    blocks = [rocking.Block.from_parameters(p=p, alpha=0.1, restitution=0.6) for p in (1.0, 2.0, 4.0)]
+    # Each pulse is short for every block, so that its velocity counts.
+    pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.005, 0.01, 0.02)]
+    found = compare_measures(blocks, pulses, periods=[1.0], model="linear", progress=False)
+    within, overall = found.dispersion.to_series(), found.dispersion_of_all.to_series()
+    assert within["PGV"] == pytest.approx(within["p PGV / (g tan α)"], rel=1e-9)
+    assert overall["p PGV / (g tan α)"] < 0.03 < 0.5 < overall["PGV"]
+    assert "of all blocks" in found.summary()
+    assert found.to_dict()["measures"][0]["unit"] == "m/s^2"
+
+
+def test_what_cannot_be_compared_is_told_in_one_sentence():
+    pulse = rocking.pulses.half_sine(1.0, 1.0)
+    with pytest.raises(rocking.InvalidOption, match="fewer than two motions overturn a block"):
+        compare_measures(SLENDER, pulse, progress=False)
+    with pytest.raises(rocking.InvalidOption, match="periods must be one or more positive"):
+        compare_measures(SLENDER, [pulse, pulse], periods=[0.0], progress=False)
+
+
+def test_the_command_prints_and_writes_the_comparison(run, tmp_path):
+    pulses = ["--pulse", "half-sine:amplitude=1,frequency=1Hz", "--pulse", "half-sine:amplitude=1,frequency=2Hz"]
+    sizes = ["--width", "0.24", "--height", "1.1", "--periods", "0.5,2"]
+    code, out, err = run("measures", *pulses, *sizes, "--out", tmp_path)
+    assert (code, err) == (0, "")
+    assert "intensities at which 2 motions overturn" in out and "SA(0.5 s)" in out
+    names = {"measures.csv", "intensities.csv", "measures.nc", "measures.pdf", "measures.png", "result.json"}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    rows = json.loads((tmp_path / "result.json").read_text("utf-8"))["measures"]
+    first = rows[0]["intensity"]
+    assert rows[0]["dispersion"] == pytest.approx(abs(math.log(first[0][0] / first[1][0])) / math.sqrt(2.0))
+    header = (tmp_path / "measures.csv").read_text("utf-8").splitlines()[0]
+    assert header.startswith("measure,unit,median_intensity,dispersion,")

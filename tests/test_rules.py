@@ -1,0 +1,205 @@
+"""Rules of thumb: their formulas against simulations, quadrature and the forms in which they are printed."""
+
+import importlib.util
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import rocking
+from rocking import rules
+from rocking.analysis.rules import criteria
+from rocking.constants import STANDARD_GRAVITY as G
+
+RECORD = "el-centro-meloland-270"
+TOMBSTONE = rocking.Block(width=0.3, height=0.9)
+
+
+@pytest.fixture(scope="module")
+def record():
+    return rocking.records.load(RECORD).processed(trim=(5.0, 15.0))
+
+
+@pytest.mark.parametrize(("p", "alpha"), [(2.0, 0.1), (4.0, 0.3), (3.0, 0.5)])
+def test_the_overturning_velocity_takes_a_block_at_rest_just_to_its_balance_point(p, alpha):
+    block = rocking.Block.from_parameters(p=p, alpha=alpha)
+    velocity = criteria.overturning_velocity(rocking.Blocks.of(block))[0, 0]
+    # Momentum about the pivot, m V R cos(alpha) = I w.
+    speed = velocity * p**2 * math.cos(alpha) / G
+    for factor, falls in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
+        assert rocking.simulate(block, None, initial_velocity=factor * speed).overturned is falls
+
+
+def test_ishiyamas_velocity_is_ten_widths_over_the_root_of_the_height_in_centimetres():
+    for width, height in ((10.0, 100.0), (30.0, 150.0), (50.0, 400.0)):
+        block = rocking.Blocks.of(rocking.Block(width=width / 100.0, height=height / 100.0))
+        velocity = 100.0 * 0.4 * criteria.overturning_velocity(block)[0, 0]
+        assert velocity == pytest.approx(10.0 * width / math.sqrt(height), rel=0.05)
+
+
+def test_ishiyama_asks_for_acceleration_and_velocity():
+    long, short = rocking.pulses.half_sine(2.0, 0.2), rocking.pulses.half_sine(20.0, 20.0)
+    weak, quick = rules.ishiyama(TOMBSTONE, long), rules.ishiyama(TOMBSTONE, short)
+    assert weak.ratio[0] == pytest.approx(2.0 / (G * math.tan(TOMBSTONE.alpha)), rel=1e-9)
+    velocity = 0.4 * criteria.overturning_velocity(rocking.Blocks.of(TOMBSTONE))[0, 0]
+    assert quick.ratio[0] == pytest.approx(short.pgv / velocity, rel=1e-12)
+    assert not weak.overturns[0]
+
+
+def test_the_static_threshold_is_what_lifts_the_block():
+    pulse = rocking.pulses.half_sine(1.0, 1.0)
+    for excess, lifted in ((1.0 - 1e-9, 0), (1.0 + 1e-9, 1)):
+        scaled = pulse.scaled(excess / rules.west(TOMBSTONE, pulse).ratio[0])
+        assert len(rocking.simulate(TOMBSTONE, scaled).events) >= lifted
+        assert rules.west(TOMBSTONE, scaled).overturns[0] == bool(lifted)
+
+
+def test_under_a_blow_every_spectral_velocity_is_that_of_the_ground():
+    # An undamped oscillator at rest goes on with the speed of the blow, whatever its period.
+    blow = rocking.Motion.from_points([0.0, 1e-5, 2e-5], [0.0, 0.5e5, 0.0])
+    assert blow.pgv == pytest.approx(0.5, rel=1e-12)
+    assert criteria.mean_spectral_velocity(blow) == pytest.approx(0.5, rel=1e-6)
+    block = rocking.Block.from_parameters(p=3.0, alpha=0.2)
+    assert rules.housner(block, blow).ratio[0] == pytest.approx(3.0 * 0.5 / (G * 0.2), rel=1e-6)
+
+
+def test_housners_criterion_is_the_energy_of_the_balance_point():
+    block = rocking.Block.from_parameters(p=3.0, alpha=0.01)
+    velocity = criteria.overturning_velocity(rocking.Blocks.of(block))[0, 0]
+    assert velocity == pytest.approx(G * 0.01 / 3.0, rel=1e-4)
+
+
+def test_asce_43_05_in_the_terms_of_the_standard(record):
+    b, h = 0.15, 0.45
+    a, inertia = b / h, 4.0 / 3.0 * (1.0 + (b / h) ** 2)
+    decay = -2.0 * math.log(1.0 - 2.0 * a**2 / inertia)
+    damping = decay / math.sqrt(4.0 * math.pi**2 + decay**2)
+    rotation = math.atan(a)
+    raised = math.cos(rotation) + a * math.sin(rotation) - 1.0
+    capacity = 2.0 * G * raised / rotation
+    frequency = math.sqrt(2.0 * raised * G / (inertia * rotation**2 * h)) / (2.0 * math.pi)
+    demand = record.spectral_acceleration(1.0 / frequency, damping)
+    rating = rules.asce_43_05(TOMBSTONE, record)
+    assert rating.capacity[0] == pytest.approx(capacity, rel=1e-12)
+    assert rating.ratio[0] == pytest.approx(demand / capacity, rel=1e-10)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.5, 1.0])
+def test_the_oscillator_of_asce_43_05_has_the_energy_of_the_block_and_loses_what_two_impacts_take(share):
+    p, alpha, e = 3.0, 0.25, 0.9
+    here = criteria._reserve_energy(p, alpha, e, G, share)
+    rotation = share * alpha
+    # Work against gravity about the pivot, over m g R; h = R cos(alpha), a spring's force grows with the rotation.
+    work = quad(lambda t: math.sin(alpha - t), 0.0, rotation)[0]
+    assert here.capacities[0] * math.cos(alpha) * rotation / (2.0 * G) == pytest.approx(work, rel=1e-11)
+    # I w^2 theta^2/2 is the same energy.
+    rate = 2.0 * math.pi / here.periods[0]
+    assert 0.5 * (rate * rotation / p) ** 2 == pytest.approx(work, rel=1e-11)
+    left = math.exp(-2.0 * math.pi * here.damping / math.sqrt(1.0 - here.damping**2))
+    assert left == pytest.approx(e**2, rel=1e-12)
+
+
+def test_the_period_of_priestley_is_that_of_free_rocking():
+    block = rocking.Block.from_parameters(p=3.0, alpha=0.1, restitution=0.9)
+    here = criteria._free_rocking(3.0, 0.1, 0.9, G)
+    for k in (0, 24, 55):
+        start = criteria._SHARES[k] * 0.1
+        free = rocking.simulate(block, None, model="linear", initial_rotation=start)
+        assert 4.0 * free.impacts["time"][0] == pytest.approx(here.periods[k], rel=1e-12)
+    # At the balance point the centre of mass stands above the pivot.
+    assert here.capacities[-1] == pytest.approx(block.radius * math.sin(0.1), rel=2e-3)
+
+
+@pytest.mark.parametrize("restitution", [0.75, 0.85, 0.95])
+def test_the_damping_of_priestley_lies_between_those_of_small_and_large_free_rocking(restitution):
+    block = rocking.Block.from_parameters(p=3.0, alpha=0.1, restitution=restitution)
+    dampings = []
+    for share in (1e-3, 0.8):
+        free = rocking.simulate(block, None, model="linear", initial_rotation=share * 0.1)
+        speed = free.impacts["speed_after"][3] / (3.0 * 0.1)
+        later = 2.0 * math.sin(0.5 * math.asin(speed)) ** 2
+        # Four impacts are two cycles.
+        dampings.append(math.log(share / later) / (4.0 * math.pi))
+    small, large = dampings
+    assert small == pytest.approx(-2.0 * math.log(restitution) / math.pi, rel=2e-3)
+    assert small < criteria._free_rocking(3.0, 0.1, restitution, G).damping < min(large, 1.1 * small)
+
+
+@pytest.mark.parametrize("name", rules.RULES)
+def test_every_demand_grows_with_the_motion_and_counts_the_weaker_side(name, record):
+    rule = rules.RULES[name]
+    strong, weak = rocking.Block.from_parameters(2.0, 0.3, 0.9), rocking.Block.from_parameters(3.0, 0.2, 0.8)
+    both = rocking.Block.from_parameters((2.0, 3.0), (0.3, 0.2), (0.9, 0.8))
+    rating = rule([strong, weak, both], record)
+    assert rating.rule == name
+    assert rating.ratio.shape == (3,)
+    assert rating.ratio[2] == rating.ratio[1] > rating.ratio[0]
+    np.testing.assert_allclose(rule([strong, weak, both], record.scaled(-1.7)).ratio, 1.7 * rating.ratio, rtol=1e-9)
+    np.testing.assert_array_equal(rule(weak, record).ratio, rating.ratio[1:2])
+    at_limit = record.scaled(1.0 / float(rating.ratio[1]))
+    assert rule(weak, at_limit.scaled(1.0 + 1e-9)).overturns[0]
+    assert not rule(weak, at_limit.scaled(1.0 - 1e-9)).overturns[0]
+
+
+def test_what_a_rule_cannot_take_is_told_in_one_sentence(record):
+    with pytest.raises(rocking.InvalidBlock, match=r"priestley needs a restitution above 0\.23"):
+        rules.priestley(rocking.Block.from_parameters(2.0, 0.2, 0.2), record)
+    with pytest.raises(rocking.InvalidOption, match="rules must be one of west, ishiyama"):
+        rules.rate(TOMBSTONE, record, ["wst"])
+    with pytest.raises(rocking.InvalidMotion, match="a Motion is needed, not None"):
+        rules.west(TOMBSTONE, None)
+    with pytest.raises(rocking.InvalidOption, match="at least one motion"):
+        rules.check(TOMBSTONE, {})
+
+
+def test_a_check_sets_the_rules_beside_the_exact_answer(record):
+    motions = {"as it is": record, "stronger": record.scaled(1.8)}
+    found = rules.check(TOMBSTONE, motions, rules=["west", "asce_43_05"])
+    once, more = found.rows()
+    assert more["west"] == pytest.approx(1.8 * once["west"])
+    assert more["exact"] == pytest.approx(1.8 * once["exact"], rel=1e-3)
+    assert (once["overturned"], more["overturned"]) == (False, True)
+    for excess, falls in ((1.0 - 2e-4, False), (1.0 + 2e-4, True)):
+        assert rocking.simulate(TOMBSTONE, record.scaled(excess / once["exact"])).overturned is falls
+    for low, words in (
+        (1.2, "right 1, unsafe 0, over-conservative 1"),
+        (0.5, "right 1, unsafe 1, over-conservative 0"),
+    ):
+        text = replace(found, ratios=({"west": low}, {"west": low})).summary()
+        assert f"West: {words} of 2" in text
+
+
+@pytest.mark.slow
+def test_the_tables_of_the_trial_are_those_that_the_script_makes():
+    path = Path(__file__).resolve().parents[1] / "scripts" / "rules_trial.py"
+    specification = importlib.util.spec_from_file_location("rules_trial", path)
+    script = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(script)
+    blocks, motions = script.all_blocks(), script.all_motions()
+    ratios = script.ratings(blocks, motions)
+    verdicts = script.verdict_table(blocks, motions, ratios, script.exact_verdicts(blocks, motions))
+    assert verdicts == (script.TABLES / "rules-verdicts.txt").read_text("utf-8")
+    capacities = script.capacity_table(ratios, script.exact_capacities(blocks, motions))
+    assert capacities == (script.TABLES / "rules-capacities.txt").read_text("utf-8")
+
+
+def test_the_command_prints_and_writes_the_check(run, tmp_path):
+    arguments = ["check", RECORD, "--width", "0.3", "--height", "0.9", "--rules", "west, ishiyama", "--out", tmp_path]
+    code, out, err = run(*arguments)
+    assert (code, err) == (0, "")
+    assert "exact verdict" in out and "does not move" in out and "Ishiyama: right 1" in out
+    assert {path.name for path in tmp_path.iterdir()} == {"check.csv", "result.json"}
+    (row,) = json.loads((tmp_path / "result.json").read_text("utf-8"))["records"]
+    assert row["west"] == rules.west(TOMBSTONE, rocking.records.load(RECORD)).ratio[0]
+    header = (tmp_path / "check.csv").read_text("utf-8").splitlines()[0]
+    assert header == "record,pga_g,pgv_m_s,west,ishiyama,exact,peak_over_slenderness,overturned,verdict"
+
+
+def test_a_rule_that_does_not_exist_is_told_by_the_option(run):
+    code, _, err = run("check", RECORD, "--width", "0.3", "--height", "0.9", "--rules", "wst")
+    assert code == 2
+    assert "--rules must be one of west, ishiyama, housner, asce_43_05, priestley, not 'wst'" in err
