@@ -274,7 +274,13 @@ def _motion(given: Texts, shelf: Shelf) -> _Found:
     if found.motion is None:
         raise InvalidOption("there is no motion to scale: choose one, or leave the scaling out")
     written = ", ".join(f"{key}={value!r}" for key, value in target.items())
-    return _Found(found.motion.scaled(**target), f"{found.python}.scaled({written})", found.words)
+    return _Found(_scaled(found.motion, **target), f"{found.python}.scaled({written})", found.words)
+
+
+@functools.lru_cache(maxsize=4)
+def _scaled(motion: Motion, **target: float) -> Motion:
+    """Scaled motion, made once while only the block is changed."""
+    return motion.scaled(**target)
 
 
 def _unscaled(name: str, given: Texts, shelf: Shelf) -> _Found:

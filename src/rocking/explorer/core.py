@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
 import tempfile
@@ -9,7 +10,6 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -82,7 +82,7 @@ class Shown:
     case: Case
     response: Response
 
-    @cached_property
+    @functools.cached_property
     def fine(self) -> Response:
         """The same response with more impacts resolved before each proven rest."""
         if self.case.treatment.name != _FINEST.name:
@@ -97,7 +97,7 @@ class Shown:
                 return self.fine
         return self.response
 
-    @cached_property
+    @functools.cached_property
     def ground(self) -> Motion | None:
         """The motion whose displacement is drawn."""
         return None if self.case.motion is None else _steady(self.case.motion)
@@ -400,15 +400,7 @@ def _facts(shown: Shown) -> dict[str, Any]:
             "outline": _outline(block),
             "notes": list(block_notes(block)),
         },
-        "motion": None
-        if motion is None
-        else {
-            "name": motion.name,
-            "duration": motion.duration,
-            "pga_g": motion.pga / gravity,
-            "notes": list(motion_notes(motion)),
-            "filtered": _drifts(motion),
-        },
+        "motion": None if motion is None else _motion_facts(motion, gravity),
         "model": case.model,
         "treatment": case.treatment.label,
         "duration": response.duration,
@@ -458,6 +450,18 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> str:
     unproven = rests - int(np.sum(np.isfinite(response.chattering["upper"])))
     doubt = "" if unproven == 0 else f" ({unproven} by the treatment, not proven)"
     return f"It rocks, {resting}{doubt}, and does not overturn."
+
+
+@functools.lru_cache(maxsize=4)
+def _motion_facts(motion: Motion, gravity: float) -> dict[str, Any]:
+    """What the page says of a motion, found once while only the block is changed."""
+    return {
+        "name": motion.name,
+        "duration": motion.duration,
+        "pga_g": motion.pga / gravity,
+        "notes": list(motion_notes(motion)),
+        "filtered": _drifts(motion),
+    }
 
 
 def _outline(block: Block) -> dict[str, Any]:

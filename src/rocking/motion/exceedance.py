@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
@@ -38,8 +39,10 @@ def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float 
     """
     plus, minus = thresholds
     towards_plus, towards_minus = _push(motion, -plus / gravity), _push(motion, minus / gravity)
-    crossings = [_crossings(towards_plus, -plus), _crossings(towards_minus, minus)]
-    cuts = np.unique(np.concatenate([towards_plus.breakpoints, *crossings]))
+    reaching = _reaching(towards_plus, plus) | _reaching(towards_minus, minus)
+    ends = towards_plus.breakpoints[np.append(reaching, False) | np.append(False, reaching)]
+    crossings = [_crossings(towards_plus, -plus, reaching), _crossings(towards_minus, minus, reaching)]
+    cuts = np.unique(np.concatenate([ends, *crossings]))
     middle = 0.5 * (cuts[:-1] + cuts[1:])
     beyond = (towards_minus.acceleration(middle) > minus) | (towards_plus.acceleration(middle) < -plus)
     return cuts[np.flatnonzero(np.diff(beyond, prepend=False, append=False))].reshape(-1, 2)
@@ -51,12 +54,18 @@ def _push(motion: Motion, threshold_over_g: float) -> Motion:
     return alone if motion.vertical is None else alone + motion.vertical.scaled(-threshold_over_g)
 
 
-def _crossings(motion: Motion, level: float) -> Floats:
-    """Find times, s, among which are all those at which the motion passes a level inside a piece."""
-    widths = np.diff(motion.breakpoints)
-    shifted = motion.coefficients.copy()
+def _reaching(motion: Motion, level: float) -> NDArray[np.bool_]:
+    """Which pieces may be of this magnitude somewhere: of a record with few strong pulses, few."""
+    bounds = piecewise.bounds(np.diff(motion.breakpoints), motion.coefficients)
+    return np.asarray(bounds >= level * (1.0 - 1e-12))
+
+
+def _crossings(motion: Motion, level: float, pieces: NDArray[np.bool_]) -> Floats:
+    """Find times, s, among which are all those at which the motion passes a level inside one of the pieces."""
+    widths = np.diff(motion.breakpoints)[pieces]
+    shifted = motion.coefficients[pieces]
     shifted[:, 0] -= level
     offsets = piecewise.root_candidates(widths, shifted)
     inside = (offsets > 0.0) & (offsets < widths[:, np.newaxis])
-    times: Floats = (motion.breakpoints[:-1, np.newaxis] + offsets)[inside]
+    times: Floats = (motion.breakpoints[:-1][pieces][:, np.newaxis] + offsets)[inside]
     return times

@@ -410,7 +410,7 @@ class Motion:
         >>> [f"{rocking.simulate(block, motion).peak_rotation:.6f}" for motion in (horizontal, both)]
         ['0.006366', '0.003524']
         """
-        return replace(self, vertical=vertical)
+        return self if vertical is self.vertical else replace(self, vertical=vertical)
 
     def delayed(self, delay: float) -> Motion:
         """Return the motion after `delay` seconds of no acceleration.

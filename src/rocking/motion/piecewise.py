@@ -181,13 +181,20 @@ def _powers(widths: Floats, columns: int) -> Floats:
     return powers
 
 
+def bounds(widths: Floats, coefficients: Floats) -> Floats:
+    """Upper bound on the magnitude of each piece: of straight ones at their ends, else by Bernstein coefficients."""
+    if coefficients.shape[1] <= 2:
+        return np.maximum(np.abs(coefficients[:, 0]), np.abs(value(coefficients, widths)))
+    result: Floats = np.max(np.abs(_control_points(widths, coefficients)), axis=1)
+    return result
+
+
 def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
     """Largest absolute value over all pieces, at their ends or at their interior extrema."""
     best = max(float(np.max(np.abs(coefficients[:, 0]))), float(np.max(np.abs(value(coefficients, widths)))))
     if coefficients.shape[1] <= 2:
         return best
-    enclosed = np.max(np.abs(_control_points(widths, coefficients)), axis=1)
-    may_exceed = enclosed > best * (1.0 + 1e-15)
+    may_exceed = bounds(widths, coefficients) > best * (1.0 + 1e-15)
     if not np.any(may_exceed):
         return best
     pieces, spans = coefficients[may_exceed], widths[may_exceed]

@@ -201,20 +201,31 @@ export class Histories {
     return [low, high];
   }
 
-  /** What of the ground motion is beyond the threshold of a side. @param {number} sign */
+  /** What of the ground motion is beyond the threshold of a side, and one point before and after it. @param {number} sign */
   beyond(sign) {
     const {x, y} = this.sources[`${NAMES[0]}-ground`].data;
     const [plus, minus] = this.thresholds ?? [Infinity, Infinity];
     const level = sign > 0 ? minus : plus;
     const over = (/** @type {number} */ k) => sign * y[k] > level;
-    const cut = y.map((/** @type {number} */ each, /** @type {number} */ k) => (over(k) ? each : sign * level));
-    const line = cut.map((/** @type {number} */ each, /** @type {number} */ k) => (over(k) || over(k - 1) || over(k + 1) ? each : NaN));
-    this.sources[`beyond${sign}`].data = {x, y: cut, line, level: new Float64Array(x.length).fill(sign * level)};
+    /** @type {number[]} */
+    const seen = [], cut = [], line = [];
+    for (let k = 0; k < x.length; k += 1) {
+      if (!over(k) && !over(k - 1) && !over(k + 1)) continue;
+      // Between two stretches the area is of no height, and the line has a gap.
+      if (seen.length && !over(k) && !over(k - 1)) { seen.push(x[k]); cut.push(sign * level); line.push(NaN); }
+      seen.push(x[k]);
+      cut.push(over(k) ? y[k] : sign * level);
+      line.push(cut[cut.length - 1]);
+    }
+    this.sources[`beyond${sign}`].data = {
+      x: Float64Array.from(seen), y: Float64Array.from(cut), line: Float64Array.from(line), level: new Float64Array(seen.length).fill(sign * level),
+    };
   }
 
   /** @param {string} name @returns {[number, number]} */
   blank(name) {
     const none = new Float64Array(0);
+    if (!this.sources[name].data.x.length) return [0, 0];
     this.sources[name].data = {x: none, y: none};
     this.sources[`${name}-ground`].data = {x: none, y: none};
     this.sources[`${name}-impact`].data = {x: none, y: none};

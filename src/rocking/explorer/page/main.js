@@ -59,14 +59,15 @@ const PAUSE = 120;
 let resting = 0;
 
 /** The whole case, where a form has changed it. */
-const load = new Latest(() => told(async () => {
-  const asked = {...state.texts, ...ends()};
-  const started = performance.now();
-  page.shown = await payload("/api/case", asked);
-  draw();
-  document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
-  document.body.dataset.took = String(performance.now() - started);
-}));
+const load = new Latest(async () => {
+  window.clearTimeout(resting);
+  await told(async () => {
+    page.shown = await payload("/api/case", {...state.texts, ...ends()});
+    draw();
+    document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
+  });
+  resting = window.setTimeout(drawRest, PAUSE);
+});
 
 /** Another window of the case that is shown. */
 const look = new Latest(() => told(async () => {
@@ -76,6 +77,7 @@ const look = new Latest(() => told(async () => {
   page.shown.header.window = header.window;
   Object.assign(page.shown.arrays, arrays);
   histories_draw();
+  showTaking(page.shown.header, state);
   document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
 }));
 
@@ -145,8 +147,6 @@ function draw() {
     + `η = ${short(header.block.sides[0].restitution)}; lifts above ${plus === minus ? short(plus) : `${short(plus)} and ${short(minus)}`} g.`;
   if (state.view === "response" || state.view === "block") histories_draw();
   views[state.view]?.draw?.();
-  window.clearTimeout(resting);
-  resting = window.setTimeout(drawRest, PAUSE);
 }
 
 /** What nobody reads while a slider moves. */

@@ -1,8 +1,15 @@
-// The plotting library writes style elements; the page's policy admits those that carry its nonce.
+// The plotting library writes style elements; the page's policy admits those that carry its nonce. At every painting it
+// writes most of them anew as they were, which would make the browser compute all styles again: that is left out.
 const nonce = /** @type {HTMLScriptElement} */ (document.currentScript).dataset.nonce ?? "";
 const createElement = document.createElement.bind(document);
+const text = /** @type {PropertyDescriptor} */ (Object.getOwnPropertyDescriptor(Node.prototype, "textContent"));
 document.createElement = (/** @type {string} */ name, /** @type {any} */ options) => {
   const made = createElement(name, options);
-  if (name.toLowerCase() === "style") made.nonce = nonce;
+  if (name.toLowerCase() !== "style") return made;
+  made.nonce = nonce;
+  Object.defineProperty(made, "textContent", {
+    get: () => text.get?.call(made),
+    set: (/** @type {string} */ css) => { if (css !== made.textContent) text.set?.call(made, css); },
+  });
   return made;
 };
