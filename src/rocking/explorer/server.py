@@ -22,6 +22,7 @@ from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer import assets, maps
+from rocking.explorer.background import behind_others, result_of
 from rocking.explorer.case import NAMES, read_case
 from rocking.explorer.core import EXPORTS, Explorer, Payload
 from rocking.explorer.offers import offers
@@ -233,13 +234,14 @@ class App:
         """Parts of a map as bytes; the work ends with the reader."""
         yield _framed(json.dumps({**about, "problem": None}).encode())
         async with self._maps:
-            found = maps.parts(grid)
-            try:
-                while (part := await anyio.to_thread.run_sync(lambda: _next(found), limiter=self._threads)) is not None:
-                    yield part
-            finally:
-                with anyio.CancelScope(shield=True):
-                    await anyio.to_thread.run_sync(found.close)  # type: ignore[attr-defined]
+            with behind_others() as thread:
+                found = maps.parts(grid)
+                try:
+                    while (part := await result_of(thread, partial(_next, found))) is not None:
+                        yield part
+                finally:
+                    with anyio.CancelScope(shield=True):
+                        await result_of(thread, found.close)  # type: ignore[attr-defined]
 
 
 def pack(payload: Payload) -> bytes:
