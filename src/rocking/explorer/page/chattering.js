@@ -87,9 +87,10 @@ export class ChatteringPanel {
 
   build() {
     const B = bokeh();
-    const x_range = new B.DataRange1d({range_padding: 0.04});
-    this.intervals = figure({height: 210, x_range, y_range: new B.DataRange1d({}), y_axis_type: "log", min_border_bottom: 44}, "Interval to the next impact, by number of the impact");
-    this.ratios = figure({height: 210, x_range, y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 44}, "Ratio of intervals, by number of the impact");
+    // Ranges that follow the data by themselves would paint everything twice.
+    this.x = new B.Range1d({start: 0, end: 1});
+    this.intervals = figure({height: 210, x_range: this.x, y_range: new B.Range1d({start: 1e-3, end: 1}), y_axis_type: "log", min_border_bottom: 44}, "Interval to the next impact, by number of the impact");
+    this.ratios = figure({height: 210, x_range: this.x, y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 44}, "Ratio of intervals, by number of the impact");
     this.intervals.left[0].axis_label = "interval (s)";
     this.ratios.left[0].axis_label = "interval ratio";
     for (const plot of [this.intervals, this.ratios]) plot.below[0].axis_label = "impact since uplift";
@@ -129,6 +130,12 @@ export class ChatteringPanel {
     const high = Math.max(eta, sorted[Math.floor(0.95 * sorted.length)] ?? eta), low = Math.min(eta, sorted[Math.floor(0.05 * sorted.length)] ?? eta);
     const margin = Math.max(0.35 * (high - low), 0.02);
     this.ratios.y_range.setv({start: low - margin, end: high + margin});
+    this.x?.setv({start: 1 - 0.02 * count, end: count + 0.02 * count});
+    if (intervals.y.length) {
+      const least = intervals.y.reduce((one, other) => Math.min(one, other)), most = intervals.y.reduce((one, other) => Math.max(one, other));
+      const beside = Math.max((most / least) ** 0.05, 1.2);
+      this.intervals.y_range.setv({start: least / beside, end: most * beside});
+    }
     /** @type {any} */ (this.sources)[0].data = intervals;
     /** @type {any} */ (this.sources)[1].data = ratios;
     if (this.eta) this.eta.location = eta;

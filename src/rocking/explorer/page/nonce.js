@@ -7,9 +7,13 @@ document.createElement = (/** @type {string} */ name, /** @type {any} */ options
   const made = createElement(name, options);
   if (name.toLowerCase() !== "style") return made;
   made.nonce = nonce;
+  let written = "";
   Object.defineProperty(made, "textContent", {
-    get: () => text.get?.call(made),
-    set: (/** @type {string} */ css) => { if (css !== made.textContent) text.set?.call(made, css); },
+    get: () => written,
+    set: (/** @type {string} */ css) => {
+      if (css !== written) text.set?.call(made, css);
+      written = css;
+    },
   });
   return made;
 };
