@@ -348,6 +348,32 @@ def test_a_file_of_several_channels_is_dropped(opened):
     assert query_of(page)["channel"]
 
 
+def test_a_record_shakes_upwards_as_well(opened, tmp_path):
+    page = opened(STATUE)
+    assert "vertical" not in page.text("#legend")
+    page.rested(lambda: page.page.select_option("#vertical", "ridgecrest-clc-up"))
+    assert query_of(page)["vertical"] == "ridgecrest-clc-up"
+    upwards = rocking.records.load("ridgecrest-clc-up")
+    motion = rocking.records.load("ridgecrest-clc-090").with_vertical(upwards).scaled(pga=0.4 * 9.80665)
+    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), motion)
+    assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, abs=6e-4)
+    assert "vertical acceleration (ridgecrest-clc-up" in page.text("#legend")
+    assert "--vertical ridgecrest-clc-up" in page.text("#command")
+    assert "with_vertical(rocking.records.load('ridgecrest-clc-up'))" in page.text("#python")
+    file = tmp_path / "up.txt"
+    file.write_text("\n".join(f"{value:.17g}" for value in upwards.samples[1]), "utf-8")
+    with page.page.expect_file_chooser() as chooser:
+        page.page.click("#choose-vertical")
+    chooser.value.set_files(file)
+    page.until("getComputedStyle(document.getElementById('units').parentElement).display !== 'none'")
+    page.rested(lambda: (page.page.locator("#dt").fill("0.01"), page.page.locator("#dt").press("Enter")))
+    page.rested(lambda: page.page.select_option("#units", "m/s2"))
+    assert query_of(page)["vertical"].startswith("file:")
+    assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, abs=6e-4)
+    page.rested(lambda: page.page.select_option("#record", "ridgecrest-clc-360"))
+    assert "vertical" not in query_of(page)
+
+
 def test_a_broken_file_is_answered_with_a_sentence(opened):
     page = opened(STATUE, allowed=["422"])
     page.js(DROP, ["broken.at2", "PEER NGA\nheading\nnothing\nNPTS= 100, DT= .01 SEC\n 0.1 0.2 x\n"])

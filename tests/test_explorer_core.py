@@ -3,6 +3,7 @@
 import math
 import runpy
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from rocking.explorer.core import Explorer, thinned
 from rocking.explorer.pulses import FAMILIES, pulse_as_text, pulse_of
 from rocking.explorer.shelf import LARGEST, MOST, Shelf, bare_name
 from rocking.explorer.studies import StudyView
+from rocking.motion.exceedance import exceedances
 
 STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
 SINE = {
@@ -79,6 +81,74 @@ def test_every_pulse_of_the_package_can_be_written_and_read_back(family):
     motion = pulse_of(f"{family}:{PULSES[family]}")
     again = pulse_of(pulse_as_text(motion))
     assert np.array_equal(again.coefficients, motion.coefficients)
+
+
+@pytest.mark.parametrize("vertical", ["ridgecrest-clc-up", "file:{up}", "file:{both}#2"])
+def test_a_record_has_a_vertical_component(vertical, tmp_path, monkeypatch):
+    horizontal, upwards = (rocking.records.load(f"ridgecrest-clc-{which}") for which in ("090", "up"))
+    times = np.arange(len(upwards.samples[1])) * upwards.step
+    table = np.column_stack([times, horizontal.acceleration(times), upwards.samples[1]])
+    files = {"up.csv": table[:, [0, 2]], "both.csv": table}
+    shelf, keys = Shelf(), {}
+    monkeypatch.chdir(tmp_path)
+    for name, columns in files.items():
+        heading = "time (s),along (m/s2),up (m/s2)" if columns.shape[1] == 3 else "time (s),up (m/s2)"
+        np.savetxt(tmp_path / name, columns, "%.17g", ",", header=heading, comments="")
+        keys[name.removesuffix(".csv")] = shelf.put(name, (tmp_path / name).read_bytes())
+    case = read_case({**STATUE, "vertical": vertical.format(**keys)}, shelf)
+    expected = rocking.simulate(
+        rocking.Block(width=0.24, height=1.1), horizontal.with_vertical(upwards).scaled(pga=0.4 * 9.80665)
+    )
+    assert case.simulate().peak_rotation == expected.peak_rotation
+    script = tmp_path / "case.py"
+    script.write_text(as_python(case), "utf-8")
+    assert runpy.run_path(str(script))["response"].peak_rotation == expected.peak_rotation
+    command = as_command(case)
+    assert (command is None) == ("#" in vertical)
+    if command is not None:
+        assert f"--vertical {'up.csv' if 'file' in vertical else vertical}" in command
+
+
+def test_a_vertical_component_is_a_channel_of_the_same_file(tmp_path, monkeypatch):
+    shelf = Shelf()
+    file = Path(__file__).parent / "data" / "formats" / "two.v2"
+    key = shelf.put(file.name, file.read_bytes())
+    case = read_case({**STATUE, "motion": f"file:{key}", "channel": "1", "vertical": "2"}, shelf)
+    expected = rocking.read(file, channel=1).with_vertical(rocking.read(file, channel=2)).scaled(pga=0.4 * 9.80665)
+    assert np.array_equal(case.motion.vertical.coefficients, expected.vertical.coefficients)
+    assert as_command(case).startswith("rocking simulate two.v2 --vertical 2 ")
+
+
+@pytest.mark.parametrize(
+    ("texts", "says"),
+    [
+        ({"motion": "none"}, "goes with a record"),
+        ({"motion": "sine:amplitude=3,frequency=1,cycles=2"}, "goes with a record"),
+        ({"vertical": "nothing-up"}, "no shipped record 'nothing-up'"),
+        ({"vertical": "file:unknown"}, "not here any more"),
+    ],
+)
+def test_a_vertical_component_that_cannot_be_is_answered(texts, says):
+    with pytest.raises(RockingError, match=says):
+        read_case(
+            {"width": "0.24", "height": "1.1", "motion": DEFAULT["motion"], "vertical": "ridgecrest-clc-up"} | texts,
+            Shelf(),
+        )
+
+
+def test_the_weight_on_moving_ground_says_when_the_block_is_lifted(explorer):
+    texts = {**STATUE, "vertical": "ridgecrest-clc-up"}
+    arrays = explorer.case(texts, (228.0, 236.0)).arrays
+    response = explorer.show(texts).response
+    lift = response.block.uplift_thresholds()[0] / 9.80665
+    beyond = np.abs(arrays["ground_g"]) > lift * arrays["weight"]
+    stretches = exceedances(response.motion, response.block.uplift_thresholds())
+    times = 228.0 + arrays["ground_time"]
+    inside = (np.searchsorted(stretches.ravel(), times, side="right") % 2).astype(bool)
+    assert beyond.sum() > 30
+    # A sample at the very end of a stretch may be on either side of it.
+    assert np.count_nonzero(beyond != inside) <= 2
+    assert "weight" not in explorer.case(STATUE).arrays
 
 
 def test_a_motion_that_is_no_pulse_any_more_is_not_written_as_one():

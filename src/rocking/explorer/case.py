@@ -37,7 +37,7 @@ DEFAULT: Final[Texts] = {"width": "0.24", "height": "1.1", "motion": "ridgecrest
 #: Names of the texts of a case.
 NAMES: Final = (
     "width", "height", "p", "alpha", "restitution", "gravity",
-    "motion", "channel", "dt", "units", "scale", "pga", "pgv", "sa",
+    "motion", "channel", "vertical", "dt", "units", "scale", "pga", "pgv", "sa",
     "model", "chattering", "duration", "initial_rotation", "initial_velocity",
 )  # fmt: skip
 
@@ -94,7 +94,8 @@ def read_case(texts: Texts, shelf: Shelf) -> Case:
     ----------
     texts : mapping of str to str
         Values by `NAMES`; empty ones count as not given. ``motion`` is the name of a shipped record, a pulse
-        (``sine:amplitude=0.3g,frequency=1,cycles=2.5``), ``file:KEY``, ``given:KEY`` or ``none``.
+        (``sine:amplitude=0.3g,frequency=1,cycles=2.5``), ``file:KEY``, ``given:KEY`` or ``none``; ``vertical`` the name
+        of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a channel of the motion's own file.
     shelf : Shelf
         Where the files and motions of keys are.
 
@@ -176,7 +177,7 @@ def as_command(case: Case) -> str | None:
     """
     if not case.words or "gravity" in case.texts:
         return None
-    options = [name for name in NAMES if name in case.texts and name != "motion"]
+    options = [name for name in NAMES if name in case.texts and name not in ("motion", "vertical")]
     each = ([f"--{name.replace('_', '-')}", case.texts[name]] for name in options)
     return shlex.join(["rocking", "simulate", *case.words, *itertools.chain.from_iterable(each)])
 
@@ -269,6 +270,8 @@ class _Found(NamedTuple):
 def _motion(given: Texts, shelf: Shelf) -> _Found:
     target = _target(given)
     found = _unscaled(given.get("motion", DEFAULT["motion"]), given, shelf)
+    if "vertical" in given:
+        found = _with_vertical(found, given, shelf)
     if not target:
         return found
     if found.motion is None:
@@ -283,6 +286,35 @@ def _scaled(motion: Motion, **target: float) -> Motion:
     return motion.scaled(**target)
 
 
+def _with_vertical(found: _Found, given: Texts, shelf: Shelf) -> _Found:
+    """Add the vertical component, which is read with the same step and units as the motion."""
+    name, motion = given["vertical"], given.get("motion", DEFAULT["motion"])
+    kind, _, key = motion.partition(":")
+    if found.motion is None or is_pulse(motion) or kind == "given":
+        raise InvalidOption("a vertical component goes with a record: choose one, or leave the component out")
+    if name.startswith("file:"):
+        other, _, channel = name.removeprefix("file:").partition("#")
+        vertical = _from_file(other, {**_told(given), "channel": channel or None}, shelf)
+        words = vertical.words if not channel else ()
+    elif name in records.names():
+        vertical, words = _unscaled(name, {}, shelf), (name,)
+    elif kind == "file":
+        vertical, words = _from_file(key, {**_told(given), "channel": name}, shelf), (name,)
+    else:
+        raise InvalidOption(f"there is no shipped record {name[:40]!r} for the vertical component")
+    return _Found(
+        _together(found.motion, vertical.motion),
+        f"{found.python}.with_vertical({vertical.python})",
+        (*found.words, "--vertical", *words) if found.words and words else (),
+    )
+
+
+@functools.lru_cache(maxsize=4)
+def _together(motion: Motion, vertical: Motion | None) -> Motion:
+    """Add a vertical component, made once while only the block is changed."""
+    return motion.with_vertical(vertical)
+
+
 def _unscaled(name: str, given: Texts, shelf: Shelf) -> _Found:
     kind, _, key = name.partition(":")
     if name == "none":
@@ -293,11 +325,14 @@ def _unscaled(name: str, given: Texts, shelf: Shelf) -> _Found:
         motion = shelf.given(key)
         return _Found(motion, f"...  # {motion.name}: the motion that this page was opened with", ())
     if kind == "file":
-        told = _told(given)
-        file = shelf.file(key).name
-        written = "".join(f", {each}={value!r}" for each, value in told.items() if value is not None)
-        return _Found(shelf.read(key, **told), f"rocking.read({file!r}{written})", (file,))
+        return _from_file(key, _told(given), shelf)
     return _Found(_shipped(name), f"rocking.records.load({name!r})", (name,))
+
+
+def _from_file(key: str, told: dict[str, Any], shelf: Shelf) -> _Found:
+    file = shelf.file(key).name
+    written = "".join(f", {each}={value!r}" for each, value in told.items() if value is not None)
+    return _Found(shelf.read(key, **told), f"rocking.read({file!r}{written})", (file,))
 
 
 @functools.cache

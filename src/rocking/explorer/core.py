@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.arrays import Floats, Integers
 from rocking.block import Block
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.schemes import compare_schemes
@@ -63,7 +63,7 @@ EXPORTS: Final[Mapping[str, str]] = {
 #: Texts that say one thing together.
 _GROUPS: Final = (
     {"width", "height", "p", "alpha", "restitution"},
-    {"motion", "channel", "dt", "units", "scale", "pga", "pgv", "sa"},
+    {"motion", "channel", "vertical", "dt", "units", "scale", "pga", "pgv", "sa"},
 )
 
 
@@ -306,13 +306,19 @@ def thinned(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
     >>> thinned(np.arange(6.0), np.array([0.0, 3.0, 1.0, 5.0, -2.0, 4.0]), 4)
     (array([0., 1., 3., 4.]), array([ 0.,  3.,  5., -2.]))
     """
-    if len(time) <= most:
-        return time, values
-    width = math.ceil(2 * len(time) / most)
+    kept = _extremes(values, most)
+    return time[kept], values[kept]
+
+
+def _extremes(values: Floats, most: int) -> Integers:
+    """Return where at most so many values are: the least and the greatest of each stretch of neighbours."""
+    if len(values) <= most:
+        return np.arange(len(values))
+    width = math.ceil(2 * len(values) / most)
     rows = np.pad(values, (0, -len(values) % width), mode="edge").reshape(-1, width)
     starts = width * np.arange(len(rows))
-    kept = np.minimum(np.union1d(starts + rows.argmin(axis=1), starts + rows.argmax(axis=1)), len(time) - 1)
-    return time[kept], values[kept]
+    kept: Integers = np.union1d(starts + rows.argmin(axis=1), starts + rows.argmax(axis=1))
+    return np.minimum(kept, len(values) - 1)
 
 
 def _checked(window: tuple[float, float], response: Response) -> tuple[float, float]:
@@ -327,22 +333,35 @@ def _checked(window: tuple[float, float], response: Response) -> tuple[float, fl
 
 def _window_arrays(shown: Shown, start: float, end: float, points: int = _POINTS) -> dict[str, Floats]:
     """Lines in a window; times count from its start, so that they keep their digits however narrow it is."""
-    response, motion = shown.resolved(start, end), shown.case.motion
+    response = shown.resolved(start, end)
     struck = response.impacts["time"]
     inside = struck[(struck >= start) & (struck <= end)]
     marked = inside if len(inside) <= _MARKED else inside[:: math.ceil(len(inside) / _MARKED)]
     times = np.union1d(np.linspace(start, end, min(_TIMES, 4 * points)), marked)
     time, rotation = thinned(times, response.rotation(times), points)
-    corners = np.empty(0) if motion is None else motion.drawing_times(start, min(end, max(start, motion.duration)))
-    acceleration = corners if motion is None else motion.acceleration(corners) / shown.case.block.gravity
-    corners, acceleration = thinned(corners, acceleration, points)
     return {
         "time": time - start,
         "rotation": rotation,
-        "ground_time": corners - start,
-        "ground_g": acceleration,
         "impact": marked - start,
+        **_shaking(shown.case, start, end, points),
     }
+
+
+def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Floats]:
+    """Ground acceleration in a window, g; with a vertical component, the weight, by which thresholds are multiplied."""
+    motion, gravity = case.motion, case.block.gravity
+    if motion is None:
+        return {"ground_time": np.empty(0), "ground_g": np.empty(0)}
+    corners = motion.drawing_times(start, min(end, max(start, motion.duration)))
+    acceleration = motion.acceleration(corners) / gravity
+    if motion.vertical is None:
+        corners, acceleration = thinned(corners, acceleration, points)
+        return {"ground_time": corners - start, "ground_g": acceleration}
+    weight = 1.0 + motion.vertical.acceleration(corners) / gravity
+    plus, minus = (threshold / gravity for threshold in case.block.uplift_thresholds(case.model))
+    beyond = (-acceleration - plus * weight, acceleration - minus * weight)
+    kept = np.unique(np.concatenate([_extremes(each, points) for each in (acceleration, weight, *beyond)]))
+    return {"ground_time": corners[kept] - start, "ground_g": acceleration[kept], "weight": weight[kept]}
 
 
 def _ground_arrays(shown: Shown, start: float, end: float) -> dict[str, Floats]:
@@ -438,6 +457,8 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> str:
         return f"{words[0].upper()}{words[1:]}."
     if not len(response.events) and not len(response.impacts) and response.peak_rotation == 0.0:
         lifting = min(thresholds) / response.block.gravity
+        if response.motion is not None and response.motion.vertical is not None:
+            return "It does not move: the ground acceleration never passes what would lift it."
         return f"It does not move: the ground acceleration never passes {lifting:.3g} g, which would lift it."
     rests = int(np.sum(response.events["kind"] == "rest"))
     count = {0: "does not come to rest", 1: "comes to rest once", 2: "comes to rest twice"}
@@ -454,11 +475,12 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> str:
 
 @functools.lru_cache(maxsize=4)
 def _motion_facts(motion: Motion, gravity: float) -> dict[str, Any]:
-    """What the page says of a motion, found once while only the block is changed."""
+    """Say what a motion is, found once while only the block is changed."""
     return {
         "name": motion.name,
         "duration": motion.duration,
         "pga_g": motion.pga / gravity,
+        "vertical": motion.vertical and {"name": motion.vertical.name, "pga_g": motion.vertical.pga / gravity},
         "notes": list(motion_notes(motion)),
         "filtered": _drifts(motion),
     }

@@ -78,6 +78,8 @@ export class View {
     const none = new Float64Array(0);
     const lines = (/** @type {string} */ name) => Object.fromEntries(["time", "rotation", "ground_time", "ground_g", "impact"].map((key) => [key, arrays[`${name}_${key}`] ?? none]));
     const first = {lines: lines("first"), rest: arrays.first_rest, uplift: none, sides: one_.block.sides};
+    const weight = arrays.first_weight;
+    if (weight) first.lines.weight = weight;
     const second = {lines: lines("second"), rest: arrays.second_rest, uplift: none, sides: other.block.sides};
     if (this.with.value !== "motion") second.lines.ground_time = second.lines.ground_g = none;
     this.histories.draw([header.window.from, header.window.to], header.duration, /** @type {any} */ (first), /** @type {any} */ (second), one_.block.thresholds_g);

@@ -1,7 +1,7 @@
 // Forms that change the texts of a case: its block, its motion, its model.
 
 import {NumberControl} from "./controls.js";
-import {make, sent, what} from "./words.js";
+import {make, one, sent, what} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {(texts: Texts, gone: string[]) => void} Changed */
@@ -134,9 +134,12 @@ export class MotionForm {
     this.prefix = prefix;
     /** @type {any} */
     this.file = null;
+    /** @type {any[]} */
+    this.files = [];
     this.given = "";
-    this.kind = choice(`${prefix}kind`, "Shaken by", KINDS, () => this.tell());
-    this.record = choice(`${prefix}record`, "Record", offers.records.map((/** @type {any} */ each) => [each.name, each.name]), () => this.tell());
+    this.wanted = "";
+    this.kind = choice(`${prefix}kind`, "Shaken by", KINDS, () => this.another());
+    this.record = choice(`${prefix}record`, "Record", offers.records.map((/** @type {any} */ each) => [each.name, each.name]), () => this.another());
     this.about = make("p", {className: "derived"});
     this.pulse = choice(`${prefix}pulse`, "Pulse", Object.entries(offers.pulses).map(([name, each]) => [name, /** @type {any} */ (each).label]), (name) => { this.furnish(name); this.tell(); });
     this.numbers = make("div");
@@ -146,12 +149,13 @@ export class MotionForm {
     };
     this.dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, value: "0.01", on: {change: () => this.tell()}}));
     this.dtElement = make("div", {className: "choice"}, [make("label", {className: "field", for: `${prefix}dt`}, ["Sampling step, s"]), this.dt]);
+    this.vertical = choice(`${prefix}vertical`, "Vertical component", [["", "none"]], (value) => { this.wanted = value; this.tell(); });
     this.start = offers.start.map((/** @type {any} */ spec) => new NumberControl(spec, () => this.tell(), prefix));
     this.scale = choice(`${prefix}scaled`, "Scaled", SCALES, () => this.tell());
     this.scales = offers.scales.map((/** @type {any} */ spec) => new NumberControl(spec, () => this.tell(), prefix));
     this.period = new NumberControl(offers.period, () => this.tell(), prefix);
     element.replaceChildren(
-      this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.told.channel.element, this.told.units.element,
+      this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.told.channel.element, this.vertical.element, this.told.units.element,
       this.dtElement, ...this.start.map((/** @type {NumberControl} */ each) => each.element), this.scale.element,
       ...this.scales.map((/** @type {NumberControl} */ each) => each.element), this.period.element,
     );
@@ -190,18 +194,55 @@ export class MotionForm {
     if (texts.sa) this.period.show(texts.sa.split("@")[1] ?? "1");
     for (const each of this.start) if (texts[each.spec.name]) each.show(texts[each.spec.name]);
     if (texts.channel) this.told.channel.select.value = texts.channel;
+    this.wanted = texts.vertical ?? "";
     if (texts.units) this.told.units.select.value = texts.units;
     if (texts.dt) this.dt.value = texts.dt;
     this.reveal();
   }
 
-  /** A file that the server keeps. @param {any} file */
-  take(file) {
+  /** A file that the server keeps: what shakes the block, or moves it up and down as well. @param {any} file @param {boolean} [upwards] */
+  take(file, upwards = false) {
+    this.files = [...this.files.filter((each) => each.key !== file.key), file];
+    if (upwards) {
+      this.wanted = file.channels.length > 1 ? `file:${file.key}#${file.channels.at(-1).number}` : `file:${file.key}`;
+      this.offerVertical();
+      this.tell();
+      return;
+    }
     this.file = file;
+    this.wanted = "";
     this.told.channel.select.replaceChildren(...file.channels.map((/** @type {any} */ each) => make("option", {value: String(each.number)}, [`${each.number}: ${each.name}`])));
     this.kind.select.value = "file";
     this.scale.select.value = "";
     this.tell();
+  }
+
+  /** What may move the block up and down: other channels of the file, shipped records, other files. */
+  offerVertical() {
+    const kind = this.kind.select.value;
+    const shaking = kind === "record" ? this.record.select.value : "";
+    /** @type {[string, string][]} */
+    const found = [];
+    if (kind === "file" && this.file) {
+      for (const each of this.file.channels) {
+        if (String(each.number) !== this.told.channel.select.value) found.push([String(each.number), `channel ${each.number}: ${each.name}`]);
+      }
+    }
+    for (const file of this.files) {
+      if (file.key === this.file?.key && kind === "file") continue;
+      if (file.channels.length < 2) found.push([`file:${file.key}`, file.name]);
+      else for (const each of file.channels) found.push([`file:${file.key}#${each.number}`, `${file.name}, channel ${each.number}: ${each.name}`]);
+    }
+    const station = (/** @type {string} */ name) => name.slice(0, name.lastIndexOf("-"));
+    const upwards = this.offers.records.filter((/** @type {any} */ each) => each.direction === "up").map((/** @type {any} */ each) => each.name);
+    upwards.sort((/** @type {string} */ before, /** @type {string} */ after) => Number(station(after) === station(shaking)) - Number(station(before) === station(shaking)));
+    found.push(...upwards.map((/** @type {string} */ name) => [name, name]));
+    if (this.wanted && !found.some(([value]) => value === this.wanted)) found.push([this.wanted, this.wanted]);
+    const {select, element} = this.vertical;
+    element.hidden = kind !== "record" && kind !== "file";
+    if (!this.prefix) one("choose-vertical").hidden = element.hidden;
+    select.replaceChildren(...[["", "none"], ...found].map(([value, text]) => make("option", {value}, [text])));
+    select.value = this.wanted;
   }
 
   reveal() {
@@ -210,10 +251,11 @@ export class MotionForm {
     for (const option of options) option.hidden = (option.value === "given" && !this.given) || (option.value === "file" && !this.file && kind !== "file");
     this.record.element.hidden = kind !== "record";
     this.pulse.element.hidden = this.numbers.hidden = kind !== "pulse";
+    this.offerVertical();
     const file = kind === "file" ? this.file : null;
     this.told.channel.element.hidden = !file || file.channels.length < 2;
-    this.told.units.element.hidden = !file || !file.missing.includes("units");
-    this.dtElement.hidden = !file || !file.missing.includes("dt");
+    this.told.units.element.hidden = !this.needs("units");
+    this.dtElement.hidden = !this.needs("dt");
     for (const each of this.start) each.element.hidden = kind !== "none";
     this.scale.element.hidden = kind === "none" || kind === "pulse";
     for (const each of this.scales) each.element.hidden = this.scale.element.hidden || this.scale.select.value !== each.spec.name;
@@ -222,6 +264,20 @@ export class MotionForm {
     this.about.textContent = kind === "record" && record ? `${record.event}; ${record.station}, ${record.direction === "up" ? "vertical component, used as a horizontal motion" : `${record.direction}°`}.`
       : file ? `${file.name}: ${file.format}, since ${file.reason}.` : "";
     this.about.hidden = !this.about.textContent;
+  }
+
+  /** Another motion, whose vertical component was not chosen yet. */
+  another() {
+    this.wanted = "";
+    this.tell();
+  }
+
+  /** Whether a file that is used does not say something itself. @param {string} what */
+  needs(what) {
+    const kind = this.kind.select.value;
+    const beside = this.files.find((file) => this.wanted.startsWith(`file:${file.key}`));
+    const used = kind === "file" ? [this.file, beside] : kind === "record" ? [beside] : [];
+    return used.some((file) => file?.missing.includes(what));
   }
 
   tell() {
@@ -241,15 +297,16 @@ export class MotionForm {
     } else if (this.file) {
       texts.motion = `file:${this.file.key}`;
       if (this.file.channels.length > 1) texts.channel = this.told.channel.select.value;
-      if (this.file.missing.includes("units")) texts.units = this.told.units.select.value;
-      if (this.file.missing.includes("dt")) texts.dt = this.dt.value;
     }
+    if (this.wanted && !this.vertical.element.hidden) texts.vertical = this.wanted;
+    if (this.needs("units")) texts.units = this.told.units.select.value;
+    if (this.needs("dt")) texts.dt = this.dt.value;
     const scaled = this.scale.select.value;
     if (scaled && kind !== "none" && kind !== "pulse") {
       const control = this.scales.find((/** @type {NumberControl} */ each) => each.spec.name === scaled);
       texts[scaled] = scaled === "sa" ? `${control.text}@${this.period.text}` : control.text;
     }
-    this.changed(texts, ["motion", "channel", "dt", "units", "scale", "pga", "pgv", "sa", "initial_rotation", "initial_velocity"]);
+    this.changed(texts, ["motion", "channel", "vertical", "dt", "units", "scale", "pga", "pgv", "sa", "initial_rotation", "initial_velocity"]);
   }
 }
 

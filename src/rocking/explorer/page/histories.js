@@ -3,7 +3,7 @@
 import {bokeh, coarse, colour, figure, themed} from "./theme.js";
 import {decimals, short} from "./words.js";
 
-/** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, impact: Float64Array}} Lines */
+/** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, weight?: Float64Array, impact: Float64Array}} Lines */
 /** @typedef {{lines: Lines, rest: Float64Array, uplift: Float64Array, sides: {alpha: number}[]}} Drawn */
 
 const NARROWEST = 1e-10;
@@ -132,6 +132,13 @@ export class Histories {
       (glyph) => { glyph.fill_color = colour("rest"); });
     for (const [k, name] of [...NAMES.entries()].reverse()) {
       const [ink, ground] = k === 0 ? ["ink", "ground"] : ["second", "second"];
+      if (k === 0) {
+        const source = this.source("vertical", ["x", "y", "plus", "minus"]);
+        add(this.ground, new B.Line({x: F("x"), y: F("y"), line_width: 0.9}), source, (glyph) => { glyph.line_color = colour("stone"); });
+        for (const side of ["plus", "minus"]) {
+          add(this.ground, new B.Line({x: F("x"), y: F(side), line_width: 0.9, line_dash: [5, 3]}), source, (glyph) => { glyph.line_color = colour("ink"); });
+        }
+      }
       add(this.ground, new B.Line({x: F("x"), y: F("y"), line_width: 1}), this.source(`${name}-ground`, ["x", "y"]),
         (glyph) => { glyph.line_color = colour(ground); });
       if (k === 0) for (const sign of SIGNS) {
@@ -195,31 +202,46 @@ export class Histories {
     const y = lines.rotation.map((each) => each / sides[each >= 0 ? 0 : 1].alpha);
     this.sources[name].data = {x: this.scale.all(lines.time, from), y};
     this.sources[`${name}-ground`].data = {x: this.scale.all(lines.ground_time, from), y: lines.ground_g};
-    if (name === NAMES[0]) for (const sign of SIGNS) this.beyond(sign);
+    if (name === NAMES[0]) {
+      this.weigh(lines.weight);
+      for (const sign of SIGNS) this.beyond(sign, lines.weight);
+    }
     let low = 0, high = 0;
     for (const each of y) { if (each < low) low = each; if (each > high) high = each; }
     return [low, high];
   }
 
-  /** What of the ground motion is beyond the threshold of a side, and one point before and after it. @param {number} sign */
-  beyond(sign) {
+  /** Vertical acceleration, and the thresholds that move with it. @param {Float64Array} [weight] */
+  weigh(weight) {
+    const none = new Float64Array(0);
+    const {x} = this.sources[`${NAMES[0]}-ground`].data;
+    const [plus, minus] = this.thresholds ?? [NaN, NaN];
+    for (const level of this.levels.threshold) level.visible = !weight;
+    if (weight) this.sources.vertical.data = {x, y: weight.map((each) => each - 1), plus: weight.map((each) => minus * each), minus: weight.map((each) => -plus * each)};
+    else if (this.sources.vertical.data.x.length) this.sources.vertical.data = {x: none, y: none, plus: none, minus: none};
+  }
+
+  /** What of the ground motion is beyond the threshold of a side, and one point before and after it.
+   * @param {number} sign @param {Float64Array} [weight] */
+  beyond(sign, weight) {
     const {x, y} = this.sources[`${NAMES[0]}-ground`].data;
     const [plus, minus] = this.thresholds ?? [Infinity, Infinity];
-    const level = sign > 0 ? minus : plus;
-    const over = (/** @type {number} */ k) => sign * y[k] > level;
+    const still = sign > 0 ? minus : plus;
+    const level = (/** @type {number} */ k) => (weight ? still * weight[k] : still);
+    const over = (/** @type {number} */ k) => sign * y[k] > level(k);
     /** @type {number[]} */
-    const seen = [], cut = [], line = [];
+    const seen = [], cut = [], line = [], levels = [];
     for (let k = 0; k < x.length; k += 1) {
       if (!over(k) && !over(k - 1) && !over(k + 1)) continue;
       // Between two stretches the area is of no height, and the line has a gap.
-      if (seen.length && !over(k) && !over(k - 1)) { seen.push(x[k]); cut.push(sign * level); line.push(NaN); }
+      if (seen.length && !over(k) && !over(k - 1)) { seen.push(x[k]); cut.push(sign * level(k)); levels.push(sign * level(k)); line.push(NaN); }
       seen.push(x[k]);
-      cut.push(over(k) ? y[k] : sign * level);
+      cut.push(over(k) ? y[k] : sign * level(k));
+      levels.push(sign * level(k));
       line.push(cut[cut.length - 1]);
     }
-    this.sources[`beyond${sign}`].data = {
-      x: Float64Array.from(seen), y: Float64Array.from(cut), line: Float64Array.from(line), level: new Float64Array(seen.length).fill(sign * level),
-    };
+    const [xs, ys, lines, bases] = [seen, cut, line, levels].map((each) => Float64Array.from(each));
+    this.sources[`beyond${sign}`].data = {x: xs, y: ys, line: lines, level: bases};
   }
 
   /** @param {string} name @returns {[number, number]} */
@@ -240,6 +262,7 @@ export class Histories {
     this.rotation.y_range.setv({start, end});
     let peak = 0;
     for (const drawn of this.drawn) for (const each of drawn?.lines.ground_g ?? []) peak = Math.max(peak, Math.abs(each));
+    for (const each of this.drawn[0]?.lines.weight ?? []) peak = Math.max(peak, Math.abs(each - 1));
     const shown = 1.1 * Math.max(peak, Math.min(...(this.thresholds ?? [0]), peak || Infinity) || 0.1);
     this.ground.y_range.setv({start: -shown, end: shown});
     this.levels.balance.forEach((each, k) => { each.location = k ? -1 : 1; });

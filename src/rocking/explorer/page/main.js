@@ -164,13 +164,18 @@ function histories_draw() {
   const {header, arrays} = page.shown;
   const lines = /** @type {any} */ (arrays);
   histories.draw([header.window.from, header.window.to], header.duration, {lines, rest: arrays.rest, uplift: arrays.uplift, sides: header.block.sides}, null, header.block.thresholds_g);
-  if (!one("legend").childNodes.length) showLegend();
+  showLegend(header.motion?.vertical);
   chattering.window(header.window);
 }
 
-function showLegend() {
+/** @param {{name: string, pga_g: number} | null} [vertical] */
+function showLegend(vertical) {
+  const text = vertical ? `vertical acceleration (${vertical.name}, peak ${short(vertical.pga_g)} g), with which the thresholds move` : "";
+  if (one("legend").dataset.vertical === text) return;
+  one("legend").dataset.vertical = text;
   const entries = [["line", "rotation"], ["rest", "at rest"], ["impact", "impact"], ["uplift", "uplift"], ["ground", "ground acceleration"], ["beyond", "beyond the threshold of uplift"]];
-  one("legend").replaceChildren(...entries.map(([name, text]) => make("span", {}, [make("i", {className: `key ${name}`}), text])));
+  if (text) entries.push(["up", text]);
+  one("legend").replaceChildren(...entries.map(([name, words]) => make("span", {}, [make("i", {className: `key ${name}`}), words])));
 }
 
 /** @param {any} header */
@@ -223,9 +228,9 @@ one("in-words").addEventListener("toggle", () => chattering.words(state.texts));
 if (coarse()) one("cursor").textContent = "Tap the plots to read them.";
 one("settings").addEventListener("submit", (event) => event.preventDefault());
 makeCopying();
-acceptFiles(async (file) => told(async () => {
+acceptFiles(async (file, upwards) => told(async () => {
   const found = await file();
-  forms.motion.take(found);
+  forms.motion.take(found, upwards);
   say(`${found.name} was read as ${found.format}.`);
 }));
 for (const form of Object.values(forms)) form.show(state.texts);

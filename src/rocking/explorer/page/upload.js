@@ -11,15 +11,18 @@ async function sendFile(file) {
   return json("/api/records", {name: file.name}, {method: "POST", body: file});
 }
 
-/** @param {(file: () => Promise<any>) => Promise<void>} take */
+/** @param {(file: () => Promise<any>, upwards: boolean) => Promise<void>} take */
 export function acceptFiles(take) {
   const input = /** @type {HTMLInputElement} */ (one("file"));
   const dropping = one("dropping");
-  one("choose-file").addEventListener("click", () => input.click());
+  let upwards = false;
+  for (const button of [one("choose-file"), one("choose-vertical")]) {
+    button.addEventListener("click", () => { upwards = button.id === "choose-vertical"; input.click(); });
+  }
   input.addEventListener("change", () => {
     const file = input.files?.[0];
     input.value = "";
-    if (file) void take(() => sendFile(file));
+    if (file) void take(() => sendFile(file), upwards);
   });
   let depth = 0;
   window.addEventListener("dragenter", () => { depth += 1; dropping.hidden = false; });
@@ -30,6 +33,6 @@ export function acceptFiles(take) {
     depth = 0;
     dropping.hidden = true;
     const file = event.dataTransfer?.files?.[0];
-    if (file) void take(() => sendFile(file));
+    if (file) void take(() => sendFile(file), false);
   });
 }
