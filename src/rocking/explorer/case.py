@@ -159,7 +159,7 @@ def as_python(case: Case) -> str:
         [
             "import rocking",
             "",
-            f"block = rocking.{_block_as_python(case.texts)}",
+            f"block = rocking.{block_as_python(case.texts)}",
             f"motion = {case.python}",
             f"response = rocking.simulate(block, motion{options})",
             "print(response.summary())",
@@ -246,7 +246,8 @@ def _block(given: Texts) -> Block:
     )
 
 
-def _block_as_python(given: Texts) -> str:
+def block_as_python(given: Texts) -> str:
+    """Write the call of `rocking` that makes the block."""
     quantities: dict[str, Callable[[str, str], float]] = {"alpha": angle}
     arguments = {
         name: sides(given[name], name, quantities.get(name, number))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -76,7 +77,12 @@ def pulse_as_python(text: str) -> str:
     >>> pulse_as_python("sine:amplitude=3,frequency=1,cycles=2.5")
     'rocking.pulses.sine(amplitude=3.0, frequency=1.0, cycles=2.5)'
     """
-    written = ", ".join(f"{name}={value!r}" for name, value in arguments_of(text).items())
+    return pulse_call(text, {name: repr(value) for name, value in arguments_of(text).items()})
+
+
+def pulse_call(text: str, arguments: Mapping[str, str]) -> str:
+    """Write the call that makes a pulse of the same family with these arguments, as Python has them."""
+    written = ", ".join(f"{name}={value}" for name, value in arguments.items())
     return f"rocking.pulses.{_family(text).make.__name__}({written})"
 
 

@@ -21,7 +21,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer import assets, maps
+from rocking.explorer import assets, map_code, maps
 from rocking.explorer.background import behind_others, result_of
 from rocking.explorer.case import NAMES, read_case
 from rocking.explorer.core import EXPORTS, Explorer, Payload
@@ -168,7 +168,7 @@ class App:
         """Stream a map, coarse to fine: what it shows, then parts of it."""
         texts = _texts(request)
         grid = maps.grid_of(read_case(texts, self.explorer.shelf), _others(request))
-        about = await self._in_thread(lambda: maps.described(grid))
+        about = await self._in_thread(lambda: {**maps.described(grid), **map_code.described(grid)})
         return StreamingResponse(self._map(grid, about), media_type="application/octet-stream", headers=_FRESH)
 
     async def point(self, request: Request) -> Response:

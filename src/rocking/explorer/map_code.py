@@ -1,0 +1,169 @@
+"""A map as Python and as a command, which compute the same points."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Any, Final
+
+from rocking.constants import STANDARD_GRAVITY
+from rocking.explorer.case import block_as_python
+from rocking.explorer.maps import QUANTITIES, Axis, Grid
+from rocking.explorer.pulses import arguments_of, is_pulse, pulse_call
+from rocking.named_pulses import pulse_values
+
+#: Pulses that have an amplitude and a frequency, over which `rocking map` maps them.
+_MAPPED: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
+
+_HEAD: Final = """\
+import math
+
+import numpy as np
+
+import rocking
+from rocking.chattering import {names}
+
+
+def case({y}, {x}):
+    block = rocking.{block}
+    motion = {motion}
+    return families.Case(block, motion, {model!r})
+
+"""
+
+_CHATTERING: Final = """
+found = chattering_map(case, {{"{y}": {ys}, "{x}": {xs}}})
+print(found.summary())
+"""
+
+_PEAKS: Final = """
+def peak({y}, {x}):
+    block, motion, model = case({y}, {x})
+    response = rocking.simulate(block, motion, model=model)
+    return math.inf if response.overturned else response.peak_over_slenderness
+
+
+found = np.array([[peak({y}, {x}) for {x} in {xs}] for {y} in {ys}])
+print(found)
+"""
+
+_MODES: Final = """\
+import numpy as np
+
+import rocking
+
+block = rocking.{block}
+found = rocking.overturning_map({arguments})
+print(found.summary())
+"""
+
+
+def as_python(grid: Grid, quantity: str) -> str:
+    """Write a script that computes a quantity of a map; it runs as it stands.
+
+    Chattering is mapped by `chattering_map`, overturning by `overturning_map` where the map is over frequency and
+    amplitude of a pulse, everything else point by point.
+    """
+    texts = {
+        "x": grid.x.name,
+        "y": grid.y.name,
+        "xs": _values(grid.x),
+        "ys": _values(grid.y),
+        "block": _block(grid),
+        "motion": _motion(grid),
+        "model": grid.case.model,
+    }
+    if quantity in ("outcome", "rest"):
+        return (_HEAD + _CHATTERING).format(**texts, names="chattering_map, families")
+    if _is_overturning_map(grid):
+        name, _, numbers = _pulse(grid)
+        given = {name: value for name, value in numbers.items() if name not in ("amplitude", "frequency")}
+        if grid.case.model != "nonlinear":
+            given["model"] = grid.case.model
+        arguments = [repr(name), "block", f"amplitudes={texts['ys']}", f"frequencies={texts['xs']}"]
+        arguments += [f"{name}={value!r}" for name, value in given.items()]
+        return _MODES.format(block=texts["block"], arguments=", ".join(arguments))
+    return (_HEAD + _PEAKS).format(**texts, names="families")
+
+
+def as_command(grid: Grid) -> str | None:
+    """Write a map of overturning as a command; None for what the command line does not map."""
+    texts = grid.case.texts
+    if not _is_overturning_map(grid) or "gravity" in texts:
+        return None
+    name, written, _ = _pulse(grid)
+    options = {
+        "amplitudes": _range(grid.y),
+        "frequencies": _range(grid.x),
+        **{each: value for each, value in written.items() if each not in ("amplitude", "frequency")},
+        **{each: texts[each] for each in ("width", "height", "alpha", "restitution", "model") if each in texts},
+    }
+    return shlex.join(
+        ["rocking", "map", name, *(word for each in options.items() for word in (f"--{each[0]}", each[1]))]
+    )
+
+
+def described(grid: Grid) -> dict[str, Any]:
+    """Return a script for every quantity, and the command."""
+    return {"python": {each: as_python(grid, each) for each in QUANTITIES}, "command": as_command(grid)}
+
+
+def _is_overturning_map(grid: Grid) -> bool:
+    """Whether the map is one of `rocking.overturning_map`: a pulse's amplitude over its frequency."""
+    name = grid.case.texts.get("motion", "").partition(":")[0]
+    return name in _MAPPED and (grid.x.name, grid.y.name) == ("omega", "a")
+
+
+def _pulse(grid: Grid) -> tuple[str, dict[str, str], dict[str, Any]]:
+    """Name of the pulse, its parameters as they were written, and as numbers."""
+    text = grid.case.texts["motion"]
+    name, _, written = text.partition(":")
+    return name, dict(part.split("=", 1) for part in written.split(",")), pulse_values(text)[1]
+
+
+def _values(axis: Axis) -> str:
+    return f"np.linspace({float(axis.values[0])!r}, {float(axis.values[-1])!r}, {len(axis.values)})"
+
+
+def _range(axis: Axis) -> str:
+    return f"{float(axis.values[0])!r}:{float(axis.values[-1])!r}:{len(axis.values)}"
+
+
+def _block(grid: Grid) -> str:
+    """Call that makes the block, with the names of the axes among its arguments."""
+    varied = {grid.x.name, grid.y.name} & {"p", "alpha", "restitution"}
+    texts, sides = grid.case.texts, grid.case.block.sides
+    if not varied:
+        return block_as_python(texts)
+    slowest = min(side.p for side in sides)
+    arguments = {
+        "p": _pair([f"p * {side.p / slowest!r}" if "p" in varied else repr(side.p) for side in sides]),
+        "alpha": "np.radians(alpha)" if "alpha" in varied else _pair([repr(side.alpha) for side in sides]),
+    }
+    if "restitution" in varied:
+        arguments["restitution"] = "restitution"
+    elif "alpha" not in varied or "restitution" in texts:
+        arguments["restitution"] = _pair([repr(side.restitution) for side in sides])
+    if "gravity" in texts:
+        arguments["gravity"] = repr(grid.case.block.gravity)
+    return f"Block.from_parameters({', '.join(f'{name}={value}' for name, value in arguments.items())})"
+
+
+def _pair(sides: list[str]) -> str:
+    plain = [each.removesuffix(" * 1.0") for each in sides]
+    return plain[0] if plain[0] == plain[1] else f"[{', '.join(plain)}]"
+
+
+def _motion(grid: Grid) -> str:
+    """Call that makes the motion, with the names of the axes among its arguments."""
+    names, made = {grid.x.name, grid.y.name}, grid.case.python
+    text = grid.case.texts.get("motion", "")
+    if "omega" in names and is_pulse(text):
+        p = min(side.p for side in grid.case.block.sides)
+        made = pulse_call(text, {**_written(text), "frequency": f"omega * {p!r} / (2.0 * math.pi)"})
+    if "a" in names:
+        return f"{made}.scaled(pga=a * min(block.uplift_thresholds({grid.case.model!r})))"
+    return f"{made}.scaled(pga=pga * {STANDARD_GRAVITY!r})" if "pga" in names else made
+
+
+def _written(text: str) -> dict[str, str]:
+    return {name: repr(value) for name, value in arguments_of(text).items()}
