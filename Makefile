@@ -4,7 +4,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 LESS_STRICT := $(addprefix --allow-,untyped-defs untyped-calls incomplete-defs untyped-decorators any-generics) --no-warn-return-any
-PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2
+PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_guard.py explorer_server.py)
 
 .DEFAULT_GOAL := help
@@ -63,10 +63,10 @@ clean: ## remove what the other targets made, but not the environment
 distclean: clean ## remove the environment, too
 	rm -rf .venv .venv-lowest .venv-latest .lowest.txt .page-tools
 
-# What checks the page: for barriers, and for types. Without npm those two tests are skipped.
+# What checks the page: for barriers, for types, and for slips. Without npm those tests are skipped.
 .page-tools/.installed: Makefile
 	@mkdir -p .page-tools
-	@command -v npm >/dev/null || echo "npm was not found: the page is not checked for barriers and types"
+	@command -v npm >/dev/null || echo "npm was not found: the page is not checked for barriers, types and slips"
 	@! command -v npm >/dev/null || npm install --prefix .page-tools --no-save --silent --no-audit --no-fund $(PAGE_TOOLS)
 	@touch $@
 

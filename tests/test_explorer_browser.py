@@ -345,7 +345,10 @@ def test_a_file_of_several_channels_is_dropped(opened):
     assert page.js("document.getElementById('channel').options.length") == 2
     assert query_of(page)["motion"].startswith("file:")
     page.rested(lambda: page.page.select_option("#channel", index=1))
-    assert query_of(page)["channel"]
+    assert query_of(page)["channel"] == "2"
+    page.page.reload()
+    page.until("document.getElementById('channel')?.value === '2'", "a link with a file shows its channels")
+    assert page.js("document.getElementById('vertical').options[1].textContent").startswith("channel 1")
 
 
 def test_a_record_shakes_upwards_as_well(opened, tmp_path):
@@ -506,6 +509,35 @@ def test_a_map_is_read_by_keys_and_by_another_quantity(opened):
     complete(page, "by peak")
     page.rested(lambda: page.page.keyboard.press("Enter") if page.page.locator("#map").focus() is None else None)
     assert "restitution" in query_of(page)
+
+
+def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
+    page = opened(f"view=map&{SINE}&points=16&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=8&quantity=mode")
+    complete(page)
+    assert page.text("#python-title") == "This map as Python"
+    saved = {}
+    for name in ("rocking-map.svg", "rocking-map.png", "rocking-map.csv"):
+        with page.page.expect_download() as download:
+            page.page.get_by_role(
+                "button", name={"csv": "Numbers, CSV"}.get(name[-3:], f"Figure, {name[-3:].upper()}")
+            ).click()
+        assert download.value.suggested_filename == name
+        saved[name[-3:]] = Path(download.value.path()).read_bytes()
+    assert saved["png"].startswith(b"\x89PNG")
+    assert b"<svg" in saved["svg"][:200]
+    table = np.genfromtxt(saved["csv"].decode().splitlines(), delimiter=",", names=True)
+    assert table.dtype.names == ("omega", "a", "outcome", "rest", "peak", "mode")
+    command = shlex.split(page.text("#command"))
+    code = "import sys; from rocking.cli import main; main(sys.argv[1:])"
+    words = [sys.executable, "-c", code, *command[1:], "--json", "--quiet"]
+    found = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
+    assert np.array_equal(np.unique(table["omega"]), found["frequency"])
+    shown = table["mode"].reshape(16, 16)
+    assert np.array_equal(np.where(shown == -4, 0, shown), np.where(shown == -4, 0, np.array(found["mode"])))
+    page.page.select_option("#map-quantity", "outcome")
+    page.until("document.getElementById('python').textContent.includes('chattering_map')")
+    page.page.click("[data-view=response]")
+    page.until("document.getElementById('python-title').textContent === 'This case as Python'")
 
 
 def test_a_map_of_a_record_offers_a_sine_whose_critical_amplitude_is_known(opened):
@@ -707,3 +739,12 @@ def test_the_modules_pass_the_type_checker():
         ["node", compiler, *options.split(), *sorted(folder.glob("*.js"))], capture_output=True, text=True
     )
     assert found.returncode == 0, found.stdout
+
+
+def test_the_modules_pass_the_linter():
+    linter = tool("eslint/bin/eslint.js")
+    folder = Path(rocking.__file__).parent / "explorer" / "page"
+    rules = Path(__file__).parent / "page.eslint.mjs"
+    words = ["node", linter, "--no-config-lookup", "--max-warnings", "0", "--config", rules, folder]
+    found = subprocess.run(words, capture_output=True, text=True)
+    assert found.returncode == 0, found.stdout + found.stderr

@@ -1,8 +1,11 @@
 """The explorer's core: cases from texts and back, arrays of windows, maps; against the package's own functions."""
 
+import json
 import math
 import runpy
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +13,8 @@ import pytest
 
 import rocking
 from rocking.chattering import chattering_map, critical_amplitude, families
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord
-from rocking.explorer import maps
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
+from rocking.explorer import map_code, maps
 from rocking.explorer.case import DEFAULT, NAMES, as_command, as_python, read_case, texts_of
 from rocking.explorer.core import Explorer, thinned
 from rocking.explorer.pulses import FAMILIES, pulse_as_text, pulse_of
@@ -618,6 +621,87 @@ def test_a_point_of_a_study_is_its_simulation(study):
     assert payload.arrays["values"].reshape(rows, columns)[1, column] == pytest.approx(
         response.peak_rotation, rel=1e-12
     )
+
+
+def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
+    blocks = rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=[[0.2, 0.25], [0.2, 0.2], [0.3, 0.3]], restitution=0.9)
+    motions = [rocking.records.load(f"el-centro-meloland-{which}") for which in ("270", "360")]
+    made = rocking.study(tmp_path / "list", blocks, motions, pga=[2.0, 4.0, 5.0])
+    made.run(progress=False)
+    view = StudyView(tmp_path / "list")
+    assert list(view.axes()) == ["block", "scale", "motion"]
+    named = view.describe()["axes"][0]["names"]
+    assert named[0] == "p = 2 rad/s, α = 0.2, 0.25 rad, η = 0.9"
+    results = made.results()
+    over_scales = view.slice({"x": "block", "y": "scale", "quantity": "peak_rotation", "motion_index": "1"})
+    expected = results.peak_rotation.isel(motion=1).transpose("scale", "block", ...).values.reshape(3, 3)
+    assert np.array_equal(over_scales.arrays["values"].reshape(3, 3), expected)
+    over_motions = view.slice({"x": "motion", "y": "block", "quantity": "peak_rotation", "scale_index": "2"})
+    expected = results.peak_rotation.isel(scale=2).transpose("block", "motion", ...).values.reshape(3, 2)
+    assert np.array_equal(over_motions.arrays["values"].reshape(3, 2), expected)
+    texts = view.texts_at({"x": "block", "y": "motion", "at_x": "1", "at_y": "2", "scale_index": "2"}, Shelf())
+    response = read_case(texts, Shelf()).simulate()
+    assert response.peak_rotation == pytest.approx(over_motions.arrays["values"][1], rel=1e-12)
+
+
+def test_a_study_that_varies_too_little_is_refused_with_a_sentence(tmp_path):
+    motion = rocking.pulses.one_sine(3.0, 1.0)
+    made = rocking.study(tmp_path / "few", rocking.Blocks(p=[2.0, 3.0], alpha=[0.2, 0.3], restitution=0.9), motion)
+    made.run(progress=False)
+    with pytest.raises(StudyError, match="varies block; a map needs two of blocks, motions and scales"):
+        StudyView(tmp_path / "few")
+
+
+def _ran(command, folder):
+    code = "import sys; from rocking.cli import main; main(sys.argv[1:])"
+    words = [sys.executable, "-c", code, *shlex.split(command)[1:], "--json", "--quiet"]
+    return json.loads(subprocess.run(words, capture_output=True, text=True, check=True, cwd=folder).stdout)
+
+
+def _mapped(texts, axes):
+    grid = maps.grid_of(read_case(texts, Shelf()), {"points": "8", **axes})
+    found = np.empty((len(maps.QUANTITIES), 64), np.float32)
+    for part in maps.parts(grid):
+        found[:, part.points] = part.values
+    return grid, dict(zip(maps.QUANTITIES, found.reshape(-1, 8, 8), strict=True))
+
+
+def test_a_map_of_overturning_is_a_command_and_a_script(tmp_path):
+    texts = {**SINE, "motion": "ricker:amplitude=3,frequency=1,kind=antisymmetric", "model": "nonlinear"}
+    axes = {"x": "omega", "x_from": "0.6", "x_to": "5", "y": "a", "y_from": "0.7", "y_to": "9"}
+    grid, found = _mapped(texts, axes)
+    modes = np.where(found["mode"] == maps.OVERTURNS_AFTER_REST, 0, found["mode"])
+    ran = _ran(map_code.as_command(grid), tmp_path)
+    assert np.array_equal(np.array(ran["mode"]), modes)
+    assert len(np.unique(modes)) > 3
+    script = tmp_path / "map.py"
+    script.write_text(map_code.as_python(grid, "mode"), "utf-8")
+    assert np.array_equal(runpy.run_path(str(script))["found"].data.mode.values, modes)
+
+
+@pytest.mark.parametrize(
+    ("texts", "axes"),
+    [
+        (SINE, {"x": "omega", "x_from": "1", "x_to": "4", "y": "a", "y_from": "1", "y_to": "1.1"}),
+        (SINE, {"x": "restitution", "y": "omega"}),
+        ({**SINE, "restitution": "0.9,0.92"}, {"x": "p", "y": "a", "y_from": "1.1", "y_to": "2"}),
+        ({**STATUE, "motion": "el-centro-meloland-270"}, {"x": "alpha", "y": "pga"}),
+    ],
+)
+@pytest.mark.parametrize("quantity", ["outcome", "peak"])
+def test_every_map_is_a_script(texts, axes, quantity, tmp_path):
+    grid, found = _mapped(texts, axes)
+    script = tmp_path / "map.py"
+    script.write_text(map_code.as_python(grid, quantity), "utf-8")
+    ran = runpy.run_path(str(script))["found"]
+    if quantity == "outcome":
+        assert np.array_equal(ran.data.outcome.values, found["outcome"])
+        time = (ran.data.rest - ran.data.uplift).values
+        assert np.allclose(time, found["rest"], rtol=1e-5, equal_nan=True)
+    else:
+        if not isinstance(ran, np.ndarray):
+            ran = np.where(ran.data.mode >= 0, np.inf, ran.data.peak_rotation / 0.2)
+        assert np.allclose(ran, found["peak"], rtol=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -20,12 +22,19 @@ from rocking.quantities import number
 #: Largest map, points.
 _MOST: Final = 1_000_000
 
+#: Values of an axis that are named, or offered to choose from, at most.
+_NAMED: Final = 1000
+
 _LABELS: Final = {
     "p": ("Frequency parameter p", "rad/s"),
     "alpha": ("Slenderness α", "rad"),
     "restitution": ("Restitution η", ""),
-    "scale": ("Scale", ""),
+    "block": ("Block, by its number", ""),
+    "motion": ("Motion, by its number", ""),
 }
+
+#: Parameters of a block.
+_PARAMETERS: Final = ("p", "alpha", "restitution")
 
 #: Quantities of a study that are drawn.
 QUANTITIES: Final = {
@@ -40,6 +49,8 @@ QUANTITIES: Final = {
 class StudyView:
     """A study in a folder, slice by slice.
 
+    Blocks that are all combinations of some parameters are shown over these; others, by their number.
+
     Parameters
     ----------
     folder : path
@@ -48,7 +59,7 @@ class StudyView:
     Raises
     ------
     StudyError
-        If there is none, nothing of it is done, or its blocks have two sides.
+        If there is none, nothing of it is done, or it varies too little for a map.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -56,31 +67,33 @@ class StudyView:
         self.study = rocking.study(folder)
         if not self.study.status.done:
             raise StudyError(f"nothing of the study in {folder} is done yet: rocking study run {folder}")
-        product = self.study.product
-        if not product.blocks.is_symmetric:
-            raise StudyError("the blocks of this study have two sides; a map shows symmetric ones")
-        self._columns = {name: getattr(product.blocks, name)[:, 0] for name in ("p", "alpha", "restitution")}
+        blocks = self.study.product.blocks
+        self._columns: dict[str, Floats] = {name: getattr(blocks, name)[:, 0] for name in _PARAMETERS}
+        if not (blocks.is_symmetric and _is_grid(list(self._columns.values()))):
+            self._columns = {"block": np.arange(1.0, len(blocks) + 1.0)}
+        if len(self.axes()) < 2:
+            raise StudyError(
+                f"the study in {folder} varies {' and '.join(self.axes()) or 'nothing'}; a map needs two of blocks, "
+                f"motions and scales. See its numbers: rocking study report {folder}"
+            )
 
     def axes(self) -> dict[str, Floats]:
         """Values of what the study varies."""
         found = {name: np.unique(values) for name, values in self._columns.items()}
         found["scale"] = np.asarray(self.study.product.scales.values, dtype=float)
+        found["motion"] = np.arange(1.0, len(self.study.product.motions) + 1.0)
         return {name: values for name, values in found.items() if values.size > 1}
 
     def describe(self) -> dict[str, Any]:
         """Say what the study holds."""
-        product = self.study.product
-        results = self.study.results()
+        product, axes = self.study.product, self.axes()
         return {
             "name": self.name,
             "status": str(self.study.status),
-            "axes": [
-                {"name": name, "label": self._label(name)[0], "unit": self._label(name)[1], "values": values.tolist()}
-                for name, values in self.axes().items()
-            ],
-            "fixed": {name: np.unique(values).tolist() for name, values in self._columns.items()},
+            "axes": [self._described(name, axes) for name in axes],
+            "fixed": {name: np.unique(values)[:_NAMED].tolist() for name, values in self._columns.items()},
             "scales": np.asarray(product.scales.values, dtype=float).tolist(),
-            "motions": [str(name) for name in results.motion.values],
+            "motions": self._names("motion"),
             "polarities": ["+" if sign > 0 else "-" for sign in product.signs],
             "quantities": [{"name": name, "label": label} for name, label in QUANTITIES.items()],
         }
@@ -92,7 +105,7 @@ class StudyView:
         ----------
         texts : mapping of str to str
             ``x``, ``y``: parameters; ``quantity``; ``motion_index``, ``polarity_index``, ``scale_index``; ``fix_p``,
-            ``fix_alpha``, ``fix_restitution``: values of what is not drawn.
+            ``fix_alpha``, ``fix_restitution``, ``fix_block``: values of what is not drawn.
 
         Raises
         ------
@@ -108,17 +121,23 @@ class StudyView:
             raise InvalidOption(f"{axes[x].size} by {axes[y].size} points are too many for a map")
         values = np.full((axes[y].size, axes[x].size), np.nan)
         blocks = self._blocks(texts, {x, y})
-        scales = range(len(self.study.product.scales.values)) if "scale" in (x, y) else [self._scale(texts)]
-        for scale in scales:
-            outcome = self._outcomes(texts, scale, quantity)[blocks]
-            at = {name: np.searchsorted(axes[name], self._columns[name][blocks]) for name in (x, y) if name != "scale"}
-            at["scale"] = np.full(blocks.size, scale)
-            values[at[y], at[x]] = outcome
+        results, product = self.study.results()[quantity], self.study.product
+        scales = range(len(product.scales.values)) if "scale" in (x, y) else [self._scale(texts)]
+        motions = range(len(product.motions)) if "motion" in (x, y) else [self._motion(texts)]
+        at = {
+            name: np.searchsorted(axes[name], self._columns[name][blocks]) for name in (x, y) if name in self._columns
+        }
+        for scale, motion in itertools.product(scales, motions):
+            at |= {"scale": np.full(blocks.size, scale), "motion": np.full(blocks.size, motion)}
+            values[at[y], at[x]] = self._outcomes(results, texts, scale, motion)[blocks]
+        script = f"results = rocking.study({self.name!r}).results()\nprint(results[{quantity!r}])\n"
         header = {
             "x": self._described(x, axes),
             "y": self._described(y, axes),
             "quantity": quantity,
             "shape": values.shape,
+            "python": f"import rocking\n\n{script}",
+            "command": shlex.join(["rocking", "study", "report", self.name]),
         }
         return Payload(header, {"values": values.ravel()})
 
@@ -128,22 +147,26 @@ class StudyView:
         at = {texts.get(which, ""): number(texts.get(f"at_{which}", ""), f"at_{which}") for which in ("x", "y")}
         scales = np.asarray(product.scales.values, dtype=float)
         scale = self._scale(texts) if "scale" not in at else int(np.argmin(np.abs(scales - at["scale"])))
-        motion = product.motions[self._index(texts, "motion_index", len(product.motions))]
+        motion = product.motions[self._motion(texts) if "motion" not in at else round(at["motion"]) - 1]
         sign = product.signs[self._index(texts, "polarity_index", len(product.signs))]
         factor = sign * float(product.scales.factors(motion)[scale])
-        found = {name: repr(float(at.get(name, self._value(name, texts)))) for name in self._columns}
+        chosen = {name: at.get(name, self._value(name, texts)) for name in self._columns}
+        found = self._texts_of_block(chosen)
         found |= texts_of_motion(motion if factor == 1.0 else motion.scaled(factor), shelf)
         found |= {"model": product.model, "chattering": str(product.treatment)}
         return found if product.duration is None else found | {"duration": repr(product.duration)}
 
-    def _outcomes(self, texts: Mapping[str, str], scale: int, quantity: str) -> Floats:
+    def _texts_of_block(self, chosen: Mapping[str, float]) -> dict[str, str]:
+        if "block" not in chosen:
+            return {name: repr(float(value)) for name, value in chosen.items()}
+        blocks, k = self.study.product.blocks, round(chosen["block"]) - 1
+        pairs = {name: getattr(blocks, name)[k] for name in _PARAMETERS}
+        return {name: ",".join(repr(float(each)) for each in dict.fromkeys(pair)) for name, pair in pairs.items()}
+
+    def _outcomes(self, results: Any, texts: Mapping[str, str], scale: int, motion: int) -> Floats:
         """Outcomes of all blocks under one motion at one scale."""
-        results = self.study.results()[quantity]
-        chosen = {
-            "motion": self._index(texts, "motion_index", len(self.study.product.motions)),
-            "scale": scale,
-            "polarity": self._index(texts, "polarity_index", len(self.study.product.signs)),
-        }
+        polarity = self._index(texts, "polarity_index", len(self.study.product.signs))
+        chosen = {"motion": motion, "scale": scale, "polarity": polarity}
         found = results.isel({name: k for name, k in chosen.items() if name in results.dims})
         return np.asarray(found.values, dtype=float)
 
@@ -164,6 +187,9 @@ class StudyView:
     def _scale(self, texts: Mapping[str, str]) -> int:
         return self._index(texts, "scale_index", len(self.study.product.scales.values))
 
+    def _motion(self, texts: Mapping[str, str]) -> int:
+        return self._index(texts, "motion_index", len(self.study.product.motions))
+
     def _index(self, texts: Mapping[str, str], name: str, count: int) -> int:
         wanted = number(texts.get(name) or "0", name)
         if not (0 <= wanted < count and math.floor(wanted) == wanted):
@@ -181,4 +207,27 @@ class StudyView:
 
     def _described(self, name: str, axes: Mapping[str, Floats]) -> dict[str, Any]:
         label, unit = self._label(name)
-        return {"name": name, "label": label, "unit": unit, "values": axes[name].tolist()}
+        found = {"name": name, "label": label, "unit": unit, "values": axes[name].tolist()}
+        named = name in ("block", "motion") and len(axes[name]) <= _NAMED
+        return found | {"names": self._names(name)} if named else found
+
+    def _names(self, axis: str) -> list[str]:
+        """Say what stands behind the numbers of blocks or motions."""
+        if axis == "motion":
+            return [str(name) for name in self.study.results().motion.values]
+        texts = (self._texts_of_block({"block": k}) for k in self._columns["block"])
+        return [
+            f"p = {_short(each['p'])} rad/s, α = {_short(each['alpha'])} rad, η = {_short(each['restitution'])}"
+            for each in texts
+        ]
+
+
+def _is_grid(columns: list[Floats]) -> bool:
+    """Whether blocks of these parameters are all combinations of their values, each once."""
+    different = len(np.unique(np.column_stack(columns), axis=0))
+    return different == len(columns[0]) == math.prod(np.unique(each).size for each in columns)
+
+
+def _short(text: str) -> str:
+    """Write one or two numbers to four digits."""
+    return ", ".join(f"{float(each):.4g}" for each in text.split(","))

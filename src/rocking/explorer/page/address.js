@@ -12,7 +12,7 @@ export const MOTION = ["motion", "channel", "vertical", "dt", "units", "scale", 
 const VIEWS = ["response", "block", "map", "compare"];
 const MAP = [
   "x", "x_from", "x_to", "y", "y_from", "y_to", "points", "quantity",
-  "motion_index", "polarity_index", "scale_index", "fix_p", "fix_alpha", "fix_restitution",
+  "motion_index", "polarity_index", "scale_index", "fix_p", "fix_alpha", "fix_restitution", "fix_block",
 ];
 
 /** @param {Texts} opening @returns {State} */

@@ -132,7 +132,7 @@ export class ChatteringPanel {
     this.ratios.y_range.setv({start: low - margin, end: high + margin});
     this.x?.setv({start: 1 - 0.02 * count, end: count + 0.02 * count});
     if (intervals.y.length) {
-      const least = intervals.y.reduce((one, other) => Math.min(one, other)), most = intervals.y.reduce((one, other) => Math.max(one, other));
+      const least = intervals.y.reduce((a, b) => Math.min(a, b)), most = intervals.y.reduce((a, b) => Math.max(a, b));
       const beside = Math.max((most / least) ** 0.05, 1.2);
       this.intervals.y_range.setv({start: least / beside, end: most * beside});
     }

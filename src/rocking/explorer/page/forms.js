@@ -1,5 +1,6 @@
 // Forms that change the texts of a case: its block, its motion, its model.
 
+import {json} from "./api.js";
 import {NumberControl} from "./controls.js";
 import {make, one, sent, what} from "./words.js";
 
@@ -198,6 +199,28 @@ export class MotionForm {
     if (texts.units) this.told.units.select.value = texts.units;
     if (texts.dt) this.dt.value = texts.dt;
     this.reveal();
+    void this.recall(texts);
+  }
+
+  /** Learn what the files of a link are, which the server has kept. @param {Texts} texts */
+  async recall(texts) {
+    const [moving, upwards] = [texts.motion, texts.vertical].map((name) => /^file:([^#]*)/.exec(name ?? "")?.[1]);
+    for (const key of new Set([moving, upwards])) {
+      if (!key || this.files.some((file) => file.key === key)) continue;
+      try { this.files.push(await json(`/api/records/${key}`, {})); } catch { return; }
+    }
+    const known = this.files.find((file) => file.key === moving);
+    if (known && known !== this.file) {
+      this.file = known;
+      this.offerChannels(known);
+      if (texts.channel) this.told.channel.select.value = texts.channel;
+    }
+    if (moving || upwards) this.reveal();
+  }
+
+  /** @param {any} file */
+  offerChannels(file) {
+    this.told.channel.select.replaceChildren(...file.channels.map((/** @type {any} */ each) => make("option", {value: String(each.number)}, [`${each.number}: ${each.name}`])));
   }
 
   /** A file that the server keeps: what shakes the block, or moves it up and down as well. @param {any} file @param {boolean} [upwards] */
@@ -211,7 +234,7 @@ export class MotionForm {
     }
     this.file = file;
     this.wanted = "";
-    this.told.channel.select.replaceChildren(...file.channels.map((/** @type {any} */ each) => make("option", {value: String(each.number)}, [`${each.number}: ${each.name}`])));
+    this.offerChannels(file);
     this.kind.select.value = "file";
     this.scale.select.value = "";
     this.tell();
@@ -272,12 +295,12 @@ export class MotionForm {
     this.tell();
   }
 
-  /** Whether a file that is used does not say something itself. @param {string} what */
-  needs(what) {
+  /** Whether a file that is used does not say something itself. @param {string} name */
+  needs(name) {
     const kind = this.kind.select.value;
     const beside = this.files.find((file) => this.wanted.startsWith(`file:${file.key}`));
     const used = kind === "file" ? [this.file, beside] : kind === "record" ? [beside] : [];
-    return used.some((file) => file?.missing.includes(what));
+    return used.some((file) => file?.missing.includes(name));
   }
 
   tell() {

@@ -273,8 +273,8 @@ export class Histories {
     for (const [k, drawn] of this.drawn.entries()) {
       if (!drawn) continue;
       const x = this.scale.all(drawn.lines.impact, from);
-      const at = start + (0.045 + 0.075 * k) * (end - start);
-      this.sources[`${NAMES[k]}-impact`].data = {x, y: new Float64Array(x.length).fill(at)};
+      const foot = start + (0.045 + 0.075 * k) * (end - start);
+      this.sources[`${NAMES[k]}-impact`].data = {x, y: new Float64Array(x.length).fill(foot)};
     }
     const uplifts = (this.drawn[0]?.uplift ?? new Float64Array(0)).filter((each) => each >= this.window[0] && each <= this.window[1]);
     this.sources.uplift.data = {

@@ -29,11 +29,11 @@ const forms = {
   model: new ModelForm(one("model-form"), offers, changed),
 };
 const histories = new Histories(one("histories"), {
-  window: (ends) => { state.window = ends; address.write(state); look.ask(); },
+  window: (chosen) => { state.window = chosen; address.write(state); look.ask(); },
   cursor: (text) => { one("cursor").textContent = text; },
   pick: (time) => views.block?.seek(time),
 });
-const chattering = new ChatteringPanel((ends) => { state.window = ends; address.write(state); look.ask(); });
+const chattering = new ChatteringPanel((chosen) => { state.window = chosen; address.write(state); look.ask(); });
 
 /** @param {string | null} sentence */
 function problem(sentence) {
@@ -119,7 +119,7 @@ async function go(name) {
   }
   const parts = {
     summary: name !== "map", "view-histories": name === "response" || name === "block", "view-response": name === "response",
-    "view-block": name === "block", "view-map": name === "map", "view-compare": name === "compare", take: name !== "map",
+    "view-block": name === "block", "view-map": name === "map", "view-compare": name === "compare",
   };
   for (const [id, shown] of Object.entries(parts)) one(id).hidden = !shown;
   one("figures").hidden = name === "block";
@@ -154,7 +154,7 @@ function drawRest() {
   if (!page.shown) return;
   const {header} = page.shown;
   forms.block.show(state.texts, header.block.sides);
-  showTaking(header, state);
+  if (state.view !== "map") showTaking(header, state);
   if (state.view === "response") chattering.draw(page.shown, state.texts);
   document.body.dataset.rested = String(Number(document.body.dataset.rested ?? 0) + 1);
 }

@@ -2,6 +2,7 @@
 
 import {Latest, frames, json, payload} from "./api.js";
 import {bokeh, colour, figure, themed} from "./theme.js";
+import {showMapTaking} from "./taking.js";
 import {make, one, short} from "./words.js";
 
 /** From harmless to the worst, each darker than the one before; the last stands out. */
@@ -70,7 +71,7 @@ export class View {
     if (name === "quantity" && this.about && !this.study) {
       this.fill();
       this.page.remember();
-      if (JSON.stringify(this.asked()) === this.drawn) { this.recolour(); return; }
+      if (JSON.stringify(this.asked()) === this.drawn) { this.recolour(); this.offer(); return; }
     }
     this.update();
   }
@@ -166,7 +167,9 @@ export class View {
         this.page.problem(null);
         const count = this.about.shape[0] * this.about.shape[1];
         this.values = this.about.quantities.map(() => new Float32Array(count).fill(NaN));
+        this.covered = new Uint8Array(count).fill(255);
         this.drawAxes();
+        this.offer();
         done = 1;
         continue;
       }
@@ -179,23 +182,28 @@ export class View {
     }
     this.complete = true;
     this.recolour();
+    this.offer();
     body.map = "complete";
     body.mapTook = String(performance.now() - started);
   }
 
-  /** Put a part where it belongs; a coarse point covers those that are still to come. @param {Uint8Array} frame */
+  /** Put a part where it belongs. A coarse point covers those that are still to come, but none that came before it: two
+   * threads compute, and the last part of a level may come after the first of the next. @param {Uint8Array} frame */
   take(frame) {
     const view = new DataView(frame.buffer, frame.byteOffset, frame.byteLength);
     const stride = view.getUint32(0, true), count = view.getUint32(4, true);
-    const columns = this.about.shape[1], rows = this.about.shape[0];
+    const [rows, columns] = this.about.shape;
+    const covered = /** @type {Uint8Array} */ (this.covered), all = /** @type {Float32Array[]} */ (this.values);
     for (let k = 0; k < count; k += 1) {
       const index = view.getUint32(8 + 4 * k, true);
       const row = Math.floor(index / columns), column = index % columns;
-      const lastRow = Math.min(rows, row + stride), lastColumn = Math.min(columns, column + stride);
-      this.values?.forEach((/** @type {Float32Array} */ all, /** @type {number} */ q) => {
-        const value = view.getFloat32(8 + 4 * count + 4 * (q * count + k), true);
-        for (let r = row; r < lastRow; r += 1) all.fill(value, r * columns + column, r * columns + lastColumn);
-      });
+      const point = all.map((_, q) => view.getFloat32(8 + 4 * count + 4 * (q * count + k), true));
+      for (let r = row; r < Math.min(rows, row + stride); r += 1) for (let c = column; c < Math.min(columns, column + stride); c += 1) {
+        const at = r * columns + c;
+        if (covered[at] < stride) continue;
+        covered[at] = stride;
+        point.forEach((value, q) => { all[q][at] = value; });
+      }
     }
     return count;
   }
@@ -207,6 +215,29 @@ export class View {
     window.setTimeout(() => { this.waiting = false; this.recolour(); }, 90);
   }
 
+  /** What can be taken away: the picture, the numbers, and code that computes them again. */
+  offer() {
+    const {python, command} = this.about;
+    const name = this.study ? "rocking-study" : "rocking-map";
+    showMapTaking(this.study ? python : python[this.page.state.map.quantity], command, !this.complete ? [] : [
+      [`${name}.svg`, "Figure, SVG", () => this.picture("svg")], [`${name}.png`, "Figure, PNG", () => this.picture("png")],
+      [`${name}.csv`, "Numbers, CSV", async () => new Blob([this.table()], {type: "text/csv"})],
+    ]);
+  }
+
+  /** The map as it is drawn. @param {string} form @returns {Promise<Blob>} */
+  async picture(form) { return bokeh().index.find_one(this.plot).export(form).to_blob(); }
+
+  /** Every point of the map with all that is known of it. */
+  table() {
+    const {x, y, quantities} = this.about;
+    const head = [x, y].map((axis) => (axis.unit ? `${axis.name}_${axis.unit.replace("°", "deg").replace(/\W+/g, "_")}` : axis.name));
+    const rows = y.values.flatMap((/** @type {number} */ up, /** @type {number} */ row) => x.values.map((/** @type {number} */ right, /** @type {number} */ column) => [
+      right, up, ...(this.values ?? []).map((/** @type {Float32Array} */ all) => Number(all[row * x.values.length + column].toPrecision(7))),
+    ].map((each) => (Number.isNaN(each) ? "" : each === Infinity ? "inf" : String(each))).join(",")));
+    return [[...head, ...quantities].join(","), ...rows, ""].join("\n");
+  }
+
   async slice() {
     this.fill();
     const {header, arrays} = await payload("/api/study", this.page.state.map);
@@ -215,6 +246,7 @@ export class View {
     this.drawAxes();
     this.complete = true;
     this.recolour();
+    this.offer();
     /** @type {HTMLProgressElement} */ (one("map-progress")).value = 1;
     document.body.dataset.map = "complete";
   }
@@ -359,7 +391,8 @@ export class View {
   point(x, y) {
     if (!this.about || !this.values) return;
     const [row, column] = this.place(x, y);
-    const at = `${this.about.x.label} ${short(this.about.x.values[column])}, ${this.about.y.label} ${short(this.about.y.values[row])}`;
+    const written = (/** @type {any} */ axis, /** @type {number} */ k) => `${axis.label} ${short(axis.values[k])}${axis.names ? ` (${axis.names[k]})` : ""}`;
+    const at = `${written(this.about.x, column)}, ${written(this.about.y, row)}`;
     const index = row * this.about.shape[1] + column;
     const said = this.about.quantities.map((/** @type {string} */ name, /** @type {number} */ q) => this.said(name, /** @type {Float32Array[]} */ (this.values)[q][index])).filter(Boolean);
     one("map-at").textContent = `${at}: ${said.join("; ")}.`;

@@ -15,9 +15,30 @@ export function showTaking(header, state) {
     href: address("/api/export", {...state.texts, form, ...(windowed && state.window ? {from: String(from), to: String(to)} : {})}),
     download: `rocking-response.${form}`,
   }, [label])));
-  one("python").textContent = header.python;
-  one("command").textContent = header.command ?? "The command line does not do this case; Python does.";
-  /** @type {HTMLButtonElement} */ (document.querySelector("[data-copy=command]")).disabled = !header.command;
+  showCode("case", header.python, header.command);
+}
+
+/** What can be taken of a map, which the page has already. @param {string} python @param {string | null} command
+ * @param {[string, string, () => Promise<Blob>][]} files names, labels, and what makes them */
+export function showMapTaking(python, command, files) {
+  one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => save(name, await content())}}, [label])));
+  showCode("map", python, command);
+}
+
+/** @param {string} what @param {string} python @param {string | null} command */
+function showCode(what, python, command) {
+  one("python-title").textContent = `This ${what} as Python`;
+  one("python").textContent = python;
+  one("command").textContent = command ?? `The command line does not do this ${what}; Python does.`;
+  /** @type {HTMLButtonElement} */ (document.querySelector("[data-copy=command]")).disabled = !command;
+}
+
+/** @param {string} name @param {Blob} content */
+function save(name, content) {
+  const link = /** @type {HTMLAnchorElement} */ (make("a", {href: URL.createObjectURL(content), download: name}));
+  link.click();
+  window.setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+  say(`${name} is saved.`);
 }
 
 export function makeCopying() {
