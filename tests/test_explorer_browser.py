@@ -59,26 +59,38 @@ def here(explorer):
     running.server.should_exit = True
 
 
+@pytest.fixture(scope="module")
+def contexts(browser):
+    """Contexts of the browser by their options, kept so that the plotting library is loaded once in each."""
+    made = {}
+
+    def context_with(**options):
+        key = json.dumps(options, sort_keys=True)
+        if key not in made:
+            made[key] = browser.new_context(**options)
+        return made[key]
+
+    return context_with
+
+
 @pytest.fixture
-def opened(browser, here):
+def opened(contexts, here):
     """Open the page with a query; in the end nothing may have gone wrong on it."""
-    contexts, pages = [], []
+    pages = []
 
     def open_page(query="", viewport=DESK, scheme="light", server=here, allowed=(), **options):
-        context = browser.new_context(viewport=viewport, color_scheme=scheme, **options)
-        page = Watched(context.new_page(), allowed)
-        contexts.append(context)
+        page = Watched(contexts(viewport=viewport, color_scheme=scheme, **options).new_page(), allowed)
         pages.append((page, server))
         page.page.goto(server.link() + (f"&{query}" if query else ""))
         page.until("document.body.dataset.ready && document.body.dataset.rested", "the page is ready")
         return page
 
     yield open_page
+    for page, _ in pages:
+        page.page.close()
     for page, server in pages:
         assert page.complaints == []
-        assert page.hosts <= {f"127.0.0.1:{server.port}", "data"}
-    for context in contexts:
-        context.close()
+        assert page.hosts <= {f"127.0.0.1:{server.port}", "data", ""}
 
 
 def query_of(page):
@@ -474,7 +486,7 @@ def complete(page, axes=""):
 
 
 def test_a_map_is_drawn_and_a_click_opens_the_case(opened):
-    page = opened(f"view=map&{SINE}&points=100&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=1.1")
+    page = opened(f"view=map&{SINE}&points=48&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=1.1")
     complete(page)
     assert "complete" in page.text("#map-legend")
     assert "exact critical amplitude" in page.text("#map-legend")
@@ -497,7 +509,7 @@ def test_a_map_is_drawn_and_a_click_opens_the_case(opened):
 
 
 def test_a_map_is_read_by_keys_and_by_another_quantity(opened):
-    page = opened(f"view=map&{SINE}&points=100&quantity=rest&x=restitution&y=omega")
+    page = opened(f"view=map&{SINE}&points=40&quantity=rest&x=restitution&y=omega")
     complete(page)
     page.page.locator("#map").focus()
     before = page.text("#map-at")
@@ -512,7 +524,7 @@ def test_a_map_is_read_by_keys_and_by_another_quantity(opened):
 
 
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
-    page = opened(f"view=map&{SINE}&points=16&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=8&quantity=mode")
+    page = opened(f"view=map&{SINE}&points=8&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=8&quantity=mode")
     complete(page)
     assert page.text("#python-title") == "This map as Python"
     saved = {}
@@ -532,7 +544,7 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
     words = [sys.executable, "-c", code, *command[1:], "--json", "--quiet"]
     found = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
     assert np.array_equal(np.unique(table["omega"]), found["frequency"])
-    shown = table["mode"].reshape(16, 16)
+    shown = table["mode"].reshape(8, 8)
     assert np.array_equal(np.where(shown == -4, 0, shown), np.where(shown == -4, 0, np.array(found["mode"])))
     page.page.select_option("#map-quantity", "outcome")
     page.until("document.getElementById('python').textContent.includes('chattering_map')")
@@ -541,7 +553,7 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
 
 
 def test_a_map_of_a_record_offers_a_sine_whose_critical_amplitude_is_known(opened):
-    page = opened(f"view=map&{STATUE}&points=100")
+    page = opened(f"view=map&{STATUE}&points=40")
     page.page.click("#map-sine")
     page.until("/exact critical amplitude/.test(document.getElementById('map-legend').textContent)")
     assert query_of(page)["motion"].startswith("sine:")
@@ -608,7 +620,7 @@ def test_two_blocks_or_two_motions_are_compared(opened, what):
 def test_no_view_has_a_barrier(opened, viewport, scheme):
     axe = tool("axe-core/axe.min.js").read_text("utf-8")
     # The checker itself writes styles that the page's policy does not admit.
-    page = opened(f"view=response&points=100&{SINE}", viewport, scheme, bypass_csp=True)
+    page = opened(f"view=response&points=24&{SINE}", viewport, scheme, bypass_csp=True)
     page.js(axe + "; 1")
     for view in VIEWS:
         page.page.click(f"[data-view={view}]")

@@ -56,6 +56,7 @@ async function told(work) {
 
 /** How long sliders must lie still before all is drawn, ms. */
 const PAUSE = 120;
+/** The timer; 0 where all is drawn. */
 let resting = 0;
 
 /** The whole case, where a form has changed it. */
@@ -65,8 +66,9 @@ const load = new Latest(async () => {
     page.shown = await payload("/api/case", {...state.texts, ...ends()});
     draw();
     document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
+    resting = -1;
   });
-  resting = window.setTimeout(drawRest, PAUSE);
+  if (resting) resting = window.setTimeout(drawRest, PAUSE);
 });
 
 /** Another window of the case that is shown. */
@@ -151,6 +153,7 @@ function draw() {
 
 /** What nobody reads while a slider moves. */
 function drawRest() {
+  resting = 0;
   if (!page.shown) return;
   const {header} = page.shown;
   forms.block.show(state.texts, header.block.sides);
