@@ -14,6 +14,9 @@ from rocking.named_pulses import pulse_values
 #: Pulses that have an amplitude and a frequency, over which `rocking map` maps them.
 _MAPPED: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
+#: Quantities of a map of overturning.
+_OVERTURNING: Final = ("peak", "mode")
+
 _HEAD: Final = """\
 import math
 
@@ -103,8 +106,12 @@ def as_command(grid: Grid) -> str | None:
 
 
 def described(grid: Grid) -> dict[str, Any]:
-    """Return a script for every quantity, and the command."""
-    return {"python": {each: as_python(grid, each) for each in QUANTITIES}, "command": as_command(grid)}
+    """Return a script for every quantity, and the command for those that it computes."""
+    command = as_command(grid)
+    return {
+        "python": {each: as_python(grid, each) for each in QUANTITIES},
+        "command": {each: command for each in _OVERTURNING},
+    }
 
 
 def _is_overturning_map(grid: Grid) -> bool:

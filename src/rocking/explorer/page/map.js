@@ -2,7 +2,7 @@
 
 import {Latest, frames, json, payload} from "./api.js";
 import {bokeh, colour, figure, themed} from "./theme.js";
-import {showMapTaking} from "./taking.js";
+import {showMapTaking, withLegend} from "./taking.js";
 import {make, one, short} from "./words.js";
 
 /** From harmless to the worst, each darker than the one before; the last stands out. */
@@ -28,6 +28,8 @@ export class View {
     /** @type {any} */
     this.about = null;
     this.mark = [0, 0];
+    /** @type {Record<string, HTMLElement>} */
+    this.slices = {};
     this.form();
     one("map").addEventListener("keydown", (event) => this.key(event));
     one("map-open").addEventListener("click", () => this.open());
@@ -53,7 +55,8 @@ export class View {
       const select = /** @type {HTMLSelectElement} */ (make("select", {on: {change: () => { this.page.state.map[name] = select.value; this.update(); }}},
         values.map((value, k) => make("option", {value: name.startsWith("fix_") ? value : String(k)}, [value]))));
       select.value = this.page.state.map[name] ?? select.value;
-      tools.append(make("label", {}, [`${label} `, select]));
+      this.slices[name] = make("label", {}, [`${label} `, select]);
+      tools.append(this.slices[name]);
     };
     tools.append(make("strong", {}, [`Study ${this.study.name}`]), make("span", {className: "cursor"}, [this.study.status]));
     slice("motion_index", "motion", this.study.motions);
@@ -129,6 +132,7 @@ export class View {
       if (!names.includes(map.x)) map.x = names[0];
       if (!names.includes(map.y) || map.y === map.x) map.y = names.find((/** @type {string} */ each) => each !== map.x);
     }
+    for (const [name, slice] of Object.entries(this.slices)) slice.hidden = [map.x, map.y].some((axis) => name === `fix_${axis}` || name === `${axis}_index`);
     const offered = this.study ? this.study.axes : this.page.offers.axes;
     const label = (/** @type {string} */ name) => offered.find((/** @type {any} */ each) => each.name === name).label;
     for (const [name, values] of Object.entries({x: right, y: names})) {
@@ -219,14 +223,22 @@ export class View {
   offer() {
     const {python, command} = this.about;
     const name = this.study ? "rocking-study" : "rocking-map";
-    showMapTaking(this.study ? python : python[this.page.state.map.quantity], command, !this.complete ? [] : [
+    const {quantity} = this.page.state.map;
+    showMapTaking(this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
       [`${name}.svg`, "Figure, SVG", () => this.picture("svg")], [`${name}.png`, "Figure, PNG", () => this.picture("png")],
       [`${name}.csv`, "Numbers, CSV", async () => new Blob([this.table()], {type: "text/csv"})],
     ]);
   }
 
-  /** The map as it is drawn. @param {string} form @returns {Promise<Blob>} */
-  async picture(form) { return bokeh().index.find_one(this.plot).export(form).to_blob(); }
+  /** The map as it is drawn, without the mark and with its legend. @param {"svg" | "png"} form @returns {Promise<Blob>} */
+  async picture(form) {
+    const marks = this.plot.renderers.filter((/** @type {any} */ each) => each.data_source === this.at);
+    for (const each of marks) each.visible = false;
+    const drawn = bokeh().index.find_one(this.plot).export(form);
+    for (const each of marks) each.visible = true;
+    const curves = /** @type {[string, string][]} */ (this.about.curves.exact ? [["critical amplitude: exact (solid), Eq. 76 (dashed)", "#b0390c"]] : []);
+    return withLegend(await drawn.to_blob(), [...(this.entries ?? []), ...curves], this.plot.outer_width, this.plot.outer_height);
+  }
 
   /** Every point of the map with all that is known of it. */
   table() {
@@ -372,6 +384,7 @@ export class View {
 
   /** @param {[string, string][]} entries */
   legend(entries) {
+    this.entries = entries;
     const parts = entries.map(([text, ink]) => {
       const key = make("i", {className: "key swatch"});
       key.style.background = ink;

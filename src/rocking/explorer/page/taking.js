@@ -33,6 +33,63 @@ function showCode(what, python, command) {
   /** @type {HTMLButtonElement} */ (document.querySelector("[data-copy=command]")).disabled = !command;
 }
 
+const ROW = 22;
+
+/** A picture with what its colours mean below it. @param {Blob} picture @param {[string, string][]} entries @param {number} width @param {number} height
+ * @returns {Promise<Blob>} */
+export async function withLegend(picture, entries, width, height) {
+  const rows = entries.map(([text, ink], k) => ({text, ink, x: 62 + (k % 2) * 0.45 * width, y: height + 10 + ROW * Math.floor(k / 2)}));
+  const whole = height + ROW * Math.ceil(entries.length / 2) + 18;
+  const style = getComputedStyle(document.documentElement);
+  const [paper, ink] = ["--paper", "--ink"].map((name) => style.getPropertyValue(name).trim());
+  return picture.type === "image/png" ? onCanvas(picture, rows, width, height, whole, paper, ink) : inDrawing(picture, rows, width, height, whole, paper, ink);
+}
+
+/** @typedef {{text: string, ink: string, x: number, y: number}[]} Rows */
+/** @param {Blob} picture @param {Rows} rows @param {number} width @param {number} height @param {number} whole @param {string} paper @param {string} ink
+ * @returns {Promise<Blob>} */
+async function onCanvas(picture, rows, width, height, whole, paper, ink) {
+  const image = await createImageBitmap(picture);
+  const ratio = image.width / width;
+  const canvas = /** @type {HTMLCanvasElement} */ (make("canvas", {width: image.width, height: Math.round(whole * ratio)}));
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  pen.fillStyle = paper;
+  pen.fillRect(0, 0, canvas.width, canvas.height);
+  pen.drawImage(image, 0, 0);
+  pen.scale(ratio, ratio);
+  pen.font = "13px system-ui, sans-serif";
+  pen.strokeStyle = ink;
+  for (const row of rows) {
+    pen.fillStyle = row.ink;
+    pen.fillRect(row.x, row.y, 14, 14);
+    pen.strokeRect(row.x, row.y, 14, 14);
+    pen.fillStyle = ink;
+    pen.fillText(row.text, row.x + 22, row.y + 12);
+  }
+  return new Promise((done) => { canvas.toBlob((blob) => done(/** @type {Blob} */ (blob)), "image/png"); });
+}
+
+/** @param {Blob} picture @param {Rows} rows @param {number} width @param {number} height @param {number} whole @param {string} paper @param {string} ink */
+async function inDrawing(picture, rows, width, height, whole, paper, ink) {
+  const drawing = new DOMParser().parseFromString(await picture.text(), "image/svg+xml");
+  const root = drawing.documentElement;
+  /** @param {string} name @param {Record<string, string | number>} given @param {string} [text] */
+  const add = (name, given, text = "") => {
+    const made = drawing.createElementNS("http://www.w3.org/2000/svg", name);
+    for (const [key, value] of Object.entries(given)) made.setAttribute(key, String(value));
+    made.textContent = text;
+    root.append(made);
+  };
+  root.setAttribute("height", String(whole));
+  root.removeAttribute("viewBox");
+  add("rect", {x: 0, y: height, width, height: whole - height, fill: paper});
+  for (const row of rows) {
+    add("rect", {x: row.x, y: row.y, width: 14, height: 14, fill: row.ink, stroke: ink});
+    add("text", {x: row.x + 22, y: row.y + 12, fill: ink, "font-size": 13, "font-family": "system-ui, sans-serif"}, row.text);
+  }
+  return new Blob([new XMLSerializer().serializeToString(drawing)], {type: "image/svg+xml"});
+}
+
 /** @param {string} name @param {Blob} content */
 function save(name, content) {
   const link = /** @type {HTMLAnchorElement} */ (make("a", {href: URL.createObjectURL(content), download: name}));
