@@ -24,6 +24,7 @@ from explorer_client import Client, clients
 import rocking
 from rocking.errors import InvalidOption, StudyError
 from rocking.explorer import assets
+from rocking.explorer.background import behind_others
 from rocking.explorer.core import Explorer
 from rocking.explorer.guard import Guard
 from rocking.explorer.launch import served
@@ -592,3 +593,18 @@ def test_a_response_is_explored_in_a_frame():
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])
     with pytest.raises(InvalidOption, match="a Response is needed"):
         rocking.explore(response.motion)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux knows priorities of threads")
+def test_long_work_and_the_threads_that_it_starts_give_way():
+    def niceness():
+        return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+
+    def started():
+        with ThreadPoolExecutor(1) as others:
+            return niceness(), others.submit(niceness).result()
+
+    before = niceness()
+    with behind_others() as thread:
+        assert thread.submit(started).result() == (19, 19)
+    assert niceness() == before

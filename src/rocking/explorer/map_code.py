@@ -110,7 +110,7 @@ def described(grid: Grid) -> dict[str, Any]:
     command = as_command(grid)
     return {
         "python": {each: as_python(grid, each) for each in QUANTITIES},
-        "command": {each: command for each in _OVERTURNING},
+        "command": dict.fromkeys(_OVERTURNING, command),
     }
 
 

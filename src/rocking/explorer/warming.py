@@ -34,6 +34,14 @@ class Warming:
         return {"done": self._took is not None, "seconds": self._took or time.monotonic() - started}
 
     def _run(self) -> None:
+        try:
+            self._compile()
+        except RuntimeError:
+            # Threads cannot start others once the program has ended.
+            if threading.main_thread().is_alive():
+                raise
+
+    def _compile(self) -> None:
         import scipy.signal  # noqa: F401 - it takes a second, and the ground's displacement needs it
 
         block = Block(width=0.24, height=1.1)
