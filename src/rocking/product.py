@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -86,7 +87,14 @@ class Scales:
             return cls(name, values)
         if period is None:
             raise InvalidOption("sa= needs period=, in s")
-        return cls(name, values, {"period": period, "damping": damping})
+        return cls(
+            name,
+            values,
+            {
+                "period": checks.positive(period, "period", InvalidOption, "s"),
+                "damping": checks.within(damping, "damping", InvalidOption, 0.0, math.nextafter(1.0, 0.0)),
+            },
+        )
 
     @property
     def count(self) -> int:

@@ -21,11 +21,12 @@ from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.intensity import Measure, MeasureName
 from rocking.block import Block, Blocks
 from rocking.compiling import SIMULATIONS, announce
-from rocking.errors import InvalidOption, OutputError, StudyError
+from rocking.errors import InvalidOption, StudyError
 from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
 from rocking.product import Polarity, Product, Scales
 from rocking.studies import store as stores
+from rocking.studies.export import export
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
 from rocking.studies.place import Place, place_of, this_process
 from rocking.studies.report import Made, ReportPlan, keep, kept, report
@@ -353,29 +354,23 @@ class Study:
         return report(self.store, kept(self.store), progress)
 
     def export(self, path: str | Path) -> None:
-        """Write the results to one file: NetCDF (.nc), CSV (.csv) or Parquet (.parquet, with pyarrow installed).
+        """Write the results to one file, by its suffix.
+
+        Parameters
+        ----------
+        path : path
+            NetCDF (.nc), as `results` has them; or a table with a row for each simulation, in columns named with their
+            units: CSV (.csv), JSON (.json), Parquet (.parquet, with pyarrow installed), a workbook (.xlsx, with
+            openpyxl installed).
 
         Raises
         ------
         InvalidOption
-            If the suffix is another, or pyarrow is missing.
+            If the suffix is another, what writes it is not installed, or a sheet has too few rows.
         OutputError
             If the file cannot be written.
         """
-        target, dataset = Path(path), self.results()
-        try:
-            if target.suffix == ".nc":
-                dataset.to_netcdf(target, engine="h5netcdf")
-            elif target.suffix == ".csv":
-                dataset.to_dataframe().to_csv(target)
-            elif target.suffix == ".parquet":
-                dataset.to_dataframe().to_parquet(target)
-            else:
-                raise InvalidOption(f"a study is exported to .nc, .csv or .parquet, not to {target.name}")
-        except ImportError:
-            raise InvalidOption("Parquet needs pyarrow: install rocking[parquet], or export to .csv or .nc") from None
-        except OSError as error:
-            raise OutputError(f"{target} cannot be written: {error.strerror or error}; choose another place") from error
+        export(self.results(), Path(path), self.store.grid.unit[0])
 
     def __repr__(self) -> str:
         m, s, k, n = self.store.grid.shape
