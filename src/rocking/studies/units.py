@@ -32,6 +32,9 @@ OUTCOMES: Final = tuple(VARIABLES)
 #: Checked, but not packed: packing would save two thirds of the bytes, and take 3 % of the time of the simulations.
 _LEVEL: Final = 0
 
+#: Outcomes that are rearranged together: some hundreds of kilobytes.
+_CACHED: Final = 4096
+
 #: What gzip writes first: no name, no time, an unknown system. Any other byte there is damage.
 _HEADER: Final = gzip.compress(b"", _LEVEL, mtime=0)[:10]
 
@@ -177,20 +180,30 @@ def compute(work: Work, stop: threading.Event | None = None) -> bytes:
     if work.program != program():
         raise StudyError(f"the worker on {socket.gethostname()} has {program()}, the study needs {work.program}")
     blocks = slice(0, len(work.setup.blocks))
-    outcomes = np.empty((*work.factors.shape, blocks.stop), dtype=OUTCOME)
+    values = blank(work.unit, (*work.factors.shape, blocks.stop))
     for m, s, k in np.ndindex(work.factors.shape):
         task = Task(blocks, work.motions[m], float(work.factors[m, s, k]))
-        outcomes[m, s, k] = simulate_task(work.setup, task, stop)
-    return encoded(outcomes, work.unit)
+        fill(values[:, m, s, k, blocks], simulate_task(work.setup, task, stop))
+    return encoded(values)
 
 
-def encoded(outcomes: NDArray[np.void], unit: Axes) -> bytes:
-    """Bytes of a unit: outcomes by motions, scales, polarities and blocks, padded with NaN to a full unit."""
-    values = np.full((len(OUTCOMES), *unit), np.nan, "<f8")
-    held = tuple(slice(0, count) for count in outcomes.shape)
-    for one, name in zip(values, OUTCOMES, strict=True):
-        one[held] = outcomes[name]
-    return gzip.compress(values.data, _LEVEL, mtime=0)
+def blank(unit: tuple[int, ...], counts: tuple[int, ...]) -> Floats:
+    """Room for the outcomes of a unit, NaN where it holds fewer simulations than a full one."""
+    shape = len(OUTCOMES), *unit
+    return np.empty(shape) if unit == counts else np.full(shape, np.nan)
+
+
+def fill(values: Floats, outcomes: NDArray[np.void]) -> None:
+    """Write outcomes of n simulations into an array, shape (outcomes, n): as many at a time as a cache holds."""
+    for start in range(0, len(outcomes), _CACHED):
+        some = slice(start, start + _CACHED)
+        for one, name in zip(values, OUTCOMES, strict=True):
+            one[some] = outcomes[name][some]
+
+
+def encoded(values: Floats) -> bytes:
+    """Bytes of the outcomes of a full unit, however many of them are NaN."""
+    return gzip.compress(np.ascontiguousarray(values, "<f8").data, _LEVEL, mtime=0)
 
 
 def decoded(data: bytes, counts: Axes, unit: Axes) -> Floats:
