@@ -139,6 +139,7 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
         "simulations": 200,
         "failed": {},
         "running": None,
+        "refinement": None,
     }
     assert "20 units are sound" in run("study", "verify", folder, "--recompute", 2)[1]
     assert run("study", "export", folder, table)[0] == 0

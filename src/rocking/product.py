@@ -114,12 +114,22 @@ class Scales:
         InvalidMotion
             If the motion is zero throughout.
         """
+        return self.values / self.now(motion)
+
+    def now(self, motion: Motion) -> float:
+        """Return what a motion measures as it is; 1 where scales are factors.
+
+        Raises
+        ------
+        InvalidMotion
+            If the motion is zero throughout.
+        """
         if self.measure is None or self.measure == "factor":
-            return self.values
+            return 1.0
         now = measures.target(motion, self.measure, self.options.get("period"), self.options.get("damping", 0.0))
         if now == 0.0:
             raise InvalidMotion(f"{motion.name} is zero throughout and cannot be scaled to a {self.measure}")
-        return self.values / now
+        return now
 
 
 @dataclass(frozen=True, eq=False)

@@ -110,7 +110,8 @@ def status(folder: str, *, as_json: Annotated[bool, Parameter(name="--json", neg
     state = rocking.study(folder).status
     running = None if state.running is None else asdict(state.running)
     told = {name: getattr(state, name) for name in ("done", "units", "simulations", "failed")}
-    print(to_json({"folder": folder, **told, "running": running}) if as_json else f"{folder}: {state}")
+    told |= {"running": running, "refinement": None if state.refinement is None else asdict(state.refinement)}
+    print(to_json({"folder": folder, **told}) if as_json else f"{folder}: {state}")
 
 
 @study.command
@@ -136,7 +137,7 @@ def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter
 
 
 @study.command
-def export(folder: str, file: Path) -> None:
+def export(folder: str, file: Path, *, critical: Annotated[bool, Parameter(negative="")] = False) -> None:
     """Write the results to one file.
 
     Parameters
@@ -146,9 +147,11 @@ def export(folder: str, file: Path) -> None:
     file
         NetCDF (.nc), or a table with a row for each simulation: CSV (.csv), JSON (.json), Parquet (.parquet) or a
         workbook (.xlsx); units are in the names of its columns.
+    critical
+        Write the scales between which the verdict on a block changes instead.
     """
     is_replaced = file.exists()
-    rocking.study(folder).export(file)
+    rocking.study(folder).export(file, critical=critical)
     if is_replaced:
         note(f"replaced {file}")
     print(f"written to {file}")
@@ -195,7 +198,7 @@ def _created(file: Path, folder: str, unit_blocks: int | None) -> Study:
     described = read_study(file)
     for sentence in described.skipped:
         note(f"left out: {sentence}")
-    return study_of(place_of(folder), described.product, unit_blocks, described.report)
+    return study_of(place_of(folder), described.product, unit_blocks, described.report, described.refine)
 
 
 def _executor(workers: int | None, scheduler: str | None) -> contextlib.AbstractContextManager[Executor | None]:

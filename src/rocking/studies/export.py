@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _SHEET: Final = 1_048_575
 
 
-def export(dataset: xr.Dataset, target: Path, motions: int) -> None:
+def export(dataset: xr.Dataset, target: Path, along: str, step: int) -> None:
     """Write results to NetCDF, or to a table in one of the formats of `_WRITERS`, by the suffix.
 
     Parameters
@@ -28,8 +28,10 @@ def export(dataset: xr.Dataset, target: Path, motions: int) -> None:
         Results, which may be read only now.
     target : Path
         File to write.
-    motions : int
-        How many motions of a table are held in memory at a time.
+    along : str
+        Its first dimension.
+    step : int
+        How much of it is held in memory at a time.
 
     Raises
     ------
@@ -44,7 +46,10 @@ def export(dataset: xr.Dataset, target: Path, motions: int) -> None:
         if target.suffix == ".nc":
             dataset.to_netcdf(target, engine="h5netcdf")
         else:
-            _WRITERS[target.suffix](_named(dataset), target, motions)
+            table = _named(dataset)
+            parts = (slice(start, start + step) for start in range(0, max(1, table.sizes[along]), step))
+            frames = (data_frame(table.isel({along: part}).load()) for part in parts)
+            _WRITERS[target.suffix](frames, table, target)
     except ImportError:
         extra = {".parquet": "parquet", ".xlsx": "excel"}[target.suffix]
         raise InvalidOption(f"{target.suffix} needs more: install rocking[{extra}], or export to .csv or .nc") from None
@@ -54,45 +59,41 @@ def export(dataset: xr.Dataset, target: Path, motions: int) -> None:
 
 def _named(dataset: xr.Dataset) -> xr.Dataset:
     """Name the scales for what they are: factors, or values of a measure."""
-    return dataset.rename(scale=dataset.scale.attrs["measure"]) if "scale" in dataset.dims else dataset
+    if "scale" in dataset.dims:
+        return dataset.rename(scale=dataset.scale.attrs["measure"])
+    return dataset.rename({name: f"{dataset.measure}_{name}" for name in ("low", "high") if name in dataset})
 
 
-def _frames(dataset: xr.Dataset, motions: int) -> Iterator[pd.DataFrame]:
-    """Rows of some motions after the other."""
-    for start in range(0, dataset.sizes["motion"], motions):
-        yield data_frame(dataset.isel(motion=slice(start, start + motions)).load())
-
-
-def _write_csv(dataset: xr.Dataset, target: Path, motions: int) -> None:
+def _write_csv(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
     with target.open("w", encoding="utf-8", newline="") as file:
-        for k, frame in enumerate(_frames(dataset, motions)):
+        for k, frame in enumerate(frames):
             frame.to_csv(file, header=k == 0, index=False, lineterminator="\n")
 
 
-def _write_json(dataset: xr.Dataset, target: Path, motions: int) -> None:
+def _write_json(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
     with target.open("w", encoding="utf-8") as file:
         file.write(f'{{"study": {json.dumps(plain(dataset.attrs))},\n"simulations": [')
         separator = "\n"
-        for frame in _frames(dataset, motions):
+        for frame in frames:
             for row in frame.to_dict("records"):
                 file.write(separator + json.dumps(plain(row), allow_nan=False))
                 separator = ",\n"
         file.write("\n]}\n")
 
 
-def _write_parquet(dataset: xr.Dataset, target: Path, motions: int) -> None:
+def _write_parquet(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
     import pyarrow
     from pyarrow import parquet
 
-    frames = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in _frames(dataset, motions))
-    first = next(frames)
+    tables = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in frames)
+    first = next(tables)
     with parquet.ParquetWriter(target, first.schema) as file:
         file.write_table(first)
-        for table in frames:
+        for table in tables:
             file.write_table(table)
 
 
-def _write_workbook(dataset: xr.Dataset, target: Path, motions: int) -> None:
+def _write_workbook(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
     import openpyxl
 
     count = math.prod(dataset.sizes.values())
@@ -101,7 +102,7 @@ def _write_workbook(dataset: xr.Dataset, target: Path, motions: int) -> None:
     book = openpyxl.Workbook(write_only=True)
     sheet = book.create_sheet("simulations")
     sheet.freeze_panes = "A2"
-    for k, frame in enumerate(_frames(dataset, motions)):
+    for k, frame in enumerate(frames):
         if k == 0:
             sheet.append([*frame.columns])
         for row in frame.to_dict("records"):
@@ -109,7 +110,7 @@ def _write_workbook(dataset: xr.Dataset, target: Path, motions: int) -> None:
     book.save(target)
 
 
-_WRITERS: Final[Mapping[str, Callable[[xr.Dataset, Path, int], None]]] = {
+_WRITERS: Final[Mapping[str, Callable[[Iterator[pd.DataFrame], xr.Dataset, Path], None]]] = {
     ".csv": _write_csv,
     ".json": _write_json,
     ".parquet": _write_parquet,

@@ -23,6 +23,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.named_pulses import pulse_family
 from rocking.product import Product, Scales
+from rocking.studies.refine import tolerance_of
 from rocking.studies.report import FragilityPlan, ReportPlan, SpectrumPlan
 from rocking.treatment import treatment
 
@@ -51,6 +52,7 @@ skip_unreadable = false         # true: leave out records that cannot be read, a
 [scales]                        # at most one of factor, pga, pgv, sa (with period, damping)
 pga = ["0.2g", "0.4g", "0.8g"]
 polarity = "+"                  # or "-", "both"
+# refine = 1e-3                 # halve gaps between scales of which one overturns a block, to this relative width
 
 [simulation]
 model = "nonlinear"             # or "linear"
@@ -75,7 +77,7 @@ def _is_text(value: Any) -> bool:
 _KEYS: Final[Mapping[str, frozenset[str]]] = {
     "blocks": frozenset({"p", "alpha", "restitution", "csv"}),
     "motions": frozenset({"records", "channel", "vertical", "units", "dt", "skip_unreadable", "pulses"}),
-    "scales": frozenset({"factor", "pga", "pgv", "sa", "period", "damping", "polarity"}),
+    "scales": frozenset({"factor", "pga", "pgv", "sa", "period", "damping", "polarity", "refine"}),
     "simulation": frozenset({"model", "chattering", "duration"}),
     "report": frozenset({"fragility", "spectrum"}),
 }
@@ -108,11 +110,14 @@ class StudyFile:
         A sentence for each record that could not be read, where the file says to go on.
     report : ReportPlan or None
         What is to be made of the results.
+    refine : float or None
+        Tolerance to which scales are refined.
     """
 
     product: Product
     skipped: tuple[str, ...]
     report: ReportPlan | None
+    refine: float | None = None
 
 
 def read_study(path: str | Path) -> StudyFile:
@@ -169,13 +174,20 @@ class _Reader:
                 chattering,
                 rules.get("duration"),
             )
-        return StudyFile(product, tuple(skipped), self._report())
+        return StudyFile(product, tuple(skipped), self._report(), self._refine(product))
 
     def _scales(self) -> Scales:
-        given = {name: value for name, value in self.tables.get("scales", {}).items() if name != "polarity"}
+        given = {
+            name: value for name, value in self.tables.get("scales", {}).items() if name not in ("polarity", "refine")
+        }
         measures = {name: self._numbers("scales", name, given[name]) for name in given if name not in _OSCILLATOR}
         with self._lines_told("scales"):
             return Scales.of(period=given.get("period"), damping=given.get("damping", 0.05), **measures)
+
+    def _refine(self, product: Product) -> float | None:
+        refine = self.tables.get("scales", {}).get("refine")
+        with self._line_told("scales", "refine"):
+            return None if refine is None else tolerance_of(product, refine)
 
     def _report(self) -> ReportPlan | None:
         if "report" not in self.tables:

@@ -152,6 +152,11 @@ class Store:
         factors = np.array([self.product.scales.factors(motion) for motion in motions])
         return factors[:, :, None] * np.array(self.product.signs, dtype=np.float64)
 
+    @staticmethod
+    def label(key: Key) -> str:
+        """Name a unit."""
+        return name_of(key)
+
     def put(self, key: Key, data: bytes) -> None:
         """Store a unit."""
         self.place.put(f"{_ARRAY}/{name_of(key)}", data)
@@ -171,12 +176,21 @@ class Store:
         data = self.raw(key)
         if data is None:
             return None
-        try:
-            return decoded(data, self.grid.counts(key), self.grid.unit)
-        except DamagedUnit as error:
-            raise StudyError(
-                f"unit {name_of(key)} is damaged, {error}: verify(repair=True) computes it again"
-            ) from None
+        return readable(data, self.grid.counts(key), self.grid.unit, self.label(key))
+
+
+def readable(data: bytes, counts: tuple[int, ...], unit: tuple[int, ...], label: str) -> Floats:
+    """Outcomes of a unit from its bytes, shape (outcomes, *counts).
+
+    Raises
+    ------
+    StudyError
+        If they are damaged; the message names the unit.
+    """
+    try:
+        return decoded(data, counts, unit)
+    except DamagedUnit as error:
+        raise StudyError(f"unit {label} is damaged, {error}: verify(repair=True) computes it again") from None
 
 
 def exists(place: Place) -> bool:
