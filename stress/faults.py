@@ -20,6 +20,9 @@ from common import digest, made, units
 
 import rocking
 
+#: Twelve units: what fails at the hundredth one fails at the tenth.
+SCALES = 2
+
 CALLS: dict[str, tuple[Any, str]] = {
     "write": (os, "fdopen"),
     "fsync": (os, "fsync"),
@@ -70,7 +73,7 @@ def failing(call: str, code: int, fails: Callable[[int], bool]) -> Iterator[list
 def attempt(folder: Path, code: int) -> None:
     """Create and run; a failure must be one sentence that names its cause."""
     try:
-        made(folder).run(threads=1)
+        made(folder, SCALES).run(threads=1)
     except rocking.RockingError as error:
         assert os.strerror(code) in str(error), error
         assert "\n" not in str(error)
@@ -84,7 +87,7 @@ def main() -> None:
     runs: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as where:
         top = Path(where)
-        made(top / "undisturbed").run(threads=1)
+        made(top / "undisturbed", SCALES).run(threads=1)
         reference, expected = units(top / "undisturbed"), digest(top / "undisturbed")
         for call, code in ((call, code) for call in CALLS for code in (errno.ENOSPC, errno.EIO)):
             kinds = {"only": lambda n: lambda k: k == n, "each": lambda n: lambda k: k % n == 0}
@@ -96,7 +99,7 @@ def main() -> None:
                     if not failed[0]:
                         break
                     assert units(folder).items() <= reference.items()
-                    made(folder).run(threads=1)
+                    made(folder, SCALES).run(threads=1)
                     assert digest(folder) == expected
                     assert not list(folder.rglob("*.part"))
                     runs[f"{call} {errno.errorcode[code]} {kind}"] += 1

@@ -1,6 +1,7 @@
 """A study from a text file, through the commands: the same as from Python, and every mistake with its line."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -74,26 +75,42 @@ def test_blocks_come_from_a_table_as_well(tmp_path, file):
         ("restitution = 0.9", "restitutoin = 0.9", 4, "no restitutoin; it takes alpha, csv"),
         ("[scales]", "[scale]", 14, "no table"),
         ('family = "one-sine"', 'family = "two-sine"', 10, "did you mean one-sine"),
-        ("frequency = [0.5, 1.0]", "", 10, "the pulse one-sine needs frequency as well"),
+        ("frequency = [0.5, 1.0]", "", 9, "the pulse one-sine needs frequency as well"),
         ("frequency = [0.5, 1.0]", "frequncy = 2", 12, "no frequncy; did you mean frequency"),
-        ("frequency = [0.5, 1.0]", "frequency = -2", 10, "frequency must be a positive number"),
+        ("frequency = [0.5, 1.0]", "frequency = -2", 12, "frequency must be a positive number"),
         ('amplitude = ["0.3g", "0.5g"]', 'amplitude = "0.3h"', 11, "acceleration"),
-        ("factor = [0.5, 1.0]", "factor = []", None, "factor"),
-        ("factor = [0.5, 1.0]", "factor = 1\npga = 2", None, "one measure only"),
-        ('polarity = "both"', 'polarity = "up"', None, "polarity must be"),
-        ('model = "linear"', 'model = "cubic"', None, "model must be"),
-        ('chattering = "certified=1e-9"', 'chattering = "slow"', None, "chattering must be"),
+        ("factor = [0.5, 1.0]", "factor = []", 15, "factor"),
+        ("factor = [0.5, 1.0]", "factor = 1\npga = 2", 15, "one measure only"),
+        ("factor = [0.5, 1.0]", "sa = 2", 15, "sa= needs period="),
+        ("factor = [0.5, 1.0]", 'sa = 2\nperiod = "long"', 16, "period must be a positive number"),
+        ("factor = [0.5, 1.0]", "sa = 2\nperiod = 1\ndamping = 1.5", 17, "damping must be a number"),
+        ('polarity = "both"', 'polarity = "up"', 16, "polarity must be"),
+        ('polarity = "both"', "polarity = 1", 16, "polarity must be text"),
+        ('model = "linear"', 'model = "cubic"', 19, "model must be"),
+        ('model = "linear"', "duration = -1", 19, "duration must be"),
+        ('chattering = "certified=1e-9"', 'chattering = "slow"', 20, "chattering must be"),
+        ("restitution = 0.9", "restitution = 1.9", 4, "restitution must be in"),
+        ("restitution = 0.9", "restitution = 1", 4, "never comes to rest"),
+        ('alpha = ["10deg", 0.2]', 'alpha = ["100deg", 0.2]', 3, "alpha must be"),
+        ('["el-centro-meloland-270"]', '["el-centro-melolnd-270"]', 7, "did you mean el-centro-meloland-270"),
+        ('["el-centro-meloland-270"]', '[\n"el-centro-meloland-270",\n"nowhere/*.AT2",\n]', 9, "matches this pattern"),
+        ('["el-centro-meloland-270"]', '"el-centro-meloland-270"', 7, "records must be a list of texts"),
+        ("[motions]", '[motions]\nunits = "furlong"', 7, "units"),
+        ("[motions]", "[motions]\ndt = -1", 7, "dt must be a positive number"),
+        ("[motions]", '[motions]\nskip_unreadable = "no"', 7, "must be true or false"),
+        ("[motions]", '[motions]\nvertical = "9"', 8, "no such file or shipped record for the vertical motion"),
         ("[blocks]", "[blocks", 1, "no TOML file"),
     ],
 )
 def test_a_mistake_is_a_sentence_with_its_line(file, old, new, line, sentence):
     assert old in TEXT
     file.write_text(TEXT.replace(old, new))
-    with pytest.raises(rocking.StudyError, match=sentence) as caught:
+    with pytest.raises((rocking.StudyError, rocking.UnreadableRecord), match=sentence) as caught:
         read_study(file)
+    assert "\n" not in str(caught.value)
     assert str(file) in str(caught.value)
-    if line is not None:
-        assert f"line {line}" in str(caught.value)
+    if "no TOML file" not in sentence:
+        assert f"{file}, line {line}: " in str(caught.value)
 
 
 def test_unreadable_records_are_left_out_only_where_the_file_says_so(file, tmp_path):
@@ -114,12 +131,15 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
     assert (code, err) == (0, "")
     assert "0 of 20 units" in out
     assert run("study", "run", folder)[0] == 0
+    assert run("study", "status", folder)[1].startswith(f"{folder}: 20 of 20 units done")
     assert json.loads(run("study", "status", folder, "--json")[1]) == {
+        "folder": str(folder),
         "done": 20,
         "units": 20,
         "simulations": 200,
         "failed": {},
         "running": None,
+        "refinement": None,
     }
     assert "20 units are sound" in run("study", "verify", folder, "--recompute", 2)[1]
     assert run("study", "export", folder, table)[0] == 0
@@ -142,7 +162,20 @@ def test_another_study_in_the_same_folder_is_refused(run, file, tmp_path):
     file.write_text(TEXT.replace("factor = [0.5, 1.0]", "factor = [0.5, 1.5]"))
     code, _, err = run("study", "create", file, tmp_path / "kept")
     assert code == 2
-    assert "the scales changed" in err
+    assert f"{tmp_path / 'kept'} holds a study of other inputs (the scales changed), 0 of 20 units done" in err
+    assert "create this one elsewhere, or remove that one" in err
+
+
+def test_a_folder_of_other_things_is_no_place_for_a_study(run, file, tmp_path):
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "a.jpg").touch()
+    code, out, err = run("study", "create", file, tmp_path / "photos", "--unit-blocks", 512)
+    assert (code, out) == (2, "")
+    assert f"{tmp_path / 'photos'} holds no study, but a.jpg: name a new folder, or an empty one" in err
+    assert [path.name for path in (tmp_path / "photos").iterdir()] == ["a.jpg"]
+    code, _, err = run("study", "status", file)
+    assert code == 2
+    assert "is a file, and a study is kept in a folder" in err
 
 
 def test_a_file_that_is_there_is_not_overwritten(run, tmp_path):
@@ -157,7 +190,7 @@ def test_a_file_that_is_there_is_not_overwritten(run, tmp_path):
     [
         (["study", "crate", "a"], "no command crate; did you mean create?"),
         (["study", "run", "m", "--thread", "2"], "rocking study run has no option --thread; did you mean --threads?"),
-        (["study", "run", "nowhere"], "no study here"),
+        (["study", "run", "nowhere"], "no study in nowhere"),
     ],
 )
 def test_mistakes_in_the_commands_are_one_line(run, tmp_path, monkeypatch, arguments, sentence):
@@ -166,3 +199,45 @@ def test_mistakes_in_the_commands_are_one_line(run, tmp_path, monkeypatch, argum
     assert (code, out) == (2, "")
     assert sentence in err
     assert err.count("\n") == 1
+
+
+def pushes(motion):
+    """All that a motion does to the ground."""
+    return [motion.coefficients, motion.vertical.coefficients]
+
+
+def test_records_take_a_vertical_component_from_a_record_or_a_channel(file, tmp_path):
+    text = TEXT.replace("[motions]", '[motions]\nvertical = "el-centro-meloland-up"')
+    file.write_text(text)
+    alone, up = (rocking.records.load(f"el-centro-meloland-{name}") for name in ("270", "up"))
+    both, *pulses = read_study(file).product.motions
+    for one, other in zip(pushes(both), pushes(alone.with_vertical(up)), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert not any(pulse.vertical for pulse in pulses)
+
+    two = Path(__file__).parent / "data" / "formats" / "two.v1"
+    file.write_text(TEXT.replace('["el-centro-meloland-270"]', f'["{two}"]\nchannel = 1\nvertical = "2"'))
+    found = read_study(file).product.motions[0]
+    for one, channel in zip(pushes(found), ("1", "2"), strict=True):
+        np.testing.assert_array_equal(one, rocking.read(two, channel=channel).coefficients)
+
+
+def test_units_are_for_those_of_several_records_that_do_not_say_theirs(file, tmp_path):
+    """As on the command line: they may not contradict the only record, but several may differ."""
+    heading = "PEER\nHere\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 40, DT= .01 SEC\n"
+    samples = "\n".join(f"{value:.3f}" for value in np.sin(0.3 * np.arange(40)))
+    (tmp_path / "silent.txt").write_text(samples)
+    (tmp_path / "says.AT2").write_text(heading + samples)
+    several = TEXT.replace('["el-centro-meloland-270"]', '["silent.txt", "says.AT2"]\nunits = "m/s2"\ndt = 0.02')
+    file.write_text(several)
+    silent, says = read_study(file).product.motions[:2]
+    assert (silent.duration, says.duration) == pytest.approx((39 * 0.02, 39 * 0.01))
+    assert says.pga == pytest.approx(9.80665 * silent.pga)
+    file.write_text(several.replace('"silent.txt", ', ""))
+    with pytest.raises(rocking.UnreadableRecord, match=r"leave (units|dt) out"):
+        read_study(file)
+    vertical = several.replace('"silent.txt", ', "").replace(
+        'units = "m/s2"\ndt = 0.02', 'vertical = "silent.txt"\nunits = "g"\ndt = 0.01'
+    )
+    file.write_text(vertical)
+    assert read_study(file).product.motions[0].vertical.pga == pytest.approx(says.pga)

@@ -182,7 +182,7 @@ def test_of_many_who_come_at_once_one_runs_it(url):
 def test_a_store_that_is_not_there_is_one_sentence(run, bucket, monkeypatch):
     code, out, err = run("study", "run", "s3://nobody/has/this")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "s3://nobody/has/this/study.json cannot be read" in err or "there is no study here" in err
+    assert "s3://nobody/has/this/study.json cannot be read" in err or "there is no study in" in err
     code, out, err = run("study", "run", "nonsense://x/y")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "nonsense://x/y is no object store" in err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -86,7 +87,14 @@ class Scales:
             return cls(name, values)
         if period is None:
             raise InvalidOption("sa= needs period=, in s")
-        return cls(name, values, {"period": period, "damping": damping})
+        return cls(
+            name,
+            values,
+            {
+                "period": checks.positive(period, "period", InvalidOption, "s"),
+                "damping": checks.within(damping, "damping", InvalidOption, 0.0, math.nextafter(1.0, 0.0)),
+            },
+        )
 
     @property
     def count(self) -> int:
@@ -106,12 +114,22 @@ class Scales:
         InvalidMotion
             If the motion is zero throughout.
         """
+        return self.values / self.now(motion)
+
+    def now(self, motion: Motion) -> float:
+        """Return what a motion measures as it is; 1 where scales are factors.
+
+        Raises
+        ------
+        InvalidMotion
+            If the motion is zero throughout.
+        """
         if self.measure is None or self.measure == "factor":
-            return self.values
+            return 1.0
         now = measures.target(motion, self.measure, self.options.get("period"), self.options.get("damping", 0.0))
         if now == 0.0:
             raise InvalidMotion(f"{motion.name} is zero throughout and cannot be scaled to a {self.measure}")
-        return self.values / now
+        return now
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.errors import InvalidOption
-from rocking.tables import named, text_table, write_netcdf, write_text
+from rocking.tables import data_frame, text_table, write_netcdf, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,10 +91,7 @@ class Result(ABC):
         """
         names = [*self.TABLES]
         part = self._table(names[0] if table is None else checks.one_of(table, "table", InvalidOption, names))
-        # A dimension alone, without labels, only counts the rows.
-        rows = [] if len(part.dims) == 1 and not part.coords else [*part.dims]
-        columns = dict.fromkeys([*rows, *part.coords, *part.data_vars])
-        return part.to_dataframe().reset_index()[[*columns]].rename(columns=lambda name: _with_unit(part[name]))
+        return data_frame(part)
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
         """Write one of the tables of `to_dataframe` as text columns with a header; "inf" stands for infinity.
@@ -141,10 +138,6 @@ class Result(ABC):
     def _repr_html_(self) -> str:
         html: str = self.data._repr_html_()
         return f"<p><b>{type(self).__name__}</b>: {self.summary().splitlines()[0]}</p>{html}"
-
-
-def _with_unit(variable: xr.DataArray) -> str:
-    return named(str(variable.name), variable.attrs.get("units", "1"))
 
 
 def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from rocking.errors import OutputError
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 #: Wider than any table, so that none is wrapped or cut.
@@ -65,6 +66,15 @@ def named(quantity: str, unit: str) -> str:
     ('ground_acceleration_m_s2', 'rotation_rad', 'impacts')
     """
     return quantity if unit == "1" else f"{quantity}_{unit.replace('/', '_').replace('^', '')}"
+
+
+def data_frame(part: xr.Dataset) -> pd.DataFrame:
+    """Rows for each point of a dataset, in columns named with their units: dimensions, coordinates, variables."""
+    # A dimension alone, without labels, only counts the rows.
+    rows = [] if len(part.dims) == 1 and not part.coords else [*part.dims]
+    columns = dict.fromkeys([*rows, *part.coords, *part.data_vars])
+    frame = part.to_dataframe().reset_index()[[*columns]]
+    return frame.rename(columns=lambda name: named(str(name), part[name].attrs.get("units", "1")))
 
 
 def rows_of(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:

@@ -53,7 +53,7 @@ def create(file: Path, folder: str, *, unit_blocks: int | None = None) -> None:
     unit_blocks
         Blocks of a unit, a multiple of 512, of one motion and scale; by default a unit takes about five seconds.
     """
-    print(f"{_created(file, folder, unit_blocks).status}; next: rocking study run {folder}")
+    print(f"{folder}: {_created(file, folder, unit_blocks).status}; next: rocking study run {folder}")
 
 
 @study.command
@@ -87,7 +87,7 @@ def run(
     found = _opened(folder, into)
     with _executor(workers, scheduler) as executor:
         report = found.run(threads=threads, executor=executor)
-    print(f"{report}\n{found.status}")
+    print(f"{report}\n{found.place}: {found.status}")
     if report.failed:
         raise StudyError(
             f"{len(report.failed)} units failed, as runs.jsonl says; run the study again to try them again"
@@ -109,8 +109,9 @@ def status(folder: str, *, as_json: Annotated[bool, Parameter(name="--json", neg
     """
     state = rocking.study(folder).status
     running = None if state.running is None else asdict(state.running)
-    told = {"done": state.done, "units": state.units, "simulations": state.simulations, "failed": state.failed}
-    print(to_json(told | {"running": running}) if as_json else state)
+    told = {name: getattr(state, name) for name in ("done", "units", "simulations", "failed")}
+    told |= {"running": running, "refinement": None if state.refinement is None else asdict(state.refinement)}
+    print(to_json({"folder": folder, **told}) if as_json else f"{folder}: {state}")
 
 
 @study.command
@@ -136,7 +137,7 @@ def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter
 
 
 @study.command
-def export(folder: str, file: Path) -> None:
+def export(folder: str, file: Path, *, critical: Annotated[bool, Parameter(negative="")] = False) -> None:
     """Write the results to one file.
 
     Parameters
@@ -144,10 +145,13 @@ def export(folder: str, file: Path) -> None:
     folder
         Where the study is kept.
     file
-        NetCDF (.nc), CSV (.csv), or Parquet (.parquet, with pyarrow installed).
+        NetCDF (.nc), or a table with a row for each simulation: CSV (.csv), JSON (.json), Parquet (.parquet) or a
+        workbook (.xlsx); units are in the names of its columns.
+    critical
+        Write the scales between which the verdict on a block changes instead.
     """
     is_replaced = file.exists()
-    rocking.study(folder).export(file)
+    rocking.study(folder).export(file, critical=critical)
     if is_replaced:
         note(f"replaced {file}")
     print(f"written to {file}")
@@ -194,7 +198,7 @@ def _created(file: Path, folder: str, unit_blocks: int | None) -> Study:
     described = read_study(file)
     for sentence in described.skipped:
         note(f"left out: {sentence}")
-    return study_of(place_of(folder), described.product, unit_blocks, described.report)
+    return study_of(place_of(folder), described.product, unit_blocks, described.report, described.refine)
 
 
 def _executor(workers: int | None, scheduler: str | None) -> contextlib.AbstractContextManager[Executor | None]:

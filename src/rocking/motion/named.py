@@ -55,6 +55,8 @@ def named_motion(
 def named_vertical(name: str, record: str, *, dt: float | None = None, units: str | None = None) -> Motion:
     """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal one's file.
 
+    There are two motions then, so `dt` and `units` are for the one that does not say its own.
+
     Parameters
     ----------
     name : str
@@ -70,12 +72,12 @@ def named_vertical(name: str, record: str, *, dt: float | None = None, units: st
         If there is no such file, record or channel.
     """
     if Path(name).is_file() or name in records.names():
-        return named_motion(name, dt=dt, units=units)
+        return named_motion(name, dt=dt, units=units, several=True)
     if record == STANDARD_INPUT or not Path(record).exists():
         raise UnreadableRecord(
             f"{name}: there is no such file or shipped record for the vertical motion, and {record} has no channels"
         )
-    return formats.read(record, channel=name, dt=dt, units=units)
+    return formats.read_as(record, name, Request.checked(dt, units, several=True))
 
 
 def is_shipped(name: str) -> bool:

@@ -17,11 +17,13 @@ import numpy as np
 from rocking import quantities
 from rocking.arrays import Floats
 from rocking.block import Blocks
-from rocking.errors import RockingError, StudyError, UnreadableRecord
+from rocking.errors import InvalidMotion, RockingError, StudyError, UnreadableRecord
+from rocking.motion.formats.request import Request
 from rocking.motion.motion import Motion
-from rocking.motion.named import expanded, named_motion
+from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.named_pulses import pulse_family
 from rocking.product import Product, Scales
+from rocking.studies.refine import tolerance_of
 from rocking.studies.report import FragilityPlan, ReportPlan, SpectrumPlan
 from rocking.treatment import treatment
 
@@ -37,7 +39,8 @@ restitution = 0.9               # leave out for Housner's
 [motions]
 records = ["ridgecrest-clc-090", "el-centro-meloland-270"]   # files, folders, patterns, shipped records
 # channel = "1"
-# units = "g"
+# vertical = "3"                # a channel of the same file, or a record: moves the ground up and down besides
+# units = "g"                   # of files that do not say theirs
 # dt = 0.01
 skip_unreadable = false         # true: leave out records that cannot be read, and list them
 
@@ -49,6 +52,7 @@ skip_unreadable = false         # true: leave out records that cannot be read, a
 [scales]                        # at most one of factor, pga, pgv, sa (with period, damping)
 pga = ["0.2g", "0.4g", "0.8g"]
 polarity = "+"                  # or "-", "both"
+# refine = 1e-3                 # halve gaps between scales of which one overturns a block, to this relative width
 
 [simulation]
 model = "nonlinear"             # or "linear"
@@ -64,13 +68,27 @@ blocks = "each"                 # a curve for each block; or "together": one for
 # fractiles = [0.16, 0.5, 0.84]
 """
 
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
 #: Keys of every table.
 _KEYS: Final[Mapping[str, frozenset[str]]] = {
     "blocks": frozenset({"p", "alpha", "restitution", "csv"}),
-    "motions": frozenset({"records", "channel", "units", "dt", "skip_unreadable", "pulses"}),
-    "scales": frozenset({"factor", "pga", "pgv", "sa", "period", "damping", "polarity"}),
+    "motions": frozenset({"records", "channel", "vertical", "units", "dt", "skip_unreadable", "pulses"}),
+    "scales": frozenset({"factor", "pga", "pgv", "sa", "period", "damping", "polarity", "refine"}),
     "simulation": frozenset({"model", "chattering", "duration"}),
     "report": frozenset({"fragility", "spectrum"}),
+}
+
+#: Keys whose values are no numbers: what they are, in words, and whether a value is that.
+_KINDS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
+    **dict.fromkeys(("csv", "vertical", "units", "polarity", "model", "chattering"), ("text", _is_text)),
+    "channel": ("text or a whole number", lambda value: _is_text(value) or type(value) is int),
+    "records": ("a list of texts", lambda value: isinstance(value, list) and all(map(_is_text, value))),
+    "skip_unreadable": ("true or false", lambda value: isinstance(value, bool)),
+    "pulses": ("tables, [[motions.pulses]]", lambda value: all(isinstance(each, dict) for each in value)),
 }
 
 _QUANTITIES: Final[Mapping[str, Callable[[str, str], float]]] = {
@@ -92,11 +110,14 @@ class StudyFile:
         A sentence for each record that could not be read, where the file says to go on.
     report : ReportPlan or None
         What is to be made of the results.
+    refine : float or None
+        Tolerance to which scales are refined.
     """
 
     product: Product
     skipped: tuple[str, ...]
     report: ReportPlan | None
+    refine: float | None = None
 
 
 def read_study(path: str | Path) -> StudyFile:
@@ -137,28 +158,36 @@ class _Reader:
 
     def study(self) -> StudyFile:
         self._check_keys()
-        motions, skipped = self._motions()
-        scales = dict(self.tables.get("scales", {}))
-        polarity = scales.pop("polarity", "+")
-        measures = {
-            name: self._numbers("scales", name, value) for name, value in scales.items() if name not in _OSCILLATOR
-        }
+        blocks, scales = self._blocks(), self._scales()
+        motions, skipped = self._motions(scales)
         rules = self.tables.get("simulation", {})
-        try:
+        with self._line_told("simulation", "chattering"):
+            chattering = treatment(rules.get("chattering", "certified"))
+        polarity = self.tables.get("scales", {}).get("polarity", "+")
+        with self._lines_told("simulation", "scales", "blocks"):
             product = Product(
-                self._blocks(),
+                blocks,
                 tuple(motions),
-                Scales.of(period=scales.get("period"), damping=scales.get("damping", 0.05), **measures),
+                scales,
                 polarity,
                 rules.get("model", "nonlinear"),
-                treatment(rules.get("chattering", "certified")),
+                chattering,
                 rules.get("duration"),
             )
-        except StudyError:
-            raise
-        except RockingError as error:
-            raise StudyError(f"{self.file}: {error}") from error
-        return StudyFile(product, tuple(skipped), self._report())
+        return StudyFile(product, tuple(skipped), self._report(), self._refine(product))
+
+    def _scales(self) -> Scales:
+        given = {
+            name: value for name, value in self.tables.get("scales", {}).items() if name not in ("polarity", "refine")
+        }
+        measures = {name: self._numbers("scales", name, given[name]) for name in given if name not in _OSCILLATOR}
+        with self._lines_told("scales"):
+            return Scales.of(period=given.get("period"), damping=given.get("damping", 0.05), **measures)
+
+    def _refine(self, product: Product) -> float | None:
+        refine = self.tables.get("scales", {}).get("refine")
+        with self._line_told("scales", "refine"):
+            return None if refine is None else tolerance_of(product, refine)
 
     def _report(self) -> ReportPlan | None:
         if "report" not in self.tables:
@@ -175,11 +204,8 @@ class _Reader:
             for key in given:
                 if key not in known:
                     raise self._wrong(table, key, f"[{table}] has no {key}; it takes {', '.join(known)}")
-            try:
+            with self._lines_told(table):
                 plans[name] = kind(**given)
-            except RockingError as error:
-                key = next((key for key in given if key in str(error)), None)
-                raise self._wrong(table, key, str(error)) from None
         return ReportPlan(**plans)
 
     def _check_keys(self) -> None:
@@ -192,6 +218,9 @@ class _Reader:
                 if key not in _KEYS[table]:
                     known = ", ".join(sorted(_KEYS[table]))
                     raise self._wrong(table, key, f"[{table}] has no {key}; it takes {known}")
+                what, is_that = _KINDS.get(key, ("", lambda value: True))
+                if not is_that(content[key]):
+                    raise self._wrong(table, key, f"{key} must be {what}, not {content[key]!r}")
         for needed in ("blocks", "motions"):
             if needed not in self.tables:
                 raise StudyError(f"{self.file}: the table [{needed}] is missing")
@@ -206,7 +235,8 @@ class _Reader:
         if missing:
             raise self._wrong("blocks", None, f"[blocks] needs {' and '.join(missing)}, or csv")
         axes: dict[str, Any] = {name: self._numbers("blocks", name, value) for name, value in given.items()}
-        return Blocks.grid(**axes)
+        with self._lines_told("blocks"):
+            return Blocks.grid(**axes)
 
     def _blocks_of_csv(self, table: Path) -> Blocks:
         try:
@@ -221,35 +251,56 @@ class _Reader:
                 columns[name] = np.array([_cell(table, line, name, text) for line, text in cells])
         if not {"p", "alpha"} <= columns.keys():
             raise self._wrong("blocks", "csv", f"{table} needs columns p (rad/s) and alpha (rad, or 12deg), and rows")
-        return Blocks(**columns)
+        try:
+            return Blocks(**columns)
+        except RockingError as error:
+            raise self._wrong("blocks", "csv", f"{table}, whose block 0 is in line 2: {error}") from None
 
-    def _motions(self) -> tuple[list[Motion], list[str]]:
+    def _motions(self, scales: Scales) -> tuple[list[Motion], list[str]]:
+        """Motions that can be read and scaled, and a sentence for each that cannot, where the file says to go on."""
         given = self.tables["motions"]
         motions, skipped = [], []
-        options = {name: given[name] for name in ("channel", "units", "dt") if name in given}
-        for name in self._records(given.get("records", [])):
+        records = self._records()
+        for path, name in records.items():
             try:
-                motions.append(named_motion(name, **options))
-            except UnreadableRecord as error:
+                with self._record_told(name):
+                    motions.append(_scalable(self._record(path, several=len(records) > 1), scales))
+            except (UnreadableRecord, InvalidMotion) as error:
                 if not given.get("skip_unreadable", False):
                     raise
                 skipped.append(str(error))
-        for k, pulse in enumerate(given.get("pulses", [])):
-            motions += self._pulses(k, dict(pulse))
+        for k in range(len(given.get("pulses", []))):
+            motions += self._pulses(k)
         if not motions:
             raise self._wrong("motions", None, "[motions] holds no motion that can be read: name records or pulses")
         return motions, skipped
 
-    def _records(self, names: list[str]) -> list[str]:
-        """Names of records, those of files relative to the study's own file."""
-        beside = [str(self.file.parent / name) for name in names]
-        there = [
-            path if Path(path).exists() or any(mark in name for mark in "*?[") else name
-            for path, name in zip(beside, names, strict=True)
-        ]
-        return expanded(there)
+    def _records(self) -> dict[str, str]:
+        """Paths (relative to the study's own file) or names of all records, and what stands for each in the file."""
+        with self._lines_told("motions"):
+            Request.checked(self.tables["motions"].get("dt"), self.tables["motions"].get("units"))
+        found: dict[str, str] = {}
+        for name in self.tables["motions"].get("records", []):
+            with self._record_told(name):
+                found |= dict.fromkeys(expanded([self._beside(name)]), name)
+        return found
 
-    def _pulses(self, k: int, pulse: dict[str, Any]) -> list[Motion]:
+    def _record(self, path: str, *, several: bool) -> Motion:
+        given = self.tables["motions"]
+        about = {"dt": given.get("dt"), "units": given.get("units")}
+        channel = None if "channel" not in given else str(given["channel"])
+        motion = named_motion(path, channel=channel, several=several, **about)
+        if "vertical" not in given:
+            return motion
+        return motion.with_vertical(named_vertical(self._beside(given["vertical"]), path, **about))
+
+    def _beside(self, name: str) -> str:
+        """Path of a file that lies beside the study's own, or the name of anything else."""
+        path = str(self.file.parent / name)
+        return path if Path(path).exists() or any(mark in name for mark in "*?[") else name
+
+    def _pulses(self, k: int) -> list[Motion]:
+        pulse = dict(self.tables["motions"]["pulses"][k])
         with self._line_told("motions.pulses", "family", k):
             family = pulse_family(str(pulse.pop("family", "")))
         axes: dict[str, Sequence[Any] | Floats] = {}
@@ -257,7 +308,7 @@ class _Reader:
             with self._line_told("motions.pulses", key, k):
                 quantity = family.quantity(key)
                 axes[key] = [value] if quantity is None else _read(key, value, quantity)
-        with self._line_told("motions.pulses", "family", k):
+        with self._lines_told("motions.pulses", occurrence=k):
             return [family.motion(dict(zip(axes, values, strict=True))) for values in itertools.product(*axes.values())]
 
     def _numbers(self, table: str, key: str, value: Any) -> Floats:
@@ -272,11 +323,54 @@ class _Reader:
         except RockingError as error:
             raise self._wrong(table, key, str(error), occurrence) from None
 
+    @contextlib.contextmanager
+    def _lines_told(self, *tables: str, occurrence: int = 0) -> Iterator[None]:
+        """Give a mistake the line of the key of these tables that its sentence names first, or of the first heading."""
+        try:
+            yield
+        except RockingError as error:
+            sentence = str(error)
+            places = [
+                (_position(key, sentence), table, key) for table in tables for key in self._keys(table, occurrence)
+            ]
+            named = sorted(place for place in places if place[0] >= 0)
+            _, table, key = named[0] if named else (0, tables[0], None)
+            raise self._wrong(table, key, sentence, occurrence) from None
+
+    @contextlib.contextmanager
+    def _record_told(self, name: str) -> Iterator[None]:
+        """Give what is wrong with a record the line that names it."""
+        try:
+            yield
+        except (UnreadableRecord, InvalidMotion) as error:
+            first = _line(self.text, "motions", "records", 0)
+            lines = self.text.splitlines()[first - 1 :]
+            line = next((k for k, text in enumerate(lines, start=first) if name in text), first)
+            raise type(error)(f"{self.file}, line {line}: {error}") from None
+
+    def _keys(self, table: str, occurrence: int) -> list[str]:
+        content: Any = self.tables
+        for name in table.split("."):
+            content = content.get(name, {})
+        return [*(content[occurrence] if isinstance(content, list) else content)]
+
     def _wrong(self, table: str | None, key: str | None, sentence: str, occurrence: int = 0) -> StudyError:
         return StudyError(f"{self.file}, line {_line(self.text, table, key, occurrence)}: {sentence}")
 
 
 _OSCILLATOR: Final = ("period", "damping")
+
+
+def _scalable(motion: Motion, scales: Scales) -> Motion:
+    """Return a motion, checked that it can be scaled."""
+    scales.factors(motion)
+    return motion
+
+
+def _position(word: str, sentence: str) -> int:
+    """Where a word stands in a sentence; -1 if it does not."""
+    found = re.search(rf"\b{re.escape(word)}\b", sentence)
+    return found.start() if found else -1
 
 
 def _read(key: str, value: Any, quantity: quantities.Quantity) -> Floats:
@@ -296,6 +390,9 @@ def _cell(table: Path, line: int, name: str, text: str) -> float:
 
 def _line(text: str, table: str | None, key: str | None, occurrence: int) -> int:
     """Line of a key in a table, the occurrence-th of that name; of its heading where there is no key; 1 if unseen."""
+    if table is not None and "." in table and not re.search(rf"^\s*\[+\s*{re.escape(table)}\b", text, re.MULTILINE):
+        parent, _, name = table.rpartition(".")  # it is written within its parent
+        return _line(text, parent, name, 0)
     here, seen, heading_line = None, -1, 1
     for number, line in enumerate(text.splitlines(), start=1):
         heading = re.match(r"\s*\[+\s*([\w.]+)\s*\]+", line)

@@ -42,7 +42,7 @@ def to_bytes(product: Product) -> bytes:
     arrays["scales/values"] = product.scales.values
     words = {"measure": product.scales.measure, "options": dict(product.scales.options)}
     arrays["words"] = _text(json.dumps(words | {"motions": len(product.motions)} | _rules(product)))
-    return _archive(arrays)
+    return archive(arrays)
 
 
 def from_bytes(data: bytes) -> Product:
@@ -147,14 +147,14 @@ def _words(array: NDArray[Any]) -> str:
     return bytes(array).decode()
 
 
-def _archive(arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """Archive of arrays whose bytes depend on the arrays alone."""
+def archive(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Archive of arrays (NPZ) whose bytes depend on the arrays alone."""
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as file:
         for name, values in arrays.items():
             entry = io.BytesIO()
             np.lib.format.write_array(entry, np.asarray(values, order="C"), allow_pickle=False)
             about = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
             about.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(about, entry.getvalue())
+            file.writestr(about, entry.getvalue())
     return buffer.getvalue()

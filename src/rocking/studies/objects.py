@@ -52,6 +52,10 @@ class ObjectStore:
         except Exception as error:  # its own kinds, and those of the system
             raise InvalidOption(f"{url} is no object store: {_first_line(error)}") from None
 
+    def __str__(self) -> str:
+        """Name the place."""
+        return self._url
+
     def put(self, name: str, data: bytes) -> None:
         """Store an object in one request, which is carried out whole or not at all."""
         if self._taken_over:
@@ -73,7 +77,7 @@ class ObjectStore:
     def names(self, folder: str) -> Iterator[str]:
         """List the objects whose names begin with that of the folder."""
         try:
-            for chunk in self._library.list(self._store, folder):
+            for chunk in self._library.list(self._store, folder or None):
                 yield from (one["path"].removeprefix(f"{folder}/") for one in chunk)
         except self._failures as error:
             raise StudyError(f"{self._url}/{folder} cannot be listed: {_first_line(error)}") from error

@@ -23,7 +23,7 @@ _MOMENT: Final = 0.02
 
 
 class Place(Protocol):
-    """What a study asks of the place where it is kept; names may hold one "/"."""
+    """What a study asks of the place where it is kept, which str() names; names of objects may hold one "/"."""
 
     def put(self, name: str, data: bytes) -> None:
         """Store an object: when this returns it survives a crash, before that it does not exist."""
@@ -32,7 +32,7 @@ class Place(Protocol):
         """Return an object, or None where there is none."""
 
     def names(self, folder: str) -> Iterator[str]:
-        """List the objects of a folder, without its name, in any order."""
+        """List the objects of a folder ("": of the place itself), without its name, in any order."""
 
     def append(self, name: str, line: str) -> None:
         """Add a line to an object that only people read."""
@@ -55,6 +55,10 @@ class Folder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+
+    def __str__(self) -> str:
+        """Name the folder."""
+        return str(self.path)
 
     def put(self, name: str, data: bytes) -> None:
         """Write beside the object, flush to the disk, rename, and flush the folder."""
@@ -139,11 +143,19 @@ class Folder:
 
 
 def place_of(where: str | Path) -> Place:
-    """Return the place that a path or a URL (``s3://bucket/prefix``) names."""
+    """Return the place that a path or a URL (``s3://bucket/prefix``) names.
+
+    Raises
+    ------
+    StudyError
+        If it is a file.
+    """
     if "://" in str(where):
         from rocking.studies.objects import ObjectStore
 
         return ObjectStore(str(where))
+    if Path(where).is_file():
+        raise StudyError(f"{where} is a file, and a study is kept in a folder: name that")
     return Folder(Path(where))
 
 

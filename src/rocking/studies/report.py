@@ -111,7 +111,9 @@ def kept(store: Store) -> ReportPlan:
     """
     data = store.place.get(_NAME)
     if data is None:
-        raise StudyError("the study says nothing of a report: add [report.fragility] to its file and create it again")
+        raise StudyError(
+            f"{store.place}: the study says nothing of a report: add [report.fragility] to its file and create it again"
+        )
     try:
         told: dict[str, Any] = json.loads(data)
         kinds = {"fragility": FragilityPlan, "spectrum": SpectrumPlan}

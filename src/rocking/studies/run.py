@@ -11,12 +11,11 @@ from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from types import FrameType
-from typing import Final
+from typing import Final, Protocol
 
 from rocking.compiling import SIMULATIONS, announce
 from rocking.progress import Progress
-from rocking.studies.store import Store
-from rocking.studies.units import Key, name_of
+from rocking.studies.units import Grid, Key, Line, PointsWork, Work
 from rocking.studies.workers import LOST, Workers, sentence, workers_of
 
 #: Units that are handed out for each worker: one that it computes, and the next.
@@ -27,6 +26,26 @@ _AGAIN: Final = 3
 
 #: How often the workers are asked whether they still live, s.
 _PULSE: Final = 0.5
+
+
+class Job(Protocol):
+    """Units to compute: those of a study's grid, or of a round of its refinement."""
+
+    @property
+    def grid(self) -> Grid | Line:
+        """How the simulations are cut into units."""
+
+    def missing(self) -> Iterator[Key]:
+        """Keys of the units that are not done, in order."""
+
+    def work(self, key: Key) -> Work | PointsWork:
+        """Return all that a worker needs for a unit."""
+
+    def put(self, key: Key, data: bytes) -> None:
+        """Store a unit."""
+
+    def label(self, key: Key) -> str:
+        """Name a unit."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +71,16 @@ class RunReport:
     seconds: float
     failed: dict[str, str]
     stopped: bool
+
+    def __add__(self, other: RunReport) -> RunReport:
+        """Return what both did, one after the other."""
+        return RunReport(
+            self.units + other.units,
+            self.simulations + other.simulations,
+            self.seconds + other.seconds,
+            self.failed | other.failed,
+            other.stopped,
+        )
 
     def __str__(self) -> str:
         """Write it in one line."""
@@ -89,8 +118,9 @@ class Stop:
 
 
 def run(
-    store: Store,
+    job: Job,
     *,
+    stop: Stop,
     threads: int | None,
     executor: Executor | None,
     progress: bool | None,
@@ -100,8 +130,10 @@ def run(
 
     Parameters
     ----------
-    store : Store
-        Where the units are kept.
+    job : Job
+        The units.
+    stop : Stop
+        Who is asked whether to stop.
     threads, executor, progress
         As for `Study.run`.
     failing : callable
@@ -113,33 +145,32 @@ def run(
         If the workers are gone.
     """
     announce(SIMULATIONS)
-    start, stop = time.monotonic(), Stop()
-    missing = list(store.missing())
+    start = time.monotonic()
+    missing = list(job.missing())
     units = simulations = 0
     failed: dict[str, str] = {}
-    before = store.grid.total - sum(map(store.grid.simulations, missing))
+    before = job.grid.total - sum(map(job.grid.simulations, missing))
     with (
-        stop.listening(),
-        Progress("simulating", store.grid.total, show=progress, done=before) as bar,
+        Progress("simulating", job.grid.total, show=progress, done=before) as bar,
         workers_of(executor, threads) as workers,
-        contextlib.closing(_results(store, iter(missing), workers, stop)) as results,
+        contextlib.closing(_results(job, iter(missing), workers, stop)) as results,
     ):
         for key, outcome in results:
             if isinstance(outcome, bytes):
-                store.put(key, outcome)
+                job.put(key, outcome)
                 units += 1
-                simulations += store.grid.simulations(key)
-                bar.advance(store.grid.simulations(key))
+                simulations += job.grid.simulations(key)
+                bar.advance(job.grid.simulations(key))
             else:
-                failed[name_of(key)] = outcome
-                failing(name_of(key), outcome)
+                failed[job.label(key)] = outcome
+                failing(job.label(key), outcome)
                 bar.note(f"{len(failed)} units failed")
     stopped = stop.asked and units + len(failed) < len(missing)
     return RunReport(units, simulations, time.monotonic() - start, failed, stopped)
 
 
 def _results(
-    store: Store, keys: Iterator[Key], workers: Workers, stop: Stop
+    job: Job, keys: Iterator[Key], workers: Workers, stop: Stop
 ) -> Generator[tuple[Key, bytes | str], None, None]:
     """Give the bytes of every unit as they come, or a sentence where it failed."""
     pending: dict[Future[bytes], Key] = {}
@@ -147,7 +178,7 @@ def _results(
 
     def submit(key: Key) -> None:
         tries[key] += 1
-        pending[workers.submit(store.work(key))] = key
+        pending[workers.submit(job.work(key))] = key
 
     try:
         while True:

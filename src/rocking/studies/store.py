@@ -21,6 +21,13 @@ from rocking.studies.units import Axes, DamagedUnit, Grid, Key, Work, decoded, k
 
 FORMAT: Final = 1
 _ARRAY: Final = "result"
+
+#: What is in the place of a study whose creation was cut off; that of an object store keeps a clock as well.
+_ITS_OWN: Final = frozenset({_ARRAY, "inputs.npz", "zarr.json", "lock", "clock", "runs.jsonl"})
+
+#: Names of other things that a sentence lists.
+_LISTED: Final = 3
+
 _GROUP: Final = json.dumps({"zarr_format": 3, "node_type": "group", "attributes": {}}, indent=2)
 
 
@@ -45,7 +52,14 @@ class Store:
 
     @classmethod
     def create(cls, place: Place, product: Product, unit: Axes) -> Store:
-        """Write an empty store; `study.json` last, so that half a store is none."""
+        """Write an empty store; `study.json` last, so that half a store is none.
+
+        Raises
+        ------
+        StudyError
+            If there is something else in the place.
+        """
+        _require_free(place)
         grid = Grid(product.shape, unit)
         archive = inputs.to_bytes(product)
         place.put("inputs.npz", archive)
@@ -60,7 +74,7 @@ class Store:
             "inputs": hashlib.sha256(archive).hexdigest(),
             "parts": inputs.hashes(product),
         }
-        place.put("study.json", _sealed(about))
+        place.put("study.json", sealed(about))
         return cls(place, product, grid)
 
     @classmethod
@@ -75,7 +89,9 @@ class Store:
         about = described(place)
         archive = place.get("inputs.npz")
         if archive is None or hashlib.sha256(archive).hexdigest() != about["inputs"]:
-            raise StudyError("inputs.npz is missing or damaged; restore it, or create the study again elsewhere")
+            raise StudyError(
+                f"inputs.npz in {place} is missing or damaged; restore it, or create the study again elsewhere"
+            )
         product = inputs.from_bytes(archive)
         grid = Grid(product.shape, tuple(about["unit"]))
         for name, text in (("zarr.json", _GROUP), (f"{_ARRAY}/zarr.json", grid.metadata())):
@@ -94,8 +110,8 @@ class Store:
         about = described(self.place)
         if (about["version"], about["kernels"]) != (VERSION, fingerprint()):
             raise StudyError(
-                f"the study was made by rocking {about['version']} (kernels {about['kernels']}), this is {VERSION} "
-                f"(kernels {fingerprint()}): run it with that version, or create it again elsewhere"
+                f"{self.place}: the study was made by rocking {about['version']} (kernels {about['kernels']}), this is "
+                f"{VERSION} (kernels {fingerprint()}): run it with that version, or create it again elsewhere"
             )
 
     def check_inputs(self, product: Product) -> None:
@@ -108,7 +124,10 @@ class Store:
         """
         changed = inputs.changes(inputs.hashes(product), described(self.place)["parts"], product.motions)
         if changed:
-            raise StudyError(f"the study holds other inputs: {', '.join(changed)} changed; create it again elsewhere")
+            raise StudyError(
+                f"{self.place} holds a study of other inputs ({', '.join(changed)} changed), {len(self.done())} of "
+                f"{len(self.grid)} units done: create this one elsewhere, or remove that one"
+            )
 
     def done(self) -> set[Key]:
         """Keys of the units that are done."""
@@ -133,6 +152,11 @@ class Store:
         factors = np.array([self.product.scales.factors(motion) for motion in motions])
         return factors[:, :, None] * np.array(self.product.signs, dtype=np.float64)
 
+    @staticmethod
+    def label(key: Key) -> str:
+        """Name a unit."""
+        return name_of(key)
+
     def put(self, key: Key, data: bytes) -> None:
         """Store a unit."""
         self.place.put(f"{_ARRAY}/{name_of(key)}", data)
@@ -152,12 +176,21 @@ class Store:
         data = self.raw(key)
         if data is None:
             return None
-        try:
-            return decoded(data, self.grid.counts(key), self.grid.unit)
-        except DamagedUnit as error:
-            raise StudyError(
-                f"unit {name_of(key)} is damaged, {error}: verify(repair=True) computes it again"
-            ) from None
+        return readable(data, self.grid.counts(key), self.grid.unit, self.label(key))
+
+
+def readable(data: bytes, counts: tuple[int, ...], unit: tuple[int, ...], label: str) -> Floats:
+    """Outcomes of a unit from its bytes, shape (outcomes, *counts).
+
+    Raises
+    ------
+    StudyError
+        If they are damaged; the message names the unit.
+    """
+    try:
+        return decoded(data, counts, unit)
+    except DamagedUnit as error:
+        raise StudyError(f"unit {label} is damaged, {error}: verify(repair=True) computes it again") from None
 
 
 def exists(place: Place) -> bool:
@@ -175,20 +208,42 @@ def described(place: Place) -> dict[str, Any]:
     """
     data = place.get("study.json")
     if data is None:
-        raise StudyError("there is no study here: create it first")
-    try:
-        about: dict[str, Any] = json.loads(data)
-        seal = about.pop("seal")
-    except (ValueError, KeyError, AttributeError):
-        raise StudyError("study.json is damaged: restore it, or create the study again elsewhere") from None
-    if _sealed(about) != data or seal != _seal(about):
-        raise StudyError("study.json is damaged: restore it, or create the study again elsewhere")
+        raise StudyError(f"there is no study in {place}: create it first")
+    about = unsealed(data)
+    if about is None:
+        raise StudyError(f"study.json in {place} is damaged: restore it, or create the study again elsewhere")
     if about["format"] != FORMAT:
-        raise StudyError(f"study.json is of format {about['format']}, this program knows {FORMAT}: use its version")
+        raise StudyError(
+            f"the study in {place} is of format {about['format']}, this program knows {FORMAT}: use its version"
+        )
     return about
 
 
-def _sealed(about: dict[str, Any]) -> bytes:
+def _require_free(place: Place) -> None:
+    """Check that there is nothing in a place that is no study's.
+
+    Raises
+    ------
+    StudyError
+        If there is.
+    """
+    others = {name.partition("/")[0] for name in place.names("")} - _ITS_OWN
+    if others:
+        listed = ", ".join(sorted(others)[:_LISTED]) + (" and more" if len(others) > _LISTED else "")
+        raise StudyError(f"{place} holds no study, but {listed}: name a new folder, or an empty one")
+
+
+def unsealed(data: bytes) -> dict[str, Any] | None:
+    """Return what a sealed description says; None if it is damaged."""
+    try:
+        about: dict[str, Any] = json.loads(data)
+        seal = about.pop("seal")
+    except (ValueError, KeyError, AttributeError, TypeError):
+        return None
+    return about if sealed(about) == data and seal == _seal(about) else None
+
+
+def sealed(about: dict[str, Any]) -> bytes:
     """Return the description with its own hash."""
     return json.dumps(about | {"seal": _seal(about)}, indent=2).encode()
 

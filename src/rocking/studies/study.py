@@ -21,18 +21,31 @@ from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.intensity import Measure, MeasureName
 from rocking.block import Block, Blocks
 from rocking.compiling import SIMULATIONS, announce
-from rocking.errors import InvalidOption, OutputError, StudyError
+from rocking.errors import InvalidOption, StudyError
 from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
 from rocking.product import Polarity, Product, Scales
 from rocking.studies import store as stores
+from rocking.studies.export import export
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
 from rocking.studies.place import Place, place_of, this_process
+from rocking.studies.refine import (
+    Refinement,
+    Round,
+    critical_scales,
+    found_brackets,
+    keep_plan,
+    kept_plan,
+    next_round,
+    refinement,
+    rounds,
+    tolerance_of,
+)
 from rocking.studies.report import Made, ReportPlan, keep, kept, report
-from rocking.studies.run import RunReport, run
+from rocking.studies.run import RunReport, Stop, run
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.store import Store
-from rocking.studies.units import OUTCOMES, Axes, Key, Work, compute, name_of
+from rocking.studies.units import OUTCOMES, Axes, Key, Work, compute
 from rocking.treatment import Treatment, treatment
 from rocking.treatment.base import Model
 
@@ -46,6 +59,9 @@ _GROUP: Final = 512
 _UNIT: Final = 5.0
 _FEWEST: Final = 32
 _LARGEST: Final = 1 << 18
+
+#: Rows of a table that are held in memory at a time.
+_ROWS: Final = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -90,6 +106,8 @@ class Status:
         The run that goes on now, where there is one.
     runs : tuple
         What happened in every run, as `runs.jsonl` has it.
+    refinement : Refinement or None
+        How far the refinement of its scales has come, where it has one.
     """
 
     done: int
@@ -98,16 +116,18 @@ class Status:
     failed: dict[str, str]
     running: Running | None
     runs: tuple[dict[str, Any], ...]
+    refinement: Refinement | None = None
 
     @property
     def complete(self) -> bool:
-        """Whether every unit is done."""
-        return self.done == self.units
+        """Whether every unit is done, and all that is to be refined is."""
+        return self.done == self.units and (self.refinement is None or self.refinement.complete)
 
     def __str__(self) -> str:
         """Write it in one line."""
         share = 100.0 * self.done / self.units
         text = f"{self.done} of {self.units} units done ({share:.1f} %), {self.simulations} simulations in all"
+        text += f"; {self.refinement}" if self.refinement else ""
         text += f"; {len(self.failed)} failed in the last run" if self.failed else ""
         return text + (f"; {self.running}" if self.running else "")
 
@@ -135,7 +155,7 @@ class Study:
     def run(
         self, threads: int | None = None, executor: Executor | None = None, *, progress: bool | None = None
     ) -> RunReport:
-        """Compute every unit that is not done.
+        """Compute every unit that is not done, and the rounds of the refinement after them.
 
         Parameters
         ----------
@@ -166,11 +186,23 @@ class Study:
         with self.place.locked() as note:
             self._log({"event": "start", "note": note, "done": self._simulations(self.store.done())})
             try:
-                report = run(self.store, threads=threads, executor=executor, progress=progress, failing=self._failing)
+                report = self._compute(threads=threads, executor=executor, progress=progress)
             except BaseException as error:
                 self._log({"event": "end", "error": str(error) or type(error).__name__})
                 raise
             self._log({"event": "end", "units": report.units, "seconds": report.seconds, "stopped": report.stopped})
+        return report
+
+    def _compute(self, **options: Any) -> RunReport:
+        """Run the grid, and one round of the refinement after the other, until nothing is left or somebody stops it."""
+        stop, tolerance = Stop(), kept_plan(self.store)
+        with stop.listening():
+            report = run(self.store, stop=stop, failing=self._failing, **options)
+            while tolerance is not None and not (report.failed or report.stopped):
+                now = next_round(self.store, tolerance)
+                if now.is_last:
+                    break
+                report += run(now, stop=stop, failing=self._failing, **options)
         return report
 
     @property
@@ -182,7 +214,8 @@ class Study:
         failed = {entry["unit"]: entry["why"] for entry in last if entry.get("event") == "failed"}
         done = self.store.done()
         grid = self.store.grid
-        return Status(len(done), len(grid), grid.total, failed, self._running(last, done), runs)
+        running = self._running(last, done)
+        return Status(len(done), len(grid), grid.total, failed, running, runs, refinement(self.store))
 
     def _running(self, last: tuple[dict[str, Any], ...], done: set[Key]) -> Running | None:
         """Whoever runs it, and how fast since the start of the last run."""
@@ -248,18 +281,41 @@ class Study:
         if recompute or repair:
             self.store.check_program()
             announce(SIMULATIONS)
-        done = sorted(self.store.done())
-        faults = {key: fault for key in done if (fault := self._fault(key))}
-        sound = [key for key in done if key not in faults]
+        tolerance = kept_plan(self.store)
+        parts: list[Store | Round] = [self.store, *([] if tolerance is None else rounds(self.store, tolerance))]
+        done = [(part, key) for part in parts for key in sorted(part.done())]
+        faults = {unit: fault for unit in done if (fault := _fault(*unit))}
+        sound = [unit for unit in done if unit not in faults]
         rng = np.random.default_rng(seed)
-        for k in rng.permutation(len(sound))[:recompute]:
-            if compute(self.store.work(sound[k])) != self.store.raw(sound[k]):
-                faults[sound[k]] = f"unit {name_of(sound[k])} is not what this program computes"
+        for part, key in (sound[k] for k in rng.permutation(len(sound))[:recompute]):
+            if compute(part.work(key)) != part.raw(key):
+                faults[part, key] = f"unit {part.label(key)} is not what this program computes"
         if repair:
             with self.place.locked():
-                for key in faults:
-                    self.store.put(key, compute(self.store.work(key)))
+                for part, key in faults:
+                    part.put(key, compute(part.work(key)))
         return list(faults.values())
+
+    def critical_scales(self) -> xr.Dataset:
+        """Scales between which the verdict on a block changes: from standing to overturning, or back.
+
+        Returns
+        -------
+        xarray.Dataset
+            Over ``change``, in order of motion, polarity, block and scale: low and high (scales, in the units of the
+            measure), overturns (whether the higher one overturns the block, and the lower one does not), known
+            (whether no simulation on the way was given up, which leaves a bracket wide); motion, polarity, block and
+            its parameters as coordinates. A block that stands a stronger motion than one that overturns it has several.
+            Brackets are neighbouring scales of the study, or narrower where it was made with `refine`.
+
+        Raises
+        ------
+        StudyError
+            If units are missing or damaged, or the refinement is not done.
+        InvalidOption
+            If the study has no two scales in increasing order.
+        """
+        return critical_scales(self.store, found_brackets(self.store))
 
     def fragility(
         self,
@@ -352,41 +408,33 @@ class Study:
         """
         return report(self.store, kept(self.store), progress)
 
-    def export(self, path: str | Path) -> None:
-        """Write the results to one file: NetCDF (.nc), CSV (.csv) or Parquet (.parquet, with pyarrow installed).
+    def export(self, path: str | Path, *, critical: bool = False) -> None:
+        """Write the results to one file, by its suffix.
+
+        Parameters
+        ----------
+        path : path
+            NetCDF (.nc), as `results` has them; or a table with a row for each simulation, in columns named with their
+            units: CSV (.csv), JSON (.json), Parquet (.parquet, with pyarrow installed), a workbook (.xlsx, with
+            openpyxl installed).
+        critical : bool
+            Write the `critical_scales` instead, a row for each change.
 
         Raises
         ------
         InvalidOption
-            If the suffix is another, or pyarrow is missing.
+            If the suffix is another, what writes it is not installed, or a sheet has too few rows.
         OutputError
             If the file cannot be written.
         """
-        target, dataset = Path(path), self.results()
-        try:
-            if target.suffix == ".nc":
-                dataset.to_netcdf(target, engine="h5netcdf")
-            elif target.suffix == ".csv":
-                dataset.to_dataframe().to_csv(target)
-            elif target.suffix == ".parquet":
-                dataset.to_dataframe().to_parquet(target)
-            else:
-                raise InvalidOption(f"a study is exported to .nc, .csv or .parquet, not to {target.name}")
-        except ImportError:
-            raise InvalidOption("Parquet needs pyarrow: install rocking[parquet], or export to .csv or .nc") from None
-        except OSError as error:
-            raise OutputError(f"{target} cannot be written: {error.strerror or error}; choose another place") from error
+        if critical:
+            export(self.critical_scales(), Path(path), "change", _ROWS)
+        else:
+            export(self.results(), Path(path), "motion", self.store.grid.unit[0])
 
     def __repr__(self) -> str:
         m, s, k, n = self.store.grid.shape
         return f"<Study: {m} motions x {s} scales x {k} polarities x {n} blocks; {self.status}>"
-
-    def _fault(self, key: Key) -> str:
-        try:
-            self.store.outcomes(key)
-        except StudyError as error:
-            return str(error)
-        return ""
 
     def _done_mask(self, done: set[Key]) -> np.ndarray[Any, np.dtype[np.bool_]]:
         mask = np.zeros(self.store.grid.shape, dtype=bool)
@@ -407,6 +455,15 @@ class Study:
                 continue
 
 
+def _fault(part: Store | Round, key: Key) -> str:
+    """Say what is wrong with a unit; nothing if it is sound."""
+    try:
+        part.outcomes(key)
+    except StudyError as error:
+        return str(error)
+    return ""
+
+
 def study(
     folder: str | Path,
     blocks: Blocks | Block | Sequence[Block] | None = None,
@@ -422,6 +479,7 @@ def study(
     damping: float = 0.05,
     polarity: Polarity = "+",
     duration: float | None = None,
+    refine: float | None = None,
     unit_blocks: int | None = None,
 ) -> Study:
     """Create a study, or open one that is there and check that its inputs are these.
@@ -435,6 +493,10 @@ def study(
         As for `simulate_many`; without both, the study must be there, and needs no script.
     model, chattering, factor, pga, pgv, sa, period, damping, polarity, duration
         As for `simulate_many`.
+    refine : float, optional
+        Once the scales (two or more, increasing) are computed, halve the gap between neighbours of which one overturns
+        a block and the other does not, until it is narrower than this, relative to the scale: `Study.critical_scales`.
+        May be given later for a study that is there.
     unit_blocks : int, optional
         Blocks of a unit, a multiple of 512, of one motion, scale and polarity; by default a unit holds as many of all
         as take about five seconds, from a pilot.
@@ -475,10 +537,16 @@ def study(
         treatment(chattering),
         duration,
     )
-    return study_of(place, product, unit_blocks)
+    return study_of(place, product, unit_blocks, refine=refine)
 
 
-def study_of(place: Place, product: Product, unit_blocks: int | None = None, plan: ReportPlan | None = None) -> Study:
+def study_of(
+    place: Place,
+    product: Product,
+    unit_blocks: int | None = None,
+    plan: ReportPlan | None = None,
+    refine: float | None = None,
+) -> Study:
     """Create the study of a product in a place, or open the one that is there and check its inputs.
 
     Parameters
@@ -491,12 +559,15 @@ def study_of(place: Place, product: Product, unit_blocks: int | None = None, pla
         Blocks of a unit of one motion, scale and polarity; by default units are made from a pilot.
     plan : ReportPlan, optional
         What is to be made of the results; takes the place of what was.
+    refine : float, optional
+        Tolerance of the scales; may be given later.
 
     Raises
     ------
     StudyError
         If there is one of other inputs, or it is damaged.
     """
+    tolerance = None if refine is None else tolerance_of(product, refine)
     if stores.exists(place):
         found = Store.open(place)
         found.check_inputs(product)
@@ -505,6 +576,8 @@ def study_of(place: Place, product: Product, unit_blocks: int | None = None, pla
         found = Store.create(place, product, unit)
     if plan is not None:
         keep(found, plan)
+    if tolerance is not None:
+        keep_plan(found, tolerance)
     return Study(place, found)
 
 

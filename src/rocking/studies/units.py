@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.arrays import Floats
+from rocking.arrays import Floats, Integers
 from rocking.constants import VERSION
 from rocking.engine import OUTCOME, Setup, Task, simulate_task
 from rocking.errors import StudyError
@@ -32,6 +32,9 @@ OUTCOMES: Final = tuple(VARIABLES)
 #: Checked, but not packed: packing would save two thirds of the bytes, and take 3 % of the time of the simulations.
 _LEVEL: Final = 0
 
+#: Outcomes that are rearranged together: some hundreds of kilobytes.
+_CACHED: Final = 4096
+
 #: What gzip writes first: no name, no time, an unknown system. Any other byte there is damage.
 _HEADER: Final = gzip.compress(b"", _LEVEL, mtime=0)[:10]
 
@@ -39,7 +42,9 @@ _NAME: Final = re.compile(r"c\.0\.(\d+)\.(\d+)\.(\d+)\.(\d+)", re.ASCII)
 
 #: Four numbers, along motions, scales, polarities and blocks.
 Axes = tuple[int, int, int, int]
-Key = Axes
+
+#: Indices of a unit along the axes of its array.
+Key = tuple[int, ...]
 
 
 class DamagedUnit(Exception):
@@ -98,27 +103,69 @@ class Grid:
 
     def metadata(self) -> str:
         """Metadata of the array as Zarr 3 has it: one chunk a unit, in flat keys."""
-        return json.dumps(
-            {
-                "zarr_format": 3,
-                "node_type": "array",
-                "shape": [len(OUTCOMES), *self.shape],
-                "data_type": "float64",
-                "chunk_grid": {
-                    "name": "regular",
-                    "configuration": {"chunk_shape": [len(OUTCOMES), *self.unit]},
-                },
-                "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
-                "fill_value": "NaN",
-                "codecs": [
-                    {"name": "bytes", "configuration": {"endian": "little"}},
-                    {"name": "gzip", "configuration": {"level": _LEVEL}},
-                ],
-                "dimension_names": ["outcome", "motion", "scale", "polarity", "block"],
-                "attributes": {"outcomes": list(OUTCOMES)},
+        return _metadata(self.shape, self.unit, ("motion", "scale", "polarity", "block"))
+
+
+@dataclass(frozen=True)
+class Line:
+    """How simulations without a grid are cut into units.
+
+    Attributes
+    ----------
+    total : int
+        Number of simulations in all units.
+    width : int
+        How many a unit holds; the last one may hold fewer.
+    """
+
+    total: int
+    width: int
+
+    @property
+    def unit(self) -> tuple[int]:
+        """Shape of a unit."""
+        return (self.width,)
+
+    def __iter__(self) -> Iterator[Key]:
+        """Give the keys of all units."""
+        return ((k,) for k in range(math.ceil(self.total / self.width)))
+
+    def range(self, key: Key) -> slice:
+        """Range of the simulations of a unit."""
+        start = key[0] * self.width
+        return slice(start, min(start + self.width, self.total))
+
+    def simulations(self, key: Key) -> int:
+        """Count the simulations of a unit."""
+        return min(self.width, self.total - key[0] * self.width)
+
+    def metadata(self) -> str:
+        """Metadata of the array as Zarr 3 has it."""
+        return _metadata((self.total,), self.unit, ("point",))
+
+
+def _metadata(shape: tuple[int, ...], unit: tuple[int, ...], dimensions: tuple[str, ...]) -> str:
+    return json.dumps(
+        {
+            "zarr_format": 3,
+            "node_type": "array",
+            "shape": [len(OUTCOMES), *shape],
+            "data_type": "float64",
+            "chunk_grid": {
+                "name": "regular",
+                "configuration": {"chunk_shape": [len(OUTCOMES), *unit]},
             },
-            indent=2,
-        )
+            "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
+            "fill_value": "NaN",
+            "codecs": [
+                {"name": "bytes", "configuration": {"endian": "little"}},
+                {"name": "gzip", "configuration": {"level": _LEVEL}},
+            ],
+            "dimension_names": ["outcome", *dimensions],
+            "attributes": {"outcomes": list(OUTCOMES)},
+        },
+        indent=2,
+    )
 
 
 def name_of(key: Key) -> str:
@@ -126,8 +173,8 @@ def name_of(key: Key) -> str:
     return "c.0." + ".".join(map(str, key))
 
 
-def key_of(name: str) -> Key | None:
-    """Key of a unit from the name of its object; None of any other object."""
+def key_of(name: str) -> Axes | None:
+    """Key of a unit of a grid from the name of its object; None of any other object."""
     found = _NAME.fullmatch(name)
     if found is None:
         return None
@@ -165,8 +212,55 @@ class Work:
     unit: Axes
     program: str = field(default_factory=program)
 
+    def values(self, stop: threading.Event | None) -> Floats:
+        """Simulate, and return the outcomes."""
+        blocks = slice(0, len(self.setup.blocks))
+        values = blank(self.unit, (*self.factors.shape, blocks.stop))
+        for m, s, k in np.ndindex(self.factors.shape):
+            task = Task(blocks, self.motions[m], float(self.factors[m, s, k]))
+            fill(values[:, m, s, k, blocks], simulate_task(self.setup, task, stop))
+        return values
 
-def compute(work: Work, stop: threading.Event | None = None) -> bytes:
+
+@dataclass(frozen=True)
+class PointsWork:
+    """All that a worker needs for a unit of simulations that are no grid: a block, a motion and a factor each.
+
+    Attributes
+    ----------
+    setup : Setup
+        n blocks, one for each simulation, and how to compute.
+    motions : tuple of Motion
+        What shakes them.
+    which : ndarray of int, shape (n,)
+        Which motion.
+    factors : ndarray, shape (n,)
+        Factors on it; those with the same motion and factor stand together.
+    unit : (int,)
+        How many a full unit holds.
+    program : str
+        Who must compute it.
+    """
+
+    setup: Setup
+    motions: tuple[Motion, ...]
+    which: Integers
+    factors: Floats
+    unit: tuple[int]
+    program: str = field(default_factory=program)
+
+    def values(self, stop: threading.Event | None) -> Floats:
+        """Simulate, and return the outcomes."""
+        count = len(self.factors)
+        values = blank(self.unit, (count,))
+        changes = np.flatnonzero((np.diff(self.which) != 0) | (np.diff(self.factors) != 0.0)) + 1
+        for start, end in itertools.pairwise([0, *changes.tolist(), count]):
+            task = Task(slice(start, end), self.motions[self.which[start]], float(self.factors[start]))
+            fill(values[:, start:end], simulate_task(self.setup, task, stop))
+        return values
+
+
+def compute(work: Work | PointsWork, stop: threading.Event | None = None) -> bytes:
     """Simulate a unit, wherever its inputs have been sent, and return its bytes; of no use where `stop` is set.
 
     Raises
@@ -176,24 +270,29 @@ def compute(work: Work, stop: threading.Event | None = None) -> bytes:
     """
     if work.program != program():
         raise StudyError(f"the worker on {socket.gethostname()} has {program()}, the study needs {work.program}")
-    blocks = slice(0, len(work.setup.blocks))
-    outcomes = np.empty((*work.factors.shape, blocks.stop), dtype=OUTCOME)
-    for m, s, k in np.ndindex(work.factors.shape):
-        task = Task(blocks, work.motions[m], float(work.factors[m, s, k]))
-        outcomes[m, s, k] = simulate_task(work.setup, task, stop)
-    return encoded(outcomes, work.unit)
+    return encoded(work.values(stop))
 
 
-def encoded(outcomes: NDArray[np.void], unit: Axes) -> bytes:
-    """Bytes of a unit: outcomes by motions, scales, polarities and blocks, padded with NaN to a full unit."""
-    values = np.full((len(OUTCOMES), *unit), np.nan, "<f8")
-    held = tuple(slice(0, count) for count in outcomes.shape)
-    for one, name in zip(values, OUTCOMES, strict=True):
-        one[held] = outcomes[name]
-    return gzip.compress(values.data, _LEVEL, mtime=0)
+def blank(unit: tuple[int, ...], counts: tuple[int, ...]) -> Floats:
+    """Room for the outcomes of a unit, NaN where it holds fewer simulations than a full one."""
+    shape = len(OUTCOMES), *unit
+    return np.empty(shape) if unit == counts else np.full(shape, np.nan)
 
 
-def decoded(data: bytes, counts: Axes, unit: Axes) -> Floats:
+def fill(values: Floats, outcomes: NDArray[np.void]) -> None:
+    """Write outcomes of n simulations into an array, shape (outcomes, n): as many at a time as a cache holds."""
+    for start in range(0, len(outcomes), _CACHED):
+        some = slice(start, start + _CACHED)
+        for one, name in zip(values, OUTCOMES, strict=True):
+            one[some] = outcomes[name][some]
+
+
+def encoded(values: Floats) -> bytes:
+    """Bytes of the outcomes of a full unit, however many of them are NaN."""
+    return gzip.compress(np.ascontiguousarray(values, "<f8").data, _LEVEL, mtime=0)
+
+
+def decoded(data: bytes, counts: tuple[int, ...], unit: tuple[int, ...]) -> Floats:
     """Outcomes of a unit, shape (outcomes, *counts).
 
     Raises

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from rocking.engine import cores
 from rocking.errors import RockingError, StudyError
-from rocking.studies.units import Work, compute
+from rocking.studies.units import PointsWork, Work, compute
 
 #: Errors of a unit whose worker went away, or that was lost with it; every other one is the unit's own.
 LOST: Final = (CancelledError, BrokenExecutor, OSError, EOFError)
@@ -49,7 +49,7 @@ class Workers:
                 raise _gone(error) from error
         return self._count
 
-    def submit(self, work: Work) -> Future[bytes]:
+    def submit(self, work: Work | PointsWork) -> Future[bytes]:
         """Hand a unit to a worker, with all that it needs.
 
         Raises
