@@ -8,10 +8,13 @@ from matplotlib.figure import Figure
 
 import rocking
 from rocking.analysis.calibration import population
+from rocking.analysis.calibration.candidates import WIDENED, Candidates
+from rocking.analysis.calibration.evidence import Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
-from rocking.analysis.calibration.population import Evidence
+from rocking.analysis.calibration.posterior import posterior
 from rocking.analysis.calibration.scores import Scores
-from rocking.analysis.calibration.space import Candidates, Space
+from rocking.analysis.calibration.search import r_hat
+from rocking.analysis.calibration.space import Space
 
 HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
 STEP = 0.02
@@ -44,7 +47,7 @@ def shaken():
 
 @pytest.fixture(scope="module")
 def found(shaken):
-    return rocking.calibrate(*shaken, candidates=2048)
+    return rocking.calibrate(*shaken, candidates=1024)
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +79,9 @@ def test_the_hidden_block_lies_within_the_estimates(found):
 def test_the_ensemble_predicts_what_its_blocks_do(found, unseen):
     motions = unseen[0][:20]
     fallen = np.array([outcomes(motions, block) for block in found.blocks])
-    expected = found.lapse + (1.0 - 2.0 * found.lapse) * found.weights @ fallen
+    count = found.diagnostics.effective
+    share = (count * found.weights @ fallen + 0.5) / (count + 1.0)
+    expected = found.lapse + (1.0 - 2.0 * found.lapse) * share
     np.testing.assert_allclose(found.predict(motions), expected, rtol=1e-12)
     assert found.weights.sum() == pytest.approx(1.0, abs=1e-12)
 
@@ -87,13 +92,14 @@ def test_fitted_probabilities_are_those_of_the_ensemble(found, shaken):
 
 
 def test_the_same_seed_gives_the_same_calibration(shaken):
-    motions, overturned = shaken[0][:40], shaken[1][:40]
-    first, second, other = (rocking.calibrate(motions, overturned, seed, candidates=256) for seed in (5, 5, 6))
+    motions, overturned = shaken[0][:20], shaken[1][:20]
+    first, second, other = (rocking.calibrate(motions, overturned, seed, candidates=128) for seed in (5, 5, 6))
     assert np.array_equal(first.blocks.alpha, second.blocks.alpha)
     assert np.array_equal(first.weights, second.weights)
     assert not np.array_equal(first.blocks.alpha, other.blocks.alpha)
 
 
+@pytest.mark.slow
 def test_cross_validation_says_how_good_predictions_are(found, shaken, unseen):
     validation = found.cross_validate(folds=4, repeats=2)
     assert validation.probabilities.shape == (2, len(shaken[0]))
@@ -116,6 +122,7 @@ def test_a_group_is_left_out_as_a_whole():
     np.testing.assert_allclose(first, second, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_random_outcomes_are_not_predicted_with_confidence():
     motions = bursts(60, seed=7)
     overturned = np.random.default_rng(0).random(60) < 0.5
@@ -123,6 +130,7 @@ def test_random_outcomes_are_not_predicted_with_confidence():
     assert found.cross_validate(folds=6).scores.log_loss < 1.5 * math.log(2.0)
 
 
+@pytest.mark.slow
 def test_dispersion_from_test_to_test_is_measured():
     motions = bursts(150, seed=3)
     rng = np.random.default_rng(8)
@@ -130,7 +138,7 @@ def test_dispersion_from_test_to_test_is_measured():
     for deviation in (0.0, 0.4):
         factors = np.exp(deviation * rng.standard_normal(len(motions)))
         fallen = outcomes([motion.scaled(factor) for motion, factor in zip(motions, factors, strict=True)])
-        found = rocking.calibrate(motions, fallen, candidates=2048, two_sided=False)
+        found = rocking.calibrate(motions, fallen, candidates=1024, two_sided=False)
         dispersions.append(found.dispersion["alpha"])
     # No dispersion at all cannot be told from one as wide as the candidates are apart.
     assert dispersions[1] > 1.5 * dispersions[0]
@@ -159,12 +167,60 @@ def test_the_nonlinear_model_calibrates_too():
     assert found.scores.accuracy > 0.9
 
 
+def test_what_is_known_has_no_estimate_and_stays(shaken):
+    known = {"p": 3.55, "restitution": 0.81}
+    found = rocking.calibrate(shaken[0][:40], shaken[1][:40], candidates=256, **known)
+    assert set(found.estimates) == {"alpha_plus", "alpha_minus"}
+    assert np.all(found.blocks.p == 3.55) and np.all(found.blocks.restitution == 0.81)
+    assert len(found.plot().axes) == 2
+    for side, truth in zip(("plus", "minus"), HIDDEN.sides, strict=True):
+        assert found.estimates[f"alpha_{side}"].lower < truth.alpha < found.estimates[f"alpha_{side}"].upper
+
+
+def test_one_unknown_angle_is_found_from_forty_tests():
+    size = rocking.Block(width=0.4, height=2.0)
+    motions = bursts(40, seed=11)
+    found = rocking.calibrate(
+        motions, outcomes(motions, size), candidates=256, p=size.p, restitution="housner", two_sided=False
+    )
+    assert set(found.estimates) == {"alpha"}
+    angle = found.estimates["alpha"]
+    assert angle.lower < size.alpha < angle.upper < 1.4 * angle.lower
+    np.testing.assert_allclose(found.blocks.restitution, 1.0 - 1.5 * np.sin(found.blocks.alpha) ** 2, rtol=1e-12)
+    assert not found.diagnostics.notes
+
+
+def test_a_posterior_that_leans_on_a_bound_is_told_with_the_mend(shaken):
+    found = rocking.calibrate(*shaken, candidates=256, p=(1.0, 2.5), two_sided=False)
+    ends = {(one.name, one.end) for one in found.diagnostics.leaning}
+    assert ("p", "upper") in ends
+    assert "p leans on its upper bound of 2.5 rad/s" in found.summary()
+    assert "set that of p to 5" in found.summary()
+    assert found.to_dict()["diagnostics"]["notes"] == list(found.diagnostics.notes)
+
+
+def test_runs_that_agree_are_told_from_those_that_do_not():
+    rng = np.random.default_rng(0)
+    same = rng.standard_normal((2, 400))
+    assert r_hat(same) < 1.02
+    assert r_hat(same + np.array([[0.0], [1.0]])) > 1.15  # about sqrt(1 + 1/2/(2 + 1/2))
+    assert r_hat(np.exp(same)) == pytest.approx(r_hat(same), abs=0.01)
+
+
+def test_few_candidates_are_told():
+    motions = bursts(40, seed=9)
+    found = rocking.calibrate(motions, outcomes(motions), candidates=128)
+    assert found.diagnostics.effective < 20.0
+    assert any("candidates tell what a typical population does" in note for note in found.diagnostics.notes)
+
+
 def test_the_summary_has_every_parameter_and_the_scores(found):
     text = found.summary()
     for name, estimate in found.estimates.items():
         assert name in text
         assert f"{estimate.median:.5g}" in text
     assert f"{100 * found.scores.accuracy:.1f} %" in text
+    assert "2 independent runs, R-hat at most" in text
 
 
 @pytest.mark.parametrize(
@@ -184,7 +240,12 @@ def test_the_summary_has_every_parameter_and_the_scores(found):
         ({"ensemble": 0}, "ensemble"),
         ({"p": (2.0, 1.0)}, "p must be"),
         ({"p": (0.0, 1.0)}, "p must be"),
-        ({"p": 2.0}, "pair"),
+        ({"p": -2.0}, "p must be"),
+        ({"alpha": 1.6}, "alpha must be at most"),
+        ({"p": 2.0, "alpha": 0.2, "restitution": 0.9}, "everything is known"),
+        ({"restitution": "hausner"}, "'housner'"),
+        ({"p": "housner"}, "p must be a value or a pair"),
+        ({"alpha": (0.1, 1.0), "restitution": "housner"}, "below 0.9553"),
         ({"p": (1.0, math.inf)}, "p must be"),
         ({"alpha": (0.1, 1.6)}, "alpha must be"),
         ({"restitution": (0.5, 1.1)}, "restitution must be"),
@@ -213,7 +274,7 @@ def test_even_points_fill_the_space_evenly():
     low, high = space.box
     independent = low + rng.random((200_000, 6)) * (high - low)
     inside = independent[space.contains(independent)]
-    assert space.volume() == pytest.approx(len(inside) / 200_000 * np.prod(high - low), rel=0.02)
+    assert space.volume == pytest.approx(len(inside) / 200_000 * np.prod(high - low), rel=0.02)
     # Means are those of the uniform density, closer than independent points would be (0.3/sqrt(4096) of the width).
     np.testing.assert_allclose(points.mean(axis=0) / (high - low), inside.mean(axis=0) / (high - low), atol=5e-3)
 
@@ -233,14 +294,13 @@ def threshold_evidence():
     thresholds = np.log(np.geomspace(0.08, 0.35, 40))
     fallen = (points[:, 1:2] < thresholds).astype(np.float32)
     observed = np.log(0.17) + 0.1 * rng.standard_normal(40) < thresholds
-    return Evidence(Candidates(space, points, fallen, np.zeros(len(points))), observed, 0.01), thresholds
+    return Evidence(Candidates(space, points, fallen, len(points)), observed, 0.01), thresholds
 
 
 def test_the_chance_of_overturning_is_the_share_of_the_population(threshold_evidence):
     evidence, thresholds = threshold_evidence
-    centre, score = math.log(0.17), 0.5
-    dispersion = 0.1 * math.exp(0.6 * score)
-    populations = np.array([[math.log(1.4), centre, math.log(0.7), 1.0, score, 1.0]])
+    centre, dispersion = math.log(0.17), 0.13
+    populations = np.array([[math.log(1.4), centre, math.log(0.7), *np.log([0.18, dispersion, 0.18])]])
     share = [0.5 * (1.0 + math.erf((threshold - centre) / dispersion / math.sqrt(2.0))) for threshold in thresholds]
     # 4096 candidates, of which some 150 stand within the population's reach.
     np.testing.assert_allclose(evidence.probabilities(populations)[0], 0.01 + 0.98 * np.array(share), atol=0.03)
@@ -248,11 +308,11 @@ def test_the_chance_of_overturning_is_the_share_of_the_population(threshold_evid
 
 def test_the_posterior_is_that_of_brute_force(threshold_evidence):
     evidence, _ = threshold_evidence
-    tests = np.ones(40, dtype=bool)
-    drawn = population.posterior(evidence, tests, 512, np.random.default_rng(0))
+    drawn = posterior(evidence, 512, 4, np.random.default_rng(0))
     rng = np.random.default_rng(1)
-    prior = np.hstack([evidence.candidates.space.spread_evenly(20_000, rng), rng.standard_normal((20_000, 3))])
-    likelihood = np.exp(evidence.log_likelihoods(evidence.probabilities(prior), tests))
+    space = evidence.candidates.space
+    prior = population.with_dispersions(space, space.spread_evenly(20_000, rng), rng)
+    likelihood = np.exp(evidence.log_likelihoods(prior))
     weights = likelihood / likelihood.sum()
     mean = weights @ prior
     deviation = np.sqrt(weights @ (prior - mean) ** 2)
@@ -262,34 +322,43 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
     np.testing.assert_allclose(drawn.std(axis=0), deviation, rtol=0.3)
 
 
+def test_where_candidates_are_does_not_change_the_posterior(threshold_evidence):
+    """A guide in the wrong place adds candidates there; the posterior stays what it was."""
+    evidence, thresholds = threshold_evidence
+    candidates, rng = evidence.candidates, np.random.default_rng(4)
+    guide = np.array([[math.log(1.2), math.log(0.3), math.log(0.6), *np.log([0.2, 0.3, 0.2])]])
+    points = population.drawn(guide, WIDENED, 2000, rng)
+    points = points[candidates.space.contains(points)]
+    more = candidates.joined((2000, guide), points, (points[:, 1:2] < thresholds).astype(np.float32))
+    first = posterior(evidence, 512, 4, np.random.default_rng(0))
+    second = posterior(Evidence(more, evidence.observed, evidence.lapse), 512, 4, np.random.default_rng(1))
+    apart = np.abs(first.mean(axis=0) - second.mean(axis=0)) / first.std(axis=0)
+    assert np.all(apart < 0.35)
+    weights = np.exp(more.log_weights)
+    expected = np.exp(candidates.log_weights) @ candidates.points / np.exp(candidates.log_weights).sum()
+    assert np.abs(weights @ more.points / weights.sum() - expected).max() < 0.02
+
+
 def test_tests_that_are_left_out_do_not_count(threshold_evidence):
     evidence, _ = threshold_evidence
     some = np.arange(40) < 30
     flipped = Evidence(evidence.candidates, np.where(some, evidence.observed, ~evidence.observed), evidence.lapse)
-    first, second = (population.posterior(one, some, 64, np.random.default_rng(2)) for one in (evidence, flipped))
+    first, second = (posterior(one.of_tests(some), 64, 2, np.random.default_rng(2)) for one in (evidence, flipped))
     np.testing.assert_array_equal(first, second)
 
 
-def test_candidates_weigh_what_their_density_lacks(threshold_evidence):
-    """Twice as many candidates in one half of the space, at half the weight each: nothing changes."""
+def test_one_candidate_predicts_no_certainty(threshold_evidence):
     evidence, _ = threshold_evidence
-    candidates = evidence.candidates
-    doubled = candidates.points[:, 1] > math.log(0.15)
-    twice = Candidates(
-        candidates.space,
-        np.concatenate([candidates.points, candidates.points[doubled]]),
-        np.concatenate([candidates.overturned, candidates.overturned[doubled]]),
-        np.concatenate([np.where(doubled, -math.log(2.0), 0.0), np.full(doubled.sum(), -math.log(2.0))]),
-    )
-    populations = np.array([[math.log(1.4), math.log(0.16), math.log(0.7), 0.0, 0.0, 0.0]])
-    expected = evidence.probabilities(populations)
-    found = Evidence(twice, evidence.observed, evidence.lapse).probabilities(populations)
-    np.testing.assert_allclose(found, expected, atol=1e-6)
+    point = evidence.candidates.points[10]
+    populations = np.concatenate([point, np.full(3, math.log(1e-4))])[None]
+    assert evidence.effective(populations)[0] == pytest.approx(1.0, abs=1e-6)
+    expected = 0.01 + 0.98 * np.where(evidence.candidates.overturned[10] > 0.5, 0.75, 0.25)
+    np.testing.assert_allclose(evidence.probabilities(populations)[0], expected, atol=1e-6)
 
 
 def test_the_density_is_that_of_what_is_drawn():
     rng = np.random.default_rng(5)
-    populations = np.array([[0.0, 1.0, 2.0, 0.0, 1.0, -1.0], [0.2, 1.1, 2.1, 0.0, 0.0, 0.0]])
+    populations = np.array([[0.0, 1.0, 2.0, -2.3, -1.7, -2.9], [0.2, 1.1, 2.1, -2.3, -2.3, -2.3]])
     points = population.drawn(populations, 1.5, 40_000, rng)
     density = np.exp(population.log_density(populations, 1.5, points))
     box = (points > [0.0, 0.9, 1.95]) & (points < [0.2, 1.1, 2.05])

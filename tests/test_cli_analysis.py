@@ -187,3 +187,64 @@ def test_the_help_of_every_command_names_its_options(run):
         code, out, _ = run(command, "--help")
         assert code == 0
         assert option in out
+
+
+@pytest.fixture
+def outcomes_table(tmp_path):
+    """Twenty tests of a block, in a table, with two that are scaled from one motion in each group."""
+    block = rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)
+    motion = rocking.records.load(RECORD)
+    scales = np.linspace(0.4, 3.0, 20)
+    fallen = [rocking.simulate(block, motion.scaled(scale), model="linear").overturned for scale in scales]
+    assert 0 < sum(fallen) < 20
+    rows = [
+        f"{RECORD},{scale:.6f},{int(fell)},{k // 2}" for k, (scale, fell) in enumerate(zip(scales, fallen, strict=True))
+    ]
+    table = tmp_path / "outcomes.csv"
+    table.write_text("\n".join(["motion,scale,overturned,group", *rows]))
+    return table
+
+
+CALIBRATED = ["--candidates", "128", "--p", "3", "--restitution", "housner", "--no-two-sided"]
+
+
+def test_calibrate_json_is_the_calibration(run, outcomes_table):
+    code, out, err = run("calibrate", outcomes_table, *CALIBRATED, "--folds", "2", "--predict", RECORD, OTHER, "--json")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    rows = [line.split(",") for line in outcomes_table.read_text().splitlines()[1:]]
+    motions = [rocking.records.load(RECORD).scaled(float(row[1])) for row in rows]
+    overturned = [row[2] == "1" for row in rows]
+    found = rocking.calibrate(motions, overturned, p=3.0, restitution="housner", two_sided=False, candidates=128)
+    assert list(result["estimates"]) == ["alpha"]
+    assert result["estimates"]["alpha"]["median"] == pytest.approx(found.estimates["alpha"].median, rel=1e-12)
+    assert result["diagnostics"]["candidates"] == found.diagnostics.candidates
+    assert set(result["cross_validated"]) == {"accuracy", "log_loss", "brier"}
+    predicted = found.predict([rocking.records.load(name) for name in (RECORD, OTHER)])
+    assert list(result["predicted"].values()) == pytest.approx(predicted.tolist(), rel=1e-12)
+
+
+def test_calibrate_prints_the_diagnostics_and_writes_what_it_says(run, outcomes_table, tmp_path):
+    code, out, _ = run("calibrate", outcomes_table, *CALIBRATED, "--out", tmp_path / "out")
+    assert code == 0
+    assert "independent runs, R-hat at most" in out
+    written = {path.name for path in (tmp_path / "out").iterdir()}
+    assert written == {"calibration.png", "calibration.pdf", "result.json", "ensemble.csv"}
+    assert len((tmp_path / "out" / "ensemble.csv").read_text().splitlines()) > 10
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (["--alpha", "0.3,0.1"], "alpha must be a pair"),
+        (["--restitution", "hausner"], "--restitution"),
+        (["--candidates", "5"], "candidates"),
+        (["--folds", "40"], "folds"),
+        (["--motion", RECORD], "--motion is for a history"),
+        (["--predict", "no-such-record"], "no-such-record"),
+    ],
+)
+def test_calibrate_refuses_a_mistake_in_one_line(run, outcomes_table, change, words):
+    code, _, err = run("calibrate", outcomes_table, *CALIBRATED, *change)
+    assert code == 2
+    assert words in err and len(err.splitlines()) == 1

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from rocking.analysis.calibration.history import HistoryCalibration, calibrate_history
 from rocking.analysis.calibration.outcomes import Calibration
 from rocking.analysis.calibration.outcomes import calibrate as run
+from rocking.analysis.calibration.space import HOUSNER
 from rocking.analysis.calibration.tables import Outcomes, read
 from rocking.cli import batch
 from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledPulseOptions
@@ -53,15 +54,15 @@ def calibrate(
     model
         Equation of motion; by default linear for outcomes, nonlinear for a history.
     p
-        Lowest and highest thinkable frequency parameter, rad/s, with a comma between; for a history also a known value.
+        Lowest and highest thinkable frequency parameter, rad/s, with a comma between; or a known value.
     alpha
         Likewise the slenderness, as 5deg,20deg or 0.1,0.3 (rad).
     restitution
-        Likewise the factor on the angular speed at an impact.
+        Likewise the factor on the angular speed at an impact; of outcomes also housner, to follow from the slenderness.
     two_sided
         Whether the two sides of the block may differ; by default yes for outcomes, no for a history.
     candidates
-        Outcomes: blocks to try.
+        Outcomes: blocks to try, about; more where independent runs disagree.
     folds
         Outcomes: parts for cross-validation; 0: none. Tests of one group stay together.
     predict
@@ -77,7 +78,7 @@ def calibrate(
     ranges = {
         "p": None if p is None else _range(p, "--p", number),
         "alpha": None if alpha is None else _range(alpha, "--alpha", tilt),
-        "restitution": None if restitution is None else _range(restitution, "--restitution", number),
+        "restitution": restitution if restitution in (None, HOUSNER) else _range(restitution, "--restitution", number),
     }
     start = None if initial_rotation is None else tilt(initial_rotation, "--initial-rotation")
     given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}

@@ -1,11 +1,14 @@
+from .diagnostics import Diagnostics, Leaning
 from .history import HistoryCalibration, Measured, calibrate_history
 from .outcomes import Calibration, Estimate, Validation, calibrate
 from .scores import Scores
 
 __all__ = [
     "Calibration",
+    "Diagnostics",
     "Estimate",
     "HistoryCalibration",
+    "Leaning",
     "Measured",
     "Scores",
     "Validation",

@@ -13,9 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.analysis.calibration import population
-from rocking.analysis.calibration.population import Evidence
+from rocking.analysis.calibration.diagnostics import Diagnostics
+from rocking.analysis.calibration.evidence import Evidence, blurred, expected_share
+from rocking.analysis.calibration.posterior import posterior, systematic
 from rocking.analysis.calibration.scores import Scores
-from rocking.analysis.calibration.space import PARAMETERS, Candidates, Range, Space, unit_of
+from rocking.analysis.calibration.search import Problem, search
+from rocking.analysis.calibration.space import Knowledge, Space, unit_of
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.engine import require_finished
@@ -34,14 +37,10 @@ if TYPE_CHECKING:
 #: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
 _LAPSE: Final = 0.005
 
-#: Draws from the posterior over populations: for the final fit, and where it only guides the search or judges it.
+#: Draws from the posterior over populations, and rounds of moves: for the final fit, and for that without a fold.
 _DRAWS: Final = 512
-_ROUGH_DRAWS: Final = 256
-
-#: After candidates that fill the space, as many are drawn from a first fit, from a second and so on, so often, with
-#: the dispersion of the fit wider by a factor.
-_REFINEMENTS: Final = 3
-_WIDENED: Final = 1.2
+_ROUNDS: Final = 4
+_FOLD_DRAWS: Final = 256
 
 #: Central share of the posterior between an estimate's lower and upper end.
 _CENTRAL: Final = 0.9
@@ -100,6 +99,8 @@ class Calibration:
         Their weights; they sum to 1.
     estimates : mapping of str to Estimate
         The population's parameters, "p_plus" (rad/s), "alpha_minus" (rad), "restitution_plus", ...
+    draws : mapping of str to ndarray, shape (d,)
+        Draws of the posterior of the population's centre, by the same names.
     probabilities : ndarray, shape (m,)
         Fitted probability of overturning under each of the motions of the calibration.
     observed : ndarray of bool, shape (m,)
@@ -110,16 +111,21 @@ class Calibration:
         Chance that an outcome is not that of a rocking block at all.
     seed : int
         What the search started from.
+    diagnostics : Diagnostics
+        How far this can be trusted: effective candidates, agreement of independent runs, bounds that the posterior
+        leans on. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
     """
 
     blocks: Blocks
     weights: Floats
     estimates: Mapping[str, Estimate]
+    draws: Mapping[str, Floats]
     probabilities: Floats
     observed: Flags
     model: Model
     lapse: float
     seed: int
+    diagnostics: Diagnostics
     _evidence: Evidence = field(repr=False)
 
     @property
@@ -152,7 +158,7 @@ class Calibration:
         if not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
         outcomes = _outcomes(self.blocks, motions, self.model, threads, progress)
-        return population.blurred(self.weights @ outcomes, self.lapse)
+        return blurred(expected_share(self.weights @ outcomes, self.diagnostics.effective), self.lapse)
 
     def cross_validate(
         self,
@@ -195,8 +201,9 @@ class Calibration:
             parts = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
             for part in range(folds):
                 left_out = parts == part
-                drawn = population.posterior(self._evidence, ~left_out, _ROUGH_DRAWS, rng, progress)
-                row[left_out] = self._evidence.probabilities(drawn).mean(axis=0)[left_out]
+                kept, wanted = self._evidence.of_tests(~left_out), self._evidence.of_tests(left_out)
+                drawn = posterior(kept, _FOLD_DRAWS, _ROUNDS, rng, progress)
+                row[left_out] = wanted.probabilities(drawn).mean(axis=0)
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
     def summary(self) -> str:
@@ -212,6 +219,7 @@ class Calibration:
             "",
             f"ensemble of {len(self.blocks)} blocks, equivalent to {1 / (self.weights**2).sum():.0f} of equal weight",
             f"fitted motions: {self.scores}",
+            str(self.diagnostics),
         ]
         return "\n".join(lines)
 
@@ -223,6 +231,7 @@ class Calibration:
             "overturned": int(self.observed.sum()),
             "estimates": {name: asdict(one) for name, one in self.estimates.items()},
             "fitted": asdict(self.scores),
+            "diagnostics": self.diagnostics.to_dict(),
             "probabilities": self.probabilities,
         }
 
@@ -258,7 +267,7 @@ class Calibration:
         return outcomes_figure(
             probabilities=self.probabilities,
             overturned=self.observed,
-            parameters=[self._parameter(name) for name in PARAMETERS],
+            parameters=[self._parameter(name) for name in self._evidence.candidates.space.unknown],
             weights=self.weights,
             title=title or self.summary().splitlines()[0],
             ax=ax,
@@ -284,9 +293,9 @@ def calibrate(
     seed: int = 0,
     *,
     model: Model = "linear",
-    p: Range = (1.0, 10.0),
-    alpha: Range = (0.02, 0.5),
-    restitution: Range = (0.3, 0.99),
+    p: Knowledge = (1.0, 10.0),
+    alpha: Knowledge = (0.02, 0.5),
+    restitution: Knowledge = (0.3, 0.99),
     two_sided: bool = True,
     lapse: float = _LAPSE,
     candidates: int = 8192,
@@ -306,14 +315,18 @@ def calibrate(
         The same seed gives the same result.
     model : {"linear", "nonlinear"}
         Equation of motion; the linear one is faster and serves slender specimens.
-    p, alpha, restitution : pair of float
-        Lowest and highest value that is thinkable on either side (rad/s; rad; -). The prior is even in the logarithm.
+    p, alpha, restitution : float or pair of float
+        A number is known and kept, on both sides and in every test; a pair is the lowest and highest value that is
+        thinkable on either side (rad/s; rad; -), with a prior that is even in the logarithm. A body of known size has
+        p = ``Block(width=..., height=...).p``. The restitution may be "housner": it then follows from each side's
+        slenderness as 1 - 1.5 sin(alpha)^2 (Housner 1963).
     two_sided : bool
-        Whether the two sides may differ: p and restitution by a factor of 1.25, the slenderness by 3.
+        Whether the two sides may differ in what is not known: p and restitution by a factor of 1.25, the slenderness
+        by 3.
     lapse : float
         Chance that an outcome is not that of a rocking block at all.
     candidates : int
-        Blocks that are simulated under every motion.
+        Blocks that are simulated under every motion, about; up to half as many again while independent runs disagree.
     ensemble : int
         Most blocks that are kept for predictions.
     threads, progress
@@ -337,10 +350,13 @@ def calibrate(
     sides. The probability of an outcome is the share of the population that behaves so (and a small lapse); a common
     dispersion of both slendernesses is, in the linear model, the same as one of the motion's amplitude. The posterior
     over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with the prior that is given
-    by the bounds and a lognormal prior on each dispersion (median 10 %, ratios of p and restitution 5 %).
+    by the bounds and a lognormal prior on each dispersion (median 10 %, ratios of p and restitution 5 %). The
+    likelihood is derived in the documentation's page on calibration.
 
-    The search is global: half of the candidates fill the bounds evenly, the other half are drawn from a first fit and
-    weighted so that the prior stays what it was (deterministic mixture; Owen and Zhou 2000).
+    The search is global. Two independent runs each fill the bounds evenly, try blocks where their own fits look best,
+    then blocks of their own wherever any run looks best. A candidate weighs what the density of candidates lacks, so
+    that the prior stays what it was (deterministic mixture; Owen and Zhou 2000). While the runs disagree they go on;
+    what is left of that, few effective candidates, or a posterior that leans on a bound, is said in the summary.
 
     Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
     predictions are not.
@@ -358,6 +374,13 @@ def calibrate(
     >>> found = rocking.calibrate(motions, overturned, candidates=512, two_sided=False)
     >>> bool(np.mean((found.predict(motions) > 0.5) == overturned) > 0.9)
     True
+
+    Where p and the restitution are known, the same tests tell the one angle that is not:
+
+    >>> found = rocking.calibrate(motions, overturned, p=3.0, restitution=0.9, candidates=512, two_sided=False)
+    >>> angle = found.estimates["alpha"]
+    >>> angle.lower < hidden.alpha < angle.upper, angle.upper / angle.lower < 1.3
+    (True, True)
     """
     tested = list(motions)
     observed = _observed(overturned, len(tested))
@@ -368,34 +391,22 @@ def calibrate(
     def tried(points: Floats) -> NDArray[np.float32]:
         return _outcomes(space.blocks(points), tested, model, threads, progress)
 
-    share = candidates // (1 + _REFINEMENTS)
-    points = space.spread_evenly(candidates - _REFINEMENTS * share, rng)
-    outcomes = tried(points)
-    density = np.full(len(points), np.log(len(points) / space.volume()))
-    evenly, guides = density[0], []
-    for _ in range(_REFINEMENTS):
-        rough = Evidence(Candidates(space, points, outcomes, -density), observed, lapse)
-        guides.append(population.posterior(rough, _all(observed), _ROUGH_DRAWS, rng, progress))
-        nearby = population.drawn(guides[-1], _WIDENED, share, rng)
-        nearby = nearby[space.contains(nearby)]
-        points, outcomes = np.concatenate([points, nearby]), np.concatenate([outcomes, tried(nearby)])
-        # Candidates per volume: those that fill the space, and those of each guide.
-        drawn = [np.log(share) + population.log_density(guide, _WIDENED, points) for guide in guides]
-        density = np.logaddexp.reduce([np.full(len(points), evenly), *drawn])
-    evidence = Evidence(Candidates(space, points, outcomes, -density), observed, lapse)
-
-    final = population.posterior(evidence, _all(observed), _DRAWS, rng, progress)
+    found = search(Problem(space, observed, lapse, tried), candidates, rng)
+    evidence = found.evidence
+    final = posterior(evidence, _DRAWS, _ROUNDS, rng, progress)
     weights = evidence.mean_weights(final)
-    kept, times = np.unique(population.systematic(weights, ensemble, rng), return_counts=True)
+    kept, times = np.unique(systematic(weights, ensemble, rng), return_counts=True)
     return Calibration(
-        blocks=space.blocks(points[kept]),
+        blocks=space.blocks(evidence.candidates.points[kept]),
         weights=times / ensemble,
         estimates=MappingProxyType(_estimates(space, final)),
+        draws=MappingProxyType(space.named(population.unpacked(final)[0])),
         probabilities=evidence.probabilities(final).mean(axis=0),
         observed=observed,
         model=model,
         lapse=lapse,
         seed=seed,
+        diagnostics=Diagnostics.of(found, final),
         _evidence=evidence,
     )
 
@@ -410,18 +421,21 @@ def _outcomes(
 
 
 def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
-    centres, dispersion = population.unpacked(populations)
-    values = space.sides(centres)
-    # The side's logarithm is that of the mean plus or minus half that of the ratio.
-    ratio = 0.5 * dispersion[:, 3:] if len(space.ratios) else 0.0
-    deviations = np.hypot(dispersion[:, :3], ratio).mean(axis=0)
+    dispersion = _side_dispersions(space, populations).mean(axis=0)
     tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
     estimates = {}
-    for j, name in enumerate(PARAMETERS):
-        for i, side in enumerate(("_plus", "_minus") if len(space.ratios) else ("",)):
-            median, lower, upper = (float(value) for value in np.quantile(values[:, i, j], tails))
-            estimates[name + side] = Estimate(median, lower, upper, float(deviations[j]))
+    for name, values in space.named(population.unpacked(populations)[0]).items():
+        median, lower, upper = (float(value) for value in np.quantile(values, tails))
+        estimates[name] = Estimate(median, lower, upper, float(dispersion[space.unknown.index(name.partition("_")[0])]))
     return estimates
+
+
+def _side_dispersions(space: Space, populations: Floats) -> Floats:
+    """Return standard deviations of the logarithm of each unknown parameter on either side, shape (c, f)."""
+    dispersion = population.unpacked(populations)[1]
+    f = len(space.unknown)
+    # The side's logarithm is that of the mean plus or minus half that of the ratio.
+    return np.hypot(dispersion[:, :f], 0.5 * dispersion[:, f:] if space.two_sided else 0.0)
 
 
 def _observed(overturned: ArrayLike, count: int) -> Flags:
@@ -451,10 +465,6 @@ def _check(seed: int, lapse: float, candidates: int, ensemble: int) -> None:
     checks.share(lapse, "lapse", InvalidOption, below=0.5)
     checks.whole(candidates, "candidates", InvalidOption, 128)
     checks.whole(ensemble, "ensemble", InvalidOption, 1)
-
-
-def _all(observed: Flags) -> Flags:
-    return np.ones(len(observed), dtype=bool)
 
 
 def _labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.block.single import housner_restitution
 from rocking.errors import InvalidOption
 
 #: Parameters of a block's side, in the order of the coordinates.
@@ -27,10 +30,21 @@ HIGHEST: Final = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
 #: slendernesses may differ as much as the pivots' distances from the centre of mass.
 LARGEST_RATIOS: Final = {"p": 1.25, "alpha": 3.0, "restitution": 1.25}
 
+#: Median of the prior of the dispersion from test to test: of each parameter, and of the ratio between its sides.
+_DISPERSIONS: Final = {"p": 0.10, "alpha": 0.10, "restitution": 0.10}
+_RATIO_DISPERSIONS: Final = {"p": 0.05, "alpha": 0.10, "restitution": 0.05}
+
+#: Restitution that follows from the slenderness (Housner 1963), where it is positive.
+HOUSNER: Final = "housner"
+_HOUSNER_ENDS: Final = math.asin(math.sqrt(2.0 / 3.0))
+
 #: Points that measure the space's volume: its share of the box to about 0.1 %.
 _VOLUME_POINTS: Final = 20_000
 
 Range = tuple[float, float]
+
+#: What is known of a parameter: its value, or its bounds; of a restitution also that Housner's rule holds.
+Knowledge = float | Range | Literal["housner"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,31 +53,60 @@ class Space:
 
     Attributes
     ----------
-    lower, upper : ndarray, shape (3,)
-        Logarithms of the bounds that each side's p, alpha and restitution keep to.
-    ratios : ndarray, shape (3,) or (0,)
+    unknown : tuple of str, length f
+        Parameters that have coordinates.
+    known : mapping of str to float
+        Parameters that have a value; a restitution in neither follows from the slenderness.
+    lower, upper : ndarray, shape (f,)
+        Logarithms of the bounds that each side's unknown parameters keep to.
+    ratios : ndarray, shape (f,) or (0,)
         Logarithms of the largest ratios between the sides; none for symmetric blocks.
     """
 
+    unknown: tuple[str, ...]
+    known: Mapping[str, float]
     lower: Floats
     upper: Floats
     ratios: Floats
 
     @classmethod
-    def of(cls, p: Range, alpha: Range, restitution: Range, *, two_sided: bool) -> Space:
-        """Space between bounds.
+    def of(cls, p: Knowledge, alpha: Knowledge, restitution: Knowledge, *, two_sided: bool) -> Space:
+        """Space between bounds, of what is not known.
 
         Raises
         ------
         InvalidOption
-            If a pair is not two increasing numbers in the range that blocks allow.
+            If a value or a pair is not in the range that blocks allow, or everything is known.
         """
-        given = zip(PARAMETERS, (p, alpha, restitution), strict=True)
-        bounds = np.array([value_range(pair, name, HIGHEST[name]) for name, pair in given])
-        lower, upper = np.log(bounds.T)
-        largest = np.log([LARGEST_RATIOS[name] for name in PARAMETERS])
+        bounds, known = {}, {}
+        for name, given in zip(PARAMETERS, (p, alpha, restitution), strict=True):
+            if isinstance(given, str):
+                _check_housner(name, given)
+            elif np.ndim(given):
+                bounds[name] = value_range(given, name, HIGHEST[name])
+            else:
+                known[name] = known_value(given, name)
+        if not bounds:
+            raise InvalidOption("everything is known: give a pair (lowest, highest) for what is to be found")
+        steepest = bounds.get("alpha", (0.0, known.get("alpha", 0.0)))[1]
+        if "restitution" not in {*bounds, *known} and steepest >= _HOUSNER_ENDS:
+            raise InvalidOption(f"Housner's restitution is positive for alpha below {_HOUSNER_ENDS:.4f} rad only")
+        lower, upper = np.log(list(bounds.values())).T
+        largest = np.log([LARGEST_RATIOS[name] for name in bounds])
         # No wider than the bounds of a side let them be: else a box around narrow bounds would be all but empty.
-        return cls(lower, upper, np.minimum(largest, upper - lower) if two_sided else np.empty(0))
+        ratios = np.minimum(largest, upper - lower) if two_sided else np.empty(0)
+        return cls(tuple(bounds), MappingProxyType(known), lower, upper, ratios)
+
+    @property
+    def two_sided(self) -> bool:
+        """Whether the sides may differ."""
+        return bool(len(self.ratios))
+
+    @property
+    def dispersions(self) -> Floats:
+        """Median of the prior of the dispersion along each coordinate, shape (k,)."""
+        ratios = [_RATIO_DISPERSIONS[name] for name in self.unknown] if self.two_sided else []
+        return np.array([_DISPERSIONS[name] for name in self.unknown] + ratios)
 
     @property
     def box(self) -> tuple[Floats, Floats]:
@@ -82,6 +125,7 @@ class Space:
             found = np.concatenate([found, points[self.contains(points)]])
         return found[:count]
 
+    @cached_property
     def volume(self) -> float:
         """Volume of the space, from the share of its box that it fills."""
         from scipy.stats import qmc
@@ -99,7 +143,19 @@ class Space:
 
     def sides(self, points: Floats) -> Floats:
         """Values of p, alpha and restitution on each side, shape (n, 2, 3)."""
-        return np.exp(self._log_sides(points))
+        found = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
+        values = found | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
+        if "restitution" not in values:
+            values["restitution"] = np.vectorize(housner_restitution)(values["alpha"])
+        return np.stack([values[name] for name in PARAMETERS], axis=2)
+
+    def named(self, points: Floats) -> dict[str, Floats]:
+        """Values of the unknown parameters by name, of each side where they may differ; shape (n,) each."""
+        values = self.sides(points)
+        sides = ("_plus", "_minus") if self.two_sided else ("",)
+        return {
+            name + side: values[:, i, PARAMETERS.index(name)] for name in self.unknown for i, side in enumerate(sides)
+        }
 
     def blocks(self, points: Floats) -> Blocks:
         """Blocks at points."""
@@ -108,30 +164,10 @@ class Space:
         return Blocks(sides[:, :, 0], sides[:, :, 1], np.minimum(sides[:, :, 2], 1.0))
 
     def _log_sides(self, points: Floats) -> Floats:
-        half = 0.5 * points[:, 3:] if len(self.ratios) else np.zeros((len(points), 3))
-        return np.stack([points[:, :3] + half, points[:, :3] - half], axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class Candidates:
-    """Blocks that were tried on every motion.
-
-    Attributes
-    ----------
-    space : Space
-        Where they are from.
-    points : ndarray, shape (n, k)
-        Their coordinates.
-    overturned : ndarray, shape (n, m)
-        1 where a block overturned under a motion, else 0.
-    log_weights : ndarray, shape (n,)
-        Logarithm of how much of the space each stands for, up to a constant: dense regions weigh less per block.
-    """
-
-    space: Space
-    points: Floats
-    overturned: NDArray[np.float32]
-    log_weights: Floats = field(repr=False)
+        """Logarithms of the unknown parameters on each side, shape (n, 2, f)."""
+        f = len(self.unknown)
+        half = 0.5 * points[:, f:] if self.two_sided else np.zeros((len(points), f))
+        return np.stack([points[:, :f] + half, points[:, :f] - half], axis=1)
 
 
 def unit_of(estimate: str) -> str:
@@ -139,7 +175,27 @@ def unit_of(estimate: str) -> str:
     return _UNITS[estimate.partition("_")[0]]
 
 
-def value_range(pair: Sequence[float], name: str, highest: float) -> Range:
+def known_value(value: object, name: str) -> float:
+    """Return the value of a known parameter.
+
+    Raises
+    ------
+    InvalidOption
+        If it is no number in the range that blocks allow.
+    """
+    known = checks.positive(value, name, InvalidOption, unit_of(name))
+    if known > HIGHEST[name]:
+        raise InvalidOption(f"{name} must be at most {HIGHEST[name]:g}, not {known:g}")
+    return known
+
+
+def _check_housner(name: str, given: str) -> None:
+    if name != "restitution" or given != HOUSNER:
+        wanted = "a value or a pair (lowest, highest)" + (f", or {HOUSNER!r}" if name == "restitution" else "")
+        raise InvalidOption(f"{name} must be {wanted}, not {given!r}")
+
+
+def value_range(pair: Any, name: str, highest: float) -> Range:
     """Return the two ends of a range.
 
     Raises

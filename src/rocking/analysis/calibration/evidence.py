@@ -1,0 +1,99 @@
+"""How probable the outcomes are for a population of blocks.
+
+The chance that a test overturns the specimen is the share of the population that overturns under its motion, and that
+share is a weighted mean over candidate blocks that were simulated once, whatever the population.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rocking.analysis.calibration.candidates import Candidates
+from rocking.analysis.calibration.population import batches, unpacked
+from rocking.arrays import Flags, Floats
+
+#: A share that n simulated blocks estimate is itself uncertain: Jeffreys' prior, Beta(1/2, 1/2).
+_JEFFREYS: Final = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What was observed, against what candidates do.
+
+    Attributes
+    ----------
+    candidates : Candidates
+        n blocks, simulated under the m motions.
+    observed : ndarray of bool, shape (m,)
+        Whether the specimen overturned.
+    lapse : float
+        Chance that an outcome is not that of a rocking block at all.
+    """
+
+    candidates: Candidates
+    observed: Flags
+    lapse: float
+
+    def of_tests(self, tests: Flags) -> Evidence:
+        """Evidence of some of the tests alone."""
+        return Evidence(self.candidates.of_tests(tests), self.observed[tests], self.lapse)
+
+    def weights(self, populations: Floats) -> NDArray[np.float32]:
+        """Share of each population that each candidate stands for, shape (c, n); rows sum to 1."""
+        points = self.candidates.points
+        centre, dispersion = unpacked(populations)
+        precision = dispersion**-2
+        exponent = (precision * centre) @ points.T - 0.5 * precision @ (points**2).T + self.candidates.log_weights
+        exponent -= exponent.max(axis=1, keepdims=True)
+        weights = np.exp(exponent.astype(np.float32))
+        weights /= weights.sum(axis=1, keepdims=True)
+        return weights
+
+    def mean_weights(self, populations: Floats) -> Floats:
+        """Weights of the candidates, shape (n,), averaged over populations."""
+        parts = [self.weights(part).sum(axis=0, dtype=np.float64) for part in batches(populations)]
+        return np.asarray(np.sum(parts, axis=0) / len(populations))
+
+    def probabilities(self, populations: Floats) -> Floats:
+        """Probability of overturning for each population and motion, shape (c, m)."""
+        shares, effective = self._shares(populations)
+        return blurred(expected_share(shares, effective[:, None]), self.lapse)
+
+    def effective(self, populations: Floats) -> Floats:
+        """Effective number of candidates that speak for each population, shape (c,)."""
+        return self._shares(populations)[1]
+
+    def log_likelihoods(self, populations: Floats) -> Floats:
+        """Log-likelihood of each population, shape (c,)."""
+        if not len(populations):
+            return np.zeros(0)
+        chances = blurred(self._shares(populations)[0], self.lapse)
+        return np.asarray(np.log(np.where(self.observed, chances, 1.0 - chances)).sum(axis=1))
+
+    def _shares(self, populations: Floats) -> tuple[Floats, Floats]:
+        """Share of each population that overturns, shape (c, m), and the effective number of candidates behind it."""
+        shares, effective = [], []
+        for part in batches(populations):
+            weights = self.weights(part)
+            shares.append(weights @ self.candidates.overturned)
+            effective.append(1.0 / np.einsum("ij,ij->i", weights, weights))
+        return np.concatenate(shares).astype(np.float64), np.concatenate(effective).astype(np.float64)
+
+
+def expected_share(share: Floats, effective: ArrayLike) -> Floats:
+    """Mean of a share that was found with so many effective blocks.
+
+    Few blocks tell little of what a population does: a prediction from one block is no certainty. The likelihood takes
+    shares as they are found: it would otherwise favour where candidates are dense.
+    """
+    count = np.asarray(effective)
+    return np.asarray((count * share + _JEFFREYS) / (count + 2.0 * _JEFFREYS))
+
+
+def blurred(probabilities: Floats, lapse: float) -> Floats:
+    """Probabilities of recorded outcomes, from those of the rocking block."""
+    return lapse + (1.0 - 2.0 * lapse) * probabilities
