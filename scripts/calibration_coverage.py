@@ -73,7 +73,9 @@ def ranks(seed: int, two_sided: bool) -> dict[str, float]:
         motions,
         overturned,
         seed,
-        **BOUNDS,
+        p=BOUNDS["p"],
+        alpha=BOUNDS["alpha"],
+        restitution=BOUNDS["restitution"],
         two_sided=two_sided,
         lapse=LAPSE,
         candidates=CANDIDATES,
@@ -99,7 +101,7 @@ def table(found: list[dict[str, float]], two_sided: bool) -> str:
 def draw(found: list[dict[str, float]], path: Path) -> None:
     """Draw a histogram of the truth's ranks for each parameter, with the band of 90 % of even ones."""
     names = list(found[0])
-    low, high = binom.ppf([0.05, 0.95], len(found), 1.0 / BINS)
+    low, high = (float(binom.ppf(share, len(found), 1.0 / BINS)) for share in (0.05, 0.95))
     figure = Figure(figsize=(7.0, 2.4 * (len(names) // 3)), layout="constrained")
     panels = np.atleast_1d(figure.subplots(len(names) // 3, 3, sharey=True)).ravel()
     for axes, name in zip(panels, names, strict=True):

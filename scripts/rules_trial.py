@@ -77,7 +77,7 @@ def strong_part(record):
 
 def ratings(blocks, motions):
     """Demand over capacity by every rule under a PGA of 1 g, shape (motion, block)."""
-    found = {name: [] for name in rules.RULES}
+    found: dict[str, list[np.ndarray]] = {name: [] for name in rules.RULES}
     for motion in motions:
         for name, rating in rules.rate(blocks, motion).items():
             found[name].append(rating.ratio)

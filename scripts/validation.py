@@ -90,7 +90,7 @@ def blocks_table():
     rows = []
     for radius, theirs in OTHERS.items():
         block = rocking.Block(radius * math.sin(0.2), radius * math.cos(0.2))
-        ours = lowest_amplitude(block, "one-sine", 4.0 * math.pi / block.p, np.linspace(1.001, 6.0, 51))
+        ours = lowest_amplitude(block, "one-sine", 4.0 * math.pi / block.sides[0].p, np.linspace(1.001, 6.0, 51))
         within = "yes" if abs(ours - theirs) <= OTHERS_ERROR else "no"
         rows.append((f"{radius:g}", f"{theirs:.5f}", f"{ours:.8f}", f"{ours - theirs:+.1e}", within))
     return markdown(("R, m", "theirs, +- 4.9e-6", "here", "difference", "within their bound"), rows)
@@ -302,7 +302,7 @@ def opensees_tables():
     block = rocking.Block(width=width, height=height)
     rows = []
     for amplitude, frequency in ((2.0, 4.0), (3.0, 6.0)):
-        acceleration = amplitude * block.minimum_acceleration
+        acceleration = amplitude * STANDARD_GRAVITY * math.tan(alpha)
         pulse = rocking.pulses.half_sine(acceleration, frequency * p / (2.0 * math.pi))
         rigid = rocking.simulate(block, pulse).peak_rotation / alpha
         elastic = [
