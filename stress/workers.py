@@ -16,10 +16,10 @@ from rocking.studies.cluster import local_executor
 
 
 def made(folder: str, scales: int) -> rocking.Study:
-    """Make a study of units of some tenths of a second."""
+    """Make a study of units of about a third of a second."""
     motion = rocking.records.load("el-centro-meloland-270")
-    blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 2048), alpha=0.2, restitution=0.9)
-    return rocking.study(folder, blocks, motion, pga=np.linspace(2.0, 9.0, scales), unit_blocks=2048)
+    blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 16384), alpha=0.2, restitution=0.9)
+    return rocking.study(folder, blocks, motion, pga=np.linspace(2.0, 9.0, scales), unit_blocks=16384)
 
 
 def processor_time(process: psutil.Process) -> float:
