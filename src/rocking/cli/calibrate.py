@@ -62,7 +62,7 @@ def calibrate(
     two_sided
         Whether the two sides of the block may differ; by default yes for outcomes, no for a history.
     candidates
-        Outcomes: blocks to try, about; more where independent runs disagree.
+        Outcomes: blocks to try, about; more where its runs disagree.
     folds
         Outcomes: parts for cross-validation; 0: none. Tests of one group stay together.
     predict

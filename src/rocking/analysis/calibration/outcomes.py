@@ -112,7 +112,7 @@ class Calibration:
     seed : int
         What the search started from.
     diagnostics : Diagnostics
-        How far this can be trusted: effective candidates, agreement of independent runs, bounds that the posterior
+        How far this can be trusted: effective candidates, agreement of runs, bounds that the posterior
         leans on. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
     """
 
@@ -326,7 +326,7 @@ def calibrate(
     lapse : float
         Chance that an outcome is not that of a rocking block at all.
     candidates : int
-        Blocks that are simulated under every motion, about; up to half as many again while independent runs disagree.
+        Blocks that are simulated under every motion, about; up to half as many again while runs disagree.
     ensemble : int
         Most blocks that are kept for predictions.
     threads, progress
@@ -353,7 +353,7 @@ def calibrate(
     by the bounds and a lognormal prior on each dispersion (median 10 %, ratios of p and restitution 5 %). The
     likelihood is derived in the documentation's page on calibration.
 
-    The search is global. Two independent runs each fill the bounds evenly, try blocks where their own fits look best,
+    The search is global. Two runs each fill the bounds evenly, try blocks where their own fits look best,
     then blocks of their own wherever any run looks best. A candidate weighs what the density of candidates lacks, so
     that the prior stays what it was (deterministic mixture; Owen and Zhou 2000). While the runs disagree they go on;
     what is left of that, few effective candidates, or a posterior that leans on a bound, is said in the summary.

@@ -1,9 +1,10 @@
-"""Where the candidates are that a posterior is drawn from: independent runs that look everywhere, then compare.
+"""Where the candidates are that a posterior is drawn from: runs that look on their own, then share, then compare.
 
 The likelihood of a population comes from blocks that were simulated near it. So what decides whether all regions of the
 posterior are found is where blocks were tried. Each run fills the space evenly, fits, tries blocks drawn from what it
 has found, and so on. Then the runs tell each other where they have looked, though not what they saw: each tries blocks
-of its own in all regions that any of them has found, until they agree.
+of its own in all regions that any of them has found, until they agree or a limit is reached. A region that none of
+them has met is not found by comparing them.
 """
 
 from __future__ import annotations
