@@ -75,7 +75,7 @@ class Running:
     rate : float
         Simulations a second since it started.
     seconds_left : float
-        Time that it will take at this rate; infinite before its first unit.
+        Time that it will take at this rate, or that the round of a refinement will; infinite before its first unit.
     """
 
     holder: str
@@ -184,7 +184,7 @@ class Study:
             threads = checks.whole(threads, "threads", InvalidOption, least=1)
         self.store.check_program()
         with self.place.locked() as note:
-            self._log({"event": "start", "note": note, "done": self._simulations(self.store.done())})
+            self._log({"event": "start", "note": note, "done": self._simulations()})
             try:
                 report = self._compute(threads=threads, executor=executor, progress=progress)
             except BaseException as error:
@@ -214,21 +214,27 @@ class Study:
         failed = {entry["unit"]: entry["why"] for entry in last if entry.get("event") == "failed"}
         done = self.store.done()
         grid = self.store.grid
-        running = self._running(last, done)
-        return Status(len(done), len(grid), grid.total, failed, running, runs, refinement(self.store))
+        refined = refinement(self.store)
+        left = grid.total - sum(map(grid.simulations, done)) or (refined.simulations - refined.done if refined else 0)
+        return Status(len(done), len(grid), grid.total, failed, self._running(last, left), runs, refined)
 
-    def _running(self, last: tuple[dict[str, Any], ...], done: set[Key]) -> Running | None:
-        """Whoever runs it, and how fast since the start of the last run."""
+    def _running(self, last: tuple[dict[str, Any], ...], left: int) -> Running | None:
+        """Whoever runs it, and how fast since the start of the last run; so many simulations are left."""
         holder = self.place.holder()
         if not holder or not last:
             return None
         seconds = time.time() - datetime.fromisoformat(last[0]["time"]).timestamp()
-        now = self._simulations(done)
-        rate = max(now - last[0]["done"], 0) / max(seconds, 1.0)
-        return Running(holder, rate, (self.store.grid.total - now) / rate if rate else math.inf)
+        rate = max(self._simulations() - last[0]["done"], 0) / max(seconds, 1.0)
+        return Running(holder, rate, left / rate if rate else math.inf)
 
-    def _simulations(self, done: set[Key]) -> int:
-        return sum(map(self.store.grid.simulations, done))
+    def _simulations(self) -> int:
+        """Count those that are done, of the grid and of all rounds."""
+        return sum(part.grid.simulations(key) for part in self._parts() for key in part.done())
+
+    def _parts(self) -> list[Store | Round]:
+        """Return the grid, and the rounds that have begun."""
+        tolerances = kept_plan(self.store)
+        return [self.store, *([] if tolerances is None else rounds(self.store, tolerances))]
 
     def _failing(self, unit: str, why: str) -> None:
         self._log({"event": "failed", "unit": unit, "why": why})
@@ -281,9 +287,7 @@ class Study:
         if recompute or repair:
             self.store.check_program()
             announce(SIMULATIONS)
-        tolerances = kept_plan(self.store)
-        parts: list[Store | Round] = [self.store, *([] if tolerances is None else rounds(self.store, tolerances))]
-        done = [(part, key) for part in parts for key in sorted(part.done())]
+        done = [(part, key) for part in self._parts() for key in sorted(part.done())]
         faults = {unit: fault for unit in done if (fault := _fault(*unit))}
         sound = [unit for unit in done if unit not in faults]
         rng = np.random.default_rng(seed)
