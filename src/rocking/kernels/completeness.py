@@ -15,18 +15,32 @@ def note_complete(ground: Ground, blocks: Records, states: Records, scratch: Rec
     """Tell of every block that started at rest whether the chattering after its first uplift was complete."""
     for k in range(blocks.shape[0]):
         state = states[k]
-        complete[k] = state.rests > 0 and not passes_again(ground, blocks[k], scratch, state.first_rest)
+        complete[k] = state.rests > 0 and not passes_again(ground, blocks[k], scratch, state)
 
 
 @inlined
-def passes_again(ground: Ground, block: Record, scratch: Record, until: float) -> bool:
-    """Whether the motion, having lifted a block and come back within the thresholds, passes one before a time."""
-    lifted = next_uplift(ground, block, scratch, 0, 0.0, until)
+def passes_again(ground: Ground, block: Record, scratch: Record, state: Record) -> bool:
+    """Whether the motion, having lifted a block and come back within the thresholds, passes one before its rest."""
+    until = state.first_rest
+    lifted = next_uplift(ground, block, scratch, piece_before(ground, state.first_uplift), 0.0, until)
     if lifted.side == AT_REST:
         return False
     piece, offset = back_within(ground, block, scratch, lifted)
     again = next_uplift(ground, block, scratch, piece, offset, until)
     return bool(again.side != AT_REST and start_of(ground, again.piece) + again.offset < until)
+
+
+@inlined
+def piece_before(ground: Ground, time: float) -> int:
+    """Return a piece that is over before a time, the one nearest to it; the first where there is none."""
+    low, high = 0, last_piece(ground)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if start_of(ground, middle) < time:
+            low = middle
+        else:
+            high = middle
+    return max(0, low - 1)
 
 
 @inlined
