@@ -136,7 +136,7 @@ def memory(simulations: int, figure: Path | None) -> None:
     """Follow the memory of a run, most of whose blocks stay (so that much is written), and of the spectrum after it."""
     rng = np.random.default_rng(0)
     motions = simulations // 10_000
-    blocks = rocking.Blocks(p=rng.uniform(1.0, 6.0, 1000), alpha=rng.uniform(0.1, 0.4, 1000), restitution=0.9)
+    blocks = rocking.Blocks(p=rng.uniform(1.0, 6.0, 1000), alpha=rng.uniform(0.18, 0.4, 1000), restitution=0.9)
     times, held, over = [], [], threading.Event()
     start = time.monotonic()
 
