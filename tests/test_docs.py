@@ -2,6 +2,7 @@
 
 import doctest
 import re
+import runpy
 import shutil
 import tomllib
 from pathlib import Path
@@ -156,3 +157,19 @@ def test_pages_load_nothing_from_the_network(tmp_path):
         assert address.startswith("#") or (tmp_path / "html" / re.split("[?#]", address)[0]).is_file(), address
     for style in (tmp_path / "html" / "_static").rglob("*.css"):
         assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", style.read_text("utf-8"))
+
+
+def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there():
+    pytest.importorskip("hatchling")
+    namespace = runpy.run_path(str(ROOT / "hatch_build.py"))
+    shown = namespace["for_index"]((ROOT / "README.md").read_text("utf-8"))
+    assert not re.search(r"\]\((?!https?:)", shown)
+    assert "(the explorer, `docs/howto/explorer.md` in the source)" in shown
+    assert "`ARCHITECTURE.md` in the source" in shown
+    assert "```pycon\n>>> import rocking" in shown
+    assert PROJECT["dynamic"] == ["readme"]
+
+
+def test_the_readme_says_how_its_commands_are_found():
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert "source .venv/bin/activate" in readme.partition("$ rocking")[0]
