@@ -13,8 +13,8 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.response import Sensitivity
+from rocking.response.digits import time_text
 from rocking.response.forces import Contact
-from rocking.response.summary import time_text
 
 TABLES = {
     "events": ["time_s", "kind", "side"],

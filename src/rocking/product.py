@@ -112,9 +112,12 @@ class Scales:
         Raises
         ------
         InvalidMotion
-            If the motion is zero throughout.
+            If the motion is zero throughout, or would become stronger than any may be.
         """
-        return self.values / self.now(motion)
+        with np.errstate(over="ignore"):
+            factors = self.values / self.now(motion)
+        motion.scaled(float(factors.max()))  # refused where it is too strong
+        return factors
 
     def now(self, motion: Motion) -> float:
         """Return what a motion measures as it is; 1 where scales are factors.
@@ -164,8 +167,7 @@ class Product:
     duration: float | None
 
     def __post_init__(self) -> None:
-        if self.polarity not in _SIGNS:
-            raise InvalidOption(f"polarity must be one of {', '.join(_SIGNS)}, not {self.polarity!r}")
+        checks.one_of(self.polarity, "polarity", InvalidOption, list(_SIGNS))
         rules_of(self.blocks, self.model, self.treatment, self.duration, record=False)  # checked before any work
 
     @property

@@ -61,6 +61,9 @@ class Side:
         """Return the parameters as people read them."""
         return f"p = {self.p:.5g} rad/s, alpha = {self.alpha:.5g} rad, restitution = {self.restitution:.5g}"
 
+    def __repr__(self) -> str:
+        return f"<Side: {self}, R = {self.radius:.5g} m>"
+
 
 @dataclass(frozen=True)
 class Block:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from rocking.cli.options import OUTPUT, RECORDS, FileOptions, Names, PrintOptions
 from rocking.motion.catalogue import Contents, contents, shipped
-from rocking.motion.named import STANDARD_INPUT, expanded, is_shipped
+from rocking.motion.named import STANDARD_INPUT, expanded, is_shipped, refuse_what_is_known
 from rocking.plausibility import reading_notes
 from rocking.progress import note
 from rocking.tables import to_json
@@ -29,6 +29,8 @@ def records(
 
 def _contents(name: str, file: FileOptions, *, several: bool) -> Contents:
     if is_shipped(name):
+        if not several:
+            refuse_what_is_known(name, channel=file.channel, dt=file.dt, units=file.units)
         return shipped(name)
     source = sys.stdin.buffer if name == STANDARD_INPUT else name
     found = contents(source, channel=file.channel, dt=file.dt, units=file.units, several=several)

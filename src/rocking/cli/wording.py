@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from inspect import Parameter
 from typing import Final
 
-from cyclopts import App, Argument, CycloptsError, MissingArgumentError, UnknownCommandError
+from cyclopts import App, Argument, CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError
 
 from rocking.errors import InvalidOption
 
@@ -17,6 +17,9 @@ _ALIKE: Final = 0.8
 
 #: Names so short are too alike for a guess: a suggestion must not lead to another quantity.
 _SHORT: Final = len("--pga")
+
+#: What kinds of numbers are called.
+_NUMBERS: Final[dict[type, str]] = {float: "a number", int: "a whole number"}
 
 _OPTION: Final = re.compile(r"--?[A-Za-z]")
 
@@ -29,6 +32,8 @@ def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
     command = f"rocking{''.join(f' {name}' for name in _command(app, arguments))}"
     if isinstance(error, MissingArgumentError) and error.argument is not None:
         return f"{_missing(error.argument, command, arguments)}; see {command} --help"
+    if isinstance(error, CoercionError) and error.argument and error.token and error.target_type in _NUMBERS:
+        return f"{_misread(error.argument, error.token.value, error.target_type)}; see {command} --help"
     if isinstance(error, CycloptsError):
         return f"{sentence}; see {command} --help"
     return in_options(sentence, app, arguments)
@@ -95,6 +100,12 @@ def _missing(argument: Argument, command: str, arguments: Sequence[str]) -> str:
         return f"{command} needs {argument.name.lstrip('-').upper()}"
     given = any(each.partition("=")[0] in argument.names for each in arguments)
     return f"{argument.name} needs a value" if given else f"{command} needs {argument.name}"
+
+
+def _misread(argument: Argument, text: str, wanted: type) -> str:
+    """Say that an option takes a number, where its text is none."""
+    name = argument.name.lstrip("-").upper() if _is_positional(argument) else argument.name
+    return f"{name} takes {_NUMBERS[wanted]}, not {text!r}"
 
 
 def _is_positional(argument: Argument) -> bool:

@@ -103,6 +103,12 @@ class Check:
             ]
         )
 
+    def __repr__(self) -> str:
+        count = "1 record" if len(self.records) == 1 else f"{len(self.records)} records"
+        overturned = sum(response.overturned for response in self.responses)
+        rules = ", ".join(self.ratios[0]) or "no rule"
+        return f"<Check: {self.block.description}: {count}, overturned by {overturned}; by {rules}>"
+
     def _disagreements(self, rules: list[str]) -> list[str]:
         """Say of each rule how often it is wrong, and how."""
         lines = []
