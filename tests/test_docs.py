@@ -4,8 +4,10 @@ import doctest
 import re
 import runpy
 import shutil
+import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -159,14 +161,22 @@ def test_pages_load_nothing_from_the_network(tmp_path):
         assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", style.read_text("utf-8"))
 
 
-def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there():
-    pytest.importorskip("hatchling")
+def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there(monkeypatch):
+    # What builds the package is not installed beside it.
+    monkeypatch.setitem(
+        sys.modules, "hatchling.metadata.plugin.interface", SimpleNamespace(MetadataHookInterface=object)
+    )
     namespace = runpy.run_path(str(ROOT / "hatch_build.py"))
     shown = namespace["for_index"]((ROOT / "README.md").read_text("utf-8"))
     assert not re.search(r"\]\((?!https?:)", shown)
     assert "(the explorer, `docs/howto/explorer.md` in the source)" in shown
     assert "`ARCHITECTURE.md` in the source" in shown
     assert "```pycon\n>>> import rocking" in shown
+    metadata: dict = {}
+    hook = namespace["ReadmeHook"]()
+    hook.root = str(ROOT)
+    hook.update(metadata)
+    assert metadata == {"readme": {"content-type": "text/markdown", "text": shown}}
     assert PROJECT["dynamic"] == ["readme"]
 
 

@@ -399,7 +399,7 @@ def test_data_that_cannot_be_fitted_are_refused(changes, word):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"limits": {}}, "limit state"),
+        ({"limits": {}}, "limits must be a mapping with one entry or more"),
         ({"limits": {"half": -0.5}}, "'half'"),
         ({"limits": {"half": math.nan}}, "'half'"),
         ({"levels": [3.0, 2.0]}, "levels"),

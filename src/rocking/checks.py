@@ -7,7 +7,7 @@ are not, though ``float`` takes them: "0.2" is more often a mistake than a wish.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
@@ -101,6 +101,13 @@ def mapping(value: object, name: str, error: Error, example: str) -> Mapping[Any
     if not isinstance(value, Mapping) or not value:
         raise error(f"{name} must be a mapping with one entry or more, as {example}, not {shown(value)}")
     return value
+
+
+def several(value: object, name: str, error: Error) -> list[Any]:
+    """Return what `value` holds, one after the other, or raise `error` where it is text, a mapping or no collection."""
+    if isinstance(value, (str, Mapping)) or not isinstance(value, Iterable):
+        raise error(f"{name} must be a list, not {shown(value)}")
+    return [*value]
 
 
 def grid_size(sizes: Mapping[str, int], error: Error, most: int = 10_000_000) -> None:

@@ -18,6 +18,7 @@ from rocking.constants import VERSION
 from rocking.engine import Setup, Task, parts_of
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import measures
+from rocking.motion.arguments import STRONGEST
 from rocking.motion.motion import Motion
 from rocking.problem import rules_of
 from rocking.treatment import Treatment
@@ -116,7 +117,8 @@ class Scales:
         """
         with np.errstate(over="ignore"):
             factors = self.values / self.now(motion)
-        motion.scaled(float(factors.max()))  # refused where it is too strong
+        if not factors.max() * np.abs(motion.coefficients).max() <= STRONGEST:
+            motion.scaled(float(factors.max()))  # refused where it is too strong, and not only steep
         return factors
 
     def now(self, motion: Motion) -> float:

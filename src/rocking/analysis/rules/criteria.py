@@ -357,7 +357,8 @@ def rate(
     >>> [*rate(rocking.Block(width=0.3, height=0.9), record, ["west", "ishiyama"])]
     ['west', 'ishiyama']
     """
-    names = [*RULES] if rules is None else [checks.one_of(name, "rules", InvalidOption, [*RULES]) for name in rules]
+    wanted = [*RULES] if rules is None else checks.several(rules, "rules", InvalidOption)
+    names = [checks.one_of(name, "rules", InvalidOption, [*RULES]) for name in wanted]
     many = Blocks.of(blocks)
     return {name: RULES[name](many, motion) for name in names}
 
