@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 import rocking
+from rocking.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -183,3 +184,15 @@ def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there(monkey
 def test_the_readme_says_how_its_commands_are_found():
     readme = (ROOT / "README.md").read_text("utf-8")
     assert "source .venv/bin/activate" in readme.partition("$ rocking")[0]
+
+
+def test_the_page_and_the_help_say_how_far_an_ida_goes(capsys):
+    page = " ".join((ROOT / "docs" / "howto" / "fragility.md").read_text("utf-8").split())
+    assert "until all have overturned the block and on to three times that level" in page
+    main(["ida", "--help"])
+    assert "three times that by which every motion has overturned" in " ".join(capsys.readouterr().out.split())
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    motions = [rocking.pulses.one_sine(1.0, frequency) for frequency in (0.5, 1.5)]
+    found = rocking.incremental_dynamic_analysis(block, motions, tolerance=1e-2)
+    by_which = float(found.overturning_level.max())
+    assert 3.0 / 1.05 <= float(found.level[-1]) / by_which <= 3.0 * 1.05**2
