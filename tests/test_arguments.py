@@ -7,6 +7,8 @@ import pytest
 
 import rocking
 from rocking import Block, Blocks, InvalidBlock, InvalidMotion, InvalidOption
+from rocking.analysis.survey import survey
+from rocking.named_pulses import named_pulse
 
 BLOCK = Block(0.12, 0.55)
 MOTION = rocking.pulses.one_sine(3.0, 1.0)
@@ -100,3 +102,120 @@ def test_full_sizes_are_checked_under_their_own_names():
 def test_an_unknown_model_has_no_thresholds():
     with pytest.raises(InvalidOption, match="model must be one of nonlinear, linear, not 'Linear'"):
         BLOCK.uplift_thresholds("Linear")
+
+
+ARRAY = np.array([[1.0, 1.0], [1.0, 1.0]])
+SITE = rocking.HazardCurve([0.5, 1.0, 2.0], [0.1, 0.01, 0.001])
+FITTED = rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
+
+MAP = rocking.overturning_map("one-sine", BLOCK, amplitudes=[1.0, 2.0], frequencies=[1.0])
+
+#: Each takes one argument that is often given as something else.
+TAKES_ONE_THING = {
+    "pulse of a map": lambda value: rocking.overturning_map(value, BLOCK, amplitudes=[2.0], frequencies=[1.0]),
+    "block of a map": lambda value: rocking.overturning_map("one-sine", value, amplitudes=[2.0], frequencies=[1.0]),
+    "text of a pulse": named_pulse,
+    "name of a shipped record": rocking.records.load,
+    "critical amplitude of a treatment": rocking.AsymptoticTime,
+    "measure": lambda value: rocking.incremental_dynamic_analysis(BLOCK, MOTION, measure=value),
+    "method of a chattering time": lambda value: rocking.chattering.chattering_time(1.03, 2.0, 0.9, method=value),
+    "method of a critical amplitude": lambda value: rocking.chattering.critical_amplitude(2.0, 0.9, method=value),
+    "lobes": lambda value: rocking.pulses.n_lobe([1.0, 2.0], 1.0, lobes=value),
+    "kind of a Ricker pulse": lambda value: rocking.pulses.ricker(1.0, 1.0, kind=value),
+    "motions of a survey": lambda value: survey(BLOCK, value),
+    "motions of a check": lambda value: rocking.rules.check(BLOCK, value),
+    "rules": lambda value: rocking.rules.rate(BLOCK, MOTION, value),
+    "rules of a check": lambda value: rocking.rules.check(BLOCK, {"one": MOTION}, rules=value),
+    "parameters of a map": lambda value: rocking.chattering.chattering_map(lambda a, b: None, value),
+    "response of episodes": rocking.chattering.chattering_episodes,
+    "number of a figure": rocking.chattering.paper_figure,
+    "slenderness": rocking.block.housner_restitution,
+    "label of a part": lambda value: MAP.select(frequency=value),
+    "limits": lambda value: rocking.fragility(BLOCK, [MOTION], limits=value),
+    "polarity": lambda value: rocking.fragility(BLOCK, [MOTION], polarity=value),
+    "polarity of an ensemble": lambda value: rocking.simulate_many(BLOCK, MOTION, polarity=value),
+    "band": lambda value: rocking.fit_fragility([2.0, 3.0], [1, 2], trials=3, band=value),
+    "hazard curve": FITTED.annual_rate,
+    "limit state": FITTED.curve,
+    "intensity of a probability": FITTED.curves[0].probability,
+    "intensity of a band": lambda value: FITTED.curves[0].band(value)[0],
+    "intensity of a rate": SITE.rate_of,
+    "chosen blocks": Blocks.of(BLOCK).select,
+    "file of a fragility": FITTED.to_csv,
+    "NRML file": FITTED.to_nrml,
+    "NRML taxonomy": lambda value: FITTED.to_nrml("unwritten.xml", taxonomy=value),
+    "NRML format": lambda value: FITTED.to_nrml("unwritten.xml", format=value),
+    "file of a response": lambda value: rocking.simulate(BLOCK, None, initial_rotation=0.1).to_csv(value),
+    "file of histories": lambda value: rocking.simulate(BLOCK, None, initial_rotation=0.1).to_netcdf(value),
+    "file of a hazard curve": rocking.HazardCurve.read,
+}
+
+#: Where an empty list asks for nothing, and gets it.
+TAKES_NONE_AT_ALL = {
+    "intensity of a probability", "intensity of a band", "intensity of a rate", "chosen blocks", "rules",
+    "rules of a check", "label of a part",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("take", TAKES_ONE_THING)
+@pytest.mark.parametrize("value", [[], {}, ARRAY * -1.0, object(), 1 + 2j], ids=lambda value: type(value).__name__)
+def test_what_is_not_that_thing_is_refused_in_one_sentence(take, value):
+    if isinstance(value, list) and take in TAKES_NONE_AT_ALL:
+        TAKES_ONE_THING[take](value)
+        return
+    with pytest.raises(rocking.RockingError) as caught:
+        TAKES_ONE_THING[take](value)
+    assert "\n" not in str(caught.value)
+
+
+def test_one_block_is_not_chosen_by_select_nor_are_those_that_are_not_there():
+    blocks = Blocks(p=[1.0, 2.0, 3.0], alpha=0.2)
+    for index in (0, 1.5, [0, 3], [True, False], np.array([[0, 1]])):
+        with pytest.raises(InvalidBlock):
+            blocks.select(index)
+    assert repr(blocks.select([])) == "<Blocks: none>"
+    for index in (slice(0, 2), [0, 1], np.array([True, True, False]), [0, -2]):
+        assert blocks.select(index).p[:, 0].tolist() == [1.0, 2.0]
+
+
+def test_a_number_of_trials_is_bounded_by_itself_in_the_message():
+    with pytest.raises(InvalidOption, match="trials must be whole numbers, at least 1 and no more than 9"):
+        rocking.fit_fragility([2.0, 3.0], [1, 2], trials=0)
+
+
+def test_a_fragility_names_its_limit_states():
+    with pytest.raises(InvalidOption, match="exceeded must be a mapping with one entry or more"):
+        rocking.fit_fragility([2.0, 3.0], {})
+    with pytest.raises(InvalidOption, match="limit_state must be one of overturning, not 'half'"):
+        FITTED.curve("half")
+
+
+@pytest.mark.parametrize("level", [1e60, 1e300])
+def test_no_ensemble_is_shaken_more_than_a_motion_may_be(level):
+    for scale in ({"pga": level}, {"factor": level}):
+        with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+50 m/s\^2"):
+            rocking.simulate_many(BLOCK, MOTION, **scale)
+
+
+def test_a_steep_piece_is_told_from_a_strong_motion():
+    with pytest.raises(InvalidMotion, match=r"a piece of a motion is too steep: shorter than 1e-09 s"):
+        rocking.Motion([0.0, 1e-20, 1.0], [[0.0, 1e65], [0.0, 0.0]])
+
+
+@pytest.mark.parametrize("period", [1e300, 1e9])
+def test_a_period_that_says_nothing_is_refused(period):
+    with pytest.raises(InvalidMotion, match="a period above a million times the duration"):
+        MOTION.spectral_acceleration(period)
+
+
+def test_forces_outside_the_response_are_not_numbers():
+    response = rocking.simulate(BLOCK, MOTION)
+    for time in (-1.0, np.nan, np.inf, 1e300):
+        assert np.isnan(response.friction_demand(time))
+        assert np.isnan(response.normal_force(time))
+
+
+@pytest.mark.parametrize("schemes", ["certified", 0.5, {"velocity": 1e-9}, None])
+def test_schemes_are_a_list(schemes):
+    with pytest.raises(InvalidOption, match="schemes must be a list, not"):
+        rocking.chattering.compare_schemes(BLOCK, MOTION, schemes=schemes)

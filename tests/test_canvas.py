@@ -90,7 +90,7 @@ def test_a_notebook_shows_a_figure_of_the_caller_once(monkeypatch):
     assert images(*cells) == [1, 1, 1, 1, 1, 0, 0]
 
 
-@pytest.mark.parametrize("size", [(3.0,), (3.0, 2.0, 1.0), (3.0, 0.0), (3.0, float("nan")), "wide"])
+@pytest.mark.parametrize("size", [(3.0,), (3.0, 2.0, 1.0), (3.0, 0.0), (3.0, float("nan")), "wide", (), 0, ""])
 def test_a_figure_of_no_size_is_refused(size):
     with pytest.raises(InvalidOption, match="figsize must be"):
         drawn(figsize=size)

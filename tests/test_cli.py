@@ -1,5 +1,7 @@
 """The command line: results, files, exit codes, and one line for every mistake."""
 
+import importlib
+import inspect
 import json
 import os
 import subprocess
@@ -8,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from rocking.cli import app
 
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
 RECORD = "el-centro-meloland-270"
@@ -174,3 +178,19 @@ def test_json_has_no_nan(run):
     _, out, _ = run("simulate", RECORD, *BLOCK, "--chattering", "velocity", "--json")
     assert "NaN" not in out
     assert np.isfinite(json.loads(out)["duration_s"])
+
+
+COMMANDS = [name for name in app if not name.startswith("-") and name != "study"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_a_command_is_all_that_its_function_says(run, command):
+    function = getattr(importlib.import_module(f"rocking.cli.{command}"), command)
+    said = " ".join(inspect.getdoc(function).partition("Parameters\n---")[0].split())
+    assert said in " ".join(run(command, "--help")[1].split())
+
+
+def test_the_list_of_commands_has_a_line_for_each(run):
+    code, out, _ = run("--help")
+    assert code == 0
+    assert all(f"│ {command} " in out for command in [*COMMANDS, "study"])

@@ -248,3 +248,30 @@ def test_calibrate_refuses_a_mistake_in_one_line(run, outcomes_table, change, wo
     code, _, err = run("calibrate", outcomes_table, *CALIBRATED, *change)
     assert code == 2
     assert words in err and len(err.splitlines()) == 1
+
+
+def test_the_outcomes_of_a_fragility_name_their_block_and_the_unit_of_their_intensity(run, tmp_path):
+    records = [name for name in rocking.records.names() if not name.endswith("up")]
+    sizes = ["--width", "0.3", "--height", "1.5"]
+    code, out, _ = run("fragility", *records, *sizes, "--levels", "0.1g:1.2g:12", "--out", tmp_path, "--json")
+    assert code == 0
+    assert json.loads(out)["block"] == "rectangular block, 0.3 m x 1.5 m"
+    header = (tmp_path / "outcomes.csv").read_text().splitlines()[0].split(",")
+    assert "pga_m_s2" in header
+    assert "intensity" not in header
+
+
+def test_the_table_of_many_records_says_no_more_than_is_known(run, tmp_path):
+    """What is ambiguous alone is so in a table, and a peak has no more digits there."""
+    path = tmp_path / "long.csv"
+    times = 0.02 * np.arange(2001)
+    shaking = 0.45 * np.sin(2.1 * times) + 0.2 * np.sin(13.0 * times + 0.3) + 0.1 * np.sin(37.0 * times)
+    path.write_text("time (s),a (g)\n" + "".join(f"{t:.2f},{a:.4f}\n" for t, a in zip(times, shaking, strict=True)))
+    block = ["--width", "0.6", "--height", "2.1"]
+    alone = run("simulate", path, *block)[1]
+    many = run("simulate", path, "el-centro-meloland-270", *block, "--out", tmp_path / "out")[1]
+    row = next(line for line in many.splitlines() if str(path) in line)
+    assert ("AMBIGUOUS" in alone) == ("AMBIGUOUS" in row)
+    peak = next(line for line in alone.splitlines() if line.startswith("peak rotation"))
+    assert peak.split(", ")[-1].split()[0] in row.split()
+    assert "ambiguous" in (tmp_path / "out" / "summary.csv").read_text().splitlines()[0]

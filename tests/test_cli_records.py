@@ -111,7 +111,7 @@ def test_levels_of_an_acceleration_may_be_in_g_and_those_of_a_velocity_may_not(r
     module = importlib.import_module(f"rocking.cli.{command}")
     monkeypatch.setattr(module, analysis, refuse)
     assert "[0.980665, 1.96133]" in run(command, RECORD, *BLOCK, "--levels", "0.1g,0.2g")[2]
-    assert "--levels takes a number" in run(command, RECORD, *BLOCK, "--measure", "pgv", "--levels", "0.1g,0.2g")[2]
+    assert "--levels takes a velocity" in run(command, RECORD, *BLOCK, "--measure", "pgv", "--levels", "0.1g,0.2g")[2]
 
 
 def test_files_folders_patterns_and_shipped_names_make_one_table(run, folder):

@@ -2,13 +2,17 @@
 
 import doctest
 import re
+import runpy
 import shutil
+import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import rocking
+from rocking.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -156,3 +160,39 @@ def test_pages_load_nothing_from_the_network(tmp_path):
         assert address.startswith("#") or (tmp_path / "html" / re.split("[?#]", address)[0]).is_file(), address
     for style in (tmp_path / "html" / "_static").rglob("*.css"):
         assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", style.read_text("utf-8"))
+
+
+def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there(monkeypatch):
+    # What builds the package is not installed beside it.
+    monkeypatch.setitem(
+        sys.modules, "hatchling.metadata.plugin.interface", SimpleNamespace(MetadataHookInterface=object)
+    )
+    namespace = runpy.run_path(str(ROOT / "hatch_build.py"))
+    shown = namespace["for_index"]((ROOT / "README.md").read_text("utf-8"))
+    assert not re.search(r"\]\((?!https?:)", shown)
+    assert "(the explorer, `docs/howto/explorer.md` in the source)" in shown
+    assert "`ARCHITECTURE.md` in the source" in shown
+    assert "```pycon\n>>> import rocking" in shown
+    metadata: dict = {}
+    hook = namespace["ReadmeHook"]()
+    hook.root = str(ROOT)
+    hook.update(metadata)
+    assert metadata == {"readme": {"content-type": "text/markdown", "text": shown}}
+    assert PROJECT["dynamic"] == ["readme"]
+
+
+def test_the_readme_says_how_its_commands_are_found():
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert "source .venv/bin/activate" in readme.partition("$ rocking")[0]
+
+
+def test_the_page_and_the_help_say_how_far_an_ida_goes(capsys):
+    page = " ".join((ROOT / "docs" / "howto" / "fragility.md").read_text("utf-8").split())
+    assert "until all have overturned the block and on to three times that level" in page
+    main(["ida", "--help"])
+    assert "three times that by which every motion has overturned" in " ".join(capsys.readouterr().out.split())
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    motions = [rocking.pulses.one_sine(1.0, frequency) for frequency in (0.5, 1.5)]
+    found = rocking.incremental_dynamic_analysis(block, motions, tolerance=1e-2)
+    by_which = float(found.overturning_level.max())
+    assert 3.0 / 1.05 <= float(found.level[-1]) / by_which <= 3.0 * 1.05**2

@@ -266,6 +266,16 @@ def test_the_frame_of_an_ida_ends_with_the_levels_or_above_what_stands_with_arro
     whole = ida_figure(motions=ends, level_label="PGA")
     assert whole.axes[0].get_ylim()[1] == motions[0].levels[27] < 1.5 * stands
     assert not [line for line in whole.axes[1].lines if line.get_marker() == "^"]
+    assert entries(figure)[-1] == "strip: levels that overturn (arrow: and above)"
+    assert entries(whole)[-1] == "strip: levels that overturn"
+
+
+def test_long_names_of_few_strips_are_written_in_lines():
+    motions = [motion._replace(label=f"Pacoima Dam (upper left abut) {k}") for k, motion in enumerate(scaled(6))]
+    names = [text.get_text() for text in ida_figure(motions=motions, level_label="PGA").axes[1].get_xticklabels()]
+    assert names[0] == "Pacoima Dam (upper\nleft abut) 0"
+    many = [motion._replace(label="Pacoima Dam (upper left abut)") for motion in scaled(12)]
+    assert "\n" not in ida_figure(motions=many, level_label="PGA").axes[1].get_xticklabels()[0].get_text()
 
 
 def test_the_thinnest_band_of_an_ida_has_ends_that_are_seen():

@@ -399,7 +399,7 @@ def test_data_that_cannot_be_fitted_are_refused(changes, word):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"limits": {}}, "limit state"),
+        ({"limits": {}}, "limits must be a mapping with one entry or more"),
         ({"limits": {"half": -0.5}}, "'half'"),
         ({"limits": {"half": math.nan}}, "'half'"),
         ({"levels": [3.0, 2.0]}, "levels"),
@@ -457,7 +457,7 @@ def test_numbers_of_any_real_type_are_taken():
 def test_an_unknown_limit_state_names_those_there_are():
     result = fit_fragility([1.0, 2.0, 3.0], [0, 1, 3], trials=4)
     assert result.curve("overturning") is result.curves[0]
-    with pytest.raises(rocking.InvalidOption, match="there are overturning"):
+    with pytest.raises(rocking.InvalidOption, match="limit_state must be one of overturning, not"):
         result.curve("uplift")
     with pytest.raises(rocking.InvalidOption, match="intensities"):
         result.curves[0].probability([-1.0])

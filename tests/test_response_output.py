@@ -12,9 +12,10 @@ import xarray as xr
 
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
-from rocking.response import Sensitivity
+from rocking.analysis.survey import survey
+from rocking.response import Sensitivity, digits
+from rocking.response.digits import time_text
 from rocking.response.forces import Contact
-from rocking.response.summary import time_text
 
 TABLES = {
     "events": ["time_s", "kind", "side"],
@@ -227,3 +228,32 @@ def test_unknown_units_and_times_that_are_no_numbers_are_refused(shaken):
     for evaluate in (shaken.rotation, shaken.angular_velocity, shaken.normal_force, shaken.friction_demand):
         with pytest.raises(InvalidOption, match="time"):
             evaluate("1.0")
+
+
+def test_no_time_beside_another_has_more_digits_than_it():
+    """A rectangular pulse that takes the block just over its balance point: nobody knows when it falls, or tips."""
+    amplitude, block = 3.0, Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    critical = math.acosh(1.0 + 0.5 / (amplitude * (amplitude - 1.0))) / 2.0  # Housner (1963)
+    pulse = rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, critical * (1.0 + 1e-11))
+    response = simulate(block, pulse, model="linear")
+    assert response.overturned
+    assert digits.overturn_text(response).startswith("about ")
+    for text in (digits.tipping_text(response), digits.peak_time_text(response)):
+        assert text == f"about {float(text.split()[1]):.0f} s"
+    assert "AMBIGUOUS" in response.summary()
+    (row,) = survey(block, {"pulse": pulse}, model="linear").rows()
+    assert row["ambiguous"]
+    assert row["verdict"] == f"overturns at {digits.overturn_text(response)}, AMBIGUOUS"
+    known = simulate(block, rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, 1.2 * critical), model="linear")
+    assert re.fullmatch(r"\d+\.\d{4} s", digits.peak_time_text(known))
+    assert re.fullmatch(r"\d+\.\d{4} s", digits.tipping_text(known))
+
+
+def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():
+    """A motion that is known to a millionth leaves so much of the peak; here by scaling it by a hundred times that."""
+    motion = rocking.records.load("el-centro-meloland-270").scaled(pga=4.0)
+    block = Block(width=0.6, height=2.1)
+    one, other = (simulate(block, motion.scaled(factor)) for factor in (1.0, 1.0 + 1e-4))
+    decimals = len(digits.peak_time_text(one).partition(".")[2].removesuffix(" s"))
+    moved = 0.01 * abs(other.peak_time - one.peak_time)
+    assert moved < 10.0**-decimals

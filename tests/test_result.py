@@ -193,13 +193,13 @@ def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
     assert len(found.outcomes) == len(levels) * len(motions)
     for _, row in found.outcomes.iterrows():
         motion = motions[names.index(row.motion)]
-        response = rocking.simulate(BLOCK, motion.scaled(pga=row.intensity))
+        response = rocking.simulate(BLOCK, motion.scaled(pga=row.pga_m_s2))
         assert response.overturned == row.overturned == row.exceeded_overturning
         assert response.peak_rotation == pytest.approx(row.peak_rotation_rad, abs=1e-9)
         assert math.isinf(row.peak_over_alpha) == row.overturned
     found.outcomes_to_csv(tmp_path / "outcomes.csv")
     header = (tmp_path / "outcomes.csv").read_text().splitlines()[0]
-    assert header.startswith("motion,block,polarity,intensity,peak_rotation_rad,peak_over_alpha,overturned")
+    assert header.startswith("motion,block,polarity,pga_m_s2,peak_rotation_rad,peak_over_alpha,overturned")
     given = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
     with pytest.raises(rocking.InvalidOption, match="no simulations"):
         given.outcomes_to_csv(tmp_path / "none.csv")

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import mpmath
@@ -181,3 +182,36 @@ def test_the_command_gives_annual_rates(run, tmp_path: Path) -> None:
     assert written["rates"][0]["probability"] == pytest.approx(-math.expm1(-100.0 * rate))
     assert (tmp_path / "out" / "risk.png").stat().st_size > 10_000
     assert run("fragility", *records, *options, "--years", "-1")[0] == 2
+
+
+def test_a_table_from_a_spreadsheet_with_semicolons_and_decimal_commas_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "site.csv"
+    path.write_bytes("PGA (m/s^2);Annual rate\r\n0,5;0,05\r\n1,0;0,02\r\n".encode("utf-8-sig"))
+    curve = HazardCurve.read(path)
+    assert curve.intensity.tolist() == [0.5, 1.0]
+    assert curve.rate.tolist() == [0.05, 0.02]
+    assert curve.measure.column == "pga_m_s2"
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("0.1,0.9\n0.2,1.5", "must be positive and decrease from point to point, but that of point 2 is 1.5 after 0.9"),
+        ("0.1,nan\n0.2,0.1", "but that of point 1 is nan; correct it or leave the point out"),
+        ("0.2,0.9\n0.1,0.5", "the intensities of a hazard curve must be positive and increase"),
+    ],
+)
+def test_points_out_of_order_are_named_with_their_file(tmp_path: Path, rows: str, said: str) -> None:
+    path = tmp_path / "site.csv"
+    path.write_text(f"pga_g,annual_rate\n{rows}\n")
+    with pytest.raises(InvalidOption, match=re.escape(said)) as caught:
+        HazardCurve.read(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize("site", [1, -1, float("nan"), "x"])
+def test_a_table_has_one_site_only(tmp_path: Path, site: int) -> None:
+    path = tmp_path / "site.csv"
+    path.write_text("pga_g,annual_rate\n0.1,0.9\n0.2,0.5\n")
+    with pytest.raises(InvalidOption, match="site"):
+        HazardCurve.read(path, site=site)

@@ -7,8 +7,10 @@ are not, though ``float`` takes them: "0.2" is more often a mistake than a wish.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
+from os import PathLike
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -27,7 +29,7 @@ def number(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one real number (perhaps not finite)."""
     result = _real(value)
     if result is None:
-        raise error(f"{name} must be a number, not {_shown(value)}")
+        raise error(f"{name} must be a number, not {shown(value)}")
     return result
 
 
@@ -35,7 +37,7 @@ def finite(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one finite number."""
     result = _real(value)
     if result is None or not math.isfinite(result):
-        raise error(f"{name} must be a finite number, not {_shown(value)}")
+        raise error(f"{name} must be a finite number, not {shown(value)}")
     return result
 
 
@@ -43,7 +45,7 @@ def positive(value: object, name: str, error: Error, unit: str = "") -> float:
     """Return `value` as a float, or raise `error` unless it is one positive finite number."""
     result = _real(value)
     if result is None or not (math.isfinite(result) and result > 0.0):
-        raise error(f"{name} must be a positive number{_in(unit)}, not {_shown(value)}")
+        raise error(f"{name} must be a positive number{_in(unit)}, not {shown(value)}")
     return result
 
 
@@ -51,7 +53,7 @@ def within(value: object, name: str, error: Error, low: float, high: float, unit
     """Return `value` as a float, or raise `error` unless it is a number from `low` to `high`, both included."""
     result = _real(value)
     if result is None or not low <= result <= high:
-        raise error(f"{name} must be a number from {low:g} to {high:g}{_in(unit)}, not {_shown(value)}")
+        raise error(f"{name} must be a number from {low:g} to {high:g}{_in(unit)}, not {shown(value)}")
     return result
 
 
@@ -59,7 +61,7 @@ def share(value: object, name: str, error: Error, below: float = 1.0) -> float:
     """Return `value` as a float, or raise `error` unless it is a number above 0 and below `below`."""
     result = _real(value)
     if result is None or not 0.0 < result < below:
-        raise error(f"{name} must be a number between 0 and {below:g}, not {_shown(value)}")
+        raise error(f"{name} must be a number between 0 and {below:g}, not {shown(value)}")
     return result
 
 
@@ -69,22 +71,43 @@ def whole(value: object, name: str, error: Error, least: int, most: int | None =
     usable = isinstance(single, Integral) and not isinstance(single, bool)
     if not usable or not least <= single or not (most is None or single <= most):
         bounds = f"of at least {least}" if most is None else f"from {least} to {most}"
-        raise error(f"{name} must be a whole number {bounds}, not {_shown(value)}")
+        raise error(f"{name} must be a whole number {bounds}, not {shown(value)}")
     return int(single)
 
 
 def text(value: object, name: str, error: Error) -> str:
     """Return `value`, or raise `error` unless it is text."""
     if not isinstance(value, str):
-        raise error(f"{name} must be text, not {_shown(value)}")
+        raise error(f"{name} must be text, not {shown(value)}")
     return value
+
+
+def path(value: object, name: str, error: Error) -> Path:
+    """Return `value` as a path, or raise `error` unless it is one, or text."""
+    if not isinstance(value, (str, PathLike)):
+        raise error(f"{name} must be text or a path, not {shown(value)}")
+    return Path(value)
 
 
 def one_of(value: object, name: str, error: Error, choices: Sequence[str]) -> str:
     """Return `value`, or raise `error` unless it is one of the choices."""
     if not isinstance(value, str) or value not in choices:
-        raise error(f"{name} must be one of {', '.join(choices)}, not {_shown(value)}")
+        raise error(f"{name} must be one of {', '.join(choices)}, not {shown(value)}")
     return value
+
+
+def mapping(value: object, name: str, error: Error, example: str) -> Mapping[Any, Any]:
+    """Return `value`, or raise `error` unless it is a mapping with an entry or more."""
+    if not isinstance(value, Mapping) or not value:
+        raise error(f"{name} must be a mapping with one entry or more, as {example}, not {shown(value)}")
+    return value
+
+
+def several(value: object, name: str, error: Error) -> list[Any]:
+    """Return what `value` holds, one after the other, or raise `error` where it is text, a mapping or no collection."""
+    if isinstance(value, (str, Mapping)) or not isinstance(value, Iterable):
+        raise error(f"{name} must be a list, not {shown(value)}")
+    return [*value]
 
 
 def grid_size(sizes: Mapping[str, int], error: Error, most: int = 10_000_000) -> None:
@@ -104,9 +127,9 @@ def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
         if given.dtype.kind == "O":
             given = np.reshape([number(value, name, error) for value in given.ravel()], given.shape)
     except (TypeError, ValueError):
-        raise error(f"{name} must be a number or an array of numbers, not {_shown(values)}") from None
+        raise error(f"{name} must be a number or an array of numbers, not {shown(values)}") from None
     if given.dtype.kind not in "iuf" and given.size:
-        raise error(f"{name} must be a number or an array of numbers, not {_shown(values)}")
+        raise error(f"{name} must be a number or an array of numbers, not {shown(values)}")
     return np.asarray(given, dtype=np.float64)
 
 
@@ -124,6 +147,12 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     if not np.all(np.diff(axis) > 0.0):
         raise error(f"{name} must increase from one to the next")
     return axis
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: in one line that is not too long."""
+    text = " ".join((f"{value:g}" if isinstance(value, float) else repr(value)).split())
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 10]}...{text[-7:]}"
 
 
 def hint_of_degrees(angle: float) -> str:
@@ -151,8 +180,3 @@ def _single(value: object) -> Any:
 
 def _in(unit: str) -> str:
     return f", in {unit}" if unit else ""
-
-
-def _shown(value: object) -> str:
-    text = " ".join((f"{value:g}" if isinstance(value, float) else repr(value)).split())
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 10]}...{text[-7:]}"

@@ -43,7 +43,7 @@ def contact_forces(
 
 
 def friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
-    """Friction coefficient that sticking needs: |H|/N, and infinite where the block would leave the ground."""
-    demand = np.full(np.shape(horizontal), np.inf)
+    """Friction coefficient that sticking needs: |H|/N, infinite where the block would leave the ground, NaN of NaN."""
+    demand = np.where(np.isnan(vertical), np.nan, np.inf)
     np.divide(np.abs(horizontal), vertical, out=demand, where=vertical > 0.0)
     return demand

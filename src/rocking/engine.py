@@ -179,8 +179,8 @@ def require_finished(unfinished: Flags) -> None:
     if count:
         raise Unfinished(
             f"{count} of {unfinished.size} simulations were given up after more than {BUDGET} steps, so that their "
-            "verdicts are not known: blocks whose restitution is so near 1 hardly come to rest; lower it, or look at "
-            "each with simulate_many"
+            "verdicts are not known: blocks whose restitution is near 1 hardly come to rest, nor do blocks under "
+            "motions that nobody has seen; lower the one or the other, or look at each with simulate_many"
         )
 
 

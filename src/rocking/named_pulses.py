@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from rocking import quantities
+from rocking import checks, quantities
 from rocking.errors import InvalidOption
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
@@ -127,7 +127,7 @@ def pulse_family(name: str) -> Family:
         ...
     rocking.errors.InvalidOption: there is no pulse 'triangel'; did you mean triangular?
     """
-    plain = name.strip().lower().replace("_", "-").replace(" ", "-")
+    plain = checks.text(name, "pulse", InvalidOption).strip().lower().replace("_", "-").replace(" ", "-")
     if plain not in FAMILIES:
         raise InvalidOption(
             f"there is no pulse {name!r}; {_meant(plain, FAMILIES) or f'there are {_listed(FAMILIES)}'}"
@@ -184,7 +184,7 @@ def pulse_values(text: str) -> tuple[Family, dict[str, Any]]:
     >>> family.name, values
     ('one-sine', {'amplitude': 4.903325, 'frequency': 2.0})
     """
-    name, _, rest = text.partition(":")
+    name, _, rest = checks.text(text, "pulse", InvalidOption).partition(":")
     family = pulse_family(name)
     return family, {parameter: _value(family, parameter, texts) for parameter, texts in _parts(rest).items()}
 

@@ -114,7 +114,7 @@ def block_notes(block: Block) -> tuple[str, ...]:
     largest = max(2.0 * side.radius for side in block.sides)
     if largest > _LARGEST:
         notes.append(
-            f"the diagonal of the block is {largest:.3g} m, more than {_LARGEST:g} m: are its sizes in metres?"
+            f"the diagonal of the block is {largest:.0f} m, more than {_LARGEST:g} m: are its sizes in metres?"
         )
     if block.half_width is not None and block.half_height is not None and block.half_width > block.half_height:
         width, height = 2.0 * block.half_width, 2.0 * block.half_height

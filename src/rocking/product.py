@@ -18,6 +18,7 @@ from rocking.constants import VERSION
 from rocking.engine import Setup, Task, parts_of
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import measures
+from rocking.motion.arguments import STRONGEST
 from rocking.motion.motion import Motion
 from rocking.problem import rules_of
 from rocking.treatment import Treatment
@@ -117,9 +118,13 @@ class Scales:
         Raises
         ------
         InvalidMotion
-            If the motion is zero throughout.
+            If the motion is zero throughout, or would become stronger than any may be.
         """
-        return self.values / self.now(motion)
+        with np.errstate(over="ignore"):
+            factors = self.values / self.now(motion)
+        if not factors.max() * np.abs(motion.coefficients).max() <= STRONGEST:
+            motion.scaled(float(factors.max()))  # refused where it is too strong, and not only steep
+        return factors
 
     def now(self, motion: Motion) -> float:
         """Return what a motion measures as it is; 1 where scales are factors.
@@ -169,8 +174,7 @@ class Product:
     duration: float | None
 
     def __post_init__(self) -> None:
-        if self.polarity not in _SIGNS:
-            raise InvalidOption(f"polarity must be one of {', '.join(_SIGNS)}, not {self.polarity!r}")
+        checks.one_of(self.polarity, "polarity", InvalidOption, list(_SIGNS))
         rules_of(self.blocks, self.model, self.treatment, self.duration, record=False)  # checked before any work
 
     @property

@@ -28,6 +28,9 @@ def _as_it_is(sentence: str) -> str:
 
 _phrased: Callable[[str], str] = _as_it_is
 
+#: What the present audience has been told, where it is told everything once.
+_told: set[str] | None = None
+
 
 def note(sentence: str) -> None:
     """Say a sentence on stderr, on a line of its own, to whom `notes_for` has chosen.
@@ -36,26 +39,30 @@ def note(sentence: str) -> None:
     --------
     >>> note("nobody reads this where stderr is not a terminal")
     """
+    if _told is not None:
+        if sentence in _told:
+            return
+        _told.add(sentence)
     if _audience == "everybody" or (_audience == "terminal" and sys.stderr.isatty()):
         print(f"rocking: note: {_phrased(' '.join(sentence.split()))}", file=sys.stderr)
 
 
 @contextlib.contextmanager
 def notes_for(audience: Audience, phrased: Callable[[str], str] = _as_it_is) -> Iterator[None]:
-    """Choose who is told, while a command runs, and in whose words.
+    """Choose who is told, while a command runs, and in whose words; the same sentence only once.
 
     Examples
     --------
     >>> with notes_for("nobody"):
     ...     note("not even a person at a terminal sees this")
     """
-    global _audience, _phrased
-    before = _audience, _phrased
-    _audience, _phrased = audience, phrased
+    global _audience, _phrased, _told
+    before = _audience, _phrased, _told
+    _audience, _phrased, _told = audience, phrased, set()
     try:
         yield
     finally:
-        _audience, _phrased = before
+        _audience, _phrased, _told = before
 
 
 class Progress:

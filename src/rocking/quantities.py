@@ -70,11 +70,13 @@ def duration(text: str, option: str) -> float:
 def tilt(text: str, option: str) -> float:
     """Return an angle, rad, as `angle`, of a block that stands: below pi/2, and no degrees without their unit."""
     value = angle(text, option)
-    if 0.5 * math.pi <= abs(value) < 90.0 and not _parts(text)[1]:
+    if abs(value) < 0.5 * math.pi:
+        return value
+    if abs(value) < 90.0 and not _parts(text)[1]:
         raise InvalidOption(
             f"{option} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?"
         )
-    return value
+    raise InvalidOption(f"{option} must be below 90deg in size, not {text.strip()}")
 
 
 def sides(text: str, option: str, quantity: Quantity = number) -> float | list[float]:

@@ -57,11 +57,12 @@ class Result(ABC):
         data = self.data
         try:
             for name, values in wanted.items():
-                nearest = "nearest" if data[name].dtype.kind == "f" else None
-                data = data.sel({name: values}, method=nearest)
-        except KeyError as error:
+                numeric = data[name].dtype.kind == "f"
+                at = checks.numbers(values, name, InvalidOption) if numeric else values
+                data = data.sel({name: at}, method="nearest" if numeric else None)
+        except (KeyError, TypeError, ValueError, IndexError):
             names = ", ".join(map(str, data.sizes))
-            raise InvalidOption(f"there is nothing at {error.args[0]}; the dimensions are {names}") from None
+            raise InvalidOption(f"there is nothing at {checks.shown(labels)}; the dimensions are {names}") from None
         return type(self)(data)
 
     @abstractmethod

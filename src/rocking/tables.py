@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rocking import checks
+from rocking.arrays import Floats
 from rocking.errors import OutputError
 
 if TYPE_CHECKING:
@@ -55,6 +57,18 @@ def cell(entry: Any) -> str:
     if isinstance(entry, (float, np.floating)):
         return "infinite" if math.isinf(entry) else "-" if math.isnan(entry) else f"{entry:.5g}"
     return str(entry)
+
+
+def range_text(values: Floats) -> str:
+    """Lowest and highest of some numbers, or the one that they all are.
+
+    Examples
+    --------
+    >>> range_text(np.array([1.0, 2.5])), range_text(np.array([2.0, 2.0]))
+    ('from 1 to 2.5', '2')
+    """
+    low, high = float(np.min(values)), float(np.max(values))
+    return f"{low:.5g}" if low == high else f"from {low:.5g} to {high:.5g}"
 
 
 def named(quantity: str, unit: str) -> str:
@@ -110,7 +124,7 @@ def write_text(path: str | Path, text: str) -> None:
         If it cannot be written.
     """
     try:
-        Path(path).write_text(text, "utf-8")
+        checks.path(path, "path of a file", OutputError).write_text(text, "utf-8")
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
 
@@ -123,7 +137,7 @@ def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
     OutputError
         If it cannot be written.
     """
-    folder = Path(path).parent
+    folder = checks.path(path, "path of a file", OutputError).parent
     if not folder.is_dir():
         raise OutputError(f"{path} cannot be written: there is no folder {folder}; make it, or choose another place")
     try:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.intensity import Measure
-from rocking.arrays import Floats
+from rocking.analysis.intensity import Measure, intensities
+from rocking.arrays import Floats, as_asked
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.tables import text_table
@@ -77,12 +77,8 @@ class HazardCurve:
                 "a hazard curve needs two points or more, and as many rates as intensities, not shapes "
                 f"{intensity.shape} and {rate.shape}"
             )
-        for what, values, way in (("intensities", intensity, 1.0), ("rates", rate, -1.0)):
-            if not (np.all(values > 0.0) and np.all(np.isfinite(values)) and np.all(way * np.diff(values) > 0.0)):
-                raise InvalidOption(
-                    f"the {what} of a hazard curve must be positive and {'increase' if way > 0.0 else 'decrease'} "
-                    "from point to point; leave out what repeats the point before"
-                )
+        _check_order("intensities", intensity, 1.0)
+        _check_order("rates", rate, -1.0)
         given: Any = self.measure
         measure = given if isinstance(given, Measure) else Measure(given)
         if measure.units == "1":
@@ -100,35 +96,45 @@ class HazardCurve:
         ----------
         path : str or Path
             CSV file. A table has a heading that names the intensity with its units (pga_g, pga_m_s2, pgv_m_s, pgv_cm_s,
-            sa_g or sa_m_s2) and the rate (annual_rate); OpenQuake's ``hazard_curve-...csv`` says all in its first line,
-            and its probabilities of exceedance in T years become rates by -ln(1 - probability)/T.
+            sa_g or sa_m_s2; "PGA (g)" is pga_g as well) and the rate (annual_rate), with commas between, or with
+            semicolons where numbers have decimal commas. OpenQuake's ``hazard_curve-...csv`` says all in its first
+            line, and its probabilities of exceedance in T years become rates by -ln(1 - probability)/T.
         site : int
-            Which row of OpenQuake's file.
+            Which row of OpenQuake's file; a table has one site only.
         period : float, optional
             Period of a table's spectral acceleration, s.
 
         Raises
         ------
         InvalidOption
-            If the file cannot be read, or is neither.
+            If the file cannot be read, or is neither, or has no such site.
         """
+        file = checks.path(path, "path of a hazard curve", InvalidOption)
+        checks.whole(site, "site", InvalidOption, 0)
         try:
-            lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+            lines = file.read_text(encoding="utf-8-sig").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is no text"
-            raise InvalidOption(f"{path} cannot be read: {reason}") from error
-        name = Path(path).stem
+            raise InvalidOption(f"{file} cannot be read: {reason}") from error
         if lines and "investigation_time" in lines[0]:
-            return _from_openquake(lines, str(path), site, name)
-        return _from_table(lines, str(path), period, name)
+            return _of_file(file, *_from_openquake(lines, str(file), site))
+        if site:
+            raise InvalidOption(f"{file}: a table of two columns is of one site; leave site out")
+        return _of_file(file, *_from_table(lines, str(file), period))
 
     def rate_of(self, intensity: ArrayLike) -> Floats:
-        """Annual rate of exceeding intensities, shaped like them."""
-        at = np.asarray(intensity, dtype=np.float64)
+        """Annual rate of exceeding intensities, shaped like them; infinite at 0.
+
+        Raises
+        ------
+        InvalidOption
+            If an intensity is no number, or negative.
+        """
+        at = intensities(intensity)
         exponents, factors = self.powers()
         segment = np.clip(np.searchsorted(self.intensity, at, side="right") - 1, 0, len(self.rate) - 2)
-        with np.errstate(divide="ignore"):
-            return np.asarray(np.exp(factors[segment] - exponents[segment] * np.log(at)))
+        with np.errstate(divide="ignore", over="ignore"):
+            return as_asked(np.asarray(np.exp(factors[segment] - exponents[segment] * np.log(at))))
 
     def powers(self) -> tuple[Floats, Floats]:
         """Exponent k and logarithm of c of each segment, on which the rate is c intensity^-k."""
@@ -158,31 +164,60 @@ class HazardCurve:
         )
 
 
-def _from_table(lines: list[str], path: str, period: float | None, name: str) -> HazardCurve:
-    rows = [row for row in csv.reader(lines) if row and not row[0].lstrip().startswith("#")]
-    heading = [cell.strip().lower() for cell in rows[0]] if rows else []
+def _check_order(what: str, values: Floats, way: float) -> None:
+    """Check that values are positive, and increase (`way` 1) or decrease (-1)."""
+    sound = np.isfinite(values) & (values > 0.0)
+    sound[1:] &= way * np.diff(values) > 0.0
+    if not np.all(sound):
+        k = int(np.argmin(sound))
+        after = f" after {values[k - 1]:g}" if k else ""
+        ordered = "increase" if way > 0.0 else "decrease"
+        raise InvalidOption(
+            f"the {what} of a hazard curve must be positive and {ordered} from point to point, but "
+            f"that of point {k + 1} is {values[k]:g}{after}; correct it or leave the point out"
+        )
+
+
+def _of_file(file: Path, intensity: Floats, rate: Floats, measure: Measure) -> HazardCurve:
+    try:
+        return HazardCurve(intensity, rate, measure, file.stem)
+    except InvalidOption as error:
+        raise InvalidOption(f"{file}: {error}") from None
+
+
+def _heading(cell: str) -> str:
+    """Name of a column as it is known here: "PGA (m/s^2)" is pga_m_s2."""
+    return re.sub(r"[^a-z0-9]+", "_", cell.lower().replace("^", "")).strip("_")
+
+
+def _from_table(lines: list[str], path: str, period: float | None) -> tuple[Floats, Floats, Measure]:
+    told = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    # Where semicolons are between the columns, a comma is the decimal sign.
+    apart, decimal = (";", ",") if told and ";" in told[0] else (",", ".")
+    rows = list(csv.reader(told, delimiter=apart))
+    heading = [_heading(cell) for cell in rows[0]] if rows else []
     found = [cell for cell in heading if cell in _HEADINGS]
     if len(found) != 1 or "annual_rate" not in heading:
         raise InvalidOption(
             f"{path}: a hazard curve needs a heading with annual_rate and one of {', '.join(_HEADINGS)}, "
-            f"not {','.join(heading) or 'nothing'}"
+            f"not {', '.join(rows[0]) if rows else 'nothing'}"
         )
     kind, factor = _HEADINGS[found[0]]
     columns = [heading.index(found[0]), heading.index("annual_rate")]
     points = []
     for k, row in enumerate(rows[1:], start=2):
         try:
-            points.append([float(row[column]) for column in columns])
+            points.append([float(row[column].replace(decimal, ".")) for column in columns])
         except (ValueError, IndexError):
-            raise InvalidOption(f"{path}, row {k}: {','.join(row)} is not an intensity and a rate") from None
+            raise InvalidOption(f"{path}, row {k}: {apart.join(row)} is not an intensity and a rate") from None
     if kind == "sa" and period is None:
         raise InvalidOption(f"{path}: give period= (s) of its spectral acceleration")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)  # type: ignore[arg-type]
     table = np.array(points, dtype=np.float64).reshape(-1, 2)
-    return HazardCurve(factor * table[:, 0], table[:, 1], measure, name)
+    return factor * table[:, 0], table[:, 1], measure
 
 
-def _from_openquake(lines: list[str], path: str, site: int, name: str) -> HazardCurve:
+def _from_openquake(lines: list[str], path: str, site: int) -> tuple[Floats, Floats, Measure]:
     said = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
     kind, _, rest = said.get("imt", "").partition("(")
     rows = list(csv.reader(lines[1:]))
@@ -206,4 +241,4 @@ def _from_openquake(lines: list[str], path: str, site: int, name: str) -> Hazard
     useful = (exceeded > 0.0) & (exceeded < 1.0)
     rate = -np.log1p(-exceeded[useful]) / years
     falling = np.append(True, np.diff(np.minimum.accumulate(rate)) < 0.0) if len(rate) else np.zeros(0, dtype=bool)
-    return HazardCurve(factor * intensity[useful][falling], rate[falling], measure, name)
+    return factor * intensity[useful][falling], rate[falling], measure

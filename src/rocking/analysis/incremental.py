@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Without levels each is this times the one before; they go on to this times the lowest that overturns.
+#: Without levels each is this times the one before; they go on to this times that by which all motions overturn.
 _STEP: Final = 1.05
 _BEYOND: Final = 3.0
 _MOST: Final = 128

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Floats
@@ -44,8 +45,7 @@ class Measure:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        if self.name not in get_args(MeasureName):
-            raise InvalidOption(f"measure must be one of {', '.join(get_args(MeasureName))}, not {self.name!r}")
+        checks.one_of(self.name, "measure", InvalidOption, get_args(MeasureName))
         if (self.name == "sa") != (self.period is not None):
             raise InvalidOption('period= (s) goes with measure="sa", and only with it')
         if self.period is not None:
@@ -120,3 +120,17 @@ class Measure:
     def options(self) -> dict[str, float]:
         """Further arguments of `simulate_many` and `Motion.scaled`."""
         return {} if self.period is None else {"period": self.period, "damping": self.damping}
+
+
+def intensities(values: ArrayLike) -> Floats:
+    """Return intensities at which a curve is asked for, as an array of their shape.
+
+    Raises
+    ------
+    InvalidOption
+        If one is no number, or negative.
+    """
+    at = checks.numbers(values, "intensities", InvalidOption)
+    if not np.all(at >= 0.0):
+        raise InvalidOption("intensities must be numbers that are not negative")
+    return at

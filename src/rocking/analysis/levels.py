@@ -23,12 +23,18 @@ if TYPE_CHECKING:
 
 def described(blocks: Blocks | Block | Sequence[Block]) -> str:
     """Name blocks in a few words: one by its sizes or parameters, several by their number."""
-    if isinstance(blocks, Block):
-        return blocks.description
-    many = Blocks.of(blocks)
-    if len(many) > 1:
-        return f"{len(many)} blocks"
-    return f"block with p = {_pair(many.p[0])} rad/s, alpha = {_pair(many.alpha[0])} rad"
+    only = only_block(blocks)
+    if only is None:
+        return f"{len(Blocks.of(blocks))} blocks"
+    if not isinstance(blocks, Blocks):
+        return only.description
+    return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
+
+
+def only_block(blocks: Blocks | Block | Sequence[Block]) -> Block | None:
+    """Return the block, as it was described, where there is one only."""
+    several: Sequence[Block] | Blocks = [blocks] if isinstance(blocks, Block) else blocks
+    return several[0] if len(several) == 1 else None
 
 
 def _pair(sides: Floats) -> str:

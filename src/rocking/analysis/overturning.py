@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.analysis.boundaries import Boundaries, boundaries
 from rocking.arrays import Floats, Integers
-from rocking.block import Block, Blocks
+from rocking.block import Block, Blocks, one_block
 from rocking.constants import VERSION
 from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
@@ -123,6 +123,7 @@ def overturning_map(
     )
     checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
+    one_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
         raise InvalidOption("a block with restitution 1 never comes to rest; an overturning map needs one below 1")
     slowest = min(side.p for side in block.sides)
@@ -211,7 +212,7 @@ class OverturningMap(Result):
             [
                 f"{self._pulse} on a block with {self._proportions}; {self.data.model} model",
                 text_table(["outcome", "share of the map"], shares),
-                table_of_some(["2 pi f/p", "lowest amplitude that overturns"], rows),
+                table_of_some(["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"], rows),
             ]
         )
 

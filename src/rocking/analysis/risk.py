@@ -57,6 +57,13 @@ class Rate:
     above: float
     intensities: tuple[float, float, float]
 
+    def __repr__(self) -> str:
+        low, high = self.interval
+        return (
+            f"<Rate: {self.limit_state}: {self.annual_rate:.3g} a year ({low:.3g} to {high:.3g}), once in "
+            f"{self.return_period:.4g} years>"
+        )
+
     def probability(self, years: float) -> float:
         """Probability of at least one exceedance in some years, for exceedances that do not depend on one another."""
         return -math.expm1(-self.annual_rate * checks.positive(years, "years", InvalidOption))
@@ -190,6 +197,11 @@ class Risk:
 
 def risk(fragility: Fragility, hazard: HazardCurve) -> Risk:
     """Annual rates of a fragility's limit states under a hazard curve; see `Fragility.annual_rate`."""
+    if not isinstance(hazard, HazardCurve):
+        raise InvalidOption(
+            f"a HazardCurve is needed, not a {type(hazard).__name__}: make one with HazardCurve(intensity, rate), or "
+            "read one with HazardCurve.read(path)"
+        )
     if fragility.measure != hazard.measure:
         raise InvalidOption(
             f"the fragility is against {fragility.measure.label}, the hazard curve of {hazard.measure.label}; "

@@ -226,8 +226,7 @@ class RockingSpectrum(Result):
         """
         from rocking.plot import SpectrumCurves, spectrum_figure
 
-        if against not in get_args(Abscissa):
-            raise InvalidOption(f"against must be one of {', '.join(get_args(Abscissa))}, not {against!r}")
+        checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
         named_curves = self._curves()
         if len(named_curves) > _MOST_CURVES:
             raise InvalidOption(f"a figure shows at most {_MOST_CURVES} curves, not {len(named_curves)}; select some")

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from rocking import checks
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import OutputError
+from rocking.errors import InvalidOption, OutputError
 from rocking.motion.motion import Motion
 from rocking.progress import Progress, note
 from rocking.response import Response
+from rocking.response.digits import ratio_text
 from rocking.response.verdict import in_brief
 from rocking.simulation import simulate
 from rocking.tables import named, text_table, to_json, write_text
@@ -58,16 +60,24 @@ class Survey:
 
     def summary(self) -> str:
         """Return the table for people."""
-        rows = self.rows()
-        overturned = sum(row["overturned"] for row in rows)
+        known = [{"peak_over_slenderness": float(ratio_text(response))} for response in self.responses]
+        rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
         shown = _SHOWN if self.friction is None else _SHOWN | {_SLIDING: f"slides at {self.friction:g}, s"}
         if any(row["processing"] for row in rows):
             shown = shown | {"processing": "done to the record"}
         table = text_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
-        undecided = sum(row["stopped"] or row["unfinished"] for row in rows)
-        count = "1 record" if len(rows) == 1 else f"{len(rows)} records"
+        return f"{self._count()}\n\n{table}"
+
+    def _count(self) -> str:
+        """Say under how many records the block overturns."""
+        overturned = sum(response.overturned for response in self.responses)
+        undecided = sum(response.stopped or response.unfinished for response in self.responses)
+        count = "1 record" if len(self.records) == 1 else f"{len(self.records)} records"
         known = f", not decided under {undecided}" if undecided else ""
-        return f"{self.block.description}: {count}, overturned by {overturned}{known}\n\n{table}"
+        return f"{self.block.description}: {count}, overturned by {overturned}{known}"
+
+    def __repr__(self) -> str:
+        return f"<Survey: {self._count()}>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for machines."""
@@ -155,10 +165,12 @@ def survey(
     >>> print(found.summary().splitlines()[0])
     rectangular block, 0.24 m x 1.1 m: 2 records, overturned by 1
     """
+    checks.mapping(motions, "motions", InvalidOption, "{name: motion}")
     responses = []
     with Progress("simulating", total=len(motions), show=progress) as bar:
-        for motion in motions.values():
+        for name, motion in motions.items():
             responses.append(simulate(block, motion, **options))
+            _row(name, responses[-1])  # what takes long in it, the response keeps: while the bar is there
             bar.advance()
     return Survey(block, tuple(motions), tuple(responses), friction)
 
@@ -176,6 +188,7 @@ def _row(record: str, response: Response) -> dict[str, Any]:
         "overturned": response.overturned,
         "unfinished": response.unfinished,
         "stopped": response.stopped,
+        "ambiguous": response.ambiguous,
         named("overturn_time", "s"): response.overturn_time,
         "peak_over_slenderness": response.peak_over_slenderness,
         named("peak_rotation", "rad"): response.peak_rotation,

@@ -14,6 +14,7 @@ from rocking.arrays import Floats
 from rocking.block.single import ALPHA, GRAVITY, RESTITUTION, Block, Limits, P, one_block, within
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
+from rocking.tables import range_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +148,10 @@ class Blocks:
         return all(np.array_equal(array[:, 0], array[:, 1]) for array in (self.p, self.alpha, self.restitution))
 
     def __repr__(self) -> str:
+        if not len(self):
+            return "<Blocks: none>"
         ranges = [
-            f"{name} {_range_text(values)}{unit}"
+            f"{name} {range_text(values)}{unit}"
             for name, values, unit in (
                 ("p", self.p, " rad/s"),
                 ("alpha", self.alpha, " rad"),
@@ -170,7 +173,16 @@ class Blocks:
         return (self[index] for index in range(len(self)))
 
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
-        """Return some of the blocks: a slice, indices, or a mask. Their values are checked already."""
+        """Return some of the blocks: a slice, indices, or a mask.
+
+        Raises
+        ------
+        InvalidBlock
+            If it is none of these, or an index is out of range.
+        """
+        if not isinstance(index, slice):
+            index = self._indices(index)
+        # Their values are checked already.
         some = object.__new__(Blocks)
         object.__setattr__(some, "gravity", self.gravity)
         for name in ("p", "alpha", "restitution"):
@@ -179,10 +191,19 @@ class Blocks:
             object.__setattr__(some, name, held)
         return some
 
-
-def _range_text(values: Floats) -> str:
-    low, high = (float(extreme(values)) if values.size else np.nan for extreme in (np.min, np.max))
-    return f"{low:.5g}" if low == high else f"from {low:.5g} to {high:.5g}"
+    def _indices(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Positions of the blocks of a flat array of indices, or of a mask."""
+        given = np.asarray(index)
+        if given.ndim == 1 and given.dtype == np.bool_ and len(given) == len(self):
+            return np.flatnonzero(given)
+        usable = given.ndim == 1 and (given.dtype.kind in "iu" or not given.size)
+        chosen = given.astype(np.int64) if usable else np.array([len(self)])
+        if not np.all((chosen >= -len(self)) & (chosen < len(self))):
+            raise InvalidBlock(
+                f"select takes a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} truth "
+                f"values, not {checks.shown(index)}; for one block alone blocks[0]"
+            )
+        return chosen
 
 
 def _columns(array: Floats) -> Floats:

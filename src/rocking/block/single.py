@@ -61,6 +61,9 @@ class Side:
         """Return the parameters as people read them."""
         return f"p = {self.p:.5g} rad/s, alpha = {self.alpha:.5g} rad, restitution = {self.restitution:.5g}"
 
+    def __repr__(self) -> str:
+        return f"<Side: {self}, R = {self.radius:.5g} m>"
+
 
 @dataclass(frozen=True)
 class Block:
@@ -378,12 +381,17 @@ class Block:
 def housner_restitution(alpha: float) -> float:
     """Restitution of a rectangular block that conserves angular momentum: 1 - 1.5 sin(alpha)^2 (Housner 1963).
 
+    Raises
+    ------
+    InvalidBlock
+        If the slenderness is no number.
+
     Examples
     --------
     >>> round(housner_restitution(0.2), 6)
     0.940796
     """
-    return 1.0 - 1.5 * math.sin(alpha) ** 2
+    return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", InvalidBlock)) ** 2
 
 
 def _made(

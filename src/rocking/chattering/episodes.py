@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.errors import InvalidOption
 from rocking.motion.exceedance import exceedances
 from rocking.response import Response
 
@@ -111,6 +112,8 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     >>> print(f"{found.share_at_rest:.3f}")
     0.498
     """
+    if not isinstance(response, Response):
+        raise InvalidOption(f"a Response is needed, not a {type(response).__name__}: simulate(block, motion) makes one")
     proven = response.chattering[np.isfinite(response.chattering["upper"])]
     starts = response.events["time"][response.events["kind"] == "uplift"]
     struck = response.impacts["time"]

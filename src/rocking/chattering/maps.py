@@ -105,6 +105,7 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> Chatt
     """
     import xarray as xr
 
+    checks.mapping(parameters, "parameters", InvalidOption, '{"a": [1.0, 1.1], "omega": [1.0, 2.0]}')
     if len(parameters) != 2:
         raise InvalidOption(f"a map has two parameters, not {len(parameters)}")
     (first, x), (second, y) = ((name, _axis(values, name)) for name, values in parameters.items())

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 #: Rows of a table for people, of which the last is the last.
 _SHOWN: Final = 12
 
+#: What is wrong with a time by a formula that cannot know.
+_TAKES_FOR_COMPLETE: Final = ", worthless: it takes chattering for complete"
+
 _AMPLITUDES: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77", "approximation": "Chebyshev expansion"}
 
 
@@ -70,7 +73,7 @@ class ChatteringReport:
             ("time of rest, exact", self._time(times["exact"])),
             ("  proven bracket", self._bracket(bracket)),
             (f"  by Eq. 75{_resolved(result['resolved'])}", self._time(times["semianalytical"])),
-            ("  by Eq. 65", self._time(times["asymptotic"])),
+            ("  by Eq. 65", f"{self._time(times['asymptotic'])}{'' if result['complete'] else _TAKES_FOR_COMPLETE}"),
             (
                 f"  by a series, {result['series']['order']} terms",
                 f"{self._time(times['series'])}{_trust(result['series'])}",
@@ -177,9 +180,9 @@ class ChatteringReport:
         return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {bracket['impacts']} impacts"
 
     def _pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
-        approximate = f"{values[equation]:.9g} by Eq. {equation[2:]}"
         if math.isnan(values["exact"]):
-            return f"none, the block does not come down; {approximate}"
+            return f"none, the block does not come down; Eq. {equation[2:]} means nothing here"
+        approximate = f"{values[equation]:.9g} by Eq. {equation[2:]}"
         exact = self._time(values["exact"]) if time else f"{values['exact']:.9g}"
         return f"{exact} exact, {approximate}"
 
@@ -265,6 +268,12 @@ class CriticalReport:
     omega: float
     eta: float
     amplitudes: dict[str, float | None]
+
+    def __repr__(self) -> str:
+        return (
+            f"<CriticalReport: omega = {self.omega:g}, eta = {self.eta:g}: chattering is complete up to "
+            f"{self.amplitudes['exact']:.9g} g alpha>"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return all numbers by name."""

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.engine import require_finished
@@ -218,9 +219,10 @@ def compare_schemes(
         require_finished(np.array([found.unfinished]))
         return found
 
+    tried = checks.several(schemes, "schemes", InvalidOption)
     certified = response(Certified())
     outcomes, refused = [], []
-    for scheme in schemes:
+    for scheme in tried:
         try:
             outcomes.append(_outcome(scheme, response(scheme), certified))
         except InvalidOption as error:

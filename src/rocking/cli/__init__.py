@@ -65,11 +65,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _run(arguments: list[str]) -> None:
     wording.refuse_unknown_options(app, arguments)
+    _explain(wording.called(app, arguments))
     command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
     quiet = any(getattr(value, "quiet", False) for value in bound.arguments.values())
     audience: Audience = "nobody" if quiet else "everybody"
     with notes_for(audience, lambda sentence: wording.in_options(sentence, app, arguments)), _warnings_as_notes():
         command(*bound.args, **bound.kwargs)
+
+
+def _explain(command: App) -> None:
+    """Let a command's help be all that its function says, not the line that the list of commands has."""
+    if command.default_command is not None:
+        command.help = None
 
 
 def _print_what_the_terminal_can_show() -> None:

@@ -18,7 +18,7 @@ from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.named_pulses import named_pulse
 from rocking.plausibility import block_notes, level_notes, motion_notes
 from rocking.progress import Progress, note
-from rocking.quantities import acceleration, number, sides, tilt, values
+from rocking.quantities import Quantity, acceleration, number, sides, tilt, values, velocity
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 #: Options that say what a rectangular block is.
 _SIZES: Final = ("--width", "--height")
 _HALVES: Final = ("--half-width", "--half-height")
+
+#: What goes with a slenderness that is all that is known of a block.
+_FREQUENCY_PARAMETER: Final = (
+    "p is sqrt(3 g/(4 R)) of a rectangular block, with the distance R from its edge to its centre of mass; the mass "
+    "alone does not matter"
+)
 
 #: Spread over the command's own options, each group under its own heading in the help.
 BLOCK: Final = Parameter(name="*", group=Group("Block", sort_key=1))
@@ -127,7 +133,8 @@ def _which_block(given: Sequence[str], descriptions: Sequence[Sequence[str]]) ->
     if len(begun) > 1:
         return f"{' and '.join(given)} belong to different descriptions of a block; give one: {_choices(begun)}"
     if begun:
-        return f"a block needs more than {' and '.join(given)}: give {_choices(begun)}"
+        hint = "" if given != ("--alpha",) or "--p" not in begun[0] else f"; {_FREQUENCY_PARAMETER}"
+        return f"a block needs more than {' and '.join(given)}: give {_choices(begun)}{hint}"
     return f"a block is needed: give {_choices(descriptions)}"
 
 
@@ -163,6 +170,17 @@ def _acceleration(text: str, option: str) -> float:
     for sentence in level_notes(text, value, option):
         note(sentence)
     return value
+
+
+def _ratio(text: str, option: str) -> float:
+    """Return a level of a measure in the block's own units."""
+    try:
+        return number(text, option)
+    except InvalidOption:
+        raise InvalidOption(
+            f"{option} takes plain numbers with this --measure, which counts in the block's own units, "
+            f"not {text.strip()!r}"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -300,16 +318,19 @@ class MeasureOptions:
     levels: Annotated[
         str | None,
         _written(
-            "Levels to scale every motion to, as 0.1g,0.2g or 0.1g:1g:10 (of velocities, m/s, and of ratios plain "
-            "numbers); START:STOP:COUNT:log for equal ratios."
+            "Levels to scale every motion to, as 0.1g,0.2g or 0.1g:1g:10 (velocities as 0.4 (m/s) or 40cm/s, ratios as "
+            "plain numbers); START:STOP:COUNT:log for equal ratios."
         ),
     ] = None
 
     def chosen(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        quantity = _acceleration if self.measure in ("pga", "sa") else number
-        levels = None if self.levels is None else values(self.levels, "--levels", quantity)
+        levels = None if self.levels is None else values(self.levels, "--levels", self._quantity())
         return {"measure": self.measure, "period": self.period, "damping": self.damping, "levels": levels}
+
+    def _quantity(self) -> Quantity:
+        """Return what reads a level of the measure."""
+        return {"pga": _acceleration, "sa": _acceleration, "pgv": velocity}.get(self.measure, _ratio)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from inspect import Parameter
 from typing import Final
 
-from cyclopts import App, Argument, CycloptsError, MissingArgumentError, UnknownCommandError
+from cyclopts import App, Argument, CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError
 
 from rocking.errors import InvalidOption
 
@@ -18,6 +18,9 @@ _ALIKE: Final = 0.8
 #: Names so short are too alike for a guess: a suggestion must not lead to another quantity.
 _SHORT: Final = len("--pga")
 
+#: What kinds of numbers are called.
+_NUMBERS: Final[dict[type, str]] = {float: "a number", int: "a whole number"}
+
 _OPTION: Final = re.compile(r"--?[A-Za-z]")
 
 
@@ -25,10 +28,12 @@ def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
     """Return an error as one line that names options."""
     sentence = " ".join(str(error).split()).rstrip(".")
     if isinstance(error, UnknownCommandError):
-        return _unknown_command(_called(app, arguments), (error.unused_tokens or arguments)[0])
+        return _unknown_command(called(app, arguments), (error.unused_tokens or arguments)[0])
     command = f"rocking{''.join(f' {name}' for name in _command(app, arguments))}"
     if isinstance(error, MissingArgumentError) and error.argument is not None:
         return f"{_missing(error.argument, command, arguments)}; see {command} --help"
+    if isinstance(error, CoercionError) and error.argument and error.token and error.target_type in _NUMBERS:
+        return f"{_misread(error.argument, error.token.value, error.target_type)}; see {command} --help"
     if isinstance(error, CycloptsError):
         return f"{sentence}; see {command} --help"
     return in_options(sentence, app, arguments)
@@ -59,6 +64,13 @@ def refuse_unknown_options(app: App, arguments: Sequence[str]) -> None:
             raise InvalidOption(f"rocking {' '.join(command)} has no option {name}{_meant(name, known)}")
 
 
+def called(app: App, arguments: Sequence[str]) -> App:
+    """Return the command that is called, or the program where none is."""
+    for name in _command(app, arguments):
+        app = app[name]
+    return app
+
+
 def _unknown_command(app: App, name: str) -> str:
     commands = [each for each in app if not each.startswith("-")]
     close = difflib.get_close_matches(name, commands, n=1)
@@ -83,12 +95,6 @@ def _command(app: App, arguments: Sequence[str]) -> list[str]:
     return names
 
 
-def _called(app: App, arguments: Sequence[str]) -> App:
-    for name in _command(app, arguments):
-        app = app[name]
-    return app
-
-
 def _missing(argument: Argument, command: str, arguments: Sequence[str]) -> str:
     """Say what a command needs, or that an option is given without its value."""
     if _is_positional(argument):
@@ -97,24 +103,30 @@ def _missing(argument: Argument, command: str, arguments: Sequence[str]) -> str:
     return f"{argument.name} needs a value" if given else f"{command} needs {argument.name}"
 
 
+def _misread(argument: Argument, text: str, wanted: type) -> str:
+    """Say that an option takes a number, where its text is none."""
+    name = argument.name.lstrip("-").upper() if _is_positional(argument) else argument.name
+    return f"{name} takes {_NUMBERS[wanted]}, not {text!r}"
+
+
 def _is_positional(argument: Argument) -> bool:
     return not argument.keys and argument.field_info.kind is not Parameter.KEYWORD_ONLY
 
 
 def _options(app: App, arguments: Sequence[str]) -> set[str]:
     """Return the options of the command that is called."""
-    called = _called(app, arguments)
-    if called.default_command is None:
+    chosen = called(app, arguments)
+    if chosen.default_command is None:
         return {"--help", "-h", "--version", "-V"}
-    return _names(called.assemble_argument_collection()) | {"--help", "-h", "--version", "-V"}
+    return _names(chosen.assemble_argument_collection()) | {"--help", "-h", "--version", "-V"}
 
 
 def _keywords(app: App, arguments: Sequence[str]) -> set[str]:
     """Return the options of the command that is called which are no positional arguments as well."""
-    called = _called(app, arguments)
-    if called.default_command is None:
+    chosen = called(app, arguments)
+    if chosen.default_command is None:
         return set()
-    return _names(each for each in called.assemble_argument_collection() if not _is_positional(each))
+    return _names(each for each in chosen.assemble_argument_collection() if not _is_positional(each))
 
 
 def _names(collection: Iterable[Argument]) -> set[str]:

@@ -57,16 +57,21 @@ def pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Flo
         raise InvalidMotion(
             f"a motion must last from {_SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
         )
-    with np.errstate(over="ignore"):
-        bounds = piecewise.value(np.abs(rows), np.maximum(np.diff(ends), _SHORTEST))
-    if not np.all(bounds <= STRONGEST):
+    if not _stays_below(STRONGEST, rows, np.diff(ends)):
+        raise InvalidMotion(f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale")
+    if not _stays_below(STRONGEST, rows, np.maximum(np.diff(ends), _SHORTEST)):
         raise InvalidMotion(
-            f"a motion must stay below {STRONGEST:g} m/s^2 on all its pieces, and where they are shorter than "
-            f"{_SHORTEST:g} s so long: check its units"
+            f"a piece of a motion is too steep: shorter than {_SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "
+            "within that time: check units and times"
         )
     for array in (ends, rows):
         array.setflags(write=False)
     return ends, rows
+
+
+def _stays_below(limit: float, rows: Floats, widths: Floats) -> bool:
+    with np.errstate(over="ignore"):
+        return bool(np.all(piecewise.value(np.abs(rows), widths) <= limit))
 
 
 def vertical(component: M, kind: type[M]) -> M:

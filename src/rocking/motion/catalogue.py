@@ -43,6 +43,12 @@ class Contents:
         table = text_table(columns, [[entry[column] for column in columns] for entry in self.entries])
         return f"{self.title}\n\n{table}" if self.title else table
 
+    def __repr__(self) -> str:
+        names = ", ".join(str(entry["name"]) for entry in self.entries)
+        title = f"{self.title}; " if self.title else ""
+        kind = self.kind if len(self.entries) > 1 else self.kind.removesuffix("s")
+        return f"<Contents: {title}{len(self.entries)} {kind}: {names}>"
+
     def to_dict(self) -> dict[str, Any]:
         """Return the table for machines."""
         return {**self.facts, self.kind: self.entries}

@@ -85,6 +85,8 @@ def spectral_acceleration(
     duration = float(motion.breakpoints[-1])
     if np.any(periods < 1e-6 * duration):
         raise InvalidMotion(f"a period below a millionth of the duration, {duration:.6g} s, takes too long: use pga")
+    if np.any(periods > 1e6 * duration):
+        raise InvalidMotion(f"a period above a million times the duration, {duration:.6g} s, says nothing: use pgd")
     if not 0.0 <= checks.finite(damping, "damping", InvalidMotion) < 1.0:
         raise InvalidMotion(f"the damping must be a fraction of critical from 0 to below 1, not {damping:g}")
     frequencies = np.ravel(2.0 * np.pi / periods)

@@ -45,6 +45,8 @@ def named_motion(
         If there is neither, or the file cannot be read.
     """
     if is_shipped(name):
+        if not several:
+            refuse_what_is_known(name, channel=channel, dt=dt, units=units)
         motion = records.load(name)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
@@ -78,6 +80,21 @@ def named_vertical(name: str, record: str, *, dt: float | None = None, units: st
             f"{name}: there is no such file or shipped record for the vertical motion, and {record} has no channels"
         )
     return formats.read_as(record, name, Request.checked(dt, units, several=True))
+
+
+def refuse_what_is_known(name: str, **said: object) -> None:
+    """Check that nothing is said of a shipped record that it knows itself.
+
+    Raises
+    ------
+    UnreadableRecord
+        If its channel, step or units are given.
+    """
+    for argument, value in said.items():
+        if value is not None:
+            raise UnreadableRecord(
+                f"{name}: a shipped record is one channel, with its step and units; leave {argument} out"
+            )
 
 
 def is_shipped(name: str) -> bool:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from rocking import checks
 from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description
 from rocking.motion.formats.units import choose_unit
@@ -88,7 +89,7 @@ def info(name: str) -> Record:
     (0.01, 31932, 'g', 'CC0 1.0')
     """
     catalogue = _catalogue()
-    if name not in catalogue:
+    if checks.text(name, "name of a shipped record", UnreadableRecord) not in catalogue:
         close = meant(name)
         hint = f"did you mean {' or '.join(map(repr, close))}?" if close else f"there are {', '.join(catalogue)}"
         raise UnreadableRecord(f"no shipped record is named {name!r}: {hint}")

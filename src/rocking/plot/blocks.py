@@ -73,7 +73,7 @@ def blocks_figure(
     finite = np.concatenate([values[np.isfinite(values)] for values in panels.values()])
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     area = float(np.clip(_AREA / len(p), *_MARK))
-    with figure_for(ax, figsize or (columns * _PANEL[0] + 0.6, rows * _PANEL[1] + 0.4)) as figure:
+    with figure_for(ax, (columns * _PANEL[0] + 0.6, rows * _PANEL[1] + 0.4), figsize) as figure:
         axes = [ax] if ax is not None else list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
         for each, (name, values) in zip(axes, panels.items(), strict=False):
             there = np.isfinite(values)

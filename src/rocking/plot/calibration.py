@@ -70,7 +70,7 @@ def outcomes_figure(
     >>> [axes.get_xlabel() for axes in figure.axes]
     ['test, by its probability', 'p (rad/s)']
     """
-    with figure_for(ax, figsize or (7.0, 4.6)) as figure:
+    with figure_for(ax, (7.0, 4.6), figsize) as figure:
         tests, panels = _panels(figure, len(parameters)) if ax is None else (ax, [])
         _draw_tests(tests, probabilities, overturned)
         for panel, parameter in zip(panels, parameters, strict=False):
@@ -116,7 +116,7 @@ def measured_figure(
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
     ['measured', 'fitted']
     """
-    with figure_for(ax, figsize or (7.0, 4.0)) as figure:
+    with figure_for(ax, (7.0, 4.0), figsize) as figure:
         panels = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0)).tolist() if ax is None else [ax]
         main, *others = panels
         main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")

@@ -43,15 +43,17 @@ _TITLE_AT: Final = 0.02
 
 
 @contextmanager
-def figure_for(ax: Axes | None, figsize: tuple[float, float]) -> Iterator[Figure]:
+def figure_for(
+    ax: Axes | None, default: tuple[float, float], figsize: tuple[float, float] | None = None
+) -> Iterator[Figure]:
     """Yield the figure to draw in: that of `ax` where there is one, in its own style, else a new one in this package's.
 
     Parameters
     ----------
     ax : matplotlib.axes.Axes or None
         Where the caller is asked to draw.
-    figsize : (float, float)
-        Width and height of a new figure, inches.
+    default, figsize : (float, float)
+        Width and height of a new figure, inches: those that suit what is drawn, and the caller's own choice.
 
     Raises
     ------
@@ -76,7 +78,7 @@ def figure_for(ax: Axes | None, figsize: tuple[float, float]) -> Iterator[Figure
     import matplotlib as mpl
 
     with mpl.rc_context(STYLE):
-        figure = _new_figure(_size(figsize))
+        figure = _new_figure(_size(default if figsize is None else figsize))
         yield figure
         _make_ticks(figure)
 

@@ -41,7 +41,7 @@ def dispersions_figure(
     figsize : (float, float), optional
         Width and height of a new figure, inches.
     """
-    with figure_for(ax, figsize or (5.6, 0.8 + 0.32 * len(names))) as figure:
+    with figure_for(ax, (5.6, 0.8 + 0.32 * len(names)), figsize) as figure:
         axes = ax or figure.add_subplot()
         row = np.arange(len(names))
         axes.hlines(row, low, high, color=INK, linewidth=1.0)

@@ -68,7 +68,7 @@ def fragility_figure(
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
     ['overturning', 'band: 90 % confidence', 'dot: share of 12 outcomes at about its intensity']
     """
-    with figure_for(ax, figsize or (5.6, 4.2)) as figure:
+    with figure_for(ax, (5.6, 4.2), figsize) as figure:
         axes = ax or figure.add_subplot()
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]

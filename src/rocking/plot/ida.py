@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -35,6 +36,10 @@ _STRIP: Final[dict[str, Any]] = {"linewidth": 5.0, "solid_capstyle": "butt"}
 #: Ends of strips: lines, so that the thinnest strip is seen, and an arrow where one leaves the frame.
 _END: Final[dict[str, Any]] = {"linestyle": "", "marker": "_", "markersize": 5.0, "markeredgewidth": 0.8}
 _GOES_ON: Final[dict[str, Any]] = {"linestyle": "", "marker": "^", "markersize": 9.0, "markeredgewidth": 0.0}
+
+#: Up to so many strips there is room for names in lines of so many letters, which would else be as long as the panel.
+_ROOMY: Final = 8
+_NAME_LINE: Final = 18
 
 #: Marker that looks like a kinked curve.
 _KINK: Final = [(-4, -4), (2, -1), (0, 1), (4, 4)]
@@ -85,7 +90,7 @@ def ida_figure(
     """
     few = len(motions) <= _FEW
     styles = [*CURVES[: len(motions)]] if few else [{"color": GROUND, "linestyle": "-"}] * len(motions)
-    with figure_for(ax, figsize or (7.0, 4.2)) as figure:
+    with figure_for(ax, (7.0, 4.2), figsize) as figure:
         curves, *strips = figure.subplots(1, 2, sharey=True, width_ratios=(2.0, 1.0)).tolist() if ax is None else [ax]
         for motion, style in zip(motions, styles, strict=True):
             _draw_motion(curves, motion, style | (_OWN if few else _ALIKE))
@@ -98,8 +103,9 @@ def ida_figure(
         for panel in strips:
             _draw_strips(panel, motions, styles if few else [{"color": INK}] * len(motions))
             _name_strips(panel, motions, few=few)
+        named = motions if few else []
         add_title(figure, ax, title)
-        add_legend(figure, ax, _handles(motions if few else [], with_strips=ax is None))
+        add_legend(figure, ax, _handles(named, with_strips=ax is None, with_arrows=_go_on(motions)))
     return figure
 
 
@@ -172,6 +178,12 @@ def _highest_shown(motions: Sequence[ScaledMotion]) -> float:
     return min(_HEADROOM * float(np.max(np.concatenate(stands), initial=0.0)) or last, last)
 
 
+def _go_on(motions: Sequence[ScaledMotion]) -> bool:
+    """Whether a strip leaves the frame."""
+    top = _highest_shown(motions)
+    return any(high > top for motion in motions for _, high in motion.bands)
+
+
 def _draw_strips(axes: Axes, motions: Sequence[ScaledMotion], styles: Sequence[dict[str, Any]]) -> None:
     top = axes.get_ylim()[1]
     for k, (motion, style) in enumerate(zip(motions, styles, strict=True)):
@@ -189,14 +201,16 @@ def _name_strips(axes: Axes, motions: Sequence[ScaledMotion], *, few: bool) -> N
     """Write below each strip the number that its motion has in the legend, or its name where that has none."""
     axes.set_xlabel("overturns")
     if not few:
-        axes.set_xticks(range(len(motions)), [motion.label for motion in motions], rotation=90, fontsize="x-small")
+        width = _NAME_LINE if len(motions) <= _ROOMY else len(max((motion.label for motion in motions), key=len))
+        names = [textwrap.fill(motion.label, width) for motion in motions]
+        axes.set_xticks(range(len(motions)), names, rotation=90, fontsize="x-small")
     elif len(motions) > 1:
         axes.set_xticks(range(len(motions)), [str(k + 1) for k in range(len(motions))])
     else:
         axes.set_xticks([])
 
 
-def _handles(named: Sequence[ScaledMotion], *, with_strips: bool) -> list[Line2D]:
+def _handles(named: Sequence[ScaledMotion], *, with_strips: bool, with_arrows: bool) -> list[Line2D]:
     """Name the motions that have a style of their own, and say what else is drawn."""
     from matplotlib.lines import Line2D
 
@@ -221,5 +235,6 @@ def _handles(named: Sequence[ScaledMotion], *, with_strips: bool) -> list[Line2D
         ),
     ]
     if with_strips:
-        handles.append(Line2D([], [], color=INK, label="strip: levels that overturn (arrow: and above)", **_STRIP))
+        arrow = " (arrow: and above)" if with_arrows else ""
+        handles.append(Line2D([], [], color=INK, label=f"strip: levels that overturn{arrow}", **_STRIP))
     return handles

@@ -54,7 +54,7 @@ def intervals_figure(
     >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
     ['interval before the impact, p t', 'interval over that two impacts before']
     """
-    with figure_for(ax, figsize or (7.0, 3.2)) as figure:
+    with figure_for(ax, (7.0, 3.2), figsize) as figure:
         panels = _panels(figure) if ax is None else [ax]
         number = np.arange(1, intervals.size + 1)
         _draw(panels[0], number, intervals)

@@ -66,7 +66,7 @@ def outcome_figure(
     from matplotlib.patches import Patch
 
     count = len(meanings)
-    with figure_for(ax, figsize or (5.4, 4.2)) as figure:
+    with figure_for(ax, (5.4, 4.2), figsize) as figure:
         axes = ax or figure.add_subplot()
         axes.pcolormesh(
             x,

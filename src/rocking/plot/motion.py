@@ -45,7 +45,7 @@ def motion_figure(
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_xlim()
     ('time (s)', (np.float64(0.0), np.float64(1.0)))
     """
-    with figure_for(ax, figsize or (7.0, 2.4)) as figure:
+    with figure_for(ax, (7.0, 2.4), figsize) as figure:
         axes = ax or figure.add_subplot()
         axes.axhline(0.0, color=INK, linewidth=0.4)
         axes.plot(time, acceleration_g, color=GROUND, linewidth=0.8)

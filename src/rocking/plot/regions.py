@@ -92,7 +92,7 @@ def regions_figure(
         for region, below, above in zip(inside, curves, curves[1:], strict=False):
             polygons.setdefault(region, []).append(np.concatenate([below, above[::-1]]))
         lines += curves[1:-1]
-    with figure_for(ax, figsize or (5.6, 4.6)) as figure:
+    with figure_for(ax, (5.6, 4.6), figsize) as figure:
         axes = ax or figure.add_subplot()
         for region, corners in polygons.items():
             colour, hatch = _look(region)

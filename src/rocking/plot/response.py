@@ -122,7 +122,7 @@ def response_figure(
     scale = _scale(units, slenderness)
     drawn = scale.of(rotation)
     zoom = chattering if ax is None and chattering and _can_be_zoomed(chattering) else None
-    with figure_for(ax, figsize or (7.0, 4.4)) as figure:
+    with figure_for(ax, (7.0, 4.4), figsize) as figure:
         main, motion, sequence = _panels(figure, ax, shaken=motion_time.size > 0, zoomed=zoom is not None)
         _shade_rest(main, np.clip(rest_intervals, *shown))
         _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])))

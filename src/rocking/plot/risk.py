@@ -54,7 +54,7 @@ def risk_figure(
     figsize : (float, float), optional
         Width and height of a new figure, inches.
     """
-    with figure_for(ax, figsize or (5.6, 4.2)) as figure:
+    with figure_for(ax, (5.6, 4.2), figsize) as figure:
         axes = ax or figure.add_subplot()
         inside = (intensity >= known[0]) & (intensity <= known[1])
         axes.plot(intensity, rate, color=GROUND, linewidth=1.0, linestyle=":")

@@ -92,7 +92,7 @@ def spectrum_figure(
     few = len(motions) <= _FEW
     middle = _middle(fractiles)
     chosen = {share: k for k, share in enumerate(fractiles) if share == middle or len(curves) <= _WITH_ALL_FRACTILES}
-    with figure_for(ax, figsize or (5.6, 4.8)) as figure:
+    with figure_for(ax, (5.6, 4.8), figsize) as figure:
         panels = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0)).tolist() if ax is None else [ax]
         peaks, *shares = panels
         for style, curve in zip(CURVES, curves, strict=False):

@@ -45,8 +45,10 @@ class Contact:
         """Both forces at times of any shape; NaN outside the response."""
         times = checks.numbers(time, "time", InvalidOption)
         flat = times.ravel()
-        horizontal, vertical = self._forces_in(flat, self.history.rows(flat))
-        horizontal[self.history.outside(flat)] = vertical[self.history.outside(flat)] = np.nan
+        outside = self.history.outside(flat)
+        within = np.where(outside, 0.0, flat)
+        horizontal, vertical = self._forces_in(within, self.history.rows(within))
+        horizontal[outside] = vertical[outside] = np.nan
         return horizontal.reshape(times.shape), vertical.reshape(times.shape)
 
     def largest(self, measure: Measure) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks, svg
-from rocking.arrays import Floats
+from rocking.arrays import Floats, as_asked
 from rocking.block import Block
 from rocking.contact import friction_demand
 from rocking.errors import InvalidOption
@@ -211,30 +211,33 @@ class Response:
         Returns
         -------
         ndarray
-            Same shape; NaN outside [0, duration].
+            Same shape, a number for a number; NaN outside [0, duration].
 
         Raises
         ------
         InvalidOption
             If a time is not a number.
         """
-        return self._history.states(time)[..., 0]
+        return as_asked(self._history.states(time)[..., 0])
 
     def angular_velocity(self, time: ArrayLike) -> Floats:
         """Angular velocity, rad/s, at any time (just after an impact, at one); NaN outside [0, duration]."""
-        return self._history.states(time)[..., 1]
+        return as_asked(self._history.states(time)[..., 1])
 
     def angular_acceleration(self, time: ArrayLike) -> Floats:
         """Angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
-        return self._history.states(time)[..., 2]
+        return as_asked(self._history.states(time)[..., 2])
 
     def normal_force(self, time: ArrayLike) -> Floats:
         """Return the normal force over the weight at any time; impulses at impacts are not part of it."""
-        return self._contact.forces(time)[1]
+        return as_asked(self._contact.forces(time)[1])
 
     def friction_demand(self, time: ArrayLike) -> Floats:
-        """Friction coefficient that sticking needs at any time; infinite where the normal force is not positive."""
-        return friction_demand(*self._contact.forces(time))
+        """Friction coefficient that sticking needs at any time: infinite where the normal force is not positive.
+
+        NaN outside the response.
+        """
+        return as_asked(friction_demand(*self._contact.forces(time)))
 
     @cached_property
     def required_friction(self) -> float:

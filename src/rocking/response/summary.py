@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.response import data
+from rocking.response import data, digits
 from rocking.response.verdict import in_words
 from rocking.tables import named, plain
 
@@ -15,16 +15,8 @@ if TYPE_CHECKING:
     from rocking.response.response import Response
     from rocking.response.sensitivity import Sensitivity
 
-#: What drives a block (the motion, or the initial state) is taken to be known to this part of itself, about what the
-#: usual record formats print: digits of times and of the peak that it would change are not shown.
-KNOWN: Final = 1e-6
-
 #: Events that a summary lists.
 _LISTED: Final = 12
-_MOST_DECIMALS, _MOST_DIGITS = 9, 6
-
-#: From so much on, s, the unknown part of a time is told with it.
-_TOLD: Final = 1e-3
 
 
 def text(response: Response, friction: float | None) -> str:
@@ -38,7 +30,7 @@ def text(response: Response, friction: float | None) -> str:
         ("uplift above", f"{plus:.4f} g" if plus == minus else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"),
         *_event_lines(response, known),
         ("impacts resolved", f"{len(response.impacts)}"),
-        ("peak rotation", _peak_text(response, known)),
+        ("peak rotation", _peak_text(response)),
         ("friction needed", f"{response.required_friction:.4f}{_before_tipping(response)}"),
         ("least normal force", f"{response.minimum_normal_force:.4f} of the weight{_before_tipping(response)}"),
         *_contact_lines(response, friction),
@@ -52,7 +44,7 @@ def text(response: Response, friction: float | None) -> str:
 def line(response: Response) -> str:
     """Return what happened, in one line."""
     shaken = "no motion" if response.motion is None else response.motion.label
-    peak = "" if response.overturned else f", peak {response.peak_over_slenderness:.4f} of the slenderness"
+    peak = "" if response.overturned else f", peak {response.peak_over_slenderness:.4g} of the slenderness"
     return (
         f"{response.block.description} under {shaken}: {in_words(response, f'{response.overturn_time:.4f} s')}{peak}; "
         f"{len(response.events)} events, {len(response.impacts)} impacts resolved, {response.duration:.5g} s"
@@ -107,34 +99,6 @@ def values(response: Response, friction: float | None) -> dict[str, Any]:
     return result
 
 
-def time_text(time: float, change: float) -> str:
-    """Time in s, as far as it is known where what drives the block is known to `KNOWN` of itself.
-
-    Parameters
-    ----------
-    change : float
-        Change of the time per relative change of what drives the block, s.
-
-    Examples
-    --------
-    >>> time_text(230.726244377, 0.0), time_text(230.726244377, 3.0), time_text(230.726244377, 4e5)
-    ('230.726244377 s', '230.72624 s', '230.7 +- 0.4 s')
-    """
-    unknown = KNOWN * change
-    text = f"{time:.{_decimals(unknown)}f}"
-    if not unknown >= _TOLD:
-        return f"{text} s"
-    return f"{text} +- {unknown:.1g} s" if unknown < 0.5 * time else f"about {text} s"
-
-
-def _decimals(unknown: float) -> int:
-    """Decimals of a number of which so much is unknown: of what is told, the one that is uncertain as well."""
-    if not unknown > 0.0:
-        return 0 if math.isnan(unknown) else _MOST_DECIMALS
-    known = -math.log10(unknown)
-    return min(max(math.ceil(known) if unknown >= _TOLD else math.floor(known), 0), _MOST_DECIMALS)
-
-
 def _parameters(response: Response) -> str:
     sides = response.block.sides[:1] if response.block.is_symmetric else response.block.sides
     return "; ".join(map(str, sides))
@@ -156,12 +120,12 @@ def _event_lines(response: Response, known: Sensitivity) -> list[tuple[str, str]
     changes = known.driving()[1]
     lines = []
     for event, change in zip(response.events[:_LISTED], changes, strict=False):
-        entry = time_text(float(event["time"]), float(change))
+        entry = digits.time_text(float(event["time"]), float(change))
         if event["kind"] == "uplift":
             entry += f", to side {'+' if event['side'] > 0 else '-'}"
         sequence = sequences.get(float(event["time"]))
         if event["kind"] == "rest" and sequence is not None:
-            entry += _bracket_text(sequence, min(_decimals(KNOWN * change), 4))
+            entry += _bracket_text(sequence, min(digits.decimals(digits.KNOWN * change), 4))
         lines.append((str(event["kind"]), entry))
     if len(response.events) > _LISTED:
         lines.append(("...", f"{len(response.events) - _LISTED} more events"))
@@ -175,15 +139,13 @@ def _bracket_text(sequence: np.void, decimals: int) -> str:
     return f", complete chattering proven from {sequence['start']:.{decimals}f} s on, bracket {width:.1e} s wide"
 
 
-def _peak_text(response: Response, known: Sensitivity) -> str:
-    change = known.driving()[0]
-    digits = _MOST_DIGITS
-    if change > 0.0 and response.peak_rotation > 0.0:
-        digits = min(max(math.floor(-math.log10(KNOWN * change / response.peak_rotation)), 1), _MOST_DIGITS)
-    return (
-        f"{response.peak_rotation:.{digits}g} rad at {response.peak_time:.4f} s, "
-        f"{response.peak_over_slenderness:.{min(digits, 4)}g} of the slenderness"
-    )
+def _peak_text(response: Response) -> str:
+    ratio = digits.ratio_text(response)
+    return f"{digits.peak_text(response)} at {digits.peak_time_text(response)}, {ratio} of the slenderness"
+
+
+def _before_tipping(response: Response) -> str:
+    return "" if math.isnan(response.tipping_time) else f", until it tips at {digits.tipping_text(response)}"
 
 
 def _contact_lines(response: Response, friction: float | None) -> list[tuple[str, str]]:
@@ -204,13 +166,8 @@ def _sliding(response: Response, friction: float | None) -> dict[str, Any]:
     )
 
 
-def _before_tipping(response: Response) -> str:
-    return "" if math.isnan(response.tipping_time) else f", until it tips at {response.tipping_time:.4f} s"
-
-
 def _verdict(response: Response, known: Sensitivity) -> str:
-    changes = known.driving()[1]
-    verdict = in_words(response, time_text(response.overturn_time, changes[-1]) if response.overturned else "")
+    verdict = in_words(response, digits.overturn_text(response) if response.overturned else "")
     if response.stalled:
         verdict += f"; {response.stalled} rest(s) not proven"
     ambiguities = known.ambiguities(response.peak_rotation)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from rocking.response.digits import brief_overturn_text
+
 if TYPE_CHECKING:
     from rocking.response.response import Response
 
@@ -22,8 +24,13 @@ def in_words(response: Response, overturn_time: str) -> str:
 
 def in_brief(response: Response) -> str:
     """Return what became of the block, for a row of a table."""
+    doubtful = ", AMBIGUOUS" if response.ambiguous else ""
+    return f"{_brief(response)}{doubtful}"
+
+
+def _brief(response: Response) -> str:
     if response.overturned:
-        return f"overturns at {response.overturn_time:.2f} s"
+        return f"overturns at {brief_overturn_text(response)}"
     if response.unfinished:
         return f"unfinished, given up at {response.duration:.2f} s"
     if response.stopped:

@@ -8,6 +8,7 @@ from typing import ClassVar, Final, Literal, get_args
 
 import numpy as np
 
+from rocking import checks
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption, OutsideFit
@@ -57,8 +58,7 @@ class AsymptoticTime(Treatment):
     critical: Critical = "eq76"
 
     def __post_init__(self) -> None:
-        if self.critical not in get_args(Critical):
-            raise InvalidOption(f"critical must be one of {', '.join(get_args(Critical))}, not {self.critical!r}")
+        checks.one_of(self.critical, "critical", InvalidOption, get_args(Critical))
 
     @property
     def label(self) -> str:

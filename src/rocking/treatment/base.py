@@ -90,4 +90,9 @@ def treatment(chattering: str | Treatment) -> Treatment:
     name, given, value = chattering.partition("=") if isinstance(chattering, str) else ("", "", "")
     if name not in _BY_NAME:
         raise InvalidOption(f"chattering must be one of {', '.join(_BY_NAME)} or a treatment, not {chattering!r}")
-    return _BY_NAME[name].from_text(value) if given else _BY_NAME[name]()
+    if not given:
+        return _BY_NAME[name]()
+    try:
+        return _BY_NAME[name].from_text(value)
+    except InvalidOption as error:
+        raise InvalidOption(f'chattering="{chattering}": {error}') from None

@@ -79,6 +79,11 @@ class Validation:
     probabilities: Floats
     repeats: tuple[Scores, ...]
 
+    def __repr__(self) -> str:
+        repeats, tests = self.probabilities.shape
+        times = "once" if repeats == 1 else f"{repeats} times"
+        return f"<Validation: {tests} tests, each left out {times}: {self.scores}>"
+
     @property
     def scores(self) -> Scores:
         """Mean scores of the repeats."""

@@ -33,6 +33,9 @@ class Scores:
         """Write the three in one line."""
         return f"accuracy {100 * self.accuracy:.1f} %, log loss {self.log_loss:.3f}, Brier score {self.brier:.3f}"
 
+    def __repr__(self) -> str:
+        return f"<Scores: {self}>"
+
     @classmethod
     def of(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
         """Measure probabilities against outcomes of the same number.
@@ -45,7 +48,7 @@ class Scores:
         Examples
         --------
         >>> Scores.of([0.9, 0.2, 0.6], [True, False, False])
-        Scores(accuracy=0.6666666666666666, log_loss=0.41493..., brier=0.13666...)
+        <Scores: accuracy 66.7 %, log loss 0.415, Brier score 0.137>
         """
         given, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
         if given.shape != seen.shape or not given.size:

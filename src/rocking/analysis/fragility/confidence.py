@@ -48,6 +48,9 @@ class LikelyRegion:
 
     rim: Probit
 
+    def __repr__(self) -> str:
+        return f"<LikelyRegion: {len(self.rim.slope)} fits on its rim>"
+
     @classmethod
     def of(
         cls, z: Floats, exceeded: Floats, trials: Floats, clusters: Integers, fitted: Probit, confidence: float
@@ -93,6 +96,9 @@ class Resamples:
     fits: Probit
     degenerate: float
     influence: Floats
+
+    def __repr__(self) -> str:
+        return f"<Resamples: {len(self.fits.slope)} fits, {100 * self.degenerate:.3g} % of them degenerate>"
 
     @classmethod
     def of(

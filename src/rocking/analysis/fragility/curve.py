@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +16,11 @@ from rocking import checks
 from rocking.analysis.fragility import lognormal, nrml
 from rocking.analysis.fragility.confidence import Confidence, Resamples
 from rocking.analysis.fragility.lognormal import Probit
-from rocking.analysis.intensity import Measure
-from rocking.arrays import Floats
+from rocking.analysis.intensity import Measure, intensities
+from rocking.arrays import Floats, as_asked
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption, OutputError
+from rocking.errors import InvalidOption
 from rocking.tables import text_table, write_text
 from rocking.treatment.base import Model
 
@@ -72,6 +73,15 @@ class FragilityCurve:
     likelihood: lognormal.Likelihood
     goodness: lognormal.Goodness
 
+    def __repr__(self) -> str:
+        ends = (self.median_interval, self.dispersion_interval)
+        median, dispersion = ("{:.4g} to {:.4g}".format(*each) for each in ends)
+        count = f"{self.exceeded.sum():.0f} of {self.trials.sum():.0f} exceeded"
+        return (
+            f"<FragilityCurve: {self.limit_state}, {count}; median {self.median:.4g} ({median}) in SI units, "
+            f"dispersion {self.dispersion:.4g} ({dispersion}); {100 * self.confidence:g} % confidence>"
+        )
+
     @property
     def median(self) -> float:
         """Intensity of probability one half."""
@@ -116,8 +126,8 @@ class FragilityCurve:
         >>> curve.probability([curve.median, 0.0]).round(12).tolist()
         [0.5, 0.0]
         """
-        at = _intensities(intensity)
-        return np.asarray(self.fitted.probability(_logarithm(at).ravel())[0].reshape(at.shape))
+        at = intensities(intensity)
+        return as_asked(self.fitted.probability(_logarithm(at).ravel())[0].reshape(at.shape))
 
     def intensity_of(self, probability: float) -> float:
         """Intensity at which the fitted probability is as given.
@@ -165,13 +175,13 @@ class FragilityCurve:
         time = checks.positive(years, "years", InvalidOption)
         share = checks.share(confidence, "confidence", InvalidOption)
         with np.errstate(divide="ignore"):
-            return np.asarray(-math.log1p(-share) / (time * self.probability(intensity)))
+            return -math.log1p(-share) / (time * self.probability(intensity))
 
     def band(self, intensity: ArrayLike) -> tuple[Floats, Floats]:
         """Lower and upper end of the pointwise confidence band of the probability."""
         from scipy.special import ndtr
 
-        at = _intensities(intensity)
+        at = intensities(intensity)
         z = _logarithm(at).ravel()
         finite = np.where(np.isfinite(z), z, 0.0)
         ends = self.uncertainty.interval(
@@ -180,7 +190,7 @@ class FragilityCurve:
             np.stack([np.ones_like(finite), finite]),
             self.confidence,
         )
-        low, high = (np.asarray(ndtr(end)).reshape(at.shape) for end in ends)
+        low, high = (as_asked(np.asarray(ndtr(end)).reshape(at.shape)) for end in ends)
         return low, high
 
     def to_dict(self) -> dict[str, Any]:
@@ -221,9 +231,9 @@ class Fragility:
     model : str
         Equation of motion, which says how a block's own unit counts.
     outcomes : pandas.DataFrame or None
-        What was simulated, one row each, so that the fit can be audited: motion, block (position), polarity, intensity
-        (SI), peak_rotation_rad, peak_over_alpha (infinite where it overturned), overturned, and whether each limit
-        state was exceeded; None where the outcomes were given.
+        What was simulated, one row each, so that the fit can be audited: motion, block (position), polarity, the
+        measure with its unit (SI, as pga_m_s2), peak_rotation_rad, peak_over_alpha (infinite where it overturned),
+        overturned, and whether each limit state was exceeded; None where the outcomes were given.
     """
 
     curves: tuple[FragilityCurve, ...]
@@ -285,11 +295,8 @@ class Fragility:
         InvalidOption
             If there is none of that name.
         """
-        for curve in self.curves:
-            if curve.limit_state == limit_state:
-                return curve
-        names = ", ".join(curve.limit_state for curve in self.curves)
-        raise InvalidOption(f"there is no limit state {limit_state!r}; there are {names}")
+        curves = {curve.limit_state: curve for curve in self.curves}
+        return curves[checks.one_of(limit_state, "limit_state", InvalidOption, list(curves))]
 
     def annual_rate(self, hazard: HazardCurve) -> Risk:
         """Annual rates of exceeding the limit states at a site, from its hazard curve.
@@ -345,15 +352,13 @@ class Fragility:
             If the file cannot be written.
         """
         intensity = np.linspace(0.0, self.range[1], _POINTS)
-        try:
-            with Path(path).open("w", encoding="utf-8", newline="") as file:
-                table = csv.writer(file, lineterminator="\n")
-                table.writerow(["limit_state", self.measure.column, "probability", "lower", "upper"])
-                for curve in self.curves:
-                    columns = np.column_stack([intensity, curve.probability(intensity), *curve.band(intensity)])
-                    table.writerows([curve.limit_state, *(f"{value:.10g}" for value in row)] for row in columns)
-        except OSError as error:
-            raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(["limit_state", self.measure.column, "probability", "lower", "upper"])
+        for curve in self.curves:
+            columns = np.column_stack([intensity, curve.probability(intensity), *curve.band(intensity)])
+            table.writerows([curve.limit_state, *(f"{value:.10g}" for value in row)] for row in columns)
+        write_text(path, text.getvalue())
 
     def outcomes_to_csv(self, path: str | Path) -> None:
         """Write `outcomes`, one row for each simulation.
@@ -474,13 +479,6 @@ def _dispersion(slope: float) -> float:
     if slope >= lognormal.STEEP:
         return 0.0
     return 1.0 / slope if slope > 0.0 else math.inf
-
-
-def _intensities(intensity: ArrayLike) -> Floats:
-    at = np.asarray(intensity, dtype=np.float64)
-    if not np.all(at >= 0.0):
-        raise InvalidOption("intensities must be numbers that are not negative")
-    return at
 
 
 def _logarithm(intensity: Floats) -> Floats:

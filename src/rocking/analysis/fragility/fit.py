@@ -15,7 +15,7 @@ from rocking.analysis.fragility import lognormal
 from rocking.analysis.fragility.confidence import Confidence, LikelyRegion, Resamples
 from rocking.analysis.fragility.curve import Fragility, FragilityCurve
 from rocking.analysis.intensity import Measure, MeasureName
-from rocking.analysis.levels import described, several_motions, simulate_levels
+from rocking.analysis.levels import described, only_block, several_motions, simulate_levels
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import require_finished
@@ -108,10 +108,9 @@ def fragility(
     median 1.443, dispersion 0.524
     """
     many, how = Blocks.of(blocks), Measure(measure, period, damping)
-    mirrored = polarity == "both" and many.is_symmetric
+    mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
     bands = _Bands(confidence, band, samples, seed)
-    if not limits:
-        raise InvalidOption("limits must name at least one limit state")
+    states = _limit_states(limits, "limits")
     shaken, values = several_motions(motions, how)
     options: dict[str, Any] = {
         "chattering": chattering,
@@ -136,14 +135,16 @@ def fragility(
     x = np.broadcast_to(intensity, ratio.shape).ravel()
     curves = [
         _curve(name, x, passed(ratio, limit, name).ravel(), np.ones(x.size), clusters.ravel(), bands, how)
-        for name, limit in limits.items()
+        for name, limit in states.items()
     ]
     text = _described(described(blocks), len(shaken), None if levels is None else len(intensity), mirrored=mirrored)
-    only = many[0] if len(many) == 1 else None
-    return Fragility(tuple(curves), how, text, only, model, _outcomes(table, x, ratio, limits))
+    outcomes = _outcomes(table, how, x, ratio, states)
+    return Fragility(tuple(curves), how, text, only_block(blocks), model, outcomes)
 
 
-def _outcomes(table: xr.Dataset, intensity: Floats, ratio: Floats, limits: Mapping[str, float]) -> pd.DataFrame:
+def _outcomes(
+    table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limits: Mapping[str, float]
+) -> pd.DataFrame:
     """Every simulation: motion, block, polarity, intensity, peak and what it exceeded."""
     import pandas as pd
 
@@ -154,7 +155,7 @@ def _outcomes(table: xr.Dataset, intensity: Floats, ratio: Floats, limits: Mappi
             "motion": motion,
             "block": block,
             "polarity": polarity,
-            "intensity": intensity,
+            measure.column: intensity,
             "peak_rotation_rad": table.peak_rotation.values.ravel(),
             "peak_over_alpha": ratio.ravel(),
             "overturned": table.overturned.values.ravel(),
@@ -248,7 +249,7 @@ def fit_fragility(
     if x.min() < _INTENSITIES[0] or x.max() > _INTENSITIES[1]:
         raise InvalidOption("intensity must be from {:g} to {:g}: check its units".format(*_INTENSITIES))
     count = _whole(trials, "trials", x.size, 1.0, _MOST_TRIALS)
-    outcomes = exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}
+    outcomes = _limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
     groups = np.arange(x.size) if clusters is None else _clusters(clusters, x.size)
     bands = _Bands(confidence, band, samples, seed)
     curves = [
@@ -269,8 +270,7 @@ class _Bands:
 
     def __post_init__(self) -> None:
         checks.share(self.confidence, "confidence", InvalidOption)
-        if self.kind not in get_args(Band):
-            raise InvalidOption(f"band must be one of {', '.join(get_args(Band))}, not {self.kind!r}")
+        checks.one_of(self.kind, "band", InvalidOption, get_args(Band))
         checks.whole(self.samples, "samples", InvalidOption, 1)
         checks.whole(self.seed, "seed", InvalidOption, 0)
 
@@ -318,6 +318,13 @@ def passed(ratio: Floats, limit: float, name: str) -> Floats:
     return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
 
 
+def _limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return what is given for each limit state by its name, of which there is one at least."""
+    for state in checks.mapping(given, name, InvalidOption, "{'overturning': inf}"):
+        checks.text(state, f"name of a limit state in {name}", InvalidOption)
+    return given
+
+
 def _whole(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
     """Whole numbers, one for each intensity, between two bounds."""
     given = np.asarray(values)
@@ -327,7 +334,8 @@ def _whole(values: ArrayLike, name: str, size: int, least: float, most: ArrayLik
     except ValueError:
         raise InvalidOption(f"{name} must hold one number for each of the {size} intensities") from None
     if not np.all((numbers >= least) & (numbers <= np.asarray(most)) & (numbers == np.floor(numbers))):
-        raise InvalidOption(f"{name} must be whole numbers, at least {least:g} and no more than the trials")
+        bound = f"{most:g}" if isinstance(most, float) else "the trials"
+        raise InvalidOption(f"{name} must be whole numbers, at least {least:g} and no more than {bound}")
     return numbers
 
 

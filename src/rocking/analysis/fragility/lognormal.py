@@ -38,6 +38,11 @@ class Probit(NamedTuple):
     intercept: Floats
     slope: Floats
 
+    def __repr__(self) -> str:
+        if len(self.slope) > 1:
+            return f"<Probit: {len(self.slope)} fits>"
+        return f"<Probit: intercept {float(self.intercept[0]):.5g}, slope {float(self.slope[0]):.5g}>"
+
     def probability(self, z: Floats) -> Floats:
         """Probability at logarithms of the intensity, shape (fits, len(z))."""
         from scipy.special import ndtr

@@ -16,10 +16,12 @@ from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from rocking import checks
 from rocking.analysis.intensity import Measure
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption, OutputError
+from rocking.errors import InvalidOption
+from rocking.tables import write_text
 from rocking.treatment.base import Model
 
 NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
@@ -68,9 +70,7 @@ def write(path: str | Path, function: ET.Element, limit_states: Sequence[str], h
     OutputError
         If the file cannot be written.
     """
-    if header.loss_category not in get_args(LossCategory):
-        categories = ", ".join(get_args(LossCategory))
-        raise InvalidOption(f"loss_category must be one of {categories}, not {header.loss_category!r}")
+    checks.one_of(header.loss_category, "loss_category", InvalidOption, get_args(LossCategory))
     root = ET.Element("nrml", {"xmlns": NAMESPACE})
     model = ET.SubElement(
         root,
@@ -86,11 +86,7 @@ def write(path: str | Path, function: ET.Element, limit_states: Sequence[str], h
     ET.SubElement(model, "limitStates").text = " ".join(_name(state, "a limit state") for state in limit_states)
     model.append(function)
     ET.indent(root)
-    root.tail = "\n"
-    try:
-        ET.ElementTree(root).write(path, encoding="UTF-8", xml_declaration=True)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
+    write_text(path, f"<?xml version='1.0' encoding='UTF-8'?>\n{ET.tostring(root, encoding='unicode')}\n")
 
 
 def fragility_function(
@@ -123,8 +119,7 @@ def fragility_function(
     InvalidOption
         If the format is neither, the identifier not allowed, or a dispersion too wide for a mean and a deviation.
     """
-    if kind not in get_args(Format):
-        raise InvalidOption(f"format must be continuous or discrete, not {kind!r}")
+    checks.one_of(kind, "format", InvalidOption, get_args(Format))
     low, high = (scale.factor * end for end in valid)
     low = max(low, no_damage or 0.0)
     if not high > low * (1.0 + _NARROWEST):
@@ -192,7 +187,7 @@ def _listed(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
 
 
 def _name(text: str, what: str) -> str:
-    if not _NAME.fullmatch(text):
+    if not _NAME.fullmatch(checks.text(text, what, InvalidOption)):
         raise InvalidOption(
             f"{what} of NRML may have letters, digits, dashes and underscores, and 100 of them at most, not {text!r}"
         )

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.rules.criteria import rate
 from rocking.block import Block
@@ -103,6 +104,12 @@ class Check:
             ]
         )
 
+    def __repr__(self) -> str:
+        count = "1 record" if len(self.records) == 1 else f"{len(self.records)} records"
+        overturned = sum(response.overturned for response in self.responses)
+        rules = ", ".join(self.ratios[0]) or "no rule"
+        return f"<Check: {self.block.description}: {count}, overturned by {overturned}; by {rules}>"
+
     def _disagreements(self, rules: list[str]) -> list[str]:
         """Say of each rule how often it is wrong, and how."""
         lines = []
@@ -183,9 +190,8 @@ def check(
     0.90 0.90 0.71 does not move
     0.93 0.93 0.64 does not move
     """
-    if not motions:
-        raise InvalidOption("motions must hold at least one motion")
-    names = None if rules is None else [*rules]
+    checks.mapping(motions, "motions", InvalidOption, "{name: motion}")
+    names = None if rules is None else checks.several(rules, "rules", InvalidOption)
     responses, ratios, margins = [], [], []
     with Progress("checking", total=len(motions), show=progress) as bar:
         for motion in motions.values():

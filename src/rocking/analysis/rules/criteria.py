@@ -19,6 +19,7 @@ from rocking.block import Block, Blocks
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
+from rocking.tables import range_text
 
 #: Share of the velocity that would overturn a block at one blow, from which on Ishiyama sees blocks overturn.
 _ISHIYAMA: Final = 0.4
@@ -52,6 +53,12 @@ class Rating:
     demand: Floats
     capacity: Floats
     unit: str
+
+    def __repr__(self) -> str:
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        demand, capacity, ratio = map(range_text, (self.demand, self.capacity, self.ratio))
+        count = f"{len(self.demand)} blocks" if len(self.demand) > 1 else "1 block"
+        return f"<Rating: {self.rule}, {count}; demand {demand}{unit}, capacity {capacity}{unit}, ratio {ratio}>"
 
     @property
     def ratio(self) -> Floats:
@@ -350,7 +357,8 @@ def rate(
     >>> [*rate(rocking.Block(width=0.3, height=0.9), record, ["west", "ishiyama"])]
     ['west', 'ishiyama']
     """
-    names = [*RULES] if rules is None else [checks.one_of(name, "rules", InvalidOption, [*RULES]) for name in rules]
+    wanted = [*RULES] if rules is None else checks.several(rules, "rules", InvalidOption)
+    names = [checks.one_of(name, "rules", InvalidOption, [*RULES]) for name in wanted]
     many = Blocks.of(blocks)
     return {name: RULES[name](many, motion) for name in names}
 

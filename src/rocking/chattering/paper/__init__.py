@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from types import MappingProxyType
 from typing import Final
 
+from rocking import checks
 from rocking.chattering.paper.amplitudes import figure_5, figure_6, figure_7
 from rocking.chattering.paper.figure import PaperFigure, Statement
 from rocking.chattering.paper.histories import figure_4, figure_9, figure_10, figure_11
@@ -82,8 +83,8 @@ def paper_figure(
     >>> paper_figure(7, eta=0.8).caption
     'Fig. 7: critical amplitude against frequency; eta = 0.8'
     """
-    if number not in FIGURES:
-        raise InvalidOption(f"the paper has Figs 1 to {len(FIGURES)}, not {number!r}")
+    if not isinstance(number, Hashable) or number not in FIGURES:
+        raise InvalidOption(f"the paper has Figs 1 to {len(FIGURES)}, not {checks.shown(number)}")
     figure = FIGURES[number]
     given = {"a": a, "omega": omega, "eta": eta, "p": p, "alpha": alpha}
     chosen = {name: value for name, value in given.items() if value is not None}

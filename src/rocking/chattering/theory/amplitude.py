@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking import checks
 from rocking.arrays import Floats
 from rocking.chattering.theory import surface
 from rocking.chattering.theory.parameters import broadcast, checked_frequency, checked_restitution
@@ -66,10 +67,9 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
         "eq77": _eq77,
         "approximation": _approximation,
     }
-    if method not in methods:
-        raise InvalidOption(f"method must be one of {', '.join(map(repr, methods))}, not {method!r}")
+    chosen = checks.one_of(method, "method", InvalidOption, list(methods))
     shape, (frequencies, restitutions) = broadcast(checked_frequency(omega), checked_restitution(eta))
-    return methods[method](frequencies, restitutions).reshape(shape)[()]
+    return methods[chosen](frequencies, restitutions).reshape(shape)[()]
 
 
 def _exact(omega: Floats, eta: Floats) -> Floats:

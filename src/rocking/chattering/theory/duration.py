@@ -125,9 +125,8 @@ def chattering_time(
         "series": lambda: series_times(*parameters, order),
         "semianalytical": lambda: _semianalytical_times(*parameters, resolved),
     }
-    if method not in methods:
-        raise InvalidOption(f"method must be one of {', '.join(map(repr, methods))}, not {method!r}")
-    return methods[method]()
+    chosen = checks.one_of(method, "method", InvalidOption, list(methods))
+    return methods[chosen]()
 
 
 def is_complete(a: ArrayLike, omega: ArrayLike, eta: ArrayLike) -> NDArray[np.bool_]:

@@ -187,9 +187,10 @@ def _unknown(source: Source) -> UnreadableRecord:
         return source.error("this is a V3 file of spectra; give the V1 or V2 file of the acceleration", line.start)
     wide = table.columns(source)
     if wide is not None:
+        decimal = "" if wide != 4 or b"." in source.raw else "; decimal commas need semicolons or tabs between columns"
         return source.error(
             f"each line holds {wide} numbers, but a text table has one (acceleration) or two (time, acceleration); "
-            f"keep only these, or name all {wide} columns in a heading line"
+            f"keep only these, or name all {wide} columns in a heading line{decimal}"
         )
     foreign = next((what for mark, what in _FOREIGN.items() if source.raw.startswith(mark)), None)
     if foreign is not None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion.description import Description
 from rocking.motion.formats.source import Source
@@ -75,6 +76,15 @@ class Channel:
     def __reduce__(self) -> tuple[Any, ...]:
         samples = (self.name, self.number, self.acceleration, self.dt, self.times)
         return Channel, (*samples, self.azimuth, self.units, self.station, self.event, dict(self.metadata))
+
+    def __repr__(self) -> str:
+        taken = f"in steps of {self.dt:g} s" if self.dt is not None else "at uneven times"
+        peak = float(np.abs(self.acceleration).max(initial=0.0))
+        in_file = f", {self.units} in the file" if self.units else ""
+        return (
+            f"<Channel: {self.label}, {len(self.acceleration)} samples {taken}, peak {peak:.5g} m/s^2 "
+            f"({peak / STANDARD_GRAVITY:.4g} g){in_file}>"
+        )
 
     @property
     def label(self) -> str:

@@ -37,7 +37,7 @@ class Request:
             If the units are not known.
         """
         return cls(
-            None if dt is None else checks.positive(dt, "sampling step dt", InvalidMotion, "s"),
+            None if dt is None else checks.positive(dt, "dt", InvalidMotion, "s"),
             None if units is None else choose_unit(units),
             several,
         )

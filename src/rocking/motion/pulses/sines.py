@@ -189,9 +189,10 @@ def _lobe_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> l
         checks.finite(a, "amplitude of a lobe", InvalidMotion)
         for a in np.atleast_1d(np.asarray(amplitude, dtype=object))
     ]
-    if np.ndim(amplitude) == 0 and lobes is not None:
-        return given * checks.whole(lobes, "number of lobes", InvalidMotion, 1, 2 * MOST_CYCLES)
-    if np.ndim(amplitude) == 0 or not given or lobes not in (None, len(given)):
+    count = None if lobes is None else checks.whole(lobes, "number of lobes", InvalidMotion, 1, 2 * MOST_CYCLES)
+    if np.ndim(amplitude) == 0 and count is not None:
+        return given * count
+    if np.ndim(amplitude) == 0 or not given or count not in (None, len(given)):
         raise InvalidMotion(
             "give one amplitude and the number of lobes, or a sequence with one amplitude for each lobe"
         )

@@ -72,9 +72,8 @@ def ricker(
     (2.0, True)
     """
     amplitude, frequency = checks.finite(amplitude, "amplitude", InvalidMotion), checked_frequency(frequency)
-    if kind not in ("symmetric", "antisymmetric"):
-        raise InvalidMotion(f'the kind of a Ricker pulse must be "symmetric" or "antisymmetric", not {kind!r}')
-    symmetric = kind == "symmetric"
+    kinds = ("symmetric", "antisymmetric")
+    symmetric = checks.one_of(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
     rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
     longest = 2.0 * (_SYMMETRIC_REACH if symmetric else _ANTISYMMETRIC_REACH) / rate
     length = longest if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")

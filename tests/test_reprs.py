@@ -1,0 +1,123 @@
+"""What every public result says of itself at the prompt: a line or two, no arrays, numbers with their units."""
+
+import re
+from collections.abc import Iterator
+from types import MappingProxyType
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import rocking
+from rocking.analysis.survey import survey
+from rocking.kernels.trace import Trail
+from rocking.motion import catalogue, formats
+
+BLOCK = rocking.Block(width=0.24, height=1.1)
+RECORD = rocking.records.load("el-centro-meloland-270")
+MOTIONS = [rocking.pulses.one_sine(a, f) for a in np.linspace(2.0, 9.0, 5) for f in (0.6, 1.0, 1.6)]
+SITE = rocking.HazardCurve([0.5, 1.0, 2.0], [0.1, 0.01, 0.001])
+
+#: Longer than any sentence at the prompt.
+LONGEST = 420
+
+#: What belongs to others: arrays, tables and figures; and a kernel's own records.
+OTHERS = (np.ndarray, np.generic, pd.DataFrame, xr.Dataset, xr.DataArray, Trail)
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    path = tmp_path_factory.mktemp("records") / "mine.csv"
+    path.write_text("time (s),a (g)\n" + "".join(f"{0.01 * k:.2f},{0.1 * (k % 7 - 3):.3f}\n" for k in range(400)))
+    return path
+
+
+RESULTS = {
+    "block": lambda path: BLOCK,
+    "two-sided block": lambda path: rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4),
+    "blocks": lambda path: rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.1, 0.2]),
+    "motion": lambda path: RECORD.scaled(pga=5.0).with_vertical(RECORD),
+    "response": lambda path: rocking.simulate(BLOCK, RECORD),
+    "fragility": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10),
+    "bootstrapped fragility": lambda path: rocking.fit_fragility(
+        [2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10, band="bootstrap", samples=50
+    ),
+    "risk": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10).annual_rate(SITE),
+    "survey": lambda path: survey(BLOCK, {"one": RECORD, "two": -RECORD}),
+    "rule": lambda path: rocking.rules.west([BLOCK, rocking.Block(0.2, 1.0)], RECORD),
+    "check": lambda path: rocking.rules.check(BLOCK, {"one": RECORD}, rules=["west"]),
+    "channel": lambda path: formats.channels(path)[0],
+    "contents": lambda path: catalogue.contents(path),
+    "shipped": lambda path: catalogue.shipped(),
+    "format": lambda path: formats.identify(path),
+    "chattering": lambda path: rocking.chattering.chattering_report(1.03, 2.0, 0.92),
+    "critical amplitude": lambda path: rocking.chattering.critical_report(2.0, 0.92),
+    "episodes": lambda path: rocking.chattering.chattering_episodes(rocking.simulate(BLOCK, RECORD)),
+    "treatment": lambda path: rocking.Certified(),
+    "validation": lambda path: rocking.calibrate(
+        MOTIONS,
+        [rocking.simulate(BLOCK, one, model="linear").overturned for one in MOTIONS],
+        candidates=256,
+        two_sided=False,
+    ).cross_validate(folds=3),
+}
+
+
+def parts_of(value: object, name: str, seen: set[int]) -> Iterator[tuple[str, object]]:
+    """Every object of the package's own that public attributes, mappings and tuples lead to."""
+    if isinstance(value, (tuple, list, dict, MappingProxyType)) and type(value).__module__ == "builtins":
+        entries = value.items() if hasattr(value, "items") else enumerate(value)
+        for key, entry in list(entries)[:3]:
+            yield from parts_of(entry, f"{name}[{key}]", seen)
+    if isinstance(value, OTHERS) or not type(value).__module__.startswith("rocking") or id(value) in seen:
+        return
+    seen.add(id(value))
+    yield name, value
+    for each in [*vars(type(value)), *getattr(value, "__dict__", {})]:
+        if not each.startswith("_") and not callable(getattr(value, each)):
+            yield from parts_of(getattr(value, each), f"{name}.{each}", seen)
+
+
+@pytest.mark.parametrize("result", RESULTS)
+def test_what_is_shown_at_the_prompt_is_a_sentence_without_arrays(result, table):
+    found = list(parts_of(RESULTS[result](table), result, set()))
+    assert found
+    for name, value in found:
+        shown = repr(value)
+        assert len(shown) <= LONGEST, f"{name}: {len(shown)} characters: {shown[:200]}"
+        assert "array(" not in shown, f"{name}: {shown}"
+        assert "np.float" not in shown, f"{name}: {shown}"
+
+
+@pytest.mark.parametrize("result", ["fragility", "risk", "rule", "channel", "survey", "validation", "shipped"])
+def test_no_number_at_the_prompt_has_more_digits_than_anybody_reads(result, table):
+    assert not re.search(r"\d\.\d{7,}", repr(RESULTS[result](table)))
+
+
+def test_a_small_peak_is_told_with_its_digits():
+    assert "peak 0.00047" in repr(rocking.simulate(rocking.Block(width=0.6, height=2.1), RECORD))
+
+
+def test_a_mean_rate_says_a_year_and_a_validation_says_how_often():
+    fitted = rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10)
+    assert re.fullmatch(
+        r"<Rate: overturning: \S+ a year \(\S+ to \S+\), once in \S+ years>", repr(fitted.annual_rate(SITE).rates[0])
+    )
+    assert repr(RESULTS["validation"](None)).startswith("<Validation: 15 tests, each left out once: accuracy ")
+
+
+def test_a_number_is_answered_with_a_number():
+    response = rocking.simulate(BLOCK, RECORD)
+    fitted = rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10).curves[0]
+    asked = [getattr(response, name) for name in ("rotation", "angular_velocity", "normal_force", "friction_demand")]
+    asked += [
+        fitted.probability,
+        SITE.rate_of,
+        lambda x: fitted.largest_rate(x, years=100.0),
+        lambda x: fitted.band(x)[1],
+    ]
+    for ask in asked:
+        assert isinstance(ask(3.0), float)
+        assert ask([3.0, 4.0]).shape == (2,)
+        assert ask([3.0])[0] == ask(3.0)
