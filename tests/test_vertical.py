@@ -251,13 +251,13 @@ def test_a_block_at_rest_leaves_the_ground_where_its_weight_is_gone() -> None:
     assert response.lift_off_time == pytest.approx(1.0, abs=1e-9)
 
 
-def test_ensembles_agree_with_single_simulations_bit_for_bit() -> None:
+def test_ensembles_agree_with_single_simulations() -> None:
     blocks = rocking.Blocks.grid(p=np.linspace(1.5, 5.0, 6), alpha=np.linspace(0.1, 0.3, 5), restitution=0.9)
     motion = wave(3.0, 7).with_vertical(wave(2.0, 8))
     for polarity, sign in (("+", 1.0), ("-", -1.0)):
         many = rocking.simulate_many(blocks, motion, polarity=polarity)
         each = [rocking.simulate(block, motion.scaled(sign)).peak_rotation for block in blocks]
-        assert many.peak_rotation.to_numpy().ravel() == pytest.approx(each, rel=0.0, abs=0.0)
+        assert many.peak_rotation.to_numpy().ravel() == pytest.approx(each, rel=1e-11)
 
 
 def test_the_vertical_component_goes_with_the_motion() -> None:
