@@ -7,7 +7,7 @@ from rocking.kernels.compiled import inlined
 from rocking.kernels.lanes.crew import WIDTH
 from rocking.kernels.state import Record
 
-MaybeLine = TypeVar("MaybeLine", Line, None)
+MaybeLine = TypeVar("MaybeLine", Line, None, Line | None)
 
 
 @inlined
