@@ -73,15 +73,13 @@ def borne(weight: Line | None, this: float, before: float) -> float:
 
 
 @inlined
-def is_carried_on(weight: Line | None, lam: float, seventh: float, first: tuple[float, float]) -> bool:
-    """Whether the change of the weight makes more than nothing of a seventh term of the rate beyond the ninth.
+def is_carried_on(change: float, seventh: float, first: tuple[float, float]) -> bool:
+    """Whether a changing weight makes more than nothing of a seventh term of the rate beyond the ninth.
 
-    Time is counted in steps. What it makes in all is less than a sixtieth of |lam| times the change times the term;
-    ``first`` are the first two terms.
+    ``change`` is lam h^2 times the change of the weight over a step of length h, and time is counted in steps. What it
+    makes in all is less than a sixtieth of its product with the term; ``first`` are the first two terms.
     """
-    if weight is None:
-        return False
-    return not abs(lam * weight[1] * seventh) <= _CARRIED * (abs(first[0]) + abs(first[1]))
+    return not abs(change * seventh) <= _CARRIED * (abs(first[0]) + abs(first[1]))
 
 
 @shared

@@ -36,29 +36,34 @@ def short_step(ground: Ground, block: Record, rules: Record, state: Record, left
     if not is_straight(ground):
         return undecided()
     if has_vertical(ground):
-        return short_weighted_step(ground, block, rules, state, left)
-    if rules.nonlinear:
+        t, c = weighted_arc(ground, block, rules, state, left)
+    elif rules.nonlinear:
         t, c = reach_nonlinear(ground, block, state, left), nonlinear_series(ground, block, state, None)
     else:
         t, c = reach_linear(block, state, left), linear_series(ground, block, state)
-    return look(c, t, state, block.fallen)
+    arrival = look(c, t, state, block.fallen)
+    if has_vertical(ground) and goes_on(ground, block, state, c, arrival.time):
+        return undecided()
+    return arrival
 
 
 @shared
-def short_weighted_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> Arrival:
-    """Take a short step while the weight changes."""
-    lam, weight = block.stiffness[state.side], weight_line(ground, state)
+def weighted_arc(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> tuple[float, Series]:
+    """Reach of an arc while the weight changes evenly, and its series."""
+    weight = weight_line(ground, state)
     if rules.nonlinear:
-        t = reach_nonlinear(ground, block, state, left)
-        c = nonlinear_series(ground, block, state, weight)
-    else:
-        t = reach_weighted(lam, weight, left)
-        c = weighted_series(ground, block, state, weight)
-    arrival = look(c, t, state, block.fallen)
-    t = arrival.time
+        return reach_nonlinear(ground, block, state, left), nonlinear_series(ground, block, state, weight)
+    reach = reach_weighted(block.stiffness[state.side], weight, left)
+    return reach, weighted_series(ground, block, state, weight)
+
+
+@inlined
+def goes_on(ground: Ground, block: Record, state: Record, c: Series, t: float) -> bool:
+    """Whether the change of the weight carries terms on beyond the last within t."""
     t2 = t * t
-    first, seventh = (c[1] * t, 2.0 * c[2] * t2), 7.0 * c[7] * (t2 * t2 * t2) * t
-    return undecided() if is_carried_on((weight[0], weight[1] * t), lam * t2, seventh, first) else arrival
+    change = coefficient(vertical_of(ground), state.piece, 1) * t * (block.stiffness[state.side] * t2)
+    seventh = 7.0 * c[7] * (t2 * t2 * t2) * t
+    return is_carried_on(change, seventh, (c[1] * t, 2.0 * c[2] * t2))
 
 
 @inlined

@@ -5,7 +5,7 @@ along, turned by the addition theorem. Under a vertical ground acceleration the 
 """
 
 from rocking.kernels.arc import Line, borne, is_carried_on
-from rocking.kernels.compiled import shared
+from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.lanes.crew import WIDTH
 from rocking.kernels.lanes.events import is_quiet
 from rocking.kernels.lanes.substeps import begin, commit, over_substep
@@ -72,7 +72,7 @@ def substep(group: Record, push: Line, weight: Line | None, stretch: float, fall
         least, most = min(r2 - rest, 0.0), max(r2 + rest, 0.0)
         quiet = is_quiet((u, u1), r1, 0.125 * most, -0.125 * least, (least, most), group.peak[lane], fallen)
         quiet &= abs(r8) + abs(r9) <= _TAIL * (abs(r1) + abs(r2))
-        quiet &= not is_carried_on(weight, 2.0 * l2, r7, (r1, r2))
+        quiet &= not goes_on(weight, l2, r7, (r1, r2))
         group.event[lane] |= not quiet
         # sin and 1 - cos of the rotation moved through
         square = moved * moved
@@ -84,3 +84,9 @@ def substep(group: Record, push: Line, weight: Line | None, stretch: float, fall
         group.next_v[lane] = v1
         group.next_sine[lane] = s0 - (s0 * versine + c0 * sine)
         group.next_cosine[lane] = c0 - (c0 * versine - s0 * sine)
+
+
+@inlined
+def goes_on(weight: Line | None, l2: float, seventh: float, first: tuple[float, float]) -> bool:
+    """Whether the change of the weight carries terms on beyond the last."""
+    return False if weight is None else is_carried_on(2.0 * l2 * weight[1], seventh, first)
