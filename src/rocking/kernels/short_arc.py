@@ -36,34 +36,32 @@ def short_step(ground: Ground, block: Record, rules: Record, state: Record, left
     if not is_straight(ground):
         return undecided()
     if has_vertical(ground):
-        t, c = weighted_arc(ground, block, rules, state, left)
-    elif rules.nonlinear:
-        t, c = reach_nonlinear(ground, block, state, left), nonlinear_series(ground, block, state, None)
+        return short_weighted_step(ground, block, rules, state, left)
+    if rules.nonlinear:
+        t, c = reach_nonlinear(ground, block, state, left, None), nonlinear_series(ground, block, state, None)
     else:
         t, c = reach_linear(block, state, left), linear_series(ground, block, state)
-    arrival = look(c, t, state, block.fallen)
-    if has_vertical(ground) and goes_on(ground, block, state, c, arrival.time):
-        return undecided()
-    return arrival
+    return look(c, t, state, block.fallen)
 
 
 @shared
-def weighted_arc(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> tuple[float, Series]:
-    """Reach of an arc while the weight changes evenly, and its series."""
+def short_weighted_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> Arrival:
+    """Step in the same way while the weight changes."""
     weight = weight_line(ground, state)
     if rules.nonlinear:
-        return reach_nonlinear(ground, block, state, left), nonlinear_series(ground, block, state, weight)
-    reach = reach_weighted(block.stiffness[state.side], weight, left)
-    return reach, weighted_series(ground, block, state, weight)
+        t, c = reach_nonlinear(ground, block, state, left, weight), nonlinear_series(ground, block, state, weight)
+    else:
+        t, c = reach_weighted(block.stiffness[state.side], weight, left), weighted_series(ground, block, state, weight)
+    arrival = look(c, t, state, block.fallen)
+    return undecided() if goes_on(c, block.stiffness[state.side], weight, arrival.time) else arrival
 
 
 @inlined
-def goes_on(ground: Ground, block: Record, state: Record, c: Series, t: float) -> bool:
+def goes_on(c: Series, lam: float, weight: Line, t: float) -> bool:
     """Whether the change of the weight carries terms on beyond the last within t."""
     t2 = t * t
-    change = coefficient(vertical_of(ground), state.piece, 1) * t * (block.stiffness[state.side] * t2)
     seventh = 7.0 * c[7] * (t2 * t2 * t2) * t
-    return is_carried_on(change, seventh, (c[1] * t, 2.0 * c[2] * t2))
+    return is_carried_on(lam * t2 * (weight[1] * t), seventh, (c[1] * t, 2.0 * c[2] * t2))
 
 
 @inlined
@@ -88,21 +86,23 @@ def reach_linear(block: Record, state: Record, left: float) -> float:
 @inlined
 def reach_weighted(lam: float, weight: Line, left: float) -> float:
     """Reach of a linear arc while the weight changes."""
-    size = abs(lam) * max(abs(weight[0]), abs(weight[0] + weight[1] * left))
+    size = abs(lam) * greatest(weight, left)
     return left if size * left * left <= SHORT_WEIGHTED else min(left, math.sqrt(SHORT_WEIGHTED / size))
 
 
 @inlined
-def reach_nonlinear(ground: Ground, block: Record, state: Record, left: float) -> float:
+def reach_nonlinear(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> float:
     """Time over which nine terms of a nonlinear arc are exact; ``left`` where that is enough."""
     start = coefficient(ground, state.piece, 0) + coefficient(ground, state.piece, 1) * state.offset
     push = max(abs(start), abs(start + coefficient(ground, state.piece, 1) * left))
-    weight = 1.0
-    if has_vertical(ground):
-        line = weight_line(ground, state)
-        weight = max(abs(line[0]), abs(line[0] + line[1] * left))
-    size = block.stiffness[state.side] * (weight + push) + state.v * state.v
+    size = block.stiffness[state.side] * (greatest(weight, left) + push) + state.v * state.v
     return left if size * left * left <= SHORT_NONLINEAR else min(left, math.sqrt(SHORT_NONLINEAR / size))
+
+
+@inlined
+def greatest(weight: Line | None, left: float) -> float:
+    """Greatest size of the weight over a time; 1 where it does not change."""
+    return 1.0 if weight is None else max(abs(weight[0]), abs(weight[0] + weight[1] * left))
 
 
 @inlined
