@@ -36,7 +36,7 @@ from oracles.scipy_events import integrate_as_practised  # noqa: E402
 
 RECORDS = ROOT.parent / "shared" / "records" / "test_only"
 NAMES = ("RSN6_IMPVALL.I_I-ELC180-hor1.AT2", "RSN753_LOMAP_CLS000-hor1.AT2")
-SHIPPED = "el-centro-meloland-270"
+SHIPPED, SHIPPED_UP = "el-centro-meloland-270", "el-centro-meloland-up"
 G = 9.80665
 REPETITIONS = 3
 SCIPY_SAMPLE = 12
@@ -52,6 +52,7 @@ def main() -> None:
         for model in get_args(Model):
             report(model, motion, acceleration, blocks, steps)
         print()
+    report_vertical(blocks)
     smooth, limit = arithmetic()
     print(f"quiet linear step: {smooth:.2f} ns per block")
     print(f"its {OPERATIONS} operations at the measured peak: {limit:.2f} ns")
@@ -73,6 +74,37 @@ def report(model: Model, motion: rocking.Motion, acceleration: np.ndarray, block
     print(f"  lanes         {1e9 * own:10.2f} ns per block-step  {1.0 / own:9.3g} per second and core")
     print(f"  Runge-Kutta   {1e9 * plain:10.2f} ns                {plain / own:9.2f} times the lanes' time")
     print(f"  SciPy         {1e9 * baseline:10.0f} ns                {baseline / own:9.0f} times")
+
+
+def report_vertical(blocks: rocking.Blocks) -> None:
+    """Print what a vertical component costs, in lanes and one block after the other."""
+    motion = rocking.records.load(SHIPPED).with_vertical(rocking.records.load(SHIPPED_UP))
+    steps = len(blocks) * len(motion.coefficients)
+    print(f"{motion.name} with {SHIPPED_UP}, ns per block-step: horizontal alone; both in lanes; both one by one")
+    for model in get_args(Model):
+        alone, lanes, each = (1e9 * time / steps for time in vertical_times(model, motion, blocks))
+        print(f"  {model:10} {alone:8.2f} {lanes:8.2f} {each:8.2f}   lanes {each / lanes:.2f} times as fast")
+    print()
+
+
+def vertical_times(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> tuple[float, float, float]:
+    """Processor times of an ensemble: under the horizontal component alone, under both, under both without lanes."""
+    horizontal = motion.with_vertical(None)
+    return (
+        shortest(lambda: rocking.simulate_many(blocks, horizontal, model=model, threads=1)),
+        shortest(lambda: rocking.simulate_many(blocks, motion, model=model, threads=1)),
+        shortest(lambda: one_by_one(model, motion, blocks)),
+    )
+
+
+def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> None:
+    """March every block to its end, as where lanes cannot be taken."""
+    how = Certified()
+    ground = ground_of(motion, blocks.gravity)
+    bodies = records_of(blocks, model, how.limits(blocks, motion, model))
+    states = state.new_states(len(blocks), state.TO_THE_END)
+    whole = crew.crew_of(bodies, states, len(ground.pieces) - 1, 1.0, 0)
+    scheduler.march_each(ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole)
 
 
 def shortest(work: Callable[[], object]) -> float:

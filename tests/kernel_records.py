@@ -18,8 +18,14 @@ PLUS, MINUS = 0, 1
 Pair = tuple[float, float]
 
 
-def in_units_of_g(breakpoints: Sequence[float], coefficients: Sequence[Sequence[float]], error: float = 0.0) -> Ground:
-    return laid_out(np.array(breakpoints, dtype=float), np.array(coefficients, dtype=float), 1.0, error)
+def in_units_of_g(
+    breakpoints: Sequence[float],
+    coefficients: Sequence[Sequence[float]],
+    error: float = 0.0,
+    vertical: Sequence[Sequence[float]] | None = None,
+) -> Ground:
+    upright = None if vertical is None else np.array(vertical, dtype=float)
+    return laid_out(np.array(breakpoints, dtype=float), np.array(coefficients, dtype=float), 1.0, error, upright)
 
 
 #: No motion at all.

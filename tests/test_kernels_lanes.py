@@ -9,13 +9,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernel_records import ULP, in_units_of_g, one_sided, rocking_block, rules_for, state_of
+from oracles.weighted import Arc
 
 from rocking.kernels import state
-from rocking.kernels.arc import evaluate, expand
-from rocking.kernels.lanes.crew import WIDTH, Crew, crew_of, lean, load, stumpff, unload
+from rocking.kernels.arc import Line, evaluate, expand
+from rocking.kernels.ground import Ground
+from rocking.kernels.lanes.crew import (
+    LONGEST_SUBSTEP,
+    LONGEST_WEIGHTED_SUBSTEP,
+    WIDTH,
+    Crew,
+    crew_of,
+    lean,
+    load,
+    stumpff,
+    unload,
+)
 from rocking.kernels.lanes.events import is_quiet
 from rocking.kernels.lanes.linear import step_linear
 from rocking.kernels.lanes.nonlinear import step_nonlinear
+from rocking.kernels.lanes.weighted import step_weighted
 from rocking.kernels.state import Record, Records, new_scratch
 
 mp = mpmath.mp.clone()
@@ -43,6 +56,21 @@ def test_stumpffs_functions_are_exact_to_two_units_in_the_last_place(exponent: f
 # ---- Single steps ----
 
 
+class Way(NamedTuple):
+    """How lanes step: the model, into how many substeps, and the weight (at the start, per second) where it changes."""
+
+    nonlinear: bool = False
+    substeps: int = 0
+    weight: Line | None = None
+
+
+def ground_under(way: Way, row: Line, *corners: float) -> Ground:
+    """Ground that pushes by a row on each piece, and lifts so that the weight is that of the way."""
+    pieces = len(corners) - 1
+    lifts = None if way.weight is None else [(way.weight[0] - 1.0, way.weight[1])] * pieces
+    return in_units_of_g(corners, [row] * pieces, vertical=lifts)
+
+
 class Step(NamedTuple):
     """What one lane's step started from and how it ended."""
 
@@ -55,23 +83,25 @@ class Step(NamedTuple):
 def stepped(
     blocks: Records,
     states: Records,
-    row: tuple[float, float],
+    row: Line,
     h: float,
+    way: Way = Way(),  # noqa: B008
     *,
-    substeps: int = 0,
     late: float = 0.0,
     fallen: float = QUARTER_TURN,
 ) -> list[Step]:
     """Take up to a group of blocks through one sample that starts with row[0] and changes by row[1] per second."""
-    crew: Crew = crew_of(blocks, states, 1, h, substeps)
+    crew: Crew = crew_of(blocks, states, 1, h, way.substeps if way.nonlinear else 0)
     for lane in range(len(blocks)):
         load(crew, lane, lane)
-        if substeps > 0:
+        if way.nonlinear:
             lean(crew, lane, lane)
     group = crew.groups[0]
     before = states.copy()
-    if substeps > 0:
-        busy = step_nonlinear(group, row[0], row[1], h + late, h, substeps, fallen)
+    if way.nonlinear:
+        busy = step_nonlinear(group, row, way.weight, h + late, h, way.substeps, fallen)
+    elif way.weight is not None:
+        busy = step_weighted(group, row, way.weight, h + late, way.substeps, fallen)
     else:
         busy = step_linear(group, row[0], row[1], h, late, fallen)
     events = np.array(group["event"][: len(blocks)], dtype=bool)
@@ -146,7 +176,7 @@ def test_a_quiet_nonlinear_step_is_the_full_series(substeps: int, late: float) -
         h = 10.0 ** random.uniform(-3.0, -1.0)
         row = (random.normal() * 0.1, random.normal() * 0.1 / h)
         ground = in_units_of_g([0.0, h + late, 2.0], [row, row])
-        for step in stepped(*drawn(random, True, h), row, h, substeps=substeps, late=late):
+        for step in stepped(*drawn(random, True, h), row, h, Way(True, substeps), late=late):
             if not step.quiet:
                 assert step.start["u"] == step.end["u"]
                 continue
@@ -159,6 +189,60 @@ def test_a_quiet_nonlinear_step_is_the_full_series(substeps: int, late: float) -
             assert abs(step.end["u"] - u) <= 8.0 * substeps * ULP * size
             assert abs(step.end["v"] - v) * h <= 8.0 * substeps * ULP * size
     assert quiet > 400
+
+
+# ---- While the weight changes ----
+
+WEIGHTS = {
+    "weak": (0.7, 1.3, 0.2),
+    "strong": (-1.0, 3.0, 2.0),
+    "near lift-off": (-1e-3, 1e-3, 1e-2),
+    "at lift-off": (0.0, 0.0, 1.0),
+}
+
+
+def weighted_cases(
+    random: np.random.Generator, nonlinear: bool, kind: str, substeps: int
+) -> tuple[Records, Records, Line, Line]:
+    """A group of blocks in motion, the push and the weight over a step of one second."""
+    low, high, swing = WEIGHTS[kind]
+    weight = (random.uniform(low, high), random.normal() * swing)
+    heaviest = max(1.0, abs(weight[0]), abs(sum(weight)))
+    longest = substeps * (LONGEST_SUBSTEP if nonlinear else LONGEST_WEIGHTED_SUBSTEP) / math.sqrt(heaviest)
+    blocks, states = state.records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
+    for k in range(WIDTH):
+        p, alpha = longest * 10.0 ** random.choice([0.0, random.uniform(-9.0, 0.0)]), 10.0 ** random.uniform(-2.0, 0.0)
+        blocks[k] = rocking_block((p, p), (alpha, alpha), nonlinear=nonlinear)
+        u = alpha * random.choice([1.0, 10.0 ** random.uniform(-6.0, 0.1)])  # balanced, too
+        v = random.choice([0.0, random.choice([-1.0, 1.0]) * max(p * alpha, u) * 10.0 ** random.uniform(-4.0, 0.0)])
+        states[k] = state_of(int(random.integers(2)), u, v, peak=9.0)
+    push = (random.normal() * 0.1, random.normal() * 0.1) if random.random() < 0.8 else (0.0, 0.0)
+    return blocks, states, push, weight
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+@pytest.mark.parametrize("kind", WEIGHTS)
+@pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
+def test_a_quiet_step_is_exact_while_the_weight_changes(nonlinear: bool, kind: str, substeps: int) -> None:
+    """To a few units in the last place, beside 60 digits; also without weight, in balance or released from rest."""
+    random, quiet = np.random.default_rng([5, substeps]), 0
+    for _ in range(4):
+        blocks, states, push, weight = weighted_cases(random, nonlinear, kind, substeps)
+        for step in stepped(blocks, states, push, 1.0, Way(nonlinear, substeps, weight), fallen=99.0):
+            if not step.quiet:
+                assert (step.start["u"], step.start["v"]) == (step.end["u"], step.end["v"])
+                continue
+            quiet += 1
+            side = int(step.start["side"])
+            p, alpha = math.sqrt(step.block["stiffness"][side]), float(step.block["slenderness"][side])
+            toward = (push[0] * (1 - 2 * side), push[1] * (1 - 2 * side))
+            arc = Arc(nonlinear, p, alpha, float(step.start["u"]), float(step.start["v"]), toward, weight)
+            u, v = arc.after(1.0)
+            pulls = p * p * (alpha * (abs(weight[0]) + abs(weight[1])) + abs(push[0]) + abs(push[1]))
+            size = max(abs(step.start["u"]), abs(step.start["v"]), abs(u), abs(v), pulls, 0.125 * alpha * nonlinear)
+            assert abs(step.end["u"] - u) <= 8.0 * substeps * ULP * size
+            assert abs(step.end["v"] - v) <= 8.0 * substeps * ULP * size
+    assert quiet > 30
 
 
 def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Records, Records]:
@@ -179,16 +263,20 @@ def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Reco
 
 
 @pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
-def test_a_lane_is_quiet_only_if_nothing_happens_in_its_step(nonlinear: bool) -> None:
+@pytest.mark.parametrize("weighted", [False, True], ids=["", "weighted"])
+def test_a_lane_is_quiet_only_if_nothing_happens_in_its_step(nonlinear: bool, weighted: bool) -> None:
     """No rotation at or below zero, and none above the highest so far but one that rises to the step's end."""
     random, scratch, quiet = np.random.default_rng(3), new_scratch(), 0
     rules = rules_for(nonlinear=nonlinear)
     for _ in range(150):
         h = 10.0 ** random.uniform(-3.0, -1.0)
         row = (random.normal() * 0.3, random.normal() * (0.3 if nonlinear else 2.0) / h)
-        ground = in_units_of_g([0.0, 9.0], [row])
         fallen = random.choice([0.1, 0.4, QUARTER_TURN])
-        for step in stepped(*shapes(random, h, nonlinear), row, h, substeps=int(nonlinear), fallen=fallen):
+        way = Way(nonlinear, int(nonlinear))
+        if weighted:
+            way = Way(nonlinear, 1, (random.uniform(-0.5, 2.0), random.normal() * 0.3 / h))
+        ground = ground_under(way, row, 0.0, 9.0)
+        for step in stepped(*shapes(random, h, nonlinear or weighted), row, h, way, fallen=fallen):
             if not step.quiet:
                 continue
             quiet += 1
@@ -215,48 +303,54 @@ def one(u: float, v: float, peak: float, *, nonlinear: bool = False) -> tuple[Re
     return blocks, states
 
 
-both = pytest.mark.parametrize("substeps", [0, 1], ids=["linear", "nonlinear"])
+#: The weight grows by a tenth within the step.
+HEAVIER = (0.9, 0.1 / H)
+WAYS = {
+    "linear": Way(),
+    "nonlinear": Way(True, 1),
+    "weighted linear": Way(False, 1, HEAVIER),
+    "weighted nonlinear": Way(True, 1, HEAVIER),
+}
+every = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 
 
-def is_quiet_step(
-    substeps: int, u: float, v: float, peak: float, row: tuple[float, float], fallen: float = 9.0
-) -> bool:
-    return stepped(*one(u, v, peak, nonlinear=substeps > 0), row, H, substeps=substeps, fallen=fallen)[0].quiet
+def is_quiet_step(way: Way, u: float, v: float, peak: float, row: tuple[float, float], fallen: float = 9.0) -> bool:
+    return stepped(*one(u, v, peak, nonlinear=way.nonlinear), row, H, way, fallen=fallen)[0].quiet
 
 
-def path(substeps: int, u: float, v: float, row: tuple[float, float]) -> np.ndarray:
+def path(way: Way, u: float, v: float, row: tuple[float, float]) -> np.ndarray:
     """Rotation throughout the step."""
-    blocks, states = one(u, v, 0.0, nonlinear=substeps > 0)
-    rules, scratch = rules_for(nonlinear=substeps > 0), new_scratch()
-    order, reach, _ = expand(in_units_of_g([0.0, 9.0], [row]), blocks[0], rules, scratch, states[0], H)
+    blocks, states = one(u, v, 0.0, nonlinear=way.nonlinear)
+    rules, scratch = rules_for(nonlinear=way.nonlinear), new_scratch()
+    order, reach, _ = expand(ground_under(way, row, 0.0, 9.0), blocks[0], rules, scratch, states[0], H)
     return np.array([evaluate(scratch["rotation"], order, t)[0] for t in np.linspace(0.0, reach, 2001)])
 
 
-@both
+@every
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
-def test_a_dip_to_the_ground_between_two_ends_above_it_is_an_event(substeps: int, share: float) -> None:
+def test_a_dip_to_the_ground_between_two_ends_above_it_is_an_event(way: Way, share: float) -> None:
     """Pushed up while it comes down; a little higher it is quiet."""
     row = (-1.2, 0.0)
     v = -share * P * P * H
-    depth = -np.min(path(substeps, 0.0, v, row))
+    depth = -np.min(path(way, 0.0, v, row))
     for low in (0.9, 0.999):
-        rotation = path(substeps, low * depth, v, row)
+        rotation = path(way, low * depth, v, row)
         assert np.min(rotation) < 0.0
-        assert not is_quiet_step(substeps, low * depth, v, 1.0, row)
-    assert is_quiet_step(substeps, depth + 0.2 * P * P * H * H, v, 1.0, row)
+        assert not is_quiet_step(way, low * depth, v, 1.0, row)
+    assert is_quiet_step(way, depth + 0.2 * P * P * H * H, v, 1.0, row)
 
 
-@both
+@every
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
-def test_a_bulge_over_the_highest_so_far_between_two_ends_below_it_is_an_event(substeps: int, share: float) -> None:
+def test_a_bulge_over_the_highest_so_far_between_two_ends_below_it_is_an_event(way: Way, share: float) -> None:
     row, u = (0.8, 0.0), 0.1
     v = share * 0.9 * P * P * H
-    rotation = path(substeps, u, v, row)
+    rotation = path(way, u, v, row)
     top = np.max(rotation)
     assert max(u, rotation[-1]) < top
     for below in (1e-6, 0.01, 0.5):
-        assert not is_quiet_step(substeps, u, v, top - below * (top - max(u, rotation[-1])), row)
-    assert is_quiet_step(substeps, u, v, top + 0.2 * P * P * H * H, row)
+        assert not is_quiet_step(way, u, v, top - below * (top - max(u, rotation[-1])), row)
+    assert is_quiet_step(way, u, v, top + 0.2 * P * P * H * H, row)
 
 
 @pytest.mark.parametrize("up", [1.0, -1.0], ids=["bulge", "dip"])
@@ -276,52 +370,52 @@ def test_the_curvature_of_an_oscillator_may_be_largest_inside_a_step(up: float) 
             assert found.end["u"] == pytest.approx(u, rel=1e-14)
 
 
-@both
-def test_a_rotation_that_rises_all_the_way_is_quiet_and_one_that_turns_is_not(substeps: int) -> None:
-    assert is_quiet_step(substeps, 0.1, 1.0, 0.1, (0.0, 0.0))
-    assert not is_quiet_step(substeps, 0.1, 0.05 * P * P * H, 0.1, (0.0, 0.0))
+@every
+def test_a_rotation_that_rises_all_the_way_is_quiet_and_one_that_turns_is_not(way: Way) -> None:
+    assert is_quiet_step(way, 0.1, 1.0, 0.1, (0.0, 0.0))
+    assert not is_quiet_step(way, 0.1, 0.05 * P * P * H, 0.1, (0.0, 0.0))
 
 
-@both
+@every
 def test_a_rotation_that_falls_from_the_highest_so_far_is_quiet_but_not_one_that_falls_from_a_higher_one(
-    substeps: int,
+    way: Way,
 ) -> None:
-    assert is_quiet_step(substeps, 0.1, -0.5, 0.1, (0.0, 0.0))
-    assert not is_quiet_step(substeps, 0.1, -0.5, 0.099, (0.0, 0.0))
+    assert is_quiet_step(way, 0.1, -0.5, 0.1, (0.0, 0.0))
+    assert not is_quiet_step(way, 0.1, -0.5, 0.099, (0.0, 0.0))
 
 
-@both
+@every
 @pytest.mark.parametrize("v", [0.03 * P * P * H, 0.05 * P * P * H, 0.08 * P * P * H])
-def test_up_down_and_up_within_a_sample_is_an_event_where_the_top_is_new(substeps: int, v: float) -> None:
+def test_up_down_and_up_within_a_sample_is_an_event_where_the_top_is_new(way: Way, v: float) -> None:
     """The motion turns around within the sample: the rotation bulges, dips, and may end above both."""
     u, strong = 0.1, 0.3
     row = (strong, -3.0 * strong / H)
-    rotation = path(substeps, u, v, row)
+    rotation = path(way, u, v, row)
     turns = np.sum(np.diff(np.sign(np.diff(rotation))) != 0)
     assert turns == 2
-    assert not is_quiet_step(substeps, u, v, u, row)
-    assert is_quiet_step(substeps, u, v, u + 1.0, row)
+    assert not is_quiet_step(way, u, v, u, row)
+    assert is_quiet_step(way, u, v, u + 1.0, row)
 
 
-@both
-def test_down_up_and_down_from_the_highest_so_far_is_an_event(substeps: int) -> None:
+@every
+def test_down_up_and_down_from_the_highest_so_far_is_an_event(way: Way) -> None:
     """At both ends it falls."""
     u, v, strong = 0.1, -0.01 * P * P * H, 0.3
     row = (-strong, 3.0 * strong / H)
-    rotation = path(substeps, u, v, row)
+    rotation = path(way, u, v, row)
     assert np.sum(np.diff(np.sign(np.diff(rotation))) != 0) == 2
-    assert not is_quiet_step(substeps, u, v, min(u, np.max(rotation)), row)
-    assert is_quiet_step(substeps, u, v, u + 1.0, row)
+    assert not is_quiet_step(way, u, v, min(u, np.max(rotation)), row)
+    assert is_quiet_step(way, u, v, u + 1.0, row)
 
 
-@both
+@every
 @pytest.mark.parametrize("below", [1e-3, 1e-9])
-def test_a_fall_is_an_event(substeps: int, below: float) -> None:
+def test_a_fall_is_an_event(way: Way, below: float) -> None:
     """At the step's end, or between its ends."""
     for v, row in ((1.0, (0.0, 0.0)), (0.45 * P * P * H, (0.8, 0.0))):
-        top = np.max(path(substeps, 0.1, v, row))
-        assert not is_quiet_step(substeps, 0.1, v, 1.0, row, fallen=0.1 + (top - 0.1) * (1.0 - below))
-        assert is_quiet_step(substeps, 0.1, v, 1.0, row, fallen=top + 0.2 * P * P * H * H)
+        top = np.max(path(way, 0.1, v, row))
+        assert not is_quiet_step(way, 0.1, v, 1.0, row, fallen=0.1 + (top - 0.1) * (1.0 - below))
+        assert is_quiet_step(way, 0.1, v, 1.0, row, fallen=top + 0.2 * P * P * H * H)
 
 
 @pytest.mark.parametrize("strength", [3.0, 30.0, 300.0, 3e3])
@@ -335,20 +429,20 @@ def test_a_nonlinear_series_whose_last_terms_still_count_is_an_event(strength: f
     )
     assert reach == H
     expected = evaluate(scratch["rotation"], order, H)
-    found = stepped(blocks, states, row, H, substeps=1, fallen=math.inf)[0]
+    found = stepped(blocks, states, row, H, Way(True, 1), fallen=math.inf)[0]
     if found.quiet:
         assert found.end["u"] == pytest.approx(expected[0], rel=4.0 * ULP)
         assert found.end["v"] == pytest.approx(expected[1], rel=8.0 * ULP)
     assert found.quiet == (strength < 100.0)
 
 
-@both
+@every
 @pytest.mark.parametrize("what", ["u", "v", "start", "slope"])
-def test_not_a_number_is_an_event(substeps: int, what: str) -> None:
+def test_not_a_number_is_an_event(way: Way, what: str) -> None:
     values = {"u": 0.1, "v": -0.5, "start": 0.0, "slope": 0.0, "peak": 0.1}
     values[what] = math.nan
     row = (values["start"], values["slope"])
-    found = stepped(*one(values["u"], values["v"], values["peak"], nonlinear=substeps > 0), row, H, substeps=substeps)
+    found = stepped(*one(values["u"], values["v"], values["peak"], nonlinear=way.nonlinear), row, H, way)
     assert not found[0].quiet
 
 
@@ -364,18 +458,18 @@ def test_the_test_of_events_never_calls_not_a_number_quiet(which: int) -> None:
     assert not quiet(numbers)
 
 
-@both
-def test_a_lane_does_the_same_whatever_its_company(substeps: int) -> None:
+@every
+def test_a_lane_does_the_same_whatever_its_company(way: Way) -> None:
     random, h, row = np.random.default_rng(4), 0.01, (0.05, 1.0)
-    blocks, states = drawn(random, substeps > 0, h)
-    whole = stepped(blocks.copy(), states.copy(), row, h, substeps=substeps)
+    blocks, states = drawn(random, way.nonlinear, h)
+    whole = stepped(blocks.copy(), states.copy(), row, h, way)
     for k in (0, 7, WIDTH - 1):
-        alone = stepped(blocks[k : k + 1].copy(), states[k : k + 1].copy(), row, h, substeps=substeps)[0]
+        alone = stepped(blocks[k : k + 1].copy(), states[k : k + 1].copy(), row, h, way)[0]
         assert alone.quiet == whole[k].quiet
         assert (alone.end["u"], alone.end["v"]) == (whole[k].end["u"], whole[k].end["v"])
 
 
-@both
-def test_a_lane_without_a_block_never_has_an_event(substeps: int) -> None:
+@every
+def test_a_lane_without_a_block_never_has_an_event(way: Way) -> None:
     for row in ((0.0, 0.0), (100.0, -1e6)):
-        stepped(*one(0.1, 0.0, 1.0, nonlinear=substeps > 0), row, H, substeps=substeps)  # checks it
+        stepped(*one(0.1, 0.0, 1.0, nonlinear=way.nonlinear), row, H, way)  # checks it

@@ -1,6 +1,6 @@
 """An ensemble and single simulations give the same outcomes, over far wider ranges than buildings and earthquakes.
 
-    python tests/test_referee.py --pairs 100000 --seed 1
+    python tests/test_referee.py --pairs 100000 --seed 1 [--vertical]
 
 compares as many pairs, prints what was drawn and every difference, and exits with status 1 if there is one.
 """
@@ -18,10 +18,12 @@ from oracles.referee import Batch, Verdict
 QUICK, LONG = 2_000, 40_000
 LAW_BATCHES = 12
 
+vertical = pytest.mark.parametrize("vertical", [False, True], ids=["horizontal", "vertical"])
 
-def judged(seed: int, pairs: int, *, first: int = 0) -> Verdict:
+
+def judged(seed: int, pairs: int, *, first: int = 0, vertical: bool = False) -> Verdict:
     verdict = Verdict()
-    for given in referee.batches(seed, pairs, first=first):
+    for given in referee.batches(seed, pairs, first=first, vertical=vertical):
         verdict.add(referee.compare(given))
     return verdict
 
@@ -31,8 +33,9 @@ def said(verdict: Verdict) -> str:
     return "\n".join([f"{len(verdict.differences)} differences in {verdict.pairs} pairs", *map(str, worst)])
 
 
-def test_an_ensemble_gives_what_single_simulations_give() -> None:
-    verdict = judged(1, QUICK)
+@vertical
+def test_an_ensemble_gives_what_single_simulations_give(vertical: bool) -> None:
+    verdict = judged(1, QUICK, vertical=vertical)
     assert not verdict.differences, said(verdict)
     # Enough of what was drawn must be decided for the comparison to mean anything.
     assert verdict.ambiguous + verdict.refused <= 0.1 * verdict.pairs
@@ -61,9 +64,10 @@ def test_what_a_few_ulps_change_visibly_calls_itself_ambiguous() -> None:
 
 
 @pytest.mark.slow
+@vertical
 @pytest.mark.parametrize("seed", [2, 3])
-def test_an_ensemble_gives_what_single_simulations_give_at_length(seed: int) -> None:
-    verdict = judged(seed, LONG)
+def test_an_ensemble_gives_what_single_simulations_give_at_length(seed: int, vertical: bool) -> None:
+    verdict = judged(seed, LONG, vertical=vertical)
     assert not verdict.differences, said(verdict)
 
 
@@ -89,16 +93,18 @@ def assert_independent_of_the_batch(given: Batch, alone: range) -> None:
         assert_same_bytes(single.together(), expected, np.array([k]))
 
 
+@vertical
 @pytest.mark.parametrize("number", range(LAW_BATCHES))
-def test_an_outcome_does_not_depend_on_the_batch(number: int) -> None:
-    given = referee.batch(4, number)
+def test_an_outcome_does_not_depend_on_the_batch(number: int, vertical: bool) -> None:
+    given = referee.batch(4, number, vertical=vertical)
     assert_independent_of_the_batch(given, range(0, len(given.blocks), 4))
 
 
 @pytest.mark.slow
+@vertical
 @pytest.mark.parametrize("number", range(LAW_BATCHES, 150))
-def test_an_outcome_does_not_depend_on_the_batch_at_length(number: int) -> None:
-    given = referee.batch(4, number)
+def test_an_outcome_does_not_depend_on_the_batch_at_length(number: int, vertical: bool) -> None:
+    given = referee.batch(4, number, vertical=vertical)
     assert_independent_of_the_batch(given, range(len(given.blocks)))
 
 
@@ -128,7 +134,7 @@ class Census:
         for name, values in drawn.items():
             self.ranges.setdefault(name, []).extend(float(value) for value in values)
         self.ends[given.ends] += verdict.pairs
-        self.by_kind.setdefault((given.kind, given.model), Verdict()).add(verdict)
+        self.by_kind.setdefault((given.kind.split(", ")[-1], given.model), Verdict()).add(verdict)
         self.total.add(verdict)
 
     def print(self) -> None:
@@ -167,11 +173,12 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--pairs", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--batch", type=int, help="only the batch of this number")
+    parser.add_argument("--vertical", action="store_true", help="motions with a vertical component")
     given = parser.parse_args(arguments)
     census, start, told = Census(), time.monotonic(), time.monotonic()
-    chosen = (
-        referee.batches(given.seed, given.pairs) if given.batch is None else [referee.batch(given.seed, given.batch)]
-    )
+    chosen = referee.batches(given.seed, given.pairs, vertical=given.vertical)
+    if given.batch is not None:
+        chosen = iter([referee.batch(given.seed, given.batch, vertical=given.vertical)])
     for drawn in chosen:
         began = time.monotonic()
         census.add(drawn, referee.compare(drawn))

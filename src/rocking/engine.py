@@ -19,12 +19,12 @@ from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import Unfinished
 from rocking.kernels import state, status
 from rocking.kernels.completeness import note_complete
-from rocking.kernels.ground import Ground
+from rocking.kernels.ground import Ground, greatest_weight, has_vertical
 from rocking.kernels.lanes import crew, scheduler
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.motion.motion import Motion
-from rocking.problem import ground_of, records_of, rules_of
+from rocking.problem import ground_of, records_of, rules_of, step_of
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
 
@@ -208,9 +208,8 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
     ground = ground_of(task.motion, blocks.gravity, task.factor)
     bodies = records_of(blocks, setup.model, limits)
     states = state.new_states(len(blocks), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))
-    # Lanes step through even samples under a constant weight.
-    step = task.motion.step if task.motion.vertical is None else None
-    for chosen, substeps in _companies(bodies, step, setup.model):
+    step = step_of(task.motion)
+    for chosen, substeps in _companies(ground, bodies, step, setup.model):
         if stop is not None and stop.is_set():
             break
         _march_together(ground, rules, (bodies, states), chosen, step, substeps)
@@ -220,17 +219,23 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
     return outcomes
 
 
-def _companies(bodies: Records, step: float | None, model: Model) -> Iterator[tuple[Integers, int]]:
+def _companies(ground: Ground, bodies: Records, step: float | None, model: Model) -> Iterator[tuple[Integers, int]]:
     """Blocks that go together, with the substeps that they need; -1 for those that march alone."""
     substeps = np.full(len(bodies), -1)
     if step is not None:
-        width = step * np.sqrt(np.abs(bodies["stiffness"]).max(axis=1))
-        finer = np.ceil(width / crew.LONGEST_SUBSTEP) if model == "nonlinear" else np.zeros(len(bodies))
-        substeps = np.where(width <= crew.LONGEST_STEP, finer, -1.0).astype(np.int64)
+        width = step * np.sqrt(np.abs(bodies["stiffness"]).max(axis=1) * greatest_weight(ground))
+        substeps = np.where(width <= crew.LONGEST_STEP, _substeps(ground, width, model), -1.0).astype(np.int64)
     for count in np.unique(substeps):
         chosen = np.flatnonzero(substeps == count)
         for start in range(0, len(chosen), _TOGETHER):
             yield chosen[start : start + _TOGETHER], int(count)
+
+
+def _substeps(ground: Ground, width: Floats, model: Model) -> Floats:
+    """Count the substeps of a sample in lanes, for each sqrt(|lam W|) h; 0 where one formula spans it."""
+    if model == "nonlinear":
+        return np.ceil(width / crew.LONGEST_SUBSTEP)
+    return np.ceil(width / crew.LONGEST_WEIGHTED_SUBSTEP) if has_vertical(ground) else np.zeros(len(width))
 
 
 def _march_together(
@@ -244,7 +249,8 @@ def _march_together(
     """Take some of the blocks through the motion in lanes, or one after the other where they cannot."""
     bodies, states = whole
     pieces = len(ground.pieces) - 1
-    together = crew.crew_of(bodies[chosen], states[chosen], pieces, step or 1.0, max(substeps, 0))
+    finer = max(substeps, 0) if rules["nonlinear"] else 0
+    together = crew.crew_of(bodies[chosen], states[chosen], pieces, step or 1.0, finer)
     if substeps < 0:
         scheduler.march_each(ground, rules, state.new_scratch(), together)
     else:

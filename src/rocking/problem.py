@@ -33,11 +33,19 @@ def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Gro
     coefficients = motion.coefficients if factor == 1.0 else _frozen(motion.coefficients * factor)
     if motion.vertical is None:
         return ground.ground_of(motion.breakpoints, coefficients, 1.0 / gravity, motion.error * abs(factor))
-    breakpoints, (pushes, lifts) = piecewise.together(motion, motion.vertical)
+    (breakpoints, pushes), (_, lifts) = _joined(motion)
     error = max(motion.error, motion.vertical.error)
     return ground.ground_of(
         breakpoints, pushes * factor, 1.0 / gravity, error * abs(factor), vertical=lifts * abs(factor)
     )
+
+
+def step_of(motion: Motion) -> float | None:
+    """Length of the pieces of `ground_of` if they are equally long and straight lines in all components, else None."""
+    if motion.vertical is None:
+        return motion.step
+    steps = [piecewise.even_step(pieces) for pieces in _joined(motion)]
+    return None if None in steps else steps[0]
 
 
 def records_of(blocks: Blocks, model: Model, limits: Floats) -> state.Records:
@@ -81,6 +89,14 @@ def rules_of(
         endless=duration is None,
         record=record,
     )
+
+
+@functools.lru_cache(maxsize=8)
+def _joined(motion: Motion) -> tuple[piecewise.Pieces, piecewise.Pieces]:
+    """Both components of a motion on the same pieces."""
+    assert motion.vertical is not None
+    breakpoints, (pushes, lifts) = piecewise.together(motion, motion.vertical)
+    return piecewise.Pieces(breakpoints, pushes), piecewise.Pieces(breakpoints, lifts)
 
 
 def _frozen(array: Floats) -> Floats:

@@ -71,7 +71,8 @@ class Batch:
     def describe(self, sign: int, k: int) -> str:
         block = self.blocks[k]
         return (
-            f"batch({self.seed}, {self.number}), polarity {sign}, block {k}: {self.kind}, {self.model}, "
+            f"batch({self.seed}, {self.number}{', vertical=True' * (self.motion.vertical is not None)}), "
+            f"polarity {sign}, block {k}: {self.kind}, {self.model}, "
             f"p={block.p!r}, alpha={block.alpha!r}, restitution={block.restitution!r}, "
             f"step={self.motion.breakpoints[1]:.6g}, pga={self.motions[sign].pga:.6g}, duration={self.duration!r}"
         )
@@ -80,11 +81,15 @@ class Batch:
 # --- what is drawn --------------------------------------------------------------------------------------------
 
 
-def batch(seed: int, number: int, *, most: int = 64) -> Batch:
-    """Batch of that number: dt 1e-6 to 0.1 s, p 0.05 to 100 rad/s, alpha 1e-4 to 1.4, restitution 0.05 to 0.999."""
+def batch(seed: int, number: int, *, most: int = 64, vertical: bool = False) -> Batch:
+    """Batch of that number: dt 1e-6 to 0.1 s, p 0.05 to 100 rad/s, alpha 1e-4 to 1.4, restitution 0.05 to 0.999.
+
+    With a vertical component dt goes down to 2e-8 s, and so p dt to 1e-9.
+    """
     rng = np.random.default_rng([seed, number])
     model = str(rng.choice(["linear", "nonlinear"]))
-    dt = _log_uniform(rng, 1e-6, 0.1) if rng.random() < 0.5 else float(rng.choice([0.001, 0.005, 0.01, 0.02, 0.1]))
+    shortest = 2e-8 if vertical else 1e-6
+    dt = _log_uniform(rng, shortest, 0.1) if rng.random() < 0.5 else float(rng.choice([0.001, 0.005, 0.01, 0.02, 0.1]))
     alpha = _log_uniform(rng, 1e-4, 1.4) if rng.random() < 0.5 else float(rng.uniform(0.05, 0.5))
     kind = str(rng.choice(list(KINDS)))
     polarity = str(rng.choice(["+", "-", "both"], p=[0.6, 0.2, 0.2]))
@@ -92,6 +97,8 @@ def batch(seed: int, number: int, *, most: int = 64) -> Batch:
     blocks = _blocks(rng, count, dt, alpha)
     threshold = GRAVITY * (alpha if model == "linear" else tan(alpha))
     motion = KINDS[kind](rng, dt, threshold)
+    if vertical:
+        kind, motion = _lifted(rng, kind, motion, dt)
     duration, ends = _duration(rng, motion)
     factor = None if rng.random() < 0.7 else float(rng.choice([0.5, 1.0, 1.0 / 3.0, 2.0, 1.7]))
     return Batch(seed, number, kind, model, blocks, motion, duration, ends, factor, polarity)
@@ -232,7 +239,7 @@ def _sum(rng: Drawn, dt: float, threshold: float) -> rocking.Motion:
     """A record and a pulse whose pieces end at its samples, or elsewhere."""
     each = 8 if rng.random() < 0.5 else float(rng.uniform(4.0, 12.0))
     cycles = int(rng.integers(1, 6))
-    pulse = rocking.pulses.sine(_times(rng) * threshold, 1.0 / (each * dt), cycles=cycles)
+    pulse = rocking.pulses.sine(_times(rng) * threshold, min(1e6, 1.0 / (each * dt)), cycles=cycles)
     samples = _scaled(_smooth(rng, 8 * cycles + 1), 0.5 * threshold) * float(rng.choice([0.0, 1.0]))
     return rocking.Motion.from_samples(samples, dt) + pulse
 
@@ -249,6 +256,66 @@ KINDS: dict[str, Callable[[Drawn, float, float], rocking.Motion]] = {
     "alternating": _alternating,
     "sine": _sine,
     "sum": _sum,
+}
+
+
+def _lifted(rng: Drawn, kind: str, motion: rocking.Motion, dt: float) -> tuple[str, rocking.Motion]:
+    """Give a motion a vertical component; the kind of both."""
+    lift = str(rng.choice(list(LIFTS)))
+    return f"{kind}, {lift}", motion.with_vertical(LIFTS[lift](rng, dt, len(motion.coefficients)))
+
+
+def _record_up(rng: Drawn, dt: float, count: int) -> rocking.Motion:
+    """Next to nothing up to a few g, on the same samples or twice as many, ending earlier or later."""
+    finer = int(rng.choice([1, 1, 1, 2]))
+    samples = _smooth(rng, finer * max(2, int(count * rng.choice([1.0, 0.7, 1.3]))) + 1)
+    return rocking.Motion.from_samples(_scaled(samples, _log_uniform(rng, 1e-6, 4.0) * GRAVITY), dt / finer)
+
+
+def _near_lift_off(rng: Drawn, dt: float, count: int) -> rocking.Motion:
+    """The weight goes down to next to nothing, to nothing, or a little below."""
+    samples = _smooth(rng, count + 1)
+    short = float(rng.choice([0.0, 1.0])) * 10.0 ** float(rng.uniform(-12.0, -1.0)) * float(rng.choice([-1.0, 1.0]))
+    samples *= -(1.0 - short) * GRAVITY / np.min(samples) if np.min(samples) < 0.0 else 1.0
+    return rocking.Motion.from_samples(samples, dt)
+
+
+def _in_free_fall(rng: Drawn, dt: float, count: int) -> rocking.Motion:
+    """Stretches without any weight, and with other ones, joined within a sample."""
+    levels = np.repeat(rng.choice([-1.0, 0.0, -1.5, 1.0], count + 1) * GRAVITY, rng.integers(1, 20, count + 1))
+    return rocking.Motion.from_samples(levels[: count + 1], dt)
+
+
+def _jumps_up(rng: Drawn, dt: float, count: int) -> rocking.Motion:
+    """Pieces that do not meet, of a degree from 0 to 2; of straight lines mostly."""
+    degree = int(rng.choice([0, 1, 1, 1, 2]))
+    coefficients = rng.normal(size=(count, degree + 1)) * dt ** -np.arange(degree + 1.0)
+    coefficients *= _log_uniform(rng, 0.01, 2.0) * GRAVITY / np.max(np.abs(coefficients[:, 0]))
+    return rocking.Motion(dt * np.arange(count + 1), coefficients)
+
+
+def _spike_up(rng: Drawn, dt: float, count: int) -> rocking.Motion:
+    samples = np.zeros(count + 1)
+    samples[int(rng.integers(count + 1))] = float(rng.choice([-1.0, 1.0])) * _log_uniform(rng, 1.0, 100.0) * GRAVITY
+    return rocking.Motion.from_samples(samples, dt)
+
+
+def _pulse_up(rng: Drawn, dt: float, count: int) -> rocking.Motion:
+    return rocking.pulses.sine(_log_uniform(rng, 0.05, 1.5) * GRAVITY, min(1e6, 1.0 / (12.0 * dt)), cycles=2)
+
+
+def _level_up(rng: Drawn, dt: float, count: int) -> rocking.Motion:
+    return rocking.Motion(dt * np.arange(count + 1), [[float(rng.uniform(-0.99, 2.0)) * GRAVITY, 0.0]] * count)
+
+
+LIFTS: dict[str, Callable[[Drawn, float, int], rocking.Motion]] = {
+    "record up": _record_up,
+    "near lift-off": _near_lift_off,
+    "free fall": _in_free_fall,
+    "jumps up": _jumps_up,
+    "spike up": _spike_up,
+    "pulse up": _pulse_up,
+    "level up": _level_up,
 }
 
 
@@ -451,12 +518,12 @@ def _neighbours(given: Batch, sign: int, k: int) -> Iterator[Callable[[], rockin
             yield simulated(rocking.Block.from_parameters(*(tuple(v) for v in values)), motion)
 
 
-def batches(seed: int, pairs: int, *, first: int = 0) -> Iterator[Batch]:
+def batches(seed: int, pairs: int, *, first: int = 0, vertical: bool = False) -> Iterator[Batch]:
     """Batches of a seed until they hold that many pairs."""
     drawn = 0
     number = first
     while drawn < pairs:
-        given = batch(seed, number)
+        given = batch(seed, number, vertical=vertical)
         yield given
         drawn += len(given.motions) * len(given.blocks)
         number += 1

@@ -24,11 +24,18 @@ from rocking.kernels.state import ORDER, Record
 #: over a step that is short beside 1/p they vanish beside u long before the velocity has converged.)
 NEGLIGIBLE = 2.0**-56
 
+#: Largest of what `is_carried_on` tests over the first two terms: a sixtieth of it is below the last place.
+_CARRIED = 2.0**-46
+
 #: First step from an impact, over the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
 
 _WEIGHT = 1.0 / ((np.arange(ORDER + 1) + 1.0) * (np.arange(ORDER + 1) + 2.0))
 _INVERSE = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
+
+
+#: A quantity that changes evenly: its value, and its slope or its change over a step.
+Line = tuple[float, float]
 
 
 @inlined
@@ -57,6 +64,22 @@ def weight_series(ground: Ground, piece: int, offset: float, W: Floats) -> int:
     degree = local_series(vertical_of(ground), piece, offset, 1.0, W) if has_vertical(ground) else 0
     W[0] += 1.0
     return degree
+
+
+@inlined
+def borne(weight: Line | None, this: float, before: float) -> float:
+    """Coefficient of the weight times a series, from two neighbouring ones of the series; None: the weight is 1."""
+    return this if weight is None else weight[0] * this + weight[1] * before
+
+
+@inlined
+def is_carried_on(change: float, seventh: float, first: tuple[float, float]) -> bool:
+    """Whether a changing weight makes more than nothing of a seventh term of the rate beyond the ninth.
+
+    ``change`` is lam h^2 times the change of the weight over a step of length h, and time is counted in steps. What it
+    makes in all is less than a sixtieth of its product with the term; ``first`` are the first two terms.
+    """
+    return not abs(change * seventh) <= _CARRIED * (abs(first[0]) + abs(first[1]))
 
 
 @shared

@@ -77,6 +77,11 @@ def components(ground: Ground, pieces: Integers) -> list[Floats]:
     return [ground.pieces[pieces, _FIRST + k * columns :][:, :columns] for k in range(count)]
 
 
+def greatest_weight(ground: Ground) -> float:
+    """Greatest size of the weight in the ground's frame, over that at rest."""
+    return float(np.max(np.abs(1.0 + ground.stretches[:, _BOUNDS : _BOUNDS + 2]), initial=1.0))
+
+
 @kernel
 def lay_out(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground, A: Floats) -> None:
     """Fill the rows of a ground for one component: pieces, and bounds on stretches of them. ``A`` is scratch space."""
@@ -133,8 +138,8 @@ def vertical_of(ground: Ground) -> Ground:
 
 @inlined
 def is_straight(ground: Ground) -> bool:
-    """Whether the motion is horizontal and changes evenly on each piece, as records do."""
-    return columns_of(ground) == 2 and not has_vertical(ground)
+    """Whether the motion changes evenly on each piece, as records do."""
+    return columns_of(ground) == 2
 
 
 @inlined

@@ -7,7 +7,7 @@ import numpy as np
 from rocking.kernels.arc import expand
 from rocking.kernels.certificate import unproven
 from rocking.kernels.compiled import inlined, kernel
-from rocking.kernels.ground import Ground, is_straight, last_piece, length_of, start_of
+from rocking.kernels.ground import Ground, has_vertical, is_straight, last_piece, length_of, start_of
 from rocking.kernels.impact import Arrival, advance, strike
 from rocking.kernels.proven import pass_proven_impacts
 from rocking.kernels.rest import ULP, Rest, note_impact, note_proof, proven_bounds, rest_after_impact, time_of
@@ -62,7 +62,7 @@ def turn(ground: Ground, block: Record, rules: Record, table: Records, scratch: 
     write_node(ground, rules, table, state)
     if state.side == AT_REST:
         return lift_off(ground, block, rules, table, scratch, state)
-    if state.run > 0 and state.u == 0.0 and not rules.nonlinear and is_straight(ground):
+    if state.run > 0 and state.u == 0.0 and may_pass(ground, rules):
         pass_proven_impacts(ground, block, rules, table, state, time_left(ground, rules, state))
     outcome = follow_arc(ground, block, rules, scratch, state)
     if outcome == IMPACT:
@@ -72,6 +72,12 @@ def turn(ground: Ground, block: Record, rules: Record, table: Records, scratch: 
     if outcome == _STOPPED:
         return stop(ground, rules, table, state)
     return BALANCED if outcome == _STUCK else GOING
+
+
+@inlined
+def may_pass(ground: Ground, rules: Record) -> bool:
+    """Whether impacts of a proven sequence can be passed at once: stiffness does not change, and pushes evenly."""
+    return not rules.nonlinear and is_straight(ground) and not has_vertical(ground)
 
 
 @inlined

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
-from rocking.kernels.arc import sign_of
-from rocking.kernels.compiled import inlined
-from rocking.kernels.ground import Ground, acceleration, coefficient, is_straight
+from rocking.kernels.arc import Line, borne, is_carried_on, sign_of, weight_at
+from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.ground import Ground, acceleration, coefficient, has_vertical, is_straight, vertical_of
 from rocking.kernels.impact import Arrival
 from rocking.kernels.state import Record
 from rocking.kernels.status import IMPACT, STEP, UNDECIDED
@@ -18,10 +18,11 @@ from rocking.kernels.status import IMPACT, STEP, UNDECIDED
 #: Coefficients c[0] to c[9].
 Series = tuple[float, float, float, float, float, float, float, float, float, float]
 
-#: Largest lam t^2 of a linear step, and (lam (1 + |a|/g) + v^2) t^2 of a nonlinear one. Two powers on, terms are then
-#: smaller by a factor of 20,000 or more: what follows the last two is nothing where they are as small as this, beside
-#: the first two of the velocity.
+#: Largest lam t^2 of a linear step, lam |W| t^2 of one while the weight W changes, and (lam (|W| + |a|/g) + v^2) t^2 of
+#: a nonlinear one. Two powers on, terms are then smaller by a factor of 20,000 or more: what follows the last two is
+#: nothing where they are as small as this, beside the first two of the velocity.
 SHORT_LINEAR = 4e-3
+SHORT_WEIGHTED = 2e-3
 SHORT_NONLINEAR = 1.2e-3
 _LAST_TERMS = 2.0**-40
 
@@ -34,17 +35,45 @@ def short_step(ground: Ground, block: Record, rules: Record, state: Record, left
     """Step to the next impact or over ``left``, or the part of it that is short; UNDECIDED where it is not simple."""
     if not is_straight(ground):
         return undecided()
+    if has_vertical(ground):
+        return short_weighted_step(ground, block, rules, state, left)
     if rules.nonlinear:
-        t, c = reach_nonlinear(ground, block, state, left), nonlinear_series(ground, block, state)
+        t, c = reach_nonlinear(ground, block, state, left, None), nonlinear_series(ground, block, state, None)
     else:
         t, c = reach_linear(block, state, left), linear_series(ground, block, state)
     return look(c, t, state, block.fallen)
+
+
+@shared
+def short_weighted_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> Arrival:
+    """Step in the same way while the weight changes."""
+    weight = weight_line(ground, state)
+    if rules.nonlinear:
+        t, c = reach_nonlinear(ground, block, state, left, weight), nonlinear_series(ground, block, state, weight)
+    else:
+        t, c = reach_weighted(block.stiffness[state.side], weight, left), weighted_series(ground, block, state, weight)
+    arrival = look(c, t, state, block.fallen)
+    return undecided() if goes_on(c, block.stiffness[state.side], weight, arrival.time) else arrival
+
+
+@inlined
+def goes_on(c: Series, lam: float, weight: Line, t: float) -> bool:
+    """Whether the change of the weight carries terms on beyond the last within t."""
+    t2 = t * t
+    seventh = 7.0 * c[7] * (t2 * t2 * t2) * t
+    return is_carried_on(lam * t2 * (weight[1] * t), seventh, (c[1] * t, 2.0 * c[2] * t2))
 
 
 @inlined
 def undecided() -> Arrival:
     """No answer."""
     return Arrival(UNDECIDED, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@inlined
+def weight_line(ground: Ground, state: Record) -> Line:
+    """Weight at a state, and its slope, where it changes evenly."""
+    return weight_at(ground, state.piece, state.offset), coefficient(vertical_of(ground), state.piece, 1)
 
 
 @inlined
@@ -55,12 +84,25 @@ def reach_linear(block: Record, state: Record, left: float) -> float:
 
 
 @inlined
-def reach_nonlinear(ground: Ground, block: Record, state: Record, left: float) -> float:
+def reach_weighted(lam: float, weight: Line, left: float) -> float:
+    """Reach of a linear arc while the weight changes."""
+    size = abs(lam) * greatest(weight, left)
+    return left if size * left * left <= SHORT_WEIGHTED else min(left, math.sqrt(SHORT_WEIGHTED / size))
+
+
+@inlined
+def reach_nonlinear(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> float:
     """Time over which nine terms of a nonlinear arc are exact; ``left`` where that is enough."""
     start = coefficient(ground, state.piece, 0) + coefficient(ground, state.piece, 1) * state.offset
     push = max(abs(start), abs(start + coefficient(ground, state.piece, 1) * left))
-    size = block.stiffness[state.side] * (1.0 + push) + state.v * state.v
+    size = block.stiffness[state.side] * (greatest(weight, left) + push) + state.v * state.v
     return left if size * left * left <= SHORT_NONLINEAR else min(left, math.sqrt(SHORT_NONLINEAR / size))
+
+
+@inlined
+def greatest(weight: Line | None, left: float) -> float:
+    """Greatest size of the weight over a time; 1 where it does not change."""
+    return 1.0 if weight is None else max(abs(weight[0]), abs(weight[0] + weight[1] * left))
 
 
 @inlined
@@ -76,6 +118,22 @@ def linear_series(ground: Ground, block: Record, state: Record) -> Series:
 
 
 @inlined
+def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) -> Series:
+    """Series of a linear arc under two ground accelerations that change evenly."""
+    side, u, v = state.side, state.u, state.v
+    lam, gain = block.stiffness[side], block.gain[side]
+    push = sign_of(side) * acceleration(ground, state.piece, state.offset)
+    rate = sign_of(side) * coefficient(ground, state.piece, 1)
+    z = lam * u - gain * block.threshold[side]
+    c2 = 0.5 * (borne(weight, z, 0.0) - gain * push)
+    c3 = (1.0 / 6.0) * (borne(weight, lam * v, z) - gain * rate)
+    c4, c5 = lam * borne(weight, c2, v) * (1.0 / 12.0), lam * borne(weight, c3, c2) * (1.0 / 20.0)
+    c6, c7 = lam * borne(weight, c4, c3) * (1.0 / 30.0), lam * borne(weight, c5, c4) * (1.0 / 42.0)
+    c8, c9 = lam * borne(weight, c6, c5) * (1.0 / 56.0), lam * borne(weight, c7, c6) * (1.0 / 72.0)
+    return u, v, c2, c3, c4, c5, c6, c7, c8, c9
+
+
+@inlined
 def linear_tail(u: float, v: float, c2: float, c3: float, lam: float) -> Series:
     """Series of a linear arc from its first four coefficients."""
     c4, c5 = lam * c2 * (1.0 / 12.0), lam * c3 * (1.0 / 20.0)
@@ -85,8 +143,11 @@ def linear_tail(u: float, v: float, c2: float, c3: float, lam: float) -> Series:
 
 
 @inlined
-def nonlinear_series(ground: Ground, block: Record, state: Record) -> Series:
-    """Series of a nonlinear arc under a ground acceleration that changes evenly, by the recurrence of `arc`."""
+def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line | None) -> Series:
+    """Series of a nonlinear arc under a ground acceleration that changes evenly, by the recurrence of `arc`.
+
+    The weight may change evenly, too, or not at all (None).
+    """
     side, u, v = state.side, state.u, state.v
     l2 = -0.5 * block.stiffness[side]
     a = sign_of(side) * acceleration(ground, state.piece, state.offset)
@@ -95,31 +156,31 @@ def nonlinear_series(ground: Ground, block: Record, state: Record) -> Series:
     if u != 0.0:
         psi = block.slenderness[side] - u
         s0, c0 = math.sin(psi), math.cos(psi)
-    u2 = l2 * (s0 + a * c0)
+    u2 = l2 * (borne(weight, s0, 0.0) + a * c0)
     s1, c1 = -(v * c0), v * s0
-    u3 = l2 * (s1 + (a * c1 + b * c0)) * (1.0 / 3.0)
+    u3 = l2 * (borne(weight, s1, s0) + (a * c1 + b * c0)) * (1.0 / 3.0)
     r2 = 2.0 * u2
     s2, c2 = -0.5 * (v * c1 + r2 * c0), 0.5 * (v * s1 + r2 * s0)
-    u4 = l2 * (s2 + (a * c2 + b * c1)) * (1.0 / 6.0)
+    u4 = l2 * (borne(weight, s2, s1) + (a * c2 + b * c1)) * (1.0 / 6.0)
     r3 = 3.0 * u3
     s3, c3 = -(v * c2 + r2 * c1 + r3 * c0) * (1.0 / 3.0), (v * s2 + r2 * s1 + r3 * s0) * (1.0 / 3.0)
-    u5 = l2 * (s3 + (a * c3 + b * c2)) * (1.0 / 10.0)
+    u5 = l2 * (borne(weight, s3, s2) + (a * c3 + b * c2)) * (1.0 / 10.0)
     r4 = 4.0 * u4
     s4 = -0.25 * ((v * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
     c4 = 0.25 * ((v * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
-    u6 = l2 * (s4 + (a * c4 + b * c3)) * (1.0 / 15.0)
+    u6 = l2 * (borne(weight, s4, s3) + (a * c4 + b * c3)) * (1.0 / 15.0)
     r5 = 5.0 * u5
     s5 = -0.2 * ((v * c4 + r2 * c3) + (r3 * c2 + r4 * c1) + r5 * c0)
     c5 = 0.2 * ((v * s4 + r2 * s3) + (r3 * s2 + r4 * s1) + r5 * s0)
-    u7 = l2 * (s5 + (a * c5 + b * c4)) * (1.0 / 21.0)
+    u7 = l2 * (borne(weight, s5, s4) + (a * c5 + b * c4)) * (1.0 / 21.0)
     r6 = 6.0 * u6
     s6 = -(1.0 / 6.0) * ((v * c5 + r2 * c4) + (r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0))
     c6 = (1.0 / 6.0) * ((v * s5 + r2 * s4) + (r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0))
-    u8 = l2 * (s6 + (a * c6 + b * c5)) * (1.0 / 28.0)
+    u8 = l2 * (borne(weight, s6, s5) + (a * c6 + b * c5)) * (1.0 / 28.0)
     r7 = 7.0 * u7
     s7 = -(1.0 / 7.0) * ((v * c6 + r2 * c5) + (r3 * c4 + r4 * c3) + ((r5 * c2 + r6 * c1) + r7 * c0))
     c7 = (1.0 / 7.0) * ((v * s6 + r2 * s5) + (r3 * s4 + r4 * s3) + ((r5 * s2 + r6 * s1) + r7 * s0))
-    u9 = l2 * (s7 + (a * c7 + b * c6)) * (1.0 / 36.0)
+    u9 = l2 * (borne(weight, s7, s6) + (a * c7 + b * c6)) * (1.0 / 36.0)
     return u, v, u2, u3, u4, u5, u6, u7, u8, u9
 
 

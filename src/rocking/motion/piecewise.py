@@ -4,7 +4,7 @@ Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, x count
 """
 
 import math
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -26,6 +26,13 @@ class Piecewise(Protocol):
     @property
     def coefficients(self) -> Floats:
         """Coefficients of each piece from its start, shape (n, degree + 1)."""
+
+
+class Pieces(NamedTuple):
+    """A piecewise polynomial and nothing else."""
+
+    breakpoints: Floats
+    coefficients: Floats
 
 
 def even_step(pieces: Piecewise) -> float | None:

@@ -13,9 +13,11 @@ from rocking.kernels.state import Record, Records, attributed, new_table, record
 #: Lanes that step together. A constant, so that their loops have a fixed length.
 WIDTH = 32
 
-#: Largest sqrt(|lam|) h of a block in lanes, and of one substep of the nonlinear model.
+#: Largest sqrt(|lam W|) h of a block in lanes, W being its weight over that at rest; of one substep of the nonlinear
+#: model; and of one of the linear model while the weight changes.
 LONGEST_STEP = 1.0
 LONGEST_SUBSTEP = 0.055
+LONGEST_WEIGHTED_SUBSTEP = 0.125
 
 #: Rotation of a lane without a block.
 NOBODYS_ROTATION = 1e-300

@@ -1,12 +1,14 @@
 """One step of all lanes of a group in the nonlinear model: a Taylor series of ninth order, in registers.
 
 Time is counted in steps, so that coefficients are terms: u is their sum. The sine and cosine of alpha - u are carried
-along, turned by the addition theorem.
+along, turned by the addition theorem. Under a vertical ground acceleration the weight changes evenly, too.
 """
 
+from rocking.kernels.arc import Line, borne, is_carried_on
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.lanes.crew import WIDTH
 from rocking.kernels.lanes.events import is_quiet
+from rocking.kernels.lanes.substeps import begin, commit, over_substep
 from rocking.kernels.state import Record
 
 #: Largest of the last two terms of the rate, over the first two, that is good to the last place: over a substep that is
@@ -16,61 +18,51 @@ _TAIL = 2.0**-38
 
 @shared
 def step_nonlinear(
-    group: Record, start: float, slope: float, length: float, h: float, substeps: int, fallen: float
+    group: Record, push: Line, weight: Line | None, length: float, h: float, substeps: int, fallen: float
 ) -> int:
     """Step a group through one sample, but mark, count and leave the lanes with an event.
 
-    Samples whose times are rounded are not all of one length: this one has ``length``, the lanes' constants are for
-    ``h``.
+    ``push`` is the ground acceleration, ``weight`` that in the ground's frame over that at rest (None: it does not
+    change). Samples whose times are rounded are not all of one length: this one has ``length``, the lanes' constants
+    are for ``h``.
     """
     share = length / substeps
     begin(group, share)
     for k in range(substeps):
-        substep(group, start + k * (slope * share), slope * share, (length / h) ** 2, fallen)
+        substep(group, over_substep(push, k, share), over_substep(weight, k, share), (length / h) ** 2, fallen)
     return commit(group, 1.0 / share)
 
 
-@inlined
-def begin(group: Record, h: float) -> None:
-    """Copy the state, with the rate per substep."""
-    for lane in range(WIDTH):
-        group.next_u[lane] = group.u[lane]
-        group.next_v[lane] = group.v[lane] * h
-        group.next_sine[lane] = group.sine[lane]
-        group.next_cosine[lane] = group.cosine[lane]
-        group.event[lane] = 0
-
-
 @shared
-def substep(group: Record, start: float, change: float, stretch: float, fallen: float) -> None:
+def substep(group: Record, push: Line, weight: Line | None, stretch: float, fallen: float) -> None:
     """Take the copies through one substep; mark the lanes in which it may hold an event.
 
-    ``change`` is that of the ground acceleration, ``stretch`` the square of the substep's length over the usual one.
+    ``push`` and ``weight`` have the changes over it; ``stretch`` is the square of its length over the usual one.
     """
     for lane in range(WIDTH):
         u, r1 = group.next_u[lane], group.next_v[lane]
         s0, c0 = group.next_sine[lane], group.next_cosine[lane]
-        a, b = group.push[lane] * start, group.push[lane] * change
+        a, b = group.push[lane] * push[0], group.push[lane] * push[1]
         l2 = group.stiffness[lane] * stretch
-        r2 = 2.0 * (l2 * (s0 + a * c0))
+        r2 = 2.0 * (l2 * (borne(weight, s0, 0.0) + a * c0))
         s1, c1 = -(r1 * c0), r1 * s0
-        r3 = l2 * (s1 + (a * c1 + b * c0))
+        r3 = l2 * (borne(weight, s1, s0) + (a * c1 + b * c0))
         s2, c2 = -0.5 * (r1 * c1 + r2 * c0), 0.5 * (r1 * s1 + r2 * s0)
-        r4 = (2.0 / 3.0) * (l2 * (s2 + (a * c2 + b * c1)))
+        r4 = (2.0 / 3.0) * (l2 * (borne(weight, s2, s1) + (a * c2 + b * c1)))
         s3, c3 = -(1.0 / 3.0) * (r1 * c2 + (r2 * c1 + r3 * c0)), (1.0 / 3.0) * (r1 * s2 + (r2 * s1 + r3 * s0))
-        r5 = 0.5 * (l2 * (s3 + (a * c3 + b * c2)))
+        r5 = 0.5 * (l2 * (borne(weight, s3, s2) + (a * c3 + b * c2)))
         s4 = -0.25 * ((r1 * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
         c4 = 0.25 * ((r1 * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
-        r6 = 0.4 * (l2 * (s4 + (a * c4 + b * c3)))
+        r6 = 0.4 * (l2 * (borne(weight, s4, s3) + (a * c4 + b * c3)))
         s5 = -0.2 * ((r1 * c4 + r2 * c3) + (r3 * c2 + (r4 * c1 + r5 * c0)))
         c5 = 0.2 * ((r1 * s4 + r2 * s3) + (r3 * s2 + (r4 * s1 + r5 * s0)))
-        r7 = (1.0 / 3.0) * (l2 * (s5 + (a * c5 + b * c4)))
+        r7 = (1.0 / 3.0) * (l2 * (borne(weight, s5, s4) + (a * c5 + b * c4)))
         s6 = -(1.0 / 6.0) * ((r1 * c5 + r2 * c4) + ((r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0)))
         c6 = (1.0 / 6.0) * ((r1 * s5 + r2 * s4) + ((r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0)))
-        r8 = (2.0 / 7.0) * (l2 * (s6 + (a * c6 + b * c5)))
+        r8 = (2.0 / 7.0) * (l2 * (borne(weight, s6, s5) + (a * c6 + b * c5)))
         s7 = -(1.0 / 7.0) * (((r1 * c6 + r2 * c5) + (r3 * c4 + r4 * c3)) + ((r5 * c2 + r6 * c1) + r7 * c0))
         c7 = (1.0 / 7.0) * (((r1 * s6 + r2 * s5) + (r3 * s4 + r4 * s3)) + ((r5 * s2 + r6 * s1) + r7 * s0))
-        r9 = 0.25 * (l2 * (s7 + (a * c7 + b * c6)))
+        r9 = 0.25 * (l2 * (borne(weight, s7, s6) + (a * c7 + b * c6)))
         last = (1.0 / 7.0) * r7 + (0.125 * r8 + (1.0 / 9.0) * r9)
         moved = r1 + (0.5 * r2 + ((1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + last)))))
         u1 = u + moved
@@ -80,6 +72,7 @@ def substep(group: Record, start: float, change: float, stretch: float, fallen: 
         least, most = min(r2 - rest, 0.0), max(r2 + rest, 0.0)
         quiet = is_quiet((u, u1), r1, 0.125 * most, -0.125 * least, (least, most), group.peak[lane], fallen)
         quiet &= abs(r8) + abs(r9) <= _TAIL * (abs(r1) + abs(r2))
+        quiet &= not goes_on(weight, l2, r7, (r1, r2))
         group.event[lane] |= not quiet
         # sin and 1 - cos of the rotation moved through
         square = moved * moved
@@ -94,14 +87,6 @@ def substep(group: Record, start: float, change: float, stretch: float, fallen: 
 
 
 @inlined
-def commit(group: Record, rate: float) -> int:
-    """Make the copies the state of the lanes that have no event; count the others."""
-    busy = 0
-    for lane in range(WIDTH):
-        event = group.event[lane]
-        group.u[lane] = group.u[lane] if event else group.next_u[lane]
-        group.v[lane] = group.v[lane] if event else group.next_v[lane] * rate
-        group.sine[lane] = group.sine[lane] if event else group.next_sine[lane]
-        group.cosine[lane] = group.cosine[lane] if event else group.next_cosine[lane]
-        busy += event
-    return busy
+def goes_on(weight: Line | None, l2: float, seventh: float, first: tuple[float, float]) -> bool:
+    """Whether the change of the weight carries terms on beyond the last."""
+    return False if weight is None else is_carried_on(2.0 * l2 * weight[1], seventh, first)

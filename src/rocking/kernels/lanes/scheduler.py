@@ -1,10 +1,11 @@
 """Who steps, who is played exactly, and who waits: the loop over the samples of a record."""
 
 from rocking.kernels.compiled import inlined, kernel
-from rocking.kernels.ground import Ground, coefficient, last_piece, length_of, start_of
+from rocking.kernels.ground import Ground, coefficient, has_vertical, last_piece, length_of, start_of, vertical_of
 from rocking.kernels.lanes.crew import WIDTH, Crew, lean, load, relocate, unload, vacate
 from rocking.kernels.lanes.linear import step_linear
 from rocking.kernels.lanes.nonlinear import step_nonlinear
+from rocking.kernels.lanes.weighted import step_weighted
 from rocking.kernels.march import march
 from rocking.kernels.state import AT_REST, TO_THE_END, Record
 from rocking.kernels.status import GOING
@@ -15,7 +16,7 @@ def run_lanes(ground: Ground, rules: Record, scratch: Record, crew: Crew, subste
     """March every block of a crew through a record of even samples, and on to its own end.
 
     ``ending`` of every state says how it ended (`status`); GOING and PAUSED ones can be taken on one by one.
-    ``substeps`` is that of `crew_of`.
+    ``substeps`` is how many a sample is divided into: 0 in the linear model under a constant weight.
     """
     piece = next_joining(crew, 0)
     while piece < last_piece(ground) and start_of(ground, piece + 1) <= rules.stop:
@@ -45,20 +46,31 @@ def next_joining(crew: Crew, piece: int) -> int:
 @inlined
 def step_groups(ground: Ground, rules: Record, scratch: Record, crew: Crew, piece: int, substeps: int) -> None:
     """Take all lanes through one sample: together, or exactly where that may hold an event."""
-    start, slope = coefficient(ground, piece, 0), coefficient(ground, piece, 1)
-    length, h = length_of(ground, piece), length_of(ground, 0)
     for first in range(0, crew.tally.active, WIDTH):
         group = crew.groups[first // WIDTH]
-        if rules.nonlinear:
-            busy = step_nonlinear(group, start, slope, length, h, substeps, crew.fallen)
-        else:
-            busy = step_linear(group, start, slope, h, length - h, crew.fallen)
+        busy = step_group(ground, rules, group, piece, substeps, crew.fallen)
         slot = 0
         while busy > 0:
             if group.event[slot] != 0:
                 replay(ground, rules, scratch, crew, piece, first + slot)
                 busy -= 1
             slot += 1
+
+
+@inlined
+def step_group(ground: Ground, rules: Record, group: Record, piece: int, substeps: int, fallen: float) -> int:
+    """Step a group through one sample; returns in how many lanes that may hold an event."""
+    push = (coefficient(ground, piece, 0), coefficient(ground, piece, 1))
+    length, h = length_of(ground, piece), length_of(ground, 0)
+    if has_vertical(ground):
+        lift = vertical_of(ground)
+        weight = (1.0 + coefficient(lift, piece, 0), coefficient(lift, piece, 1))
+        if rules.nonlinear:
+            return step_nonlinear(group, push, weight, length, h, substeps, fallen)
+        return step_weighted(group, push, weight, length, substeps, fallen)
+    if rules.nonlinear:
+        return step_nonlinear(group, push, None, length, h, substeps, fallen)
+    return step_linear(group, push[0], push[1], h, length - h, fallen)
 
 
 @inlined
