@@ -1,5 +1,6 @@
 """Calibration: hidden blocks are found again from outcomes and from histories, and what they will do is predicted."""
 
+import csv
 import math
 
 import numpy as np
@@ -205,6 +206,24 @@ def test_runs_that_agree_are_told_from_those_that_do_not():
     assert r_hat(same) < 1.02
     assert r_hat(same + np.array([[0.0], [1.0]])) > 1.15  # about sqrt(1 + 1/2/(2 + 1/2))
     assert r_hat(np.exp(same)) == pytest.approx(r_hat(same), abs=0.01)
+
+
+@pytest.mark.slow
+def test_any_seed_finds_the_p_that_the_mesh_of_a_rock_tells(shared):
+    """136 tests at the threshold of overturning; the mesh says 10.56 and 10.82 rad/s, about either axis."""
+    with (shared / "shakebot" / "tests.csv").open(newline="", encoding="utf-8") as file:
+        tests = [test for test in csv.DictReader(file) if test["set"] == "pbr0"]
+    motions = [
+        rocking.pulses.one_cosine(float(test["pga_g"]) * 9.81, 0.5 / math.pi / float(test["pgv_over_pga_s"]))
+        for test in tests
+    ]
+    overturned = [test["overturned"] == "1" for test in tests]
+    for seed in (0, 1, 2):
+        found = rocking.calibrate(motions, overturned, seed, p=(3.0, 40.0), alpha=(0.005, 0.6), candidates=4096)
+        estimate = found.estimates["p"]
+        assert estimate.lower < 10.7 < estimate.upper
+        assert 9.5 < estimate.median < 12.5
+        assert found.diagnostics.effective > 100
 
 
 def test_few_candidates_are_told():

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.analysis.calibration.candidates import Candidates
 from rocking.analysis.calibration.population import batches, unpacked
 from rocking.arrays import Flags, Floats
-from rocking.kernels.shares import shares
+from rocking.kernels.population import shares
 
 #: A share that n simulated blocks estimate is itself uncertain: Jeffreys' prior, Beta(1/2, 1/2).
 _JEFFREYS: Final = 0.5

@@ -349,10 +349,10 @@ def calibrate(
     -----
     A specimen differs a little from test to test, and no rigid plane block is a real rock. So each test is taken to
     have its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratio of the
-    sides' slendernesses. The probability of an outcome is the share of the population that behaves so (and a small lapse); a common
-    dispersion of both slendernesses is, in the linear model, the same as one of the motion's amplitude. The posterior
-    over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with the prior that is given
-    by the bounds and a lognormal prior on each dispersion (median 10 %). The
+    sides' slendernesses. The probability of an outcome is the share of the population that behaves so (and a small
+    lapse); a common dispersion of both slendernesses is, in the linear model, the same as one of the motion's
+    amplitude. The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006),
+    with the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %). The
     likelihood is derived in the documentation's page on calibration.
 
     The search is global. Two independent runs each fill the bounds evenly, then try blocks where their own fits say:

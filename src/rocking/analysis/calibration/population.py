@@ -13,7 +13,7 @@ import numpy as np
 
 from rocking.analysis.calibration.space import Space
 from rocking.arrays import Floats
-from rocking.kernels import shares as kernel
+from rocking.kernels import population as kernel
 
 #: Prior of the logarithm of a dispersion from test to test: its standard deviation.
 _DISPERSION_LOG_DEVIATION: Final = 0.6
