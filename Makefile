@@ -47,7 +47,7 @@ lint: .venv/.all ## ruff (rules and format) and the import contracts
 
 types: .venv/.all ## mypy: strictly for the package, and whether what stands beside it still fits
 	$(BIN)/mypy --strict
-	$(BIN)/mypy $(LESS_STRICT) benchmarks scripts examples
+	$(BIN)/mypy $(LESS_STRICT) benchmarks scripts examples stress
 
 docs: .venv/.all ## build the documentation into docs/_build/html; a warning is an error
 	$(BIN)/sphinx-build -W --keep-going -n -b html docs docs/_build/html

@@ -1,20 +1,41 @@
 """What keeping a study costs: processor time beside `simulate_many`, memory, listing and opening.
 
 python stress/cost.py --simulations 10000000 --figure memory.png
+
+Processor time is that of all threads of the process, with what the system does for it. Both ways are measured in pairs,
+turn about, and a ratio is taken of each pair: what others do on the machine meanwhile changes both times of a pair
+alike. Where they do much, the simulations still take now more, now less time by more than a study costs; so the time
+beside them is compared as well.
 """
 
+from __future__ import annotations
+
 import argparse
+import contextlib
+import gc
 import resource
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from unittest.mock import patch
 
 import numpy as np
 
 import rocking
+from rocking.arrays import Floats
+from rocking.engine import simulate_task
+from rocking.plot.canvas import add_labels, figure_for
 from rocking.studies.study import _LARGEST
 from rocking.studies.units import name_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Processor time, s: in all, and beside the simulations.
+Times = tuple[float, float]
 
 
 def pulses(count: int) -> list[rocking.Motion]:
@@ -22,37 +43,79 @@ def pulses(count: int) -> list[rocking.Motion]:
     return [rocking.pulses.one_sine(1.0, frequency) for frequency in np.geomspace(0.5, 5.0, count)]
 
 
-def times(blocks: rocking.Blocks, pga: float, width: int, repeats: int) -> tuple[float, float]:
-    """Processor times of one thread, the least of some turns: at once, and as a study of units of so many blocks."""
-    options = {"pga": [pga], "model": "linear"}
-    rocking.simulate_many(blocks.select(slice(0, 512)), pulses(1), **options, threads=1)  # compiles
-    at_once, as_study = [], []
-    for _ in range(repeats):
-        start = time.process_time()
-        rocking.simulate_many(blocks, pulses(4), **options, threads=1)
-        at_once.append(time.process_time() - start)
-        with tempfile.TemporaryDirectory() as folder:
-            study = rocking.study(folder, blocks, pulses(4), **options, unit_blocks=width)
-            start = time.process_time()
+def at_once(blocks: rocking.Blocks, pga: float) -> Times:
+    """Processor times of four motions, simulated at once."""
+    motions = pulses(4)
+    with timed() as taken:
+        rocking.simulate_many(blocks, motions, pga=[pga], model="linear", threads=1)
+    return taken[0]
+
+
+def as_study(blocks: rocking.Blocks, pga: float, width: int) -> Times:
+    """Processor times of running them as a study of units of so many blocks."""
+    with tempfile.TemporaryDirectory() as folder:
+        study = rocking.study(folder, blocks, pulses(4), pga=[pga], model="linear", unit_blocks=width)
+        with timed() as taken:
             report = study.run(threads=1)
-            as_study.append(time.process_time() - start)
-            assert report.units == len(study.store.grid)
-    return min(at_once), min(as_study)
+        assert report.units == len(study.store.grid)
+    return taken[0]
+
+
+@contextlib.contextmanager
+def timed() -> Iterator[list[Times]]:
+    """Put the processor times of what follows into a list."""
+    gc.collect()
+    taken: list[Times] = []
+    simulating: list[float] = []
+
+    def watched(*arguments: Any) -> Any:
+        start = time.thread_time()
+        outcomes = simulate_task(*arguments)
+        simulating.append(time.thread_time() - start)
+        return outcomes
+
+    start = time.process_time()
+    with patch("rocking.engine.simulate_task", watched), patch("rocking.studies.units.simulate_task", watched):
+        yield taken
+    whole = time.process_time() - start
+    taken.append((whole, whole - sum(simulating)))
+
+
+def paired(blocks: rocking.Blocks, pga: float, width: int, repeats: int) -> Floats:
+    """Processor times at once and as a study, shape (repeats, 2, 2); each goes first in every other pair."""
+    at_once(blocks, pga)  # compiles, and warms up
+    as_study(blocks, pga, width)
+    pairs = []
+    for k in range(repeats):
+        if k % 2 == 0:
+            pairs.append((at_once(blocks, pga), as_study(blocks, pga, width)))
+        else:
+            pairs.append((as_study(blocks, pga, width), at_once(blocks, pga))[::-1])
+    return np.array(pairs)
 
 
 def overhead(simulations: int, repeats: int) -> None:
     """Compare processor times at once and as a study: of units as large as in long studies, and of next to nothing."""
     rng = np.random.default_rng(0)
-    width = 512 * max(1, min(_LARGEST, simulations // 8) // 512)
-    for name, pga, each in (("blocks that rock", 4.0, max(512, width // 16)), ("blocks that stay", 0.5, width)):
+    groups = max(1, min(_LARGEST, simulations // 8) // 512)
+    for name, pga, each in (
+        ("blocks that rock", 4.0, 512 * max(1, groups // 16)),
+        ("blocks that stay", 0.5, 512 * groups),
+    ):
         count = 2 * each
         blocks = rocking.Blocks(p=rng.uniform(1.0, 6.0, count), alpha=rng.uniform(0.1, 0.4, count), restitution=0.9)
-        at_once, as_study = times(blocks, pga, each, repeats)
-        share = 100.0 * (as_study / at_once - 1.0)
-        cost = 1e6 * at_once / (4 * count)
-        print(f"{name}: {cost:.2f} us a simulation; as a study {share:+.1f} % ({repeats} turns of 8 units of {each})")
-    at_once, as_study = times(rocking.Blocks(p=2.0, alpha=0.2, restitution=0.9), 0.5, 512, repeats)
-    print(f"a run of 4 units of one simulation: {1e3 * (as_study - at_once):.1f} ms more than at once")
+        times = paired(blocks, pga, each, repeats)
+        once, more = times[:, 0, 0], times[:, 1] - times[:, 0]
+        (low, _), (whole, beside), (high, _) = 100.0 * np.quantile(
+            more / once[:, np.newaxis], (0.25, 0.5, 0.75), axis=0
+        )
+        print(
+            f"{name}: {1e6 * np.median(once) / (4 * count):.2f} us a simulation; as a study {whole:+.1f} % (quartiles "
+            f"{low:+.1f} and {high:+.1f} %), {beside:+.1f} % beside the simulations; {repeats} pairs, 8 units of {each}"
+        )
+    times = paired(rocking.Blocks(p=2.0, alpha=0.2, restitution=0.9), 0.5, 512, repeats)
+    short = 1e3 * np.median(times[:, 1, 0] - times[:, 0, 0])
+    print(f"a run of 4 units of one simulation: {short:.1f} ms more than at once")
 
 
 def listing(units: int) -> None:
@@ -73,7 +136,7 @@ def memory(simulations: int, figure: Path | None) -> None:
     """Follow the memory of a run, most of whose blocks stay (so that much is written), and of the spectrum after it."""
     rng = np.random.default_rng(0)
     motions = simulations // 10_000
-    blocks = rocking.Blocks(p=rng.uniform(1.0, 6.0, 1000), alpha=rng.uniform(0.1, 0.4, 1000), restitution=0.9)
+    blocks = rocking.Blocks(p=rng.uniform(1.0, 6.0, 1000), alpha=rng.uniform(0.18, 0.4, 1000), restitution=0.9)
     times, held, over = [], [], threading.Event()
     start = time.monotonic()
 
@@ -100,23 +163,28 @@ def memory(simulations: int, figure: Path | None) -> None:
     most, kept = max(held), stored / 2**20
     print(f"memory: {early:.0f} MiB early in the run, {late:.0f} late, {most:.0f} at most; stored {kept:.0f} MiB")
     if figure is not None:
-        from matplotlib.figure import Figure
+        drawn(times, held, ran, f"run of {simulations:,} simulations").savefig(figure, dpi=160)
 
-        picture = Figure(figsize=(3.5, 2.4), layout="constrained")
-        axes = picture.add_subplot()
+
+def drawn(times: list[float], held: list[float], ran: float, run: str) -> Figure:
+    """Draw memory (MiB) over time (s), and where the run ends."""
+    most = max(held)
+    with figure_for(None, (4.2, 2.8)) as figure:
+        axes = figure.add_subplot()
         axes.plot(times, held, color="black", linewidth=1.0)
-        axes.axvline(ran, color="grey", linestyle="--", linewidth=0.8)
-        axes.text(0.5 * ran, 1.05 * most, f"run of {simulations:.0e} simulations", ha="center")
-        axes.text(ran, 0.05 * most, "spectrum ", ha="right")
-        axes.set(xlabel="time (s)", ylabel="memory of the process (MiB)", ylim=(0.0, 1.2 * most))
-        picture.savefig(figure, dpi=160)
+        axes.axvline(ran, color="0.35", linestyle="--", linewidth=0.8)
+        axes.text(0.5 * ran, 1.05 * most, run, ha="center")
+        axes.text(ran, 0.05 * most, "then its spectrum \u2192 ", ha="right")
+        axes.set_ylim(0.0, 1.2 * most)
+        add_labels(axes, "time (s)", "memory of the process (MiB)")
+    return figure
 
 
 def main() -> None:
     """Measure all three."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--simulations", type=int, default=1_000_000)
-    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--repeats", type=int, default=15)
     parser.add_argument("--units", type=int, default=100_000)
     parser.add_argument("--figure", type=Path)
     given = parser.parse_args()

@@ -18,7 +18,9 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from pathlib import Path
+from unittest.mock import patch
 
 import distributed  # noqa: F401 - imported once, and not by every process that is forked
 import numpy as np
@@ -64,12 +66,12 @@ class Cluster:
 
     @staticmethod
     def _started(*arguments: str) -> subprocess.Popen[bytes]:
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        return subprocess.Popen([sys.executable, "-m", "dask", *arguments, *HERE], **quiet)
+        command = [sys.executable, "-m", "dask", *arguments, *HERE]
+        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 @contextlib.contextmanager
-def executor(cluster: Cluster, kind: str) -> Iterator[object]:
+def executor(cluster: Cluster, kind: str) -> Iterator[Executor | None]:
     """Give the executor of the cluster; none for threads."""
     if kind == "threads":
         yield None
@@ -81,10 +83,9 @@ def executor(cluster: Cluster, kind: str) -> Iterator[object]:
 def run(folder: Path, cluster: Cluster, kind: str, count: int, order: str) -> None:
     """Run the study as the setting says."""
     study = made(folder)
-    if order == "reversed":
-        keys = list(study.store.missing())[::-1]
-        study.store.missing = lambda: iter(keys)
-    with executor(cluster, kind) as pool:
+    keys = list(study.store.missing())
+    ordered = keys[::-1] if order == "reversed" else keys
+    with executor(cluster, kind) as pool, patch.object(study.store, "missing", lambda: iter(ordered)):
         study.run(threads=count if kind == "threads" else None, executor=pool)
 
 
@@ -133,7 +134,7 @@ def main() -> None:
     given = parser.parse_args()
     rng = np.random.default_rng(given.seed)
     killed: Counter[str] = Counter()
-    digests = Counter()
+    digests: Counter[str] = Counter()
     start = time.monotonic()
     with tempfile.TemporaryDirectory() as where:
         top = Path(where)
@@ -144,7 +145,8 @@ def main() -> None:
             turn = 0
             while sum(killed.values()) < given.kills or turn < len(SETTINGS):
                 kind, count, order = SETTINGS[turn % len(SETTINGS)]
-                folder, seen, within = top / str(turn), {}, WITHIN[kind]
+                folder, within = top / str(turn), WITHIN[kind]
+                seen: dict[str, bytes] = {}
                 made(folder)
                 while len(seen) < len(reference):
                     cluster.set_workers(count if kind == "dask" else 0)

@@ -1,6 +1,7 @@
 """Fixtures shared by all tests."""
 
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,7 +19,8 @@ os.environ["MPLBACKEND"] = "agg"
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep Matplotlib's settings and list of fonts to the tests: a user's own change what is drawn and said."""
-    os.environ["MPLCONFIGDIR"] = str(config.cache.mkdir("matplotlib"))
+    cached = config.pluginmanager.hasplugin("cacheprovider")
+    os.environ["MPLCONFIGDIR"] = str(config.cache.mkdir("matplotlib")) if cached else tempfile.mkdtemp()
 
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"

@@ -253,7 +253,7 @@ def test_a_run_shows_its_rate_and_others_are_told_of_it(tmp_path):
         reader.start()
         out = process.communicate(timeout=60)[0]
     os.close(inner)
-    assert re.search(rb"simulating.*\d+/409600.*/s \d:\d\d:\d\d left", shown)
+    assert re.search(rb"simulations.*\d+/409600.*/s \d:\d\d:\d\d left", shown)
     assert status.running.holder == f"process {process.pid} on {socket.gethostname()}"
     assert status.running.rate > 0.0
     assert 0.0 < status.running.seconds_left < 3600.0
@@ -527,7 +527,8 @@ def test_a_unit_that_kills_every_worker_is_reported_and_left(tmp_path):
 
 COLUMNS = [
     *("motion", "pga_m_s2", "polarity", "block", "p_rad_s", "alpha_rad", "restitution", "overturned"),
-    *("peak_rotation_rad", "peak_time_s", "impacts", "uplifts", "rests", "time_at_rest_s", "unfinished", "stopped"),
+    *("peak_rotation_rad", "peak_time_s", "impacts", "uplifts", "rests", "time_at_rest_s", "complete_chattering"),
+    *("stalled", "unfinished", "stopped"),
 ]
 
 

@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.studies import read_study
-from rocking.studies.units import name_of
+from rocking.motion.exceedance import exceedances
+from rocking.progress import Progress
+from rocking.studies import read_study, refine
+from rocking.studies.units import OUTCOMES, name_of
 
 TOLERANCE = 1e-3
 SCALES = np.linspace(4.0, 20.0, 9)
@@ -62,10 +64,11 @@ def overturns(block, motion, pga, sign):
     return rocking.simulate(BLOCKS[block], motion.scaled(pga=pga).scaled(sign), model="linear").overturned
 
 
-def bisected(block, motion, sign, low, high, above):
-    while high - low > TOLERANCE * high:
+def bisected(verdict, low, high, tolerance):
+    above = verdict(high)
+    while high - low > tolerance * high:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if overturns(block, motion, middle, sign) == above else (middle, high)
+        low, high = (low, middle) if verdict(middle) == above else (middle, high)
     return low, high
 
 
@@ -84,7 +87,8 @@ def test_critical_scales_are_those_of_bisection_by_single_simulations(complete):
         m, block, sign = names.index(one.motion), int(one.block), {"+": 1, "-": -1}[str(one.polarity.values)]
         scale = np.searchsorted(SCALES, float(one.high)) - 1
         above = bool(verdicts[m, scale + 1, 0 if sign > 0 else 1, block])
-        low, high = bisected(block, MOTIONS[m], sign, SCALES[scale], SCALES[scale + 1], above)
+        case = block, MOTIONS[m]
+        low, high = bisected(lambda pga: overturns(*case, pga, sign), *SCALES[scale : scale + 2], TOLERANCE)  # noqa: B023
         assert (float(one.low), float(one.high), bool(one.overturns)) == (low, high, above)
         seen += 1
     assert seen > 15
@@ -131,14 +135,19 @@ def test_a_refinement_says_how_far_it_is_and_goes_on_at_the_unit_that_is_missing
     assert "to be refined to 0.001" in str(study.status)
     study.run()
     count = study.status.refinement.rounds
-    assert f"refined to 0.001 in {count - 1} rounds" in str(study.status)
+    assert f"refined to 0.001 (overturning) in {count - 1} rounds" in str(study.status)
     for path in folder.glob(f"round.{count}/*"):
         path.unlink()
     unit = folder / f"round.{count - 1}" / name_of((0,))
     unit.unlink()
     assert f"round {count - 1}: " in str(study.status)
     assert not study.status.complete
-    with pytest.raises(rocking.StudyError, match=r"not yet refined to 0\.001"):
+    with study.place.locked():
+        study._log({"event": "start", "done": 5400})
+        running = study.status.running
+    assert running.rate > 0.0
+    assert 0.0 < running.seconds_left < 10.0
+    with pytest.raises(rocking.StudyError, match=r"not yet refined to 0\.001 \(overturning\)"):
         study.critical_scales()
     assert study.run().units == 1
     assert digest(folder) == digest(complete)
@@ -163,8 +172,116 @@ def test_damage_to_a_round_is_named_and_mended(complete, tmp_path):
 def test_rounds_are_arrays_that_any_zarr_reader_opens(complete):
     zarr = pytest.importorskip("zarr")
     array = zarr.open_group(complete, mode="r")["round.1"]
-    assert array.shape == (9, rocking.study(complete).critical_scales().sizes["change"])
+    assert array.shape == (11, rocking.study(complete).critical_scales().sizes["change"])
     assert not np.isnan(array[:]).any()
+
+
+def completes(block, motion, model, pga, sign):
+    """Whether the motion is beyond the thresholds only once until the block rests, by one simulation."""
+    scaled = motion.scaled(pga=pga).scaled(sign)
+    response = rocking.simulate(block, scaled, model=model)
+    if not len(response.chattering):
+        return False
+    starts = exceedances(scaled, block.uplift_thresholds(model), block.gravity)[:, 0]
+    return int(np.count_nonzero(starts < response.chattering["end"][0])) == 1
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_chattering_becomes_complete_and_stops_being_so_where_bisection_by_single_simulations_finds_it(tmp_path, model):
+    motions = [rocking.records.load("el-centro-meloland-270"), rocking.pulses.ricker(1.0, 0.9)]
+    blocks, levels, signs = BLOCKS.select(slice(0, 150, 3)), np.linspace(1.5, 6.0, 13), {"+": 1, "-": -1}
+    study = rocking.study(
+        tmp_path, blocks, motions, pga=levels, polarity="both", model=model, refine={"complete_chattering": 1e-5}
+    )
+    study.run()
+    found, verdicts = study.critical_scales("complete_chattering"), study.results().complete_chattering.values
+    assert found.known.all()
+    assert found.sizes["change"] == (verdicts[:, 1:] != verdicts[:, :-1]).sum() > 300
+    assert 0.2 < found.completes.mean() < 0.8
+    names, seen = study.results().motion.values.tolist(), 0
+    for k in range(0, found.sizes["change"], 41):
+        one = found.isel(change=k)
+        case = blocks[int(one.block)], motions[names.index(one.motion)], model
+        high, sign = np.searchsorted(levels, float(one.high)), signs[str(one.polarity.values)]
+        low, high = bisected(lambda pga: completes(*case, pga, sign), *levels[[high - 1, high]], 1e-5)  # noqa: B023
+        assert (float(one.low), float(one.high)) == (low, high)
+        assert bool(one.completes) == completes(*case, high, sign) != completes(*case, low, sign)
+        seen += 1
+    assert seen > 7
+
+
+def test_under_a_sine_chattering_is_complete_from_the_uplift_to_the_critical_amplitude(tmp_path):
+    p, eta = np.array([0.8, 1.5, 2.5, 4.0]), 0.92
+    blocks = rocking.Blocks(p=p, alpha=0.2, restitution=eta)
+    lifting = blocks.gravity * 0.2
+    study = rocking.study(
+        tmp_path,
+        blocks,
+        rocking.pulses.sine(1.0, 0.5, cycles=4),
+        pga=lifting * np.array([0.9, 1.01, 1.2]),
+        model="linear",
+        refine={"complete_chattering": 1e-9, "overturning": 0.1},
+    )
+    study.run()
+    assert "refined to 0.1 (overturning), 1e-09 (complete chattering)" in str(study.status)
+    found = study.critical_scales("complete_chattering")
+    assert found.completes.values.tolist() == [True, False] * len(p)
+    critical = rocking.chattering.critical_amplitude(np.pi / p, eta)
+    amplitude = 0.5 * (found.low + found.high).values / lifting
+    np.testing.assert_allclose(amplitude[::2], 1.0, rtol=1e-9)
+    np.testing.assert_allclose(amplitude[1::2], critical, rtol=2e-9)
+    assert len(set(critical.round(6))) == len(p)
+
+
+def test_refined_for_both_verdicts_it_finds_what_it_finds_for_each(complete, tmp_path):
+    def found_by(refine):
+        study = made(tmp_path / f"{len(refine)}{min(refine)}", refine=refine)
+        study.run(threads=1)
+        return study
+
+    chattering, both = (
+        found_by({"complete_chattering": 0.01}),
+        found_by({"complete_chattering": 0.01, "overturning": TOLERANCE}),
+    )
+    for verdict, alone in (("overturning", rocking.study(complete)), ("complete_chattering", chattering)):
+        assert both.critical_scales(verdict).identical(alone.critical_scales(verdict))
+    grid = rocking.study(complete).critical_scales("complete_chattering")
+    assert grid.sizes == chattering.critical_scales("complete_chattering").sizes
+    assert np.isin(grid.low, SCALES).all()
+    with pytest.raises(rocking.InvalidOption, match="verdict must be one of overturning, complete_chattering"):
+        both.critical_scales("falling")
+
+
+def test_chattering_that_was_cut_off_or_is_not_proven_is_no_verdict():
+    outcomes = dict.fromkeys(OUTCOMES, np.zeros(6))
+    outcomes |= {
+        "overturned": np.array([0, 0, 0, 1, 0, 0]),
+        "unfinished": np.array([1, 0, 0, 0, 0, 0]),
+        "stopped": np.array([0, 1, 1, 0, 0, 0]),
+        "rests": np.array([0, 0, 2, 0, 1, 1]),
+        "complete_chattering": np.array([0, 0, 1, 0, 1, 1]),
+        "stalled": np.array([0, 0, 0, 0, 0, 1]),
+    }
+    overturning, chattering = refine._verdicts(np.array([outcomes[name] for name in OUTCOMES], dtype=float))
+    assert overturning.tolist() == [-1, -1, -1, 1, 0, 0]
+    assert chattering.tolist() == [-1, -1, 1, 0, 1, -1]
+
+
+def test_the_bar_says_which_round_it_is_and_what_is_counted(tmp_path, monkeypatch):
+    said = []
+
+    class Bar(Progress):
+        def __init__(self, what, total, **options):
+            said.append((what, total))
+            super().__init__(what, total, **options)
+
+    monkeypatch.setattr("rocking.studies.run.Progress", Bar)
+    study = made(tmp_path)
+    study.run()
+    state = study.status
+    assert said[0] == ("simulations", 5400)
+    assert said[1] == (f"simulations of round 1 of at most {len(said) - 1}", study.critical_scales().sizes["change"])
+    assert said[-1][0].startswith(f"simulations of round {state.refinement.rounds - 1} of at most ")
 
 
 def test_simulations_that_were_stopped_are_no_verdict(tmp_path):
@@ -182,6 +299,9 @@ def test_simulations_that_were_stopped_are_no_verdict(tmp_path):
 def test_what_cannot_be_refined_is_refused(tmp_path):
     for changes, sentence in (
         ({"refine": 2.0}, "refine must be a number from 1e-12 to 0.5"),
+        ({"refine": {"complete_chattering": 2.0}}, "refine must be a number from 1e-12 to 0.5"),
+        ({"refine": {"falling": 0.1}}, "for overturning and complete_chattering, not 'falling'"),
+        ({"refine": {}}, "for overturning and complete_chattering, none of which is given"),
         ({"pga": [2.0]}, "two scales or more, in increasing order"),
         ({"pga": [3.0, 2.0]}, "two scales or more, in increasing order"),
     ):
@@ -189,7 +309,7 @@ def test_what_cannot_be_refined_is_refused(tmp_path):
             rocking.study(tmp_path / "study", BLOCKS, MOTIONS, **(OPTIONS | {"refine": 0.1} | changes))
         assert not (tmp_path / "study").exists()
     made(tmp_path / "study")
-    with pytest.raises(rocking.StudyError, match=r"holds a study refined to 0\.001, not to 0\.01"):
+    with pytest.raises(rocking.StudyError, match=r"holds a study refined to 0\.001 \(overturning\), not to 0\.01"):
         made(tmp_path / "study", refine=0.01)
 
 
@@ -217,16 +337,23 @@ model = "linear"
     file.write_text(text.replace("1e-4", "3"))
     with pytest.raises(rocking.StudyError, match=r"study\.toml, line 13: refine must be"):
         read_study(file)
+    file.write_text(text.replace("1e-4", "{ falling = 1e-4 }"))
+    with pytest.raises(rocking.StudyError, match=r"study\.toml, line 13: refine takes a number, or tolerances for"):
+        read_study(file)
+    file.write_text(text.replace("1e-4", "{ complete_chattering = 1e-6, overturning = 1e-4 }"))
+    assert read_study(file).refine == {"overturning": 1e-4, "complete_chattering": 1e-6}
     file.write_text(text)
-    assert "refined to 0.0001 in" in run("study", "run", file)[1]
+    assert "refined to 0.0001 (overturning) in" in run("study", "run", file)[1]
     assert json.loads(run("study", "status", folder, "--json")[1])["refinement"]["complete"]
-    assert run("study", "export", folder, tmp_path / "critical.csv", "--critical")[0] == 0
+    assert run("study", "export", folder, tmp_path / "critical.csv", "--critical", "overturning")[0] == 0
     table = pandas.read_csv(tmp_path / "critical.csv")
     assert [*table.columns] == [
         *("change", "motion", "polarity", "block", "p_rad_s", "alpha_rad", "restitution"),
         *("pga_low_m_s2", "pga_high_m_s2", "overturns", "known"),
     ]
     assert table.block.tolist() == [0, 1, 2, 3]
+    run("study", "export", folder, tmp_path / "chattering.csv", "--critical", "complete_chattering")
+    assert pandas.read_csv(tmp_path / "chattering.csv").columns[9] == "completes"
     exact = rocking.incremental_dynamic_analysis(
         read_study(file).product.blocks, read_study(file).product.motions, levels=np.linspace(1, 9, 5), model="linear"
     )

@@ -18,6 +18,7 @@ from rocking.block import Blocks
 from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import Unfinished
 from rocking.kernels import state, status
+from rocking.kernels.completeness import note_complete
 from rocking.kernels.ground import Ground
 from rocking.kernels.lanes import crew, scheduler
 from rocking.kernels.march import march
@@ -28,13 +29,14 @@ from rocking.treatment import Treatment
 from rocking.treatment.base import Model
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
-#: it while the block moved or the motion went on. All else is then as far as it came. ``stalled`` counts the rests that
-#: were not proven. Times of what never happened are 0.
+#: it while the block moved or the motion went on. All else is then as far as it came. ``complete_chattering``: it
+#: rested after its first uplift before the motion passed a threshold again. ``stalled`` counts the rests that were not
+#: proven. Times of what never happened are 0.
 OUTCOME = np.dtype(
     [
         ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("peak_rotation", "f8"), ("peak_time", "f8"),
         ("impacts", "i8"), ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("first_uplift", "f8"),
-        ("first_rest", "f8"), ("last_rest", "f8"), ("stalled", "i8"), ("duration", "f8"),
+        ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("stalled", "i8"), ("duration", "f8"),
     ]
 )  # fmt: skip
 
@@ -213,7 +215,9 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
             break
         _march_together(ground, rules, (bodies, states), chosen, step, substeps)
     _march_on(ground, rules, bodies, states, stop)
-    return _outcomes(states, task.motion.duration)
+    outcomes = _outcomes(states, task.motion.duration)
+    outcomes["complete_chattering"] = _complete(ground, bodies, states)
+    return outcomes
 
 
 def _companies(bodies: Records, step: float | None, model: Model) -> Iterator[tuple[Integers, int]]:
@@ -268,6 +272,13 @@ def _march_on(ground: Ground, rules: Record, bodies: Records, states: Records, s
 def slices(ground: Ground) -> int:
     """Count the slices in the budget of a simulation."""
     return math.ceil((BUDGET + _BUDGET_OF_A_PIECE * len(ground.pieces)) / SLICE)
+
+
+def _complete(ground: Ground, bodies: Records, states: Records) -> Flags:
+    """Whether the chattering after the first uplift was complete."""
+    complete = np.empty(len(states), dtype=bool)
+    note_complete(ground, bodies, states, state.new_scratch(), complete)
+    return complete
 
 
 def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:

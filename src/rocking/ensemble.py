@@ -69,8 +69,10 @@ def simulate_many(
     -------
     xarray.Dataset
         Dimensions (motion, scale, polarity, block), those that apply. Variables: overturned, peak_rotation (rad),
-        peak_time (s), impacts, uplifts, rests, time_at_rest (s), unfinished, stopped (by `duration`, so that
-        overturned is open). Coordinates name the motions and hold the blocks' parameters.
+        peak_time (s), impacts, uplifts, rests, time_at_rest (s), complete_chattering (whether the block came to rest
+        after its first uplift before the motion passed a threshold again), stalled (rests that were not proven),
+        unfinished, stopped (by `duration`, so that overturned is open). Coordinates name the motions and hold the
+        blocks' parameters.
 
     Raises
     ------

@@ -39,6 +39,11 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "uplifts": ("1", "uplifts from rest"),
     "rests": ("1", "times the block came to rest"),
     "time_at_rest": ("s", "time spent at rest"),
+    "complete_chattering": (
+        "1",
+        "whether the block came to rest after its first uplift before the motion passed a threshold again",
+    ),
+    "stalled": ("1", "rests that were not proven, as time no longer advanced between impacts"),
     "unfinished": ("1", "whether the simulation was given up after too many steps; the rest is as far as it came"),
     "stopped": (
         "1",

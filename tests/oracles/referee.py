@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import rocking
 from rocking.arrays import Floats
+from rocking.motion.exceedance import exceedances
 
 GRAVITY = 9.80665
 ULP = 2.0**-52
@@ -24,6 +25,8 @@ TOLERANCE = 1e-9
 """Of the peak; and of the duration, for times, with as many seconds at least."""
 EXPLAINED = 0.05
 """A difference is the problem's own where a neighbour differs by this share of it."""
+TOUCH = 2.0**-40
+"""A motion that falls to a threshold by less than this share of it does not leave it."""
 VISIBLE = 1e3
 """A change by this many tolerances makes a response ambiguous, by its own definition."""
 
@@ -251,7 +254,10 @@ KINDS: dict[str, Callable[[Drawn, float, float], rocking.Motion]] = {
 
 # --- how it is judged -----------------------------------------------------------------------------------------
 
-MEASURES = ("overturned", "peak_rotation", "peak_time", "uplifts", "rests", "time_at_rest", "unfinished")
+MEASURES = (
+    *("overturned", "peak_rotation", "peak_time", "uplifts", "rests", "time_at_rest", "complete_chattering"),
+    *("unfinished",),
+)
 
 
 @dataclass(frozen=True)
@@ -289,7 +295,8 @@ class Verdict:
     @property
     def unsaid(self) -> list[Difference]:
         """Of the explained ones, those after which the single simulation should have called itself ambiguous."""
-        return [found for found in self.explained if found.measure != "peak_time" and found.excess > 20.0 * VISIBLE]
+        told = [found for found in self.explained if found.measure not in ("peak_time", "complete_chattering")]
+        return [found for found in told if found.excess > 20.0 * VISIBLE]
 
     def add(self, other: Verdict) -> None:
         self.pairs += other.pairs
@@ -356,8 +363,21 @@ def outcomes(response: rocking.Response) -> dict[str, float]:
         "uplifts": float(np.sum(kinds == "uplift")),
         "rests": float(np.sum(kinds == "rest")),
         "time_at_rest": response.time_at_rest,
+        "complete_chattering": float(_completes(response)),
         "unfinished": float(getattr(response, "unfinished", False)),
     }
+
+
+def _completes(response: rocking.Response) -> bool:
+    """Whether the motion was beyond a threshold only once until the first rest; to touch it from beyond is no end."""
+    rests = response.events["time"][response.events["kind"] == "rest"]
+    if response.motion is None or not len(rests):
+        return False
+    plus, minus = response.block.uplift_thresholds(response.model)
+    touching = (1.0 - TOUCH) * plus, (1.0 - TOUCH) * minus
+    starts = exceedances(response.motion, (plus, minus), response.block.gravity)[:, 0]
+    stretches = exceedances(response.motion, touching, response.block.gravity)[:, 0]
+    return len(np.unique(np.searchsorted(stretches, starts[starts < rests[0]], side="right"))) == 1
 
 
 def excess(together: dict[str, Any], response: rocking.Response) -> dict[str, float]:
@@ -376,7 +396,7 @@ def excess(together: dict[str, Any], response: rocking.Response) -> dict[str, fl
     found["peak_time"] = _over(together["peak_time"], alone["peak_time"], seconds)
     if found["peak_time"] > 1.0 and _tied(response, float(together["peak_time"])):
         found["peak_time"] = 0.0
-    for name in ("uplifts", "rests"):
+    for name in ("uplifts", "rests", "complete_chattering"):
         found[name] = np.inf if together[name] != alone[name] else 0.0
     return found
 

@@ -170,8 +170,14 @@ class Blocks:
         return (self[index] for index in range(len(self)))
 
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
-        """Return some of the blocks: a slice, indices, or a mask."""
-        return Blocks(self.p[index], self.alpha[index], self.restitution[index], gravity=self.gravity)
+        """Return some of the blocks: a slice, indices, or a mask. Their values are checked already."""
+        some = object.__new__(Blocks)
+        object.__setattr__(some, "gravity", self.gravity)
+        for name in ("p", "alpha", "restitution"):
+            held = getattr(self, name)[index]
+            held.flags.writeable = False
+            object.__setattr__(some, name, held)
+        return some
 
 
 def _range_text(values: Floats) -> str:

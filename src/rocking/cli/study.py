@@ -19,6 +19,7 @@ from rocking.progress import note
 from rocking.studies.cluster import local_executor, scheduler_executor
 from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.place import place_of
+from rocking.studies.refine import Verdict
 from rocking.studies.study import Study, study_of
 from rocking.tables import to_json, write_text
 
@@ -137,7 +138,7 @@ def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter
 
 
 @study.command
-def export(folder: str, file: Path, *, critical: Annotated[bool, Parameter(negative="")] = False) -> None:
+def export(folder: str, file: Path, *, critical: Verdict | None = None) -> None:
     """Write the results to one file.
 
     Parameters
@@ -148,7 +149,7 @@ def export(folder: str, file: Path, *, critical: Annotated[bool, Parameter(negat
         NetCDF (.nc), or a table with a row for each simulation: CSV (.csv), JSON (.json), Parquet (.parquet) or a
         workbook (.xlsx); units are in the names of its columns.
     critical
-        Write the scales between which the verdict on a block changes instead.
+        Write the scales between which this verdict on a block changes instead.
     """
     is_replaced = file.exists()
     rocking.study(folder).export(file, critical=critical)

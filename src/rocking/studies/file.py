@@ -23,7 +23,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.named_pulses import pulse_family
 from rocking.product import Product, Scales
-from rocking.studies.refine import tolerance_of
+from rocking.studies.refine import Tolerances, tolerances_of
 from rocking.studies.report import FragilityPlan, ReportPlan, SpectrumPlan
 from rocking.treatment import treatment
 
@@ -52,7 +52,8 @@ skip_unreadable = false         # true: leave out records that cannot be read, a
 [scales]                        # at most one of factor, pga, pgv, sa (with period, damping)
 pga = ["0.2g", "0.4g", "0.8g"]
 polarity = "+"                  # or "-", "both"
-# refine = 1e-3                 # halve gaps between scales of which one overturns a block, to this relative width
+# refine = 1e-3                 # halve gaps between scales of which one overturns a block, to this relative width;
+#                               # or { overturning = 1e-3, complete_chattering = 1e-6 }
 
 [simulation]
 model = "nonlinear"             # or "linear"
@@ -110,14 +111,14 @@ class StudyFile:
         A sentence for each record that could not be read, where the file says to go on.
     report : ReportPlan or None
         What is to be made of the results.
-    refine : float or None
-        Tolerance to which scales are refined.
+    refine : mapping or None
+        Tolerances to which scales are refined, by verdict.
     """
 
     product: Product
     skipped: tuple[str, ...]
     report: ReportPlan | None
-    refine: float | None = None
+    refine: Tolerances | None = None
 
 
 def read_study(path: str | Path) -> StudyFile:
@@ -184,10 +185,10 @@ class _Reader:
         with self._lines_told("scales"):
             return Scales.of(period=given.get("period"), damping=given.get("damping", 0.05), **measures)
 
-    def _refine(self, product: Product) -> float | None:
+    def _refine(self, product: Product) -> Tolerances | None:
         refine = self.tables.get("scales", {}).get("refine")
         with self._line_told("scales", "refine"):
-            return None if refine is None else tolerance_of(product, refine)
+            return None if refine is None else tolerances_of(product, refine)
 
     def _report(self) -> ReportPlan | None:
         if "report" not in self.tables:

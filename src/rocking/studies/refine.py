@@ -1,9 +1,9 @@
-"""Refinement of a study: scales between neighbours of which one overturns a block, halved in rounds to a tolerance.
+"""Refinement of a study: gaps between scales whose verdicts differ, halved in rounds to a tolerance.
 
-Round r lists brackets, a motion, polarity and block each with two scales of different verdicts, and simulates the
-middle of every one that is wider than the tolerance. Its list follows from the round before, the first one from the
-study's grid, so that whoever computes it, and however often it is killed, makes the same bytes. A round without middles
-is the last.
+A verdict is whether a block overturns, or whether its first chattering is complete. Round r lists brackets, a verdict,
+motion, polarity and block each with two scales that differ in it, and simulates the middle of every one that is wider
+than its tolerance. Its list follows from the round before, the first one from the study's grid, so that whoever
+computes it, and however often it is killed, makes the same bytes. A round without middles is the last.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import functools
 import hashlib
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,34 +37,49 @@ _PLAN: Final = "refine.json"
 _UNITS: Final = 32
 _LEAST: Final = 64
 
-#: Verdicts; what is not known, because a simulation was given up or stopped, is none.
-_STANDS: Final = 0
-_OVERTURNS: Final = 1
+Verdict = Literal["overturning", "complete_chattering"]
+
+#: What a study may be refined for; brackets name verdicts by their number here.
+VERDICTS: Final[tuple[Verdict, ...]] = get_args(Verdict)
+
+#: How a dataset names a verdict on the higher scale, and what it says.
+_ABOVE: Final[Mapping[Verdict, tuple[str, str]]] = {
+    "overturning": ("overturns", "whether the scale above overturns the block, and the one below does not"),
+    "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not at the one below"),
+}
+
+#: Neither: a simulation was given up or stopped before, or a rest is not proven.
 _UNKNOWN: Final = -1
+
+#: Widths over scale that are narrow enough, for each verdict that is refined.
+Tolerances = Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Brackets:
-    """Changes of the verdict, each between two scales; in order of motion, polarity, block and scale.
+    """Changes of verdicts, each between two scales; in order of verdict, motion, polarity, block and scale.
 
     Attributes
     ----------
+    verdict : ndarray of int
+        Of which verdict of `VERDICTS`.
     motion, polarity, block : ndarray of int
         Whose.
     low, high : ndarray
         Scales that bracket the change.
-    overturns : ndarray of bool
-        Whether the higher one overturns the block, and the lower one does not; else the other way round.
+    above : ndarray of bool
+        Whether the verdict holds at the higher one, and not at the lower one; else the other way round.
     known : ndarray of bool
         Whether the verdicts of all middles so far are known.
     """
 
+    verdict: Integers
     motion: Integers
     polarity: Integers
     block: Integers
     low: Floats
     high: Floats
-    overturns: Flags
+    above: Flags
     known: Flags
 
     @property
@@ -72,18 +87,33 @@ class Brackets:
         """Scales halfway."""
         return 0.5 * (self.low + self.high)
 
-    def wide(self, tolerance: float) -> Integers:
+    def wide(self, tolerances: Tolerances) -> Integers:
         """Which ones to halve, in the order in which they are simulated: those of one scaled motion together."""
-        middle = self.middle
+        middle, enough = self.middle, self._enough(tolerances)
         splits = (middle > self.low) & (middle < self.high)
-        chosen = np.flatnonzero(self.known & splits & (self.high - self.low > tolerance * self.high))
+        chosen = np.flatnonzero(self.known & splits & (self.high - self.low > enough * self.high))
         keys = self.block, middle, self.polarity, self.motion
         return chosen[np.lexsort([key[chosen] for key in keys])]
 
-    def halved(self, chosen: Integers, verdicts: Integers) -> Brackets:
+    def halvings(self, tolerances: Tolerances) -> int:
+        """How often the widest one has to be halved, at most."""
+        wide = self.wide(tolerances)
+        excess = (self.high - self.low)[wide] / (self._enough(tolerances)[wide] * self.low[wide])
+        return int(np.ceil(np.log2(excess.max(initial=1.0))))
+
+    def of(self, verdict: Verdict) -> Brackets:
+        """Those of one verdict."""
+        chosen = self.verdict == VERDICTS.index(verdict)
+        return Brackets(**{name: values[chosen] for name, values in vars(self).items()})
+
+    def _enough(self, tolerances: Tolerances) -> Floats:
+        """Width over scale that is narrow enough for each."""
+        return np.array([tolerances.get(verdict, math.inf) for verdict in VERDICTS])[self.verdict]
+
+    def halved(self, chosen: Integers, verdicts: NDArray[np.int8]) -> Brackets:
         """Brackets after these verdicts on the middles of the chosen ones."""
         low, high, known, middle = self.low.copy(), self.high.copy(), self.known.copy(), self.middle
-        as_above = verdicts == np.where(self.overturns[chosen], _OVERTURNS, _STANDS)
+        as_above = verdicts == self.above[chosen]
         unknown = verdicts == _UNKNOWN
         high[chosen[as_above]] = middle[chosen[as_above]]
         low[chosen[~as_above & ~unknown]] = middle[chosen[~as_above & ~unknown]]
@@ -112,13 +142,13 @@ class Round:
         From 1 on.
     brackets : Brackets
         What is known before it.
-    tolerance : float
-        Width over scale that is narrow enough.
+    tolerances : mapping
+        Width over scale that is narrow enough, by verdict.
     """
 
-    def __init__(self, store: Store, number: int, brackets: Brackets, tolerance: float) -> None:
-        self.store, self.number, self.brackets = store, number, brackets
-        self.chosen = brackets.wide(tolerance)
+    def __init__(self, store: Store, number: int, brackets: Brackets, tolerances: Tolerances) -> None:
+        self.store, self.number, self.brackets, self.tolerances = store, number, brackets, tolerances
+        self.chosen = brackets.wide(tolerances)
         count = len(self.chosen)
         most = math.prod(store.grid.unit)
         self.grid = Line(count, min(most, max(_LEAST, math.ceil(count / _UNITS))))
@@ -137,6 +167,12 @@ class Round:
     def name(self) -> str:
         """Name of its array."""
         return f"round.{self.number}"
+
+    @property
+    def title(self) -> str:
+        """What is counted while it runs."""
+        most = self.number - 1 + self.brackets.halvings(self.tolerances)
+        return f"simulations of round {self.number} of at most {most}"
 
     @property
     def is_last(self) -> bool:
@@ -200,13 +236,14 @@ class Round:
         StudyError
             If one is damaged or gone.
         """
-        verdicts = np.empty(len(self.chosen), dtype=np.int64)
+        verdicts = np.empty((len(VERDICTS), len(self.chosen)), dtype=np.int8)
         for key in self.grid:
             outcomes = self.outcomes(key)
             if outcomes is None:
                 raise StudyError(f"{self.store.place}: unit {self.label(key)} is gone: run the study again")
-            verdicts[self.grid.range(key)] = _verdicts(outcomes)
-        return self.brackets.halved(self.chosen, verdicts)
+            verdicts[:, self.grid.range(key)] = _verdicts(outcomes)
+        which = self.brackets.verdict[self.chosen]
+        return self.brackets.halved(self.chosen, verdicts[which, np.arange(len(which))])
 
 
 @dataclass(frozen=True)
@@ -215,8 +252,8 @@ class Refinement:
 
     Attributes
     ----------
-    tolerance : float
-        Width over scale to which it goes.
+    tolerances : mapping
+        Width over scale to which it goes, by verdict.
     rounds : int
         Rounds that have begun.
     done, simulations : int
@@ -225,7 +262,7 @@ class Refinement:
         Whether nothing is left to halve.
     """
 
-    tolerance: float
+    tolerances: Tolerances
     rounds: int
     done: int
     simulations: int
@@ -234,57 +271,64 @@ class Refinement:
     def __str__(self) -> str:
         """Write it in a few words."""
         if self.complete:
-            return f"refined to {self.tolerance:g} in {self.rounds - 1} rounds"
+            return f"refined to {_told(self.tolerances)} in {self.rounds - 1} rounds"
         if not self.rounds:
-            return f"to be refined to {self.tolerance:g}"
-        return f"refined to {self.tolerance:g}, round {self.rounds}: {self.done} of {self.simulations} simulations done"
+            return f"to be refined to {_told(self.tolerances)}"
+        far = f"round {self.rounds}: {self.done} of {self.simulations} simulations done"
+        return f"being refined to {_told(self.tolerances)}, {far}"
 
 
 def refinement(store: Store) -> Refinement | None:
     """Return how far the refinement of a study has come; None where it has none."""
-    tolerance = kept_plan(store)
-    if tolerance is None:
+    tolerances = kept_plan(store)
+    if tolerances is None:
         return None
-    begun = [*rounds(store, tolerance)]
+    begun = [*rounds(store, tolerances)]
     if not begun:
-        return Refinement(tolerance, 0, 0, 0, complete=False)
+        return Refinement(tolerances, 0, 0, 0, complete=False)
     last = begun[-1]
     done = sum(map(last.grid.simulations, last.done()))
-    return Refinement(tolerance, len(begun), done, last.grid.total, last.is_last)
+    return Refinement(tolerances, len(begun), done, last.grid.total, last.is_last)
 
 
-def tolerance_of(product: Product, refine: float) -> float:
-    """Return a tolerance, checked.
+def tolerances_of(product: Product, refine: float | Mapping[str, float]) -> Tolerances:
+    """Return tolerances by verdict, checked; a number alone is one for overturning.
 
     Raises
     ------
     InvalidOption
-        If it is out of its range, or there are no scales to refine between.
+        If one is out of its range, there is no such verdict, or there are no scales to refine between.
     """
-    width = checks.within(refine, "refine", InvalidOption, 1e-12, 0.5)
+    given = refine if isinstance(refine, Mapping) else {"overturning": refine}
+    others = [name for name in given if name not in VERDICTS]
+    if others or not given:
+        what = f"not {others[0]!r}" if others else "none of which is given"
+        raise InvalidOption(f"refine takes a number, or tolerances for {' and '.join(VERDICTS)}, {what}")
     _require_order(product)
-    return width
+    names = [verdict for verdict in VERDICTS if verdict in given]
+    return {verdict: checks.within(given[verdict], "refine", InvalidOption, 1e-12, 0.5) for verdict in names}
 
 
-def keep_plan(store: Store, tolerance: float) -> None:
-    """Store to which tolerance a study is refined.
+def keep_plan(store: Store, tolerances: Tolerances) -> None:
+    """Store to which tolerances a study is refined.
 
     Raises
     ------
     StudyError
-        If it is refined to another one.
+        If it is refined to others.
     """
     before = kept_plan(store)
     if before is None:
-        store.place.put(_PLAN, sealed({"overturning": tolerance}))
-    elif before != tolerance:
+        store.place.put(_PLAN, sealed(dict(tolerances)))
+    elif before != tolerances:
         raise StudyError(
-            f"{store.place} holds a study refined to {before:g}, not to {tolerance:g}: create this one elsewhere"
+            f"{store.place} holds a study refined to {_told(before)}, not to {_told(tolerances)}: create this one "
+            "elsewhere"
         )
 
 
-def kept_plan(store: Store) -> float | None:
-    """Tolerance to which a study is refined; None where it is not.
+def kept_plan(store: Store) -> Tolerances | None:
+    """Tolerances to which a study is refined; None where it is not.
 
     Raises
     ------
@@ -297,10 +341,10 @@ def kept_plan(store: Store) -> float | None:
     plan = unsealed(data)
     if plan is None:
         raise StudyError(f"{_PLAN} in {store.place} is damaged: remove it, and create the study again from its inputs")
-    return float(plan["overturning"])
+    return {verdict: plan[verdict] for verdict in VERDICTS if verdict in plan}
 
 
-def rounds(store: Store, tolerance: float) -> Iterator[Round]:
+def rounds(store: Store, tolerances: Tolerances) -> Iterator[Round]:
     """Give the rounds that have begun, in order.
 
     Raises
@@ -313,19 +357,19 @@ def rounds(store: Store, tolerance: float) -> Iterator[Round]:
         about, archive = unsealed(data), store.place.get(f"round.{number}/brackets.npz")
         if about is None or archive is None or hashlib.sha256(archive).hexdigest() != about["brackets"]:
             raise StudyError(f"round.{number} in {store.place} is damaged: remove the folders round.* and run it again")
-        yield Round(store, number, Brackets.from_bytes(archive), tolerance)
+        yield Round(store, number, Brackets.from_bytes(archive), tolerances)
         number += 1
 
 
-def next_round(store: Store, tolerance: float) -> Round:
+def next_round(store: Store, tolerances: Tolerances) -> Round:
     """Return the round that comes now: the last one that has begun, or where that is done, the one after it."""
     last = None
-    for last in rounds(store, tolerance):  # noqa: B007 - the last is wanted
+    for last in rounds(store, tolerances):  # noqa: B007 - the last is wanted
         pass
     if last is not None and (last.is_last or next(last.missing(), None) is not None):
         return last
-    brackets = grid_brackets(store) if last is None else last.after()
-    begun = Round(store, 1 if last is None else last.number + 1, brackets, tolerance)
+    brackets = grid_brackets(store, tolerances) if last is None else last.after()
+    begun = Round(store, 1 if last is None else last.number + 1, brackets, tolerances)
     begun.create()
     return begun
 
@@ -342,8 +386,8 @@ def _require_order(product: Product) -> None:
         raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
 
 
-def found_brackets(store: Store) -> Brackets:
-    """Brackets of a study whose units are done; refined, where it is to be refined.
+def found_brackets(store: Store, verdict: Verdict) -> Brackets:
+    """Return the changes of a verdict in a study whose units are done; refined, where it is to be refined.
 
     Raises
     ------
@@ -355,38 +399,51 @@ def found_brackets(store: Store) -> Brackets:
     missing = len(store.grid) - len(store.done())
     if missing:
         raise StudyError(f"{missing} of {len(store.grid)} units are missing: run the study to its end first")
-    tolerance = kept_plan(store)
-    if tolerance is None:
-        return grid_brackets(store)
-    begun = [*rounds(store, tolerance)]
+    tolerances = kept_plan(store)
+    if tolerances is None or verdict not in tolerances:
+        return grid_brackets(store, [verdict])
+    begun = [*rounds(store, tolerances)]
     if not begun or not begun[-1].is_last:
-        raise StudyError(f"{store.place}: the study is not yet refined to {tolerance:g}: run it to its end first")
-    return begun[-1].brackets
+        raise StudyError(f"{store.place}: the study is not yet refined to {_told(tolerances)}: run it to its end first")
+    return begun[-1].brackets.of(verdict)
 
 
-def grid_brackets(store: Store) -> Brackets:
-    """Brackets between neighbouring scales of the grid, all of whose units are done."""
+def grid_brackets(store: Store, of: Collection[str]) -> Brackets:
+    """Find changes of verdicts between neighbouring scales of the grid, all of whose units are done."""
     _require_order(store.product)
-    verdicts = np.empty(store.grid.shape, dtype=np.int8)
+    verdicts = np.full((len(VERDICTS), *store.grid.shape), _UNKNOWN, dtype=np.int8)
+    wanted = [VERDICTS.index(verdict) for verdict in of]
     for key in store.grid:
         outcomes = store.outcomes(key)
         if outcomes is None:
             raise StudyError(f"{store.place}: unit {name_of(key)} is gone: run the study again")
-        verdicts[store.grid.ranges(key)] = _verdicts(outcomes)
-    here, above = verdicts[:, :-1].swapaxes(1, 3), verdicts[:, 1:].swapaxes(1, 3)  # (motion, block, polarity, scale)
-    motion, block, polarity, scale = np.nonzero((here != above) & (here != _UNKNOWN) & (above != _UNKNOWN))
-    order = np.lexsort((scale, block, polarity, motion))
-    motion, block, polarity, scale = (index[order] for index in (motion, block, polarity, scale))
+        verdicts[wanted, *store.grid.ranges(key)] = _verdicts(outcomes)[wanted]
+    here, above = verdicts[:, :, :-1], verdicts[:, :, 1:]
+    found = np.nonzero((here != above) & (here != _UNKNOWN) & (above != _UNKNOWN))
+    verdict, motion, scale, polarity, block = found
+    order = np.lexsort((scale, block, polarity, motion, verdict))
+    verdict, motion, scale, polarity, block = (index[order] for index in found)
     levels = store.product.scales.values
-    overturns = above[motion, block, polarity, scale] == _OVERTURNS
+    holds = above[verdict, motion, scale, polarity, block] == 1
     known = np.ones(len(motion), dtype=bool)
-    return Brackets(motion, polarity, block, levels[scale], levels[scale + 1], overturns, known)
+    return Brackets(verdict, motion, polarity, block, levels[scale], levels[scale + 1], holds, known)
 
 
-def critical_scales(store: Store, brackets: Brackets) -> xr.Dataset:
-    """Label brackets."""
+def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
+    """Label the changes of a verdict in a study whose units are done.
+
+    Raises
+    ------
+    StudyError
+        If units are missing or damaged.
+    InvalidOption
+        If there is no such verdict, or the study has no two scales in increasing order.
+    """
     import xarray as xr
 
+    checks.one_of(verdict, "verdict", InvalidOption, VERDICTS)
+    brackets = found_brackets(store, verdict)
+    above, meaning = _ABOVE[verdict]
     product = store.product
     whole = product.dataset({})
     about = {"units": product.scales.units}
@@ -399,8 +456,8 @@ def critical_scales(store: Store, brackets: Brackets) -> xr.Dataset:
         {
             "low": ("change", brackets.low, about | {"long_name": "scale below the change"}),
             "high": ("change", brackets.high, about | {"long_name": "scale above the change"}),
-            "overturns": ("change", brackets.overturns, {"long_name": "whether the scale above overturns the block"}),
-            "known": ("change", brackets.known, {"long_name": "whether no simulation on the way was given up"}),
+            above: ("change", brackets.above, {"long_name": meaning}),
+            "known": ("change", brackets.known, {"long_name": "whether the verdicts of all simulations are known"}),
         },
         {
             "motion": ("change", names[brackets.motion]),
@@ -412,9 +469,18 @@ def critical_scales(store: Store, brackets: Brackets) -> xr.Dataset:
     )
 
 
-def _verdicts(outcomes: Floats) -> NDArray[np.int64]:
-    """Verdict of each simulation from its outcomes, of which the first axis is."""
-    named = dict(zip(OUTCOMES, outcomes, strict=True))
-    overturned = named["overturned"] != 0.0
-    open_ = ~overturned & ((named["unfinished"] != 0.0) | (named["stopped"] != 0.0))
-    return np.where(open_, _UNKNOWN, np.where(overturned, _OVERTURNS, _STANDS))
+def _verdicts(outcomes: Floats) -> NDArray[np.int8]:
+    """Verdicts on each simulation, shape (verdicts, ...), from its outcomes, shape (outcomes, ...)."""
+    named = {name: values != 0.0 for name, values in zip(OUTCOMES, outcomes, strict=True)}
+    cut = ~named["overturned"] & (named["unfinished"] | named["stopped"])
+    unproven = (cut & ~named["rests"]) | named["stalled"]
+    return np.stack([_where_known(named["overturned"], cut), _where_known(named["complete_chattering"], unproven)])
+
+
+def _where_known(holds: Flags, unknown: Flags) -> NDArray[np.int8]:
+    return np.where(unknown, _UNKNOWN, holds).astype(np.int8)
+
+
+def _told(tolerances: Tolerances) -> str:
+    """Write tolerances in a few words."""
+    return ", ".join(f"{tolerance:g} ({verdict.replace('_', ' ')})" for verdict, tolerance in tolerances.items())

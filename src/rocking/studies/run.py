@@ -32,6 +32,10 @@ class Job(Protocol):
     """Units to compute: those of a study's grid, or of a round of its refinement."""
 
     @property
+    def title(self) -> str:
+        """What is counted while it runs, in a few words."""
+
+    @property
     def grid(self) -> Grid | Line:
         """How the simulations are cut into units."""
 
@@ -151,7 +155,7 @@ def run(
     failed: dict[str, str] = {}
     before = job.grid.total - sum(map(job.grid.simulations, missing))
     with (
-        Progress("simulating", job.grid.total, show=progress, done=before) as bar,
+        Progress(job.title, job.grid.total, show=progress, done=before) as bar,
         workers_of(executor, threads) as workers,
         contextlib.closing(_results(job, iter(missing), workers, stop)) as results,
     ):

@@ -19,7 +19,7 @@ from rocking.studies import inputs
 from rocking.studies.place import Place
 from rocking.studies.units import Axes, DamagedUnit, Grid, Key, Work, decoded, key_of, name_of
 
-FORMAT: Final = 1
+FORMAT: Final = 2
 _ARRAY: Final = "result"
 
 #: What is in the place of a study whose creation was cut off; that of an object store keeps a clock as well.
@@ -43,6 +43,9 @@ class Store:
     grid : Grid
         How it is cut into units.
     """
+
+    #: What is counted while it runs.
+    title = "simulations"
 
     def __init__(self, place: Place, product: Product, grid: Grid) -> None:
         self.place, self.product, self.grid = place, product, grid

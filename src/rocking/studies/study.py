@@ -32,14 +32,14 @@ from rocking.studies.place import Place, place_of, this_process
 from rocking.studies.refine import (
     Refinement,
     Round,
+    Verdict,
     critical_scales,
-    found_brackets,
     keep_plan,
     kept_plan,
     next_round,
     refinement,
     rounds,
-    tolerance_of,
+    tolerances_of,
 )
 from rocking.studies.report import Made, ReportPlan, keep, kept, report
 from rocking.studies.run import RunReport, Stop, run
@@ -75,7 +75,7 @@ class Running:
     rate : float
         Simulations a second since it started.
     seconds_left : float
-        Time that it will take at this rate; infinite before its first unit.
+        Time that it will take at this rate, or that the round of a refinement will; infinite before its first unit.
     """
 
     holder: str
@@ -184,7 +184,7 @@ class Study:
             threads = checks.whole(threads, "threads", InvalidOption, least=1)
         self.store.check_program()
         with self.place.locked() as note:
-            self._log({"event": "start", "note": note, "done": self._simulations(self.store.done())})
+            self._log({"event": "start", "note": note, "done": self._simulations()})
             try:
                 report = self._compute(threads=threads, executor=executor, progress=progress)
             except BaseException as error:
@@ -195,11 +195,11 @@ class Study:
 
     def _compute(self, **options: Any) -> RunReport:
         """Run the grid, and one round of the refinement after the other, until nothing is left or somebody stops it."""
-        stop, tolerance = Stop(), kept_plan(self.store)
+        stop, tolerances = Stop(), kept_plan(self.store)
         with stop.listening():
             report = run(self.store, stop=stop, failing=self._failing, **options)
-            while tolerance is not None and not (report.failed or report.stopped):
-                now = next_round(self.store, tolerance)
+            while tolerances is not None and not (report.failed or report.stopped):
+                now = next_round(self.store, tolerances)
                 if now.is_last:
                     break
                 report += run(now, stop=stop, failing=self._failing, **options)
@@ -214,21 +214,27 @@ class Study:
         failed = {entry["unit"]: entry["why"] for entry in last if entry.get("event") == "failed"}
         done = self.store.done()
         grid = self.store.grid
-        running = self._running(last, done)
-        return Status(len(done), len(grid), grid.total, failed, running, runs, refinement(self.store))
+        refined = refinement(self.store)
+        left = grid.total - sum(map(grid.simulations, done)) or (refined.simulations - refined.done if refined else 0)
+        return Status(len(done), len(grid), grid.total, failed, self._running(last, left), runs, refined)
 
-    def _running(self, last: tuple[dict[str, Any], ...], done: set[Key]) -> Running | None:
-        """Whoever runs it, and how fast since the start of the last run."""
+    def _running(self, last: tuple[dict[str, Any], ...], left: int) -> Running | None:
+        """Whoever runs it, and how fast since the start of the last run; so many simulations are left."""
         holder = self.place.holder()
         if not holder or not last:
             return None
         seconds = time.time() - datetime.fromisoformat(last[0]["time"]).timestamp()
-        now = self._simulations(done)
-        rate = max(now - last[0]["done"], 0) / max(seconds, 1.0)
-        return Running(holder, rate, (self.store.grid.total - now) / rate if rate else math.inf)
+        rate = max(self._simulations() - last[0]["done"], 0) / max(seconds, 1.0)
+        return Running(holder, rate, left / rate if rate else math.inf)
 
-    def _simulations(self, done: set[Key]) -> int:
-        return sum(map(self.store.grid.simulations, done))
+    def _simulations(self) -> int:
+        """Count those that are done, of the grid and of all rounds."""
+        return sum(part.grid.simulations(key) for part in self._parts() for key in part.done())
+
+    def _parts(self) -> list[Store | Round]:
+        """Return the grid, and the rounds that have begun."""
+        tolerances = kept_plan(self.store)
+        return [self.store, *([] if tolerances is None else rounds(self.store, tolerances))]
 
     def _failing(self, unit: str, why: str) -> None:
         self._log({"event": "failed", "unit": unit, "why": why})
@@ -281,9 +287,7 @@ class Study:
         if recompute or repair:
             self.store.check_program()
             announce(SIMULATIONS)
-        tolerance = kept_plan(self.store)
-        parts: list[Store | Round] = [self.store, *([] if tolerance is None else rounds(self.store, tolerance))]
-        done = [(part, key) for part in parts for key in sorted(part.done())]
+        done = [(part, key) for part in self._parts() for key in sorted(part.done())]
         faults = {unit: fault for unit in done if (fault := _fault(*unit))}
         sound = [unit for unit in done if unit not in faults]
         rng = np.random.default_rng(seed)
@@ -296,26 +300,33 @@ class Study:
                     part.put(key, compute(part.work(key)))
         return list(faults.values())
 
-    def critical_scales(self) -> xr.Dataset:
-        """Scales between which the verdict on a block changes: from standing to overturning, or back.
+    def critical_scales(self, verdict: Verdict = "overturning") -> xr.Dataset:
+        """Scales between which the verdict on a block changes.
+
+        Parameters
+        ----------
+        verdict : {"overturning", "complete_chattering"}
+            Whether a block overturns; or whether it comes to rest after its first uplift before the motion passes a
+            threshold again.
 
         Returns
         -------
         xarray.Dataset
             Over ``change``, in order of motion, polarity, block and scale: low and high (scales, in the units of the
-            measure), overturns (whether the higher one overturns the block, and the lower one does not), known
-            (whether no simulation on the way was given up, which leaves a bracket wide); motion, polarity, block and
-            its parameters as coordinates. A block that stands a stronger motion than one that overturns it has several.
-            Brackets are neighbouring scales of the study, or narrower where it was made with `refine`.
+            measure), overturns or completes (whether the verdict holds at the higher one, and not at the lower one),
+            known (whether all verdicts on the way are, else the bracket stays wide: a simulation was given up or
+            stopped, or a rest is not proven); motion, polarity, block and its parameters as coordinates. A block that
+            stands a stronger motion than one that overturns it has several. Brackets are neighbouring scales of the
+            study, or narrower where it was made with `refine`.
 
         Raises
         ------
         StudyError
             If units are missing or damaged, or the refinement is not done.
         InvalidOption
-            If the study has no two scales in increasing order.
+            If there is no such verdict, or the study has no two scales in increasing order.
         """
-        return critical_scales(self.store, found_brackets(self.store))
+        return critical_scales(self.store, verdict)
 
     def fragility(
         self,
@@ -408,7 +419,7 @@ class Study:
         """
         return report(self.store, kept(self.store), progress)
 
-    def export(self, path: str | Path, *, critical: bool = False) -> None:
+    def export(self, path: str | Path, *, critical: Verdict | None = None) -> None:
         """Write the results to one file, by its suffix.
 
         Parameters
@@ -417,8 +428,8 @@ class Study:
             NetCDF (.nc), as `results` has them; or a table with a row for each simulation, in columns named with their
             units: CSV (.csv), JSON (.json), Parquet (.parquet, with pyarrow installed), a workbook (.xlsx, with
             openpyxl installed).
-        critical : bool
-            Write the `critical_scales` instead, a row for each change.
+        critical : {"overturning", "complete_chattering"}, optional
+            Write the `critical_scales` of this verdict instead, a row for each change.
 
         Raises
         ------
@@ -428,7 +439,7 @@ class Study:
             If the file cannot be written.
         """
         if critical:
-            export(self.critical_scales(), Path(path), "change", _ROWS)
+            export(self.critical_scales(critical), Path(path), "change", _ROWS)
         else:
             export(self.results(), Path(path), "motion", self.store.grid.unit[0])
 
@@ -479,7 +490,7 @@ def study(
     damping: float = 0.05,
     polarity: Polarity = "+",
     duration: float | None = None,
-    refine: float | None = None,
+    refine: float | Mapping[str, float] | None = None,
     unit_blocks: int | None = None,
 ) -> Study:
     """Create a study, or open one that is there and check that its inputs are these.
@@ -493,10 +504,11 @@ def study(
         As for `simulate_many`; without both, the study must be there, and needs no script.
     model, chattering, factor, pga, pgv, sa, period, damping, polarity, duration
         As for `simulate_many`.
-    refine : float, optional
+    refine : float or mapping, optional
         Once the scales (two or more, increasing) are computed, halve the gap between neighbours of which one overturns
         a block and the other does not, until it is narrower than this, relative to the scale: `Study.critical_scales`.
-        May be given later for a study that is there.
+        ``{"complete_chattering": 1e-6}`` does so where one completes the first chattering and the other does not;
+        ``"overturning"`` may be named beside it. May be given later for a study that is there.
     unit_blocks : int, optional
         Blocks of a unit, a multiple of 512, of one motion, scale and polarity; by default a unit holds as many of all
         as take about five seconds, from a pilot.
@@ -545,7 +557,7 @@ def study_of(
     product: Product,
     unit_blocks: int | None = None,
     plan: ReportPlan | None = None,
-    refine: float | None = None,
+    refine: float | Mapping[str, float] | None = None,
 ) -> Study:
     """Create the study of a product in a place, or open the one that is there and check its inputs.
 
@@ -559,15 +571,15 @@ def study_of(
         Blocks of a unit of one motion, scale and polarity; by default units are made from a pilot.
     plan : ReportPlan, optional
         What is to be made of the results; takes the place of what was.
-    refine : float, optional
-        Tolerance of the scales; may be given later.
+    refine : float or mapping, optional
+        Tolerance of the scales, or one for each verdict; may be given later.
 
     Raises
     ------
     StudyError
         If there is one of other inputs, or it is damaged.
     """
-    tolerance = None if refine is None else tolerance_of(product, refine)
+    tolerances = None if refine is None else tolerances_of(product, refine)
     if stores.exists(place):
         found = Store.open(place)
         found.check_inputs(product)
@@ -576,8 +588,8 @@ def study_of(
         found = Store.create(place, product, unit)
     if plan is not None:
         keep(found, plan)
-    if tolerance is not None:
-        keep_plan(found, tolerance)
+    if tolerances is not None:
+        keep_plan(found, tolerances)
     return Study(place, found)
 
 
