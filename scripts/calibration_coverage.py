@@ -1,6 +1,6 @@
 """Simulation-based calibration: measure how often the 90 % intervals of `rocking.calibrate` hold the truth.
 
-Run ``python scripts/calibration_coverage.py`` from the repository's root (an hour of one core): it writes
+Run ``python scripts/calibration_coverage.py`` from the repository's root (half an hour of one core): it writes
 docs/_tables/calibration-coverage.txt and docs/_static/calibration-ranks.png. Each truth is drawn from the prior, each
 test's block from the truth, and its outcome is simulated; data sets whose outcomes are all the same are drawn again,
 which leaves the check exact, since the fit sees them refused as well. The truth's rank among the draws of the posterior
@@ -98,20 +98,21 @@ def table(found: list[dict[str, float]], two_sided: bool) -> str:
     return "\n".join(rows) + "\n"
 
 
-def draw(found: list[dict[str, float]], path: Path) -> None:
+def draw(symmetric: list[dict[str, float]], two_sided: list[dict[str, float]], path: Path) -> None:
     """Draw a histogram of the truth's ranks for each parameter, with the band of 90 % of even ones."""
-    names = list(found[0])
-    low, high = (float(binom.ppf(share, len(found), 1.0 / BINS)) for share in (0.05, 0.95))
-    figure = Figure(figsize=(7.0, 2.4 * (len(names) // 3)), layout="constrained")
-    panels = np.atleast_1d(figure.subplots(len(names) // 3, 3, sharey=True)).ravel()
-    for axes, name in zip(panels, names, strict=True):
-        axes.axhspan(low, high, color="0.85", label="90 % of even ranks")
-        axes.hist([one[name] for one in found], BINS, (0.0, 1.0), histtype="step", color="k", label="data sets")
-        axes.set_xlabel(f"share of the posterior below the true {name.replace('_', ' ')}", fontsize=7)
-        axes.set_xlim(0.0, 1.0)
-        axes.set_ylim(0.0, None)
-    panels[0].set_ylabel("data sets")
-    panels[0].legend(fontsize=7, loc="lower center")
+    figure = Figure(figsize=(10.0, 4.8), layout="constrained")
+    rows = figure.subplots(2, 4, sharey=True)
+    for row, found, sides in zip(rows, (symmetric, two_sided), ("symmetric", "two-sided"), strict=True):
+        low, high = (float(binom.ppf(share, len(found), 1.0 / BINS)) for share in (0.05, 0.95))
+        for axes, name in zip(row, found[0], strict=False):
+            axes.axhspan(low, high, color="0.85", label="90 % of even ranks")
+            axes.hist([one[name] for one in found], BINS, (0.0, 1.0), histtype="step", color="k", label="data sets")
+            axes.set_xlabel(f"share of the posterior\nbelow the true {name.replace('_', ' ')}")
+            axes.set_xlim(0.0, 1.0)
+            axes.set_ylim(0.0, None)
+        row[0].set_ylabel(f"data sets, {sides} blocks")
+    rows[0, 3].set_axis_off()
+    rows[0, 3].legend(*rows[0, 0].get_legend_handles_labels(), loc="center")
     figure.savefig(path, dpi=150)
 
 
@@ -119,15 +120,14 @@ def main() -> None:
     """Draw data sets, calibrate each, and tell how often intervals hold the truth."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data_sets", type=int, nargs="?", default=DATA_SETS)
-    parser.add_argument("--two-sided", action="store_true")
-    options = parser.parse_args()
+    count = parser.parse_args().data_sets
     with ProcessPoolExecutor(PROCESSES) as pool:
-        found = list(pool.map(ranks, range(options.data_sets), [options.two_sided] * options.data_sets))
-    text = table(found, options.two_sided)
+        two_sided, symmetric = (list(pool.map(ranks, range(count), [sides] * count)) for sides in (True, False))
+    text = "\n".join((table(symmetric, False), table(two_sided, True)))
     print(text)
-    if options.data_sets == DATA_SETS and not options.two_sided:
+    if count == DATA_SETS:
         TABLE.write_text(text, "utf-8")
-        draw(found, FIGURE)
+        draw(symmetric, two_sided, FIGURE)
 
 
 if __name__ == "__main__":

@@ -1,13 +1,15 @@
 """Write the tables of docs/validation.md from computation.
 
-Run ``python scripts/validation.py`` from the repository's root (ten minutes). Two tables need what is not part of this
-repository, and stay as they are without it: OpenSeesPy, and shake-table tests (``--shake-table FOLDER``, as
-examples/shake_table.py takes it).
+Run ``python scripts/validation.py`` from the repository's root (ten minutes). Some tables need what is not part of this
+repository, and stay as they are without it: OpenSeesPy, shake-table tests (``--shake-table FOLDER``, as
+examples/shake_table.py takes it), and tests on a small table (``--small-table FILE``: a CSV file of the columns set,
+pgv_over_pga_s, pga_g and overturned).
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import datetime
 import importlib.metadata
 import importlib.util
@@ -26,6 +28,7 @@ from rocking.constants import STANDARD_GRAVITY
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLES = ROOT / "docs" / "_tables"
+sys.path.insert(0, str(ROOT / "examples"))
 
 #: Half diagonals, m, and amplitudes over the threshold (each +- 4.9e-6) of Numerics-in-Motion/blocks, under-this-pulse.
 OTHERS = {0.25: 1.2618896484375, 0.5: 1.4584423828125, 1.0: 2.1637841796875, 2.0: 5.1549267578125}
@@ -38,21 +41,25 @@ LIMITS = ((0.25, 0.9, 7.58, 7.4, 9.9), (0.349, 0.825, 5.8, 5.3, 5.6))
 #: Random cases that are compared with SciPy, of each model.
 RANDOM = 12
 
-#: Candidates of a calibration: a quarter of the default, for the time it takes.
-CANDIDATES = 2048
+#: A rock of 0.4 kg on a small table: the bounds of its calibrations, and their seeds.
+SMALL = {"p": (3.0, 40.0), "alpha": (0.005, 0.6)}
+SEEDS = (0, 1, 2)
 
 
 def main() -> None:
     """Write the tables that are named; by default all that can be made here."""
     parser = argparse.ArgumentParser(description="Write the tables of docs/validation.md.")
     parser.add_argument("--shake-table", type=Path, metavar="FOLDER")
-    parser.add_argument("tables", nargs="*", help="quick, limits, random, opensees, shake-table")
+    parser.add_argument("--small-table", type=Path, metavar="FILE")
+    parser.add_argument("tables", nargs="*", help="quick, limits, random, opensees, shake-table, small-table")
     options = parser.parse_args()
     parts = {"quick": quick_tables, "limits": limits_tables, "random": random_tables}
     if importlib.util.find_spec("openseespy"):
         parts["opensees"] = opensees_tables
     if options.shake_table:
         parts["shake-table"] = lambda: shake_tables(options.shake_table)
+    if options.small_table:
+        parts["small-table"] = lambda: small_tables(options.small_table)
     for name in options.tables or parts:
         write(parts[name]())
     write({"validation-made.txt": versions()})
@@ -395,34 +402,77 @@ def _first_peak(ops, pulse):
 
 def shake_tables(folder):
     """Cross-validated scores on shake-table tests of two granite specimens, beside other predictions."""
-    rows = [row for specimen in ("1", "2") for row in specimen_rows(folder, specimen)]
-    heading = ("specimen", "predicted by", "accuracy", "log loss", "Brier")
-    return {"validation-shake-table.txt": markdown(heading, rows)}
-
-
-def specimen_rows(folder, specimen):
-    """Scores on one specimen's tests; source motions are left out as wholes."""
-    sys.path.insert(0, str(ROOT / "examples"))
-    from shake_table import FOLDS, as_sure_as_right, left_out, read
+    from shake_table import as_sure_as_right, read
 
     tests, motions = read(folder)
     groups = [test["ground_motion"].strip().partition("_")[0] for test in tests]
-    intensities = np.log([(motion.pga, motion.pgv) for motion in motions])
-    overturned = np.array([test[f"overturned_specimen_{specimen}"] == "1" for test in tests])
-    elements = np.array([test[f"dem_best_specimen_{specimen}"] == "1" for test in tests])
-    chances = left_out(intensities, overturned, groups, 1)
-    blocks = rocking.calibrate(motions, overturned, seed=0, candidates=CANDIDATES)
-    scored = {
-        "distinct elements, tuned by their authors on all": Scores.of(
-            as_sure_as_right(elements, overturned), overturned
-        ),
-        "logistic regression on PGA and PGV": Scores.mean([Scores.of(row, overturned) for row in chances]),
-        "rocking blocks": blocks.cross_validate(groups=groups, folds=FOLDS, repeats=1).scores,
+    rows = []
+    for specimen in ("1", "2"):
+        overturned = np.array([test[f"overturned_specimen_{specimen}"] == "1" for test in tests])
+        elements = np.array([test[f"dem_best_specimen_{specimen}"] == "1" for test in tests])
+        tuned = Scores.of(as_sure_as_right(elements, overturned), overturned)
+        rows.append(score_row(specimen, "distinct elements, tuned by their authors on all", tuned))
+        rows += left_out_rows(specimen, motions, overturned, groups, rocking.calibrate(motions, overturned, seed=0))
+    return {"validation-shake-table.txt": markdown(SCORE_HEADING, rows)}
+
+
+def small_tables(file):
+    """Cross-validated scores on tests of a printed rock on a small table, and its p from three seeds."""
+    with file.open(newline="", encoding="utf-8") as opened:
+        tests = list(csv.DictReader(opened))
+    scores, found = [], []
+    for series in sorted({test["set"] for test in tests}):
+        chosen = [test for test in tests if test["set"] == series]
+        motions = [commanded(test) for test in chosen]
+        overturned = np.array([test["overturned"] == "1" for test in chosen])
+        calibrated = [rocking.calibrate(motions, overturned, seed=seed, **SMALL) for seed in SEEDS]
+        groups = [test["pgv_over_pga_s"] for test in chosen]
+        scores += left_out_rows(series, motions, overturned, groups, calibrated[0])
+        found += [estimate_row(series, one) for one in calibrated]
+    heading = ("series", "seed", "p, rad/s", "90 %", "restitution", "90 %", "effective candidates", "R-hat")
+    return {
+        "validation-small-table.txt": markdown(SCORE_HEADING, scores),
+        "validation-small-table-seeds.txt": markdown(heading, found),
     }
+
+
+def commanded(test):
+    """One period of a cosine, as the table was told to move."""
+    frequency = 1.0 / (2.0 * math.pi * float(test["pgv_over_pga_s"]))
+    return rocking.pulses.one_cosine(float(test["pga_g"]) * STANDARD_GRAVITY, frequency)
+
+
+def estimate_row(series, found):
+    """Estimates of one seed."""
+    cells = []
+    for name, digits in (("p", 1), ("restitution", 2)):
+        one = found.estimates[name]
+        cells += [f"{one.median:.{digits}f}", f"{one.lower:.{digits}f} to {one.upper:.{digits}f}"]
+    looked = found.diagnostics
+    return (series, found.seed, *cells, f"{looked.effective:.0f}", f"{max(looked.agreement.values()):.2f}")
+
+
+def left_out_rows(specimen, motions, overturned, groups, calibration):
+    """Scores on tests that were left out, in groups as wholes, of a logistic regression and of a calibration."""
+    from shake_table import FOLDS, left_out
+
+    folds = min(FOLDS, len(set(groups)))
+    intensities = np.log([(motion.pga, motion.pgv) for motion in motions])
+    chances = left_out(intensities, overturned, groups, 1)
+    regression = Scores.mean([Scores.of(row, overturned) for row in chances])
+    blocks = calibration.cross_validate(groups=groups, folds=folds).scores
     return [
-        (specimen, name, f"{100.0 * one.accuracy:.1f} %", f"{one.log_loss:.3f}", f"{one.brier:.3f}")
-        for name, one in scored.items()
+        score_row(specimen, "logistic regression on PGA and PGV", regression),
+        score_row(specimen, "rocking blocks", blocks),
     ]
+
+
+SCORE_HEADING = ("tests", "predicted by", "accuracy", "log loss", "Brier")
+
+
+def score_row(specimen, name, one):
+    """Scores as text."""
+    return specimen, name, f"{100.0 * one.accuracy:.1f} %", f"{one.log_loss:.3f}", f"{one.brier:.3f}"
 
 
 # Text

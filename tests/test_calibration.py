@@ -1,10 +1,12 @@
 """Calibration: hidden blocks are found again from outcomes and from histories, and what they will do is predicted."""
 
+import csv
 import math
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scipy.stats import norm
 
 import rocking
 from rocking.analysis.calibration import population
@@ -68,11 +70,10 @@ def test_what_a_hidden_block_will_do_is_predicted(found, unseen):
 
 
 def test_the_hidden_block_lies_within_the_estimates(found):
-    sides = zip(("_plus", "_minus"), HIDDEN.sides, strict=True)
-    for side, truth in sides:
-        for name in ("p", "alpha"):
-            estimate = found.estimates[name + side]
-            assert estimate.lower < getattr(truth, name) < estimate.upper, name + side
+    for side, truth in zip(("_plus", "_minus"), HIDDEN.sides, strict=True):
+        slenderness = found.estimates[f"alpha{side}"]
+        assert slenderness.lower < truth.alpha < slenderness.upper, side
+        assert found.estimates["p"].lower < truth.p < found.estimates["p"].upper
     assert found.estimates["alpha_plus"].upper < found.estimates["alpha_minus"].upper
 
 
@@ -207,6 +208,24 @@ def test_runs_that_agree_are_told_from_those_that_do_not():
     assert r_hat(np.exp(same)) == pytest.approx(r_hat(same), abs=0.01)
 
 
+@pytest.mark.slow
+def test_any_seed_finds_the_p_that_the_mesh_of_a_rock_tells(shared):
+    """136 tests at the threshold of overturning; the mesh says 10.56 and 10.82 rad/s, about either axis."""
+    with (shared / "shakebot" / "tests.csv").open(newline="", encoding="utf-8") as file:
+        tests = [test for test in csv.DictReader(file) if test["set"] == "pbr0"]
+    motions = [
+        rocking.pulses.one_cosine(float(test["pga_g"]) * 9.81, 0.5 / math.pi / float(test["pgv_over_pga_s"]))
+        for test in tests
+    ]
+    overturned = [test["overturned"] == "1" for test in tests]
+    for seed in (0, 1, 2):
+        found = rocking.calibrate(motions, overturned, seed, p=(3.0, 40.0), alpha=(0.005, 0.6), candidates=4096)
+        estimate = found.estimates["p"]
+        assert estimate.lower < 10.7 < estimate.upper
+        assert 9.5 < estimate.median < 12.5
+        assert found.diagnostics.effective > 100
+
+
 def test_few_candidates_are_told():
     motions = bursts(40, seed=9)
     found = rocking.calibrate(motions, outcomes(motions), candidates=128)
@@ -272,17 +291,35 @@ def test_even_points_fill_the_space_evenly():
     rng = np.random.default_rng(0)
     points = space.spread_evenly(4096, rng)
     low, high = space.box
-    independent = low + rng.random((200_000, 6)) * (high - low)
+    independent = low + rng.random((200_000, 4)) * (high - low)
     inside = independent[space.contains(independent)]
     assert space.volume == pytest.approx(len(inside) / 200_000 * np.prod(high - low), rel=0.02)
     # Means are those of the uniform density, closer than independent points would be (0.3/sqrt(4096) of the width).
     np.testing.assert_allclose(points.mean(axis=0) / (high - low), inside.mean(axis=0) / (high - low), atol=5e-3)
 
 
-def test_sides_are_mean_times_and_over_the_root_of_the_ratio():
+def test_the_slenderness_of_a_side_is_the_mean_times_or_over_the_root_of_the_ratio():
     space = Space.of((1.0, 9.0), (0.01, 1.0), (0.1, 1.0), two_sided=True)
-    point = np.log([[3.0, 0.1, 0.5, 1.21, 4.0, 1.0]])
-    np.testing.assert_allclose(space.sides(point)[0], [[3.3, 0.2, 0.5], [3.0 / 1.1, 0.05, 0.5]], rtol=1e-12)
+    point = np.log([[3.0, 0.1, 0.5, 4.0]])
+    np.testing.assert_allclose(space.sides(point)[0], [[3.0, 0.2, 0.5], [3.0, 0.05, 0.5]], rtol=1e-12)
+    assert list(space.named(point)) == ["p", "alpha_plus", "alpha_minus", "restitution"]
+
+
+def test_a_known_slenderness_leaves_nothing_in_which_the_sides_differ():
+    space = Space.of((1.0, 9.0), 0.2, (0.1, 1.0), two_sided=True)
+    assert not space.two_sided
+    assert list(space.named(np.log([[3.0, 0.5]]))) == ["p", "restitution"]
+    np.testing.assert_allclose(space.sides(np.log([[3.0, 0.5]]))[0], [[3.0, 0.2, 0.5]] * 2, rtol=1e-12)
+
+
+def test_the_sides_of_a_rigid_body_share_p_and_restitution_to_second_order_in_slenderness():
+    """What `calibrate` rests on, for a body whose centre of mass stands at a third of its base."""
+    h, turn = 1.0, 1.0 / 3.0  # height of the centre of mass, radius of gyration squared
+    left, right = 0.1 * h, 0.2 * h
+    p = [(9.81 * math.hypot(h, side) / (turn + h**2 + side**2)) ** 0.5 for side in (left, right)]
+    lost = [(turn + h**2 - left * right) / (turn + h**2 + side**2) for side in (left, right)]
+    assert p[0] / p[1] == pytest.approx(1.0, abs=0.01)
+    assert lost[0] / lost[1] == pytest.approx(1.0, abs=0.025)
 
 
 @pytest.fixture(scope="module")
@@ -339,6 +376,49 @@ def test_where_candidates_are_does_not_change_the_posterior(threshold_evidence):
     assert np.abs(weights @ more.points / weights.sum() - expected).max() < 0.02
 
 
+def test_shares_are_sums_over_weighted_candidates(threshold_evidence):
+    """In single precision, against double precision without leaving anything out."""
+    evidence, _ = threshold_evidence
+    rng = np.random.default_rng(6)
+    populations = population.with_dispersions(evidence.candidates.space, evidence.candidates.points[:50], rng)
+    centre, dispersion = population.unpacked(populations)
+    apart = (evidence.candidates.points - centre[:, None]) / dispersion[:, None]
+    weights = np.exp(-0.5 * (apart**2).sum(axis=2) + evidence.candidates.log_weights)
+    weights /= weights.sum(axis=1, keepdims=True)
+    share = weights @ evidence.candidates.overturned
+    effective = 1.0 / (weights**2).sum(axis=1)
+    np.testing.assert_allclose(evidence.effective(populations), effective, rtol=2e-3)
+    count = effective[:, None]
+    expected = 0.01 + 0.98 * (count * share + 0.5) / (count + 1.0)
+    np.testing.assert_allclose(evidence.probabilities(populations), expected, atol=2e-4)
+    np.testing.assert_allclose(evidence.weights(populations), weights, atol=2e-4)
+
+
+def test_a_low_exponent_widens_the_posterior(threshold_evidence):
+    evidence, _ = threshold_evidence
+    spread = [
+        posterior(evidence, 256, 2, np.random.default_rng(7), exponent=exponent)[:, 1].std()
+        for exponent in (0.03, 0.3, 1.0)
+    ]
+    assert spread[0] > 1.5 * spread[1] > 2.0 * spread[2]
+
+
+def test_a_motion_that_is_given_twice_is_simulated_once(monkeypatch):
+    motions = bursts(12, seed=4)
+    counted = []
+
+    def spy(blocks, motions, **options):
+        counted.append(len(motions))
+        return rocking.simulate_many(blocks, motions, **options)
+
+    monkeypatch.setattr("rocking.analysis.calibration.outcomes.simulate_many", spy)
+    twice = motions + [rocking.Motion(one.breakpoints, one.coefficients, name="again") for one in motions]
+    observed = outcomes(twice)
+    found = rocking.calibrate(twice, observed, candidates=128, two_sided=False)
+    assert set(counted) == {12}
+    np.testing.assert_allclose(found.probabilities[:12], found.probabilities[12:], rtol=1e-12)
+
+
 def test_tests_that_are_left_out_do_not_count(threshold_evidence):
     evidence, _ = threshold_evidence
     some = np.arange(40) < 30
@@ -360,6 +440,12 @@ def test_the_density_is_that_of_what_is_drawn():
     rng = np.random.default_rng(5)
     populations = np.array([[0.0, 1.0, 2.0, -2.3, -1.7, -2.9], [0.2, 1.1, 2.1, -2.3, -2.3, -2.3]])
     points = population.drawn(populations, 1.5, 40_000, rng)
+    few = points[:100, None]
+    centre, dispersion = population.unpacked(populations)
+    parts = norm.pdf(few, centre, 1.5 * dispersion).prod(axis=2)
+    np.testing.assert_allclose(
+        population.log_density(populations, 1.5, points[:100]), np.log(parts.mean(axis=1)), atol=1e-9
+    )
     density = np.exp(population.log_density(populations, 1.5, points))
     box = (points > [0.0, 0.9, 1.95]) & (points < [0.2, 1.1, 2.05])
     inside = box.all(axis=1)

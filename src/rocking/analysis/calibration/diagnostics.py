@@ -69,7 +69,7 @@ class Diagnostics:
     effective : float
         How many of them, effectively, tell what a typical population of the posterior does.
     agreement : mapping of str to float
-        R-hat of each estimate between runs: 1 where they agree, above 1.1 where they do not.
+        R-hat of each estimate between independent runs: 1 where they agree, above 1.1 where they do not.
     leaning : tuple of Leaning
         Estimates that lean on a bound.
     """
@@ -96,7 +96,8 @@ class Diagnostics:
         notes = [f"{one}" for one in self.leaning]
         apart = [f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > AGREEMENT]
         if apart:
-            notes.append(f"runs disagree (R-hat) on {', '.join(apart)}: double the candidates")
+            held = "the estimates weigh what both found; double the candidates, or narrow the bounds to what you know"
+            notes.append(f"independent runs disagree (R-hat) on {', '.join(apart)}: {held}")
         if self.effective < _FEW:
             few = f"only {self.effective:.0f} candidates tell what a typical population does"
             notes.append(f"{few}: double the candidates, or narrow the bounds to what you know")
@@ -106,7 +107,7 @@ class Diagnostics:
         """Say how the search went, then the notes."""
         search = (
             f"{self.candidates} candidates, {self.effective:.0f} effective for a typical population; {RUNS} "
-            f"runs, R-hat at most {max(self.agreement.values()):.2f}"
+            f"independent runs, R-hat at most {max(self.agreement.values()):.2f}"
         )
         return "\n".join([search, *(f"note: {sentence}" for sentence in self.notes)])
 

@@ -7,6 +7,7 @@ share is a weighted mean over candidate blocks that were simulated once, whateve
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.analysis.calibration.candidates import Candidates
 from rocking.analysis.calibration.population import batches, unpacked
 from rocking.arrays import Flags, Floats
+from rocking.kernels.population import shares
 
 #: A share that n simulated blocks estimate is itself uncertain: Jeffreys' prior, Beta(1/2, 1/2).
 _JEFFREYS: Final = 0.5
@@ -44,12 +46,9 @@ class Evidence:
 
     def weights(self, populations: Floats) -> NDArray[np.float32]:
         """Share of each population that each candidate stands for, shape (c, n); rows sum to 1."""
-        points = self.candidates.points
-        centre, dispersion = unpacked(populations)
-        precision = dispersion**-2
-        exponent = (precision * centre) @ points.T - 0.5 * precision @ (points**2).T + self.candidates.log_weights
-        exponent -= exponent.max(axis=1, keepdims=True)
-        weights = np.exp(exponent.astype(np.float32))
+        weights = self._factors(populations) @ self._powers
+        weights -= weights.max(axis=1, keepdims=True)
+        np.exp(weights, out=weights)
         weights /= weights.sum(axis=1, keepdims=True)
         return weights
 
@@ -60,8 +59,8 @@ class Evidence:
 
     def probabilities(self, populations: Floats) -> Floats:
         """Probability of overturning for each population and motion, shape (c, m)."""
-        shares, effective = self._shares(populations)
-        return blurred(expected_share(shares, effective[:, None]), self.lapse)
+        found, effective = self._shares(populations)
+        return blurred(expected_share(found, effective[:, None]), self.lapse)
 
     def effective(self, populations: Floats) -> Floats:
         """Effective number of candidates that speak for each population, shape (c,)."""
@@ -76,12 +75,33 @@ class Evidence:
 
     def _shares(self, populations: Floats) -> tuple[Floats, Floats]:
         """Share of each population that overturns, shape (c, m), and the effective number of candidates behind it."""
-        shares, effective = [], []
-        for part in batches(populations):
-            weights = self.weights(part)
-            shares.append(weights @ self.candidates.overturned)
-            effective.append(1.0 / np.einsum("ij,ij->i", weights, weights))
-        return np.concatenate(shares).astype(np.float64), np.concatenate(effective).astype(np.float64)
+        overturned, powers = self.candidates.overturned, self._powers
+        found = np.empty((len(populations), overturned.shape[1]), np.float32)
+        effective = np.empty(len(populations))
+        room = np.empty(powers.shape[1], np.float32)
+        shares(self._factors(populations), powers, overturned, room, found, effective)
+        # Rounding may take a share of all just above 1.
+        return np.minimum(found, 1.0, dtype=np.float64), effective
+
+    def _factors(self, populations: Floats) -> NDArray[np.float32]:
+        """Factors, shape (c, 2 k + 1), of `_powers` in the logarithm of a candidate's weight."""
+        centre, dispersion = unpacked(populations)
+        precision = dispersion**-2
+        from_middle = precision * (centre - self._middle)
+        return np.hstack([from_middle, -0.5 * precision, np.ones((len(centre), 1))]).astype(np.float32)
+
+    @cached_property
+    def _powers(self) -> NDArray[np.float32]:
+        """Coordinates of the candidates, their squares and their weights, shape (2 k + 1, n).
+
+        They are counted from the candidates' middle: single precision then serves.
+        """
+        points = self.candidates.points - self._middle
+        return np.vstack([points.T, points.T**2, self.candidates.log_weights]).astype(np.float32)
+
+    @cached_property
+    def _middle(self) -> Floats:
+        return np.asarray(self.candidates.points.mean(axis=0))
 
 
 def expected_share(share: Floats, effective: ArrayLike) -> Floats:

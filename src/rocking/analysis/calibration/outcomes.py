@@ -18,7 +18,7 @@ from rocking.analysis.calibration.evidence import Evidence, blurred, expected_sh
 from rocking.analysis.calibration.posterior import posterior, systematic
 from rocking.analysis.calibration.scores import Scores
 from rocking.analysis.calibration.search import Problem, search
-from rocking.analysis.calibration.space import Knowledge, Space, unit_of
+from rocking.analysis.calibration.space import SIDED, Knowledge, Space, unit_of
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.engine import require_finished
@@ -103,7 +103,8 @@ class Calibration:
     weights : ndarray, shape (n,)
         Their weights; they sum to 1.
     estimates : mapping of str to Estimate
-        The population's parameters, "p_plus" (rad/s), "alpha_minus" (rad), "restitution_plus", ...
+        The population's parameters: "p" (rad/s), "restitution", and "alpha" (rad), of a two-sided block
+        "alpha_plus" and "alpha_minus".
     draws : mapping of str to ndarray, shape (d,)
         Draws of the posterior of the population's centre, by the same names.
     probabilities : ndarray, shape (m,)
@@ -207,7 +208,7 @@ class Calibration:
             for part in range(folds):
                 left_out = parts == part
                 kept, wanted = self._evidence.of_tests(~left_out), self._evidence.of_tests(left_out)
-                drawn = posterior(kept, _FOLD_DRAWS, _ROUNDS, rng, progress)
+                drawn = posterior(kept, _FOLD_DRAWS, _ROUNDS, rng, progress=progress)
                 row[left_out] = wanted.probabilities(drawn).mean(axis=0)
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
@@ -326,12 +327,13 @@ def calibrate(
         p = ``Block(width=..., height=...).p``. The restitution may be "housner": it then follows from each side's
         slenderness as 1 - 1.5 sin(alpha)^2 (Housner 1963).
     two_sided : bool
-        Whether the two sides may differ in what is not known: p and restitution by a factor of 1.25, the slenderness
-        by 3.
+        Whether the slendernesses of the two sides may differ, by a factor of 3 at most. p and restitution of a rigid
+        body's sides differ by terms of second order in the slenderness only.
     lapse : float
         Chance that an outcome is not that of a rocking block at all.
     candidates : int
-        Blocks that are simulated under every motion, about; up to half as many again while runs disagree.
+        Blocks that are simulated under every motion, about; up to twice as many while runs disagree. A motion that is
+        given several times is simulated once.
     ensemble : int
         Most blocks that are kept for predictions.
     threads, progress
@@ -351,17 +353,18 @@ def calibrate(
     Notes
     -----
     A specimen differs a little from test to test, and no rigid plane block is a real rock. So each test is taken to
-    have its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratios between the
-    sides. The probability of an outcome is the share of the population that behaves so (and a small lapse); a common
-    dispersion of both slendernesses is, in the linear model, the same as one of the motion's amplitude. The posterior
-    over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with the prior that is given
-    by the bounds and a lognormal prior on each dispersion (median 10 %, ratios of p and restitution 5 %). The
+    have its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratio of the
+    sides' slendernesses. The probability of an outcome is the share of the population that behaves so (and a small
+    lapse); a common dispersion of both slendernesses is, in the linear model, the same as one of the motion's
+    amplitude. The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006),
+    with the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %). The
     likelihood is derived in the documentation's page on calibration.
 
-    The search is global. Two runs each fill the bounds evenly, try blocks where their own fits look best,
-    then blocks of their own wherever any run looks best. A candidate weighs what the density of candidates lacks, so
-    that the prior stays what it was (deterministic mixture; Owen and Zhou 2000). While the runs disagree they go on;
-    what is left of that, few effective candidates, or a posterior that leans on a bound, is said in the summary.
+    The search is global. Two independent runs each fill the bounds evenly, then try blocks where their own fits say:
+    first where they are fair, in the end where they are best. A candidate weighs what the density of candidates lacks,
+    so that the prior stays what it was (deterministic mixture; Owen and Zhou 2000). While the runs disagree they go on;
+    the result is drawn from the candidates of both. What is left of a disagreement, few effective candidates, or a
+    posterior that leans on a bound, is said in the summary.
 
     Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
     predictions are not.
@@ -393,12 +396,14 @@ def calibrate(
     _check(seed, lapse, candidates, ensemble)
     rng = np.random.default_rng(seed)
 
+    distinct, which = _distinct(tested)
+
     def tried(points: Floats) -> NDArray[np.float32]:
-        return _outcomes(space.blocks(points), tested, model, threads, progress)
+        return _outcomes(space.blocks(points), distinct, model, threads, progress)[:, which]
 
     found = search(Problem(space, observed, lapse, tried), candidates, rng)
     evidence = found.evidence
-    final = posterior(evidence, _DRAWS, _ROUNDS, rng, progress)
+    final = posterior(evidence, _DRAWS, _ROUNDS, rng, progress=progress)
     weights = evidence.mean_weights(final)
     kept, times = np.unique(systematic(weights, ensemble, rng), return_counts=True)
     return Calibration(
@@ -425,6 +430,21 @@ def _outcomes(
     return np.asarray(simulated.overturned.transpose("block", "motion").values, dtype=np.float32)
 
 
+def _distinct(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
+    """Motions that differ, and which of them each one is: the same command is often given several times."""
+    places: dict[tuple[bytes, ...], int] = {}
+    distinct: list[Motion] = []
+    which = []
+    for motion in motions:
+        parts = [part for part in (motion, motion.vertical) if part is not None]
+        key = tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients))
+        if key not in places:
+            places[key] = len(distinct)
+            distinct.append(motion)
+        which.append(places[key])
+    return distinct, which
+
+
 def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
     dispersion = _side_dispersions(space, populations).mean(axis=0)
     tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
@@ -438,9 +458,12 @@ def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
 def _side_dispersions(space: Space, populations: Floats) -> Floats:
     """Return standard deviations of the logarithm of each unknown parameter on either side, shape (c, f)."""
     dispersion = population.unpacked(populations)[1]
-    f = len(space.unknown)
-    # The side's logarithm is that of the mean plus or minus half that of the ratio.
-    return np.hypot(dispersion[:, :f], 0.5 * dispersion[:, f:] if space.two_sided else 0.0)
+    sides = dispersion[:, : len(space.unknown)].copy()
+    if space.two_sided:
+        # The side's logarithm is that of the mean plus or minus half that of the ratio.
+        sided = space.unknown.index(SIDED)
+        sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersion[:, -1])
+    return sides
 
 
 def _observed(overturned: ArrayLike, count: int) -> Flags:

@@ -13,6 +13,7 @@ import numpy as np
 
 from rocking.analysis.calibration.space import Space
 from rocking.arrays import Floats
+from rocking.kernels import population as kernel
 
 #: Prior of the logarithm of a dispersion from test to test: its standard deviation.
 _DISPERSION_LOG_DEVIATION: Final = 0.6
@@ -48,22 +49,16 @@ def drawn(populations: Floats, widened: float, count: int, rng: np.random.Genera
 
 def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
     """Logarithm of the density at points of what `drawn` draws, shape (n,)."""
-    parts = [_log_sum_exp(_log_normal(part, widened, points)) for part in batches(populations)]
-    return np.asarray(_log_sum_exp(np.array(parts)) - np.log(len(populations)))
-
-
-def _log_normal(populations: Floats, widened: float, points: Floats) -> Floats:
-    """Logarithm of the density of each population at each point, shape (c, n)."""
     centre, dispersion = unpacked(populations)
+    middle = centre.mean(axis=0)
+    centre, from_middle = centre - middle, points - middle
     precision = (widened * dispersion) ** -2
     constant = 0.5 * (np.log(precision / (2.0 * np.pi)) - precision * centre**2).sum(axis=1)
-    return np.asarray((precision * centre) @ points.T - 0.5 * precision @ (points**2).T + constant[:, None])
-
-
-def _log_sum_exp(rows: Floats) -> Floats:
-    """Logarithm of the sum over rows of exponentials (much faster than numpy.logaddexp)."""
-    highest = rows.max(axis=0)
-    return np.asarray(highest + np.log(np.exp((rows - highest).astype(np.float32)).sum(axis=0)))
+    powers = np.vstack([(precision * centre).T, -0.5 * precision.T, constant])
+    factors = np.hstack([from_middle, from_middle**2, np.ones((len(points), 1))])
+    found = np.empty(len(points))
+    kernel.log_density(factors, powers, np.empty(len(populations)), found)
+    return np.asarray(found - np.log(len(populations)))
 
 
 def batches(populations: Floats) -> list[Floats]:

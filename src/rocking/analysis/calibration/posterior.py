@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -23,16 +23,22 @@ _JITTER: Final = 1e-3
 
 
 def posterior(
-    evidence: Evidence, count: int, rounds: int, rng: np.random.Generator, progress: bool | None = None
+    evidence: Evidence,
+    count: int,
+    rounds: int,
+    rng: np.random.Generator,
+    *,
+    exponent: float = 1.0,
+    progress: bool | None = None,
 ) -> Floats:
-    """Draw populations from the posterior, shape (count, 2 k).
+    """Draw populations from the posterior, shape (count, 2 k); with an exponent of the likelihood, from a wider one.
 
     Sequential Monte Carlo (Del Moral, Doucet and Jasra 2006): particles start with their centres at candidates, so
     where the search has looked, and follow the geometric path from that density to the posterior. Each step keeps half
     of them effective, resamples, and moves them in some rounds by differences of other particles (differential
     evolution), so that several separate optima are all followed.
     """
-    particles = _Particles.from_candidates(evidence, _STARTS * count, rng)
+    particles = _Particles.from_candidates(evidence, exponent, _STARTS * count, rng)
     with Progress("fitting", 100, show=progress) as bar:
         done = 0.0
         while done < 1.0:
@@ -50,27 +56,28 @@ class _Particles:
     """Populations, and the logarithms of two densities at each: that of the start, and the posterior."""
 
     evidence: Evidence
+    exponent: float
     populations: Floats
     start: Floats
     posterior: Floats
 
     @classmethod
-    def at(cls, evidence: Evidence, populations: Floats) -> _Particles:
+    def at(cls, evidence: Evidence, exponent: float, populations: Floats) -> _Particles:
         candidates, k = evidence.candidates, populations.shape[1] // 2
         centres = populations[:, :k]
         inside = candidates.space.contains(centres)
         posterior = population.log_prior_of_dispersions(candidates.space, populations)
         start = posterior + np.where(inside, 0.0, -np.inf)
         start[inside] += candidates.log_density(centres[inside])
-        posterior[inside] += evidence.log_likelihoods(populations[inside])
+        posterior[inside] += exponent * evidence.log_likelihoods(populations[inside])
         posterior[~inside] = -np.inf
-        return cls(evidence, populations, start, posterior)
+        return cls(evidence, exponent, populations, start, posterior)
 
     @classmethod
-    def from_candidates(cls, evidence: Evidence, count: int, rng: np.random.Generator) -> _Particles:
+    def from_candidates(cls, evidence: Evidence, exponent: float, count: int, rng: np.random.Generator) -> _Particles:
         points = evidence.candidates.points
         centres = points[rng.choice(len(points), min(count, len(points)), replace=False)]
-        return cls.at(evidence, population.with_dispersions(evidence.candidates.space, centres, rng))
+        return cls.at(evidence, exponent, population.with_dispersions(evidence.candidates.space, centres, rng))
 
     @property
     def gain(self) -> Floats:
@@ -79,7 +86,9 @@ class _Particles:
 
     def resampled(self, step: float, count: int, rng: np.random.Generator) -> _Particles:
         chosen = systematic(_tempered(self.gain, step), count, rng)
-        return _Particles(self.evidence, self.populations[chosen], self.start[chosen], self.posterior[chosen])
+        return _Particles(
+            self.evidence, self.exponent, self.populations[chosen], self.start[chosen], self.posterior[chosen]
+        )
 
     def moved(self, done: float, rng: np.random.Generator) -> _Particles:
         """Move one half of the particles by differences within the other half, then the other way round."""
@@ -88,7 +97,7 @@ class _Particles:
         half = len(populations) // 2
         for movers, guides in ((shuffled[:half], shuffled[half:]), (shuffled[half:], shuffled[:half])):
             changes = _differences(populations[guides], len(movers), rng)
-            new = _Particles.at(self.evidence, populations[movers] + changes)
+            new = _Particles.at(self.evidence, self.exponent, populations[movers] + changes)
             with np.errstate(invalid="ignore"):
                 gain = (1.0 - done) * (new.start - start[movers]) + done * (new.posterior - posterior[movers])
             taken = np.log(rng.random(len(movers))) < gain
@@ -98,7 +107,7 @@ class _Particles:
                 new.start[taken],
                 new.posterior[taken],
             )
-        return _Particles(self.evidence, populations, start, posterior)
+        return replace(self, populations=populations, start=start, posterior=posterior)
 
 
 def systematic(weights: Floats, count: int, rng: np.random.Generator) -> Integers:

@@ -1,10 +1,9 @@
-"""Where the candidates are that a posterior is drawn from: runs that look on their own, then share, then compare.
+"""Where the candidates are that a posterior is drawn from: independent runs that look everywhere, and then compare.
 
 The likelihood of a population comes from blocks that were simulated near it. So what decides whether all regions of the
-posterior are found is where blocks were tried. Each run fills the space evenly, fits, tries blocks drawn from what it
-has found, and so on. Then the runs tell each other where they have looked, though not what they saw: each tries blocks
-of its own in all regions that any of them has found, until they agree or a limit is reached. A region that none of
-them has met is not found by comparing them.
+posterior are found is where blocks were tried. Each run fills the space evenly, then tries blocks where its own fits
+say: first where they are fair, at last where they are best. A narrow region lies within a wider one that is better than
+the rest, and so on down to it; going for the best at once would miss it. Runs share nothing until they are compared.
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ from rocking.arrays import Flags, Floats
 #: Independent runs.
 RUNS: Final = 2
 
-#: A run's candidates come in eighths: two that fill the space, three that are guided by the run's own fits, three that
-#: are guided by the fits of all runs. While the runs disagree, up to four more of these.
-_PARTS: Final = 8
-_OWN: Final = 3
-_SHARED: Final = 3
-_MORE: Final = 4
+#: A run's candidates come in parts of equal size: two that fill the space, then one for each exponent of the likelihood
+#: that guides it. While the runs disagree, they go on with more, this many times at most.
+_FILLING: Final = 2
+_EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
+_MORE_EXPONENTS: Final = (0.1, 0.3, 1.0)
+_MORE: Final = 2
 
 #: Draws from a posterior, and rounds of moves after each step of their tempering: where they guide the search, and
 #: where they are compared.
@@ -69,9 +68,9 @@ class Problem:
         """Return what candidates tell."""
         return Evidence(candidates, self.observed, self.lapse)
 
-    def guide(self, candidates: Candidates, rng: np.random.Generator) -> Floats:
-        """Draw populations around which to look next."""
-        return posterior(self.evidence(candidates), *_GUIDING, rng, progress=False)
+    def guide(self, candidates: Candidates, rng: np.random.Generator, exponent: float) -> Floats:
+        """Draw populations around which to look next: the lower the exponent of the likelihood, the wider."""
+        return posterior(self.evidence(candidates), *_GUIDING, rng, exponent=exponent, progress=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +81,14 @@ class Search:
     ----------
     evidence : Evidence
         All candidates of all runs.
+    runs : tuple of Candidates
+        Those of each run.
     posteriors : tuple of ndarray
         Populations, drawn from the candidates of each run alone.
     """
 
     evidence: Evidence
+    runs: tuple[Candidates, ...]
     posteriors: tuple[Floats, ...]
 
     @property
@@ -98,47 +100,33 @@ class Search:
 
 
 def search(problem: Problem, candidates: int, rng: np.random.Generator) -> Search:
-    """Try about so many candidates; up to half as many again while the runs disagree."""
-    part = max(candidates // (RUNS * _PARTS), 1)
+    """Try about so many candidates; up to twice as many while the runs disagree."""
+    part = max(candidates // (RUNS * (_FILLING + len(_EXPONENTS))), 1)
     streams = rng.spawn(RUNS)
-    runs = [_alone(problem, part, stream) for stream in streams]
-    for _ in range(_SHARED):
-        guides = [problem.guide(run, stream) for run, stream in zip(runs, streams, strict=True)]
-        runs = _shared(problem, runs, guides, part, streams)
-    found = _compared(problem, runs, streams)
+    runs = [problem.filling(_FILLING * part, stream) for stream in streams]
+    found = _guided(problem, runs, _EXPONENTS, part, streams)
     for _ in range(_MORE):
         if max(found.agreement.values()) < AGREEMENT:
             break
-        runs = _shared(problem, runs, found.posteriors, part, streams)
-        found = _compared(problem, runs, streams)
+        found = _guided(problem, found.runs, _MORE_EXPONENTS, part, streams)
     return found
 
 
-def _alone(problem: Problem, part: int, rng: np.random.Generator) -> Candidates:
-    run = problem.filling((_PARTS - _OWN - _SHARED) * part, rng)
-    for _ in range(_OWN):
-        run = problem.guided(run, problem.guide(run, rng), part, rng)
-    return run
-
-
-def _shared(
+def _guided(
     problem: Problem,
     runs: Sequence[Candidates],
-    guides: Sequence[Floats],
+    exponents: Sequence[float],
     part: int,
     streams: Sequence[np.random.Generator],
-) -> list[Candidates]:
-    """Let every run try blocks of its own wherever any run would look."""
-    guide = np.concatenate(guides)
-    return [problem.guided(run, guide, part, stream) for run, stream in zip(runs, streams, strict=True)]
-
-
-def _compared(problem: Problem, runs: Sequence[Candidates], streams: Sequence[np.random.Generator]) -> Search:
-    posteriors = tuple(
-        posterior(problem.evidence(run), *_COMPARED, stream, progress=False)
-        for run, stream in zip(runs, streams, strict=True)
-    )
-    return Search(problem.evidence(Candidates.pooled(runs)), posteriors)
+) -> Search:
+    """Let every run try blocks where its own fits say, and compare what they find."""
+    longer, posteriors = [], []
+    for run, rng in zip(runs, streams, strict=True):
+        for exponent in exponents:
+            run = problem.guided(run, problem.guide(run, rng, exponent), part, rng)
+        longer.append(run)
+        posteriors.append(posterior(problem.evidence(run), *_COMPARED, rng, progress=False))
+    return Search(problem.evidence(Candidates.pooled(longer)), tuple(longer), tuple(posteriors))
 
 
 def r_hat(runs: Floats) -> float:

@@ -26,13 +26,13 @@ _UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "initial": "r
 #: What a block allows.
 HIGHEST: Final = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
 
-#: Largest ratios between the sides. A rigid body's two pivot radii are h/cos(alpha_i), so p hardly differs; the
-#: slendernesses may differ as much as the pivots' distances from the centre of mass.
-LARGEST_RATIOS: Final = {"p": 1.25, "alpha": 3.0, "restitution": 1.25}
+#: The sides of a rigid body differ in slenderness, as much as the pivots' distances from the centre of mass. Their p
+#: and restitutions differ by terms of second order in it, which outcomes do not tell.
+SIDED: Final = "alpha"
+LARGEST_RATIO: Final = 3.0
 
-#: Median of the prior of the dispersion from test to test: of each parameter, and of the ratio between its sides.
-_DISPERSIONS: Final = {"p": 0.10, "alpha": 0.10, "restitution": 0.10}
-_RATIO_DISPERSIONS: Final = {"p": 0.05, "alpha": 0.10, "restitution": 0.05}
+#: Median of the prior of the dispersion from test to test, of each coordinate.
+_DISPERSION: Final = 0.10
 
 #: Restitution that follows from the slenderness (Housner 1963), where it is positive.
 HOUSNER: Final = "housner"
@@ -49,7 +49,9 @@ Knowledge = float | Range | Literal["housner"]
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Blocks in logarithmic coordinates: geometric means of both sides, then ratios of side + to side -.
+    """Blocks in logarithmic coordinates: what is not known of p, slenderness (mean of both sides) and restitution.
+
+    The last coordinate of a two-sided block is the ratio of the slenderness of side + to that of side -.
 
     Attributes
     ----------
@@ -59,15 +61,15 @@ class Space:
         Parameters that have a value; a restitution in neither follows from the slenderness.
     lower, upper : ndarray, shape (f,)
         Logarithms of the bounds that each side's unknown parameters keep to.
-    ratios : ndarray, shape (f,) or (0,)
-        Logarithms of the largest ratios between the sides; none for symmetric blocks.
+    ratio : float
+        Logarithm of the largest ratio between the slendernesses of the sides; 0 for symmetric blocks.
     """
 
     unknown: tuple[str, ...]
     known: Mapping[str, float]
     lower: Floats
     upper: Floats
-    ratios: Floats
+    ratio: float
 
     @classmethod
     def of(cls, p: Knowledge, alpha: Knowledge, restitution: Knowledge, *, two_sided: bool) -> Space:
@@ -92,26 +94,27 @@ class Space:
         if "restitution" not in {*bounds, *known} and steepest >= _HOUSNER_ENDS:
             raise InvalidOption(f"Housner's restitution is positive for alpha below {_HOUSNER_ENDS:.4f} rad only")
         lower, upper = np.log(list(bounds.values())).T
-        largest = np.log([LARGEST_RATIOS[name] for name in bounds])
-        # No wider than the bounds of a side let them be: else a box around narrow bounds would be all but empty.
-        ratios = np.minimum(largest, upper - lower) if two_sided else np.empty(0)
-        return cls(tuple(bounds), MappingProxyType(known), lower, upper, ratios)
+        ratio = 0.0
+        if two_sided and SIDED in bounds:
+            # No wider than the bounds of a side let it be: else a box around narrow bounds would be all but empty.
+            ratio = min(math.log(LARGEST_RATIO), math.log(bounds[SIDED][1] / bounds[SIDED][0]))
+        return cls(tuple(bounds), MappingProxyType(known), lower, upper, ratio)
 
     @property
     def two_sided(self) -> bool:
         """Whether the sides may differ."""
-        return bool(len(self.ratios))
+        return self.ratio > 0.0
 
     @property
     def dispersions(self) -> Floats:
         """Median of the prior of the dispersion along each coordinate, shape (k,)."""
-        ratios = [_RATIO_DISPERSIONS[name] for name in self.unknown] if self.two_sided else []
-        return np.array([_DISPERSIONS[name] for name in self.unknown] + ratios)
+        return np.full(len(self.unknown) + self.two_sided, _DISPERSION)
 
     @property
     def box(self) -> tuple[Floats, Floats]:
         """Lower and upper ends of the coordinates, shape (k,) each."""
-        return np.concatenate([self.lower, -self.ratios]), np.concatenate([self.upper, self.ratios])
+        ratio = [self.ratio] if self.two_sided else []
+        return np.concatenate([self.lower, np.negative(ratio)]), np.concatenate([self.upper, ratio])
 
     def spread_evenly(self, count: int, rng: np.random.Generator) -> Floats:
         """Points that fill the space evenly: those of a scrambled Halton sequence that lie in it."""
@@ -150,11 +153,12 @@ class Space:
         return np.stack([values[name] for name in PARAMETERS], axis=2)
 
     def named(self, points: Floats) -> dict[str, Floats]:
-        """Values of the unknown parameters by name, of each side where they may differ; shape (n,) each."""
+        """Values of the unknown parameters by name, of each side where they differ; shape (n,) each."""
         values = self.sides(points)
-        sides = ("_plus", "_minus") if self.two_sided else ("",)
         return {
-            name + side: values[:, i, PARAMETERS.index(name)] for name in self.unknown for i, side in enumerate(sides)
+            name + side: values[:, i, PARAMETERS.index(name)]
+            for name in self.unknown
+            for i, side in enumerate(("_plus", "_minus") if self.two_sided and name == SIDED else ("",))
         }
 
     def blocks(self, points: Floats) -> Blocks:
@@ -166,7 +170,9 @@ class Space:
     def _log_sides(self, points: Floats) -> Floats:
         """Logarithms of the unknown parameters on each side, shape (n, 2, f)."""
         f = len(self.unknown)
-        half = 0.5 * points[:, f:] if self.two_sided else np.zeros((len(points), f))
+        half = np.zeros((len(points), f))
+        if self.two_sided:
+            half[:, self.unknown.index(SIDED)] = 0.5 * points[:, f]
         return np.stack([points[:, :f] + half, points[:, :f] - half], axis=1)
 
 
