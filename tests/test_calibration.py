@@ -239,7 +239,7 @@ def test_the_summary_has_every_parameter_and_the_scores(found):
         assert name in text
         assert f"{estimate.median:.5g}" in text
     assert f"{100 * found.scores.accuracy:.1f} %" in text
-    assert "2 runs, R-hat at most" in text
+    assert "2 independent runs, R-hat at most" in text
 
 
 @pytest.mark.parametrize(
