@@ -34,7 +34,7 @@ latest: ## the same without constraints: with the versions of the day
 
 .bounds:
 	@test -x $(ENVIRONMENT)/bin/python || $(PYTHON) -m venv $(ENVIRONMENT)
-	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq $(CONSTRAINTS) ".[test,explorer]"
+	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq --no-compile $(CONSTRAINTS) ".[test,explorer]"
 	$(ENVIRONMENT)/bin/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m "not slow" $(EVERY_PART)
 
 doctest: .venv/.all ## run the examples in the docstrings
@@ -71,11 +71,12 @@ distclean: clean ## remove the environment, too
 	@touch $@
 
 # A stamp per set of packages: installing again is needed only when the versions or the project's table change.
+# Python compiles a module when it is first imported; to compile all of them takes longer than to install them.
 .venv/.base: EXTRAS :=
 .venv/.all: EXTRAS := [formats,excel,explorer,browser,cluster,objects,parquet,test,lint,docs]
 .venv/.base .venv/.all: pyproject.toml constraints.txt | .venv/bin/python
 	@echo "Installing rocking$(EXTRAS) into .venv (a few minutes the first time) ..."
-	@$(BIN)/python -m pip install --disable-pip-version-check -qq -c constraints.txt -e ".$(EXTRAS)"
+	@$(BIN)/python -m pip install --disable-pip-version-check -qq --no-compile -c constraints.txt -e ".$(EXTRAS)"
 	@touch $@
 
 .venv/bin/python:
