@@ -100,17 +100,19 @@ def table(found: list[dict[str, float]], two_sided: bool) -> str:
 
 def draw(symmetric: list[dict[str, float]], two_sided: list[dict[str, float]], path: Path) -> None:
     """Draw a histogram of the truth's ranks for each parameter, with the band of 90 % of even ones."""
-    figure = Figure(figsize=(10.0, 4.8), layout="constrained")
+    figure = Figure(figsize=(10.0, 5.4), layout="constrained")
     rows = figure.subplots(2, 4, sharey=True)
     for row, found, sides in zip(rows, (symmetric, two_sided), ("symmetric", "two-sided"), strict=True):
         low, high = (float(binom.ppf(share, len(found), 1.0 / BINS)) for share in (0.05, 0.95))
         for axes, name in zip(row, found[0], strict=False):
             axes.axhspan(low, high, color="0.85", label="90 % of even ranks")
-            axes.hist([one[name] for one in found], BINS, (0.0, 1.0), histtype="step", color="k", label="data sets")
+            axes.hist(
+                [one[name] for one in found], BINS, range=(0.0, 1.0), histtype="step", color="k", label="data sets"
+            )
             axes.set_xlabel(f"share of the posterior\nbelow the true {name.replace('_', ' ')}")
             axes.set_xlim(0.0, 1.0)
             axes.set_ylim(0.0, None)
-        row[0].set_ylabel(f"data sets, {sides} blocks")
+        row[0].set_ylabel(f"data sets, {sides}")
     rows[0, 3].set_axis_off()
     rows[0, 3].legend(*rows[0, 0].get_legend_handles_labels(), loc="center")
     figure.savefig(path, dpi=150)

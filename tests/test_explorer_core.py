@@ -623,6 +623,22 @@ def test_a_point_of_a_study_is_its_simulation(study):
     )
 
 
+@pytest.mark.parametrize(
+    ("scales", "label", "unit"),
+    [
+        ({"factor": [0.5, 1.0]}, "Factor of the motion", ""),
+        ({"pga": [2.0, 4.0]}, "Peak ground acceleration", "m/s^2"),
+        ({"pgv": [0.2, 0.4]}, "Peak ground velocity", "m/s"),
+        ({"sa": [2.0, 4.0], "period": 0.5}, "Spectral acceleration at 0.5 s", "m/s^2"),
+    ],
+)
+def test_the_axis_of_scales_says_what_they_are(tmp_path, scales, label, unit):
+    blocks = rocking.Blocks(p=[2.0, 3.0], alpha=0.2, restitution=0.9)
+    rocking.study(tmp_path / "scaled", blocks, rocking.pulses.one_sine(3.0, 1.0), **scales).run(progress=False)
+    axis = next(one for one in StudyView(tmp_path / "scaled").describe()["axes"] if one["name"] == "scale")
+    assert (axis["label"], axis["unit"]) == (label, unit)
+
+
 def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
     blocks = rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=[[0.2, 0.25], [0.2, 0.2], [0.3, 0.3]], restitution=0.9)
     motions = [rocking.records.load(f"el-centro-meloland-{which}") for which in ("270", "360")]

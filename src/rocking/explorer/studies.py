@@ -202,8 +202,15 @@ class StudyView:
         return name
 
     def _label(self, name: str) -> tuple[str, str]:
+        if name != "scale":
+            return _LABELS[name]
         scales = self.study.product.scales
-        return (str(scales.measure), scales.units) if name == "scale" else _LABELS[name]
+        return {
+            "factor": ("Factor of the motion", ""),
+            "pga": ("Peak ground acceleration", "m/s^2"),
+            "pgv": ("Peak ground velocity", "m/s"),
+            "sa": (f"Spectral acceleration at {scales.options.get('period', 0.0):g} s", "m/s^2"),
+        }[scales.measure or "factor"]
 
     def _described(self, name: str, axes: Mapping[str, Floats]) -> dict[str, Any]:
         label, unit = self._label(name)
