@@ -227,7 +227,7 @@ def test_calibrate_json_is_the_calibration(run, outcomes_table):
 def test_calibrate_prints_the_diagnostics_and_writes_what_it_says(run, outcomes_table, tmp_path):
     code, out, _ = run("calibrate", outcomes_table, *CALIBRATED, "--out", tmp_path / "out")
     assert code == 0
-    assert "2 runs, R-hat at most" in out
+    assert "2 independent runs, R-hat at most" in out
     written = {path.name for path in (tmp_path / "out").iterdir()}
     assert written == {"calibration.png", "calibration.pdf", "result.json", "ensemble.csv"}
     assert len((tmp_path / "out" / "ensemble.csv").read_text().splitlines()) > 10
