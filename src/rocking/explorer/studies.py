@@ -7,11 +7,12 @@ import math
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 
 import rocking
+from rocking.analysis.intensity import Measure, MeasureName
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption, StudyError
 from rocking.explorer.case import texts_of_motion
@@ -205,12 +206,10 @@ class StudyView:
         if name != "scale":
             return _LABELS[name]
         scales = self.study.product.scales
-        return {
-            "factor": ("Factor of the motion", ""),
-            "pga": ("Peak ground acceleration", "m/s^2"),
-            "pgv": ("Peak ground velocity", "m/s"),
-            "sa": (f"Spectral acceleration at {scales.options.get('period', 0.0):g} s", "m/s^2"),
-        }[scales.measure or "factor"]
+        if scales.measure in (None, "factor"):
+            return "Factor of the motion", ""
+        measure = Measure(cast(MeasureName, scales.measure), **scales.options)
+        return measure.quantity.capitalize(), measure.units
 
     def _described(self, name: str, axes: Mapping[str, Floats]) -> dict[str, Any]:
         label, unit = self._label(name)
