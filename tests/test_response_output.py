@@ -91,11 +91,16 @@ def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatc
         (230.7262443771, 4e5, "230.7 +- 0.4 s"),
         (230.7262443771, 2e6, "231 +- 2 s"),
         (230.7262443771, 1e9, "about 231 s"),
-        (230.7262443771, math.nan, "231 s"),
     ],
 )
 def test_a_time_has_the_digits_that_a_millionth_of_the_motion_leaves(time, change, text):
     assert time_text(time, change) == text
+
+
+@pytest.mark.parametrize("change", [math.inf, math.nan])
+def test_a_change_beyond_all_numbers_leaves_no_digit_that_is_told_as_known(change):
+    assert time_text(230.7, change) == "about 231 s"
+    assert digits.digits_of(0.123, change) == 1
 
 
 def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():

@@ -37,7 +37,7 @@ def time_text(time: float, change: float) -> str:
     """
     unknown = KNOWN * change
     text = f"{time:.{decimals(unknown)}f}"
-    if not unknown >= _TOLD:
+    if unknown < _TOLD:
         return f"{text} s"
     return f"{text} +- {unknown:.1g} s" if unknown < 0.5 * time else f"about {text} s"
 
@@ -69,10 +69,16 @@ def ratio_text(response: Response) -> str:
 
 
 def _peak_digits(response: Response) -> int:
-    change = response.sensitivity.driving()[0]
-    if not (change > 0.0 and response.peak_rotation > 0.0):
+    return digits_of(response.peak_rotation, response.sensitivity.driving()[0])
+
+
+def digits_of(value: float, change: float) -> int:
+    """Digits that are known of a value, which changes so much per relative change of what drives the block."""
+    if not math.isfinite(change):
+        return 1
+    if not (change > 0.0 and value > 0.0):
         return _MOST_DIGITS
-    return min(max(math.floor(-math.log10(KNOWN * change / response.peak_rotation)), 1), _MOST_DIGITS)
+    return min(max(math.floor(-math.log10(KNOWN * change / value)), 1), _MOST_DIGITS)
 
 
 def peak_time_text(response: Response) -> str:
@@ -86,15 +92,17 @@ def peak_time_text(response: Response) -> str:
 
 def decimals(unknown: float) -> int:
     """Decimals of a number of which so much is unknown: of what is told, the one that is uncertain as well."""
-    if not unknown > 0.0:
-        return 0 if math.isnan(unknown) else _MOST_DECIMALS
+    if not math.isfinite(unknown):
+        return 0
+    if unknown <= 0.0:
+        return _MOST_DECIMALS
     known = -math.log10(unknown)
     return min(max(math.ceil(known) if unknown >= _TOLD else math.floor(known), 0), _MOST_DECIMALS)
 
 
 def _short_text(time: float, unknown: float) -> str:
     """Time to four decimals at most, of which so much is unknown, s."""
-    about = "about " if unknown >= _TOLD else ""
+    about = "" if unknown < _TOLD else "about "
     return f"{about}{time:.{min(decimals(unknown), _SHORT)}f} s"
 
 
