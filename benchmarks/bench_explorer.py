@@ -61,7 +61,10 @@ def main():
         report("slider to drawn response, 320 s record", page.evaluate(SLIDE, 60))
         mapped = browser.new_page(viewport={"width": 1280, "height": 900})
         mapped.goto(f"{here.link()}&{SINE}")
-        report("  while a map is computed", page.evaluate(SLIDE, 20))
+        wait(mapped, "document.body.dataset.first")
+        report("  while a map is computed", page.evaluate(SLIDE, 40))
+        if mapped.evaluate("document.body.dataset.map") == "complete":
+            print("  (the map was complete before the last of them)")
         wait(mapped, "document.body.dataset.map === 'complete'")
         mapped.reload()
         wait(mapped, "document.body.dataset.map === 'complete'")

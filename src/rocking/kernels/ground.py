@@ -194,12 +194,16 @@ def slope(ground: Ground, piece: int, offset: float) -> float:
 def local_series(ground: Ground, piece: int, offset: float, sign: float, A: Floats) -> int:
     """Put a piece's polynomial about ``offset``, times ``sign``, into A; returns its degree."""
     degree = columns_of(ground) - 1
-    for k in range(degree + 1):
-        A[k] = sign * ground.pieces[piece, ground.first + k]
-    while degree > 0 and A[degree] == 0.0:
+    while degree > 0 and coefficient(ground, piece, degree) == 0.0:
+        A[degree] = 0.0
         degree -= 1
-    if offset > 0.0:
-        move(A, degree, offset)
+    # Horner's rule, for all coefficients at once; the sums of a turn do not wait for one another as those of `move` do.
+    A[0] = sign * coefficient(ground, piece, degree)
+    for k in range(1, degree + 1):
+        A[k] = A[k - 1]
+        for j in range(k - 1, 0, -1):
+            A[j] = A[j - 1] + offset * A[j]
+        A[0] = sign * coefficient(ground, piece, degree - k) + offset * A[0]
     return degree
 
 

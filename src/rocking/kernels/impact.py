@@ -13,7 +13,10 @@ from rocking.kernels.status import IMPACT, OVERTURN, STEP
 
 
 class Arrival(NamedTuple):
-    """How a step ends (STEP, IMPACT or OVERTURN); time, u, u' there; time and height of the highest rotation on it."""
+    """How a step ends (STEP, IMPACT or OVERTURN); time, u, u' there; time and height of the highest rotation on it.
+
+    Where no rotation on it is above the highest so far, the last two are those of its end.
+    """
 
     outcome: int
     time: float
@@ -37,7 +40,7 @@ def advance(state: Record, scratch: Record, order: int, h: float, fallen: float)
     if end <= 0.0:  # also without a root: one within rounding of the step's end must not be left behind
         outcome, end = IMPACT, 0.0
     top, height = time, end
-    if turns(state.v, order, time, c):
+    if is_higher_between(state, end, c, order, time):
         top, height = highest(order, time, c, d)
     if height >= fallen:
         passage = first_passage(c, order, fallen, top, d)
@@ -49,11 +52,14 @@ def advance(state: Record, scratch: Record, order: int, h: float, fallen: float)
 
 
 @inlined
-def turns(v: float, order: int, h: float, c: Floats) -> bool:
-    """Whether a series may be higher within (0, h) than at both ends."""
-    if v > 0.0:
-        return v < curvature_bound(c, 0, order, h) * h
-    rise = v
+def is_higher_between(state: Record, end: float, c: Floats, order: int, h: float) -> bool:
+    """Whether a series may be higher within (0, h) than at both ends, and than the highest rotation so far."""
+    bend = curvature_bound(c, 0, order, h)
+    if max(state.u, end) + 0.125 * h * h * bend <= state.peak:
+        return False
+    if state.v > 0.0:
+        return bool(state.v < bend * h)
+    rise = state.v
     power = h
     for k in range(2, order + 1):
         rise += max(0.0, c[k]) * power

@@ -3,12 +3,13 @@
 Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, x counted from the piece's start.
 """
 
+import functools
 import math
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.arrays import Floats, Integers
 
 #: Pieces that meet within this part of the largest value do not jump.
 _JUMP: Final = 1e-12
@@ -160,27 +161,43 @@ def _numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
     control = _control_points(widths, coefficients)
     rounding = 1e-14 * np.sum(np.abs(scaled), axis=1)
     may_vanish = (np.min(control, axis=1) <= rounding) & (np.max(control, axis=1) >= -rounding)
-    for k in np.flatnonzero(may_vanish):
-        found = _polynomial_roots(scaled[k])
-        roots[k, : len(found)] = found
+    degrees = np.where(may_vanish, _significant_degrees(scaled), 0)
+    for degree in np.unique(degrees[degrees > 0]):
+        pieces = degrees == degree
+        roots[pieces, :degree] = _polynomial_roots(scaled[pieces, : degree + 1])
     return roots * widths[:, np.newaxis]
 
 
-def _polynomial_roots(piece: Floats) -> Floats:
-    # A leading coefficient far below rounding would put roots at infinity and spoil the others.
-    significant = np.flatnonzero(np.abs(piece) > 1e-18 * np.max(np.abs(piece)))
-    if len(significant) == 0:
-        return np.zeros(0)
-    found: Floats = np.polynomial.polynomial.polyroots(piece[: significant[-1] + 1]).real
+def _significant_degrees(pieces: Floats) -> Integers:
+    """Degree of each piece; a leading coefficient far below rounding would put roots at infinity and spoil others."""
+    sizes = np.abs(pieces)
+    significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
+    last = pieces.shape[1] - 1 - np.argmax(significant[:, ::-1], axis=1)
+    return np.where(significant.any(axis=1), last, 0)
+
+
+def _polynomial_roots(pieces: Floats) -> Floats:
+    """Real parts of all roots of polynomials of one degree, as eigenvalues of their companion matrices."""
+    degree = pieces.shape[1] - 1
+    companions = np.zeros((len(pieces), degree, degree))
+    companions[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
+    companions[:, :, -1] = -pieces[:, :-1] / pieces[:, -1:]
+    # Turned by half a turn, which loses fewer digits.
+    found: Floats = np.linalg.eigvals(companions[:, ::-1, ::-1]).real
     return found
 
 
 def _control_points(widths: Floats, coefficients: Floats) -> Floats:
     """Bernstein coefficients of each piece: they enclose its values."""
     columns = coefficients.shape[1]
-    shares = [[math.comb(i, j) / math.comb(columns - 1, j) for i in range(columns)] for j in range(columns)]
-    control: Floats = (coefficients * _powers(widths, columns)) @ np.array(shares)
+    control: Floats = (coefficients * _powers(widths, columns)) @ _bernstein_shares(columns)
     return control
+
+
+@functools.cache
+def _bernstein_shares(columns: int) -> Floats:
+    """Share of each power in each Bernstein coefficient."""
+    return np.array([[math.comb(i, j) / math.comb(columns - 1, j) for i in range(columns)] for j in range(columns)])
 
 
 def _powers(widths: Floats, columns: int) -> Floats:

@@ -181,7 +181,7 @@ export class View {
       done += this.take(frame);
       const [rows, columns] = this.about.shape;
       /** @type {HTMLProgressElement} */ (one("map-progress")).value = done / (rows * columns);
-      this.soon();
+      this.soon(started);
       if (!body.first || body.firstOf !== String(started)) { body.first = String(performance.now() - started); body.firstOf = String(started); }
     }
     this.complete = true;
@@ -212,11 +212,13 @@ export class View {
     return count;
   }
 
-  /** Recolour at the next frame, once. */
-  soon() {
+  /** Recolour soon, once: at first at every change, later after a part of the time that the map has taken so far, so that
+   * painting takes little from computing, which is done on the same cores. @param {number} started */
+  soon(started) {
     if (this.waiting) return;
     this.waiting = true;
-    window.setTimeout(() => { this.waiting = false; this.recolour(); }, 90);
+    const wait = Math.max(90, 0.1 * (performance.now() - started));
+    window.setTimeout(() => { this.waiting = false; if (!this.complete) this.recolour(); }, wait);
   }
 
   /** What can be taken away: the picture, the numbers, and code that computes them again. */
