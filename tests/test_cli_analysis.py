@@ -233,6 +233,41 @@ def test_calibrate_prints_the_diagnostics_and_writes_what_it_says(run, outcomes_
     assert len((tmp_path / "out" / "ensemble.csv").read_text().splitlines()) > 10
 
 
+def test_several_specimens_are_calibrated_each_by_itself(run, outcomes_table, tmp_path):
+    header, *rows = outcomes_table.read_text().splitlines()
+    flipped = [",".join((*row.split(",")[:2], "1" if k > 4 else "0", row.split(",")[3])) for k, row in enumerate(rows)]
+    both = tmp_path / "both.csv"
+    mixed = [row + f",{name}" for pair in zip(rows, flipped, strict=True) for row, name in zip(pair, "AB", strict=True)]
+    both.write_text("\n".join([header + ",specimen", *mixed]))
+    code, out, err = run("calibrate", both, *CALIBRATED, "--folds", "2", "--out", tmp_path / "out", "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)["specimens"]
+    outcomes_table.write_text("\n".join([header, *flipped]))
+    alone = json.loads(run("calibrate", outcomes_table, *CALIBRATED, "--folds", "2", "--json")[1])
+    assert list(found) == ["A", "B"]
+    assert found["B"] == alone
+    assert found["A"]["estimates"] != alone["estimates"]
+    for name in "AB":
+        written = {path.name for path in (tmp_path / "out" / name).iterdir()}
+        assert written == {"calibration.png", "calibration.pdf", "result.json", "ensemble.csv"}
+        assert json.loads((tmp_path / "out" / name / "result.json").read_text()) == found[name]
+    assert "specimen A\n20 motions" in run("calibrate", both, *CALIBRATED)[1]
+
+
+def test_a_specimen_that_cannot_be_calibrated_is_named_before_any_work(run, outcomes_table, tmp_path):
+    header, *rows = outcomes_table.read_text().splitlines()
+    stood = [",".join((*row.split(",")[:2], "0", row.split(",")[3])) for row in rows]
+    table = tmp_path / "both.csv"
+    for name, word in (("B", "specimen B: the outcomes are all the same"), ("../B", "line 22: '../B' is not the name")):
+        table.write_text(
+            "\n".join([header + ",specimen", *(f"{row},A" for row in rows), *(f"{r},{name}" for r in stood)])
+        )
+        code, _, err = run("calibrate", table, *CALIBRATED, "--out", tmp_path / "out")
+        assert code == 2
+        assert word in err and len(err.splitlines()) == 1
+        assert not (tmp_path / "out" / "A").exists()
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

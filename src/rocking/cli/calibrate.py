@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
 from rocking.analysis.calibration.history import HistoryCalibration, calibrate_history
-from rocking.analysis.calibration.outcomes import Calibration
+from rocking.analysis.calibration.outcomes import Calibration, checked_outcomes
 from rocking.analysis.calibration.outcomes import calibrate as run
 from rocking.analysis.calibration.space import HOUSNER
-from rocking.analysis.calibration.tables import Outcomes, read
+from rocking.analysis.calibration.tables import History, Outcomes, read
 from rocking.cli import batch
 from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledPulseOptions
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 from rocking.quantities import Quantity, number, sides, tilt
 from rocking.tables import text_table
@@ -43,9 +44,9 @@ def calibrate(
     """Find the block behind observed outcomes (overturned or not), or behind a measured rotation history.
 
     DATA is a CSV table with a header. Outcomes: columns motion (a record file, or a shipped record) and overturned (1
-    or 0), and where wanted scale, channel and group. A history: columns time_s and rotation_rad (or rotation_deg).
-    The motions of --predict, --motion and --pulse may be scaled. --out holds calibration.png, .pdf, result.json and, of
-    outcomes, ensemble.csv.
+    or 0), and where wanted scale, channel, group, and specimen: each specimen is then calibrated by itself. A history:
+    columns time_s and rotation_rad (or rotation_deg). The motions of --predict, --motion and --pulse may be scaled.
+    --out holds calibration.png, .pdf, result.json and, of outcomes, ensemble.csv; of several specimens a folder each.
 
     Parameters
     ----------
@@ -85,12 +86,11 @@ def calibrate(
     choices = {name: value for name, value in given.items() if value is not None}
     with output.folder() as folder:
         table = read(data, channel=file.channel, dt=file.dt, units=file.units)
-        if isinstance(table, Outcomes):
+        if not isinstance(table, History):
             _refuse("a history", motion=motion, initial_rotation=initial_rotation)
             others = {name: file.read(name) for name in predict} | file.pulses()
-            found = run(table.motions, table.overturned, seed, candidates=candidates, **choices)
-            predicted = dict(zip(others, found.predict([*others.values()]), strict=True))
-            results = _outcomes_results(found, table, folds, predicted)
+            how = _How(seed, folds, others, {"candidates": candidates, **choices})
+            results = _of_specimens(table, how, folder) if isinstance(table, dict) else _of_outcomes(table, how)
         else:
             _refuse("outcomes", predict=predict or None, folds=folds or None)
             shaking = _shaking(motion, file)
@@ -99,15 +99,33 @@ def calibrate(
             )
             results = _history_results(history)
         if folder is not None:
-            _write(folder, results)
+            results.write(folder)
         batch.show(results.numbers, results.text, as_json=output.as_json, folder=folder)
 
 
 @dataclass(frozen=True)
+class _How:
+    """How to calibrate, and what to predict."""
+
+    seed: int
+    folds: int
+    others: Mapping[str, Motion]
+    choices: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
 class _Results:
-    found: Calibration | HistoryCalibration
+    """A calibration, or of several specimens none that could be drawn; numbers and words."""
+
+    found: Calibration | HistoryCalibration | None
     numbers: dict[str, Any]
     text: str
+
+    def write(self, folder: Path) -> None:
+        """Write numbers, and figure and ensemble of a calibration."""
+        batch.write(folder, figures={"calibration": self.found.plot()} if self.found else {}, result=self.numbers)
+        if isinstance(self.found, Calibration):
+            self.found.to_csv(folder / "ensemble.csv")
 
 
 def _refuse(belong_to: str, **given: object) -> None:
@@ -129,13 +147,40 @@ def _range(text: str, option: str, quantity: Quantity) -> float | tuple[float, .
     return ends if isinstance(ends, float) else tuple(ends)
 
 
-def _outcomes_results(found: Calibration, table: Outcomes, folds: int, predicted: dict[str, np.float64]) -> _Results:
+def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None) -> _Results:
+    """Calibrate each specimen by itself, and write each as soon as it is done."""
+    for name, table in tables.items():
+        with _told_of(name):
+            checked_outcomes(table.overturned, len(table.overturned))
+    results = {}
+    for name, table in tables.items():
+        with _told_of(name):
+            results[name] = _of_outcomes(table, how)
+        if folder is not None:
+            (folder / name).mkdir(exist_ok=True)
+            results[name].write(folder / name)
+    numbers = {"specimens": {name: one.numbers for name, one in results.items()}}
+    return _Results(None, numbers, "\n\n".join(f"specimen {name}\n{one.text}" for name, one in results.items()))
+
+
+@contextlib.contextmanager
+def _told_of(specimen: str) -> Iterator[None]:
+    """Say of which specimen an error is."""
+    try:
+        yield
+    except RockingError as error:
+        raise type(error)(f"specimen {specimen}: {error}") from error
+
+
+def _of_outcomes(table: Outcomes, how: _How) -> _Results:
+    found = run(table.motions, table.overturned, how.seed, **how.choices)
+    predicted = dict(zip(how.others, found.predict([*how.others.values()]), strict=True))
     numbers = {**found.to_dict(), "predicted": predicted}
     parts = [found.summary()]
-    if folds:
-        scores = found.cross_validate(groups=table.groups, folds=folds).scores
+    if how.folds:
+        scores = found.cross_validate(groups=table.groups, folds=how.folds).scores
         numbers["cross_validated"] = asdict(scores)
-        parts.append(f"left-out motions: {scores} ({folds} folds)")
+        parts.append(f"left-out motions: {scores} ({how.folds} folds)")
     if predicted:
         rows = [(name, float(chance)) for name, chance in predicted.items()]
         parts.append("\n" + text_table(["motion", "probability"], rows))
@@ -144,9 +189,3 @@ def _outcomes_results(found: Calibration, table: Outcomes, folds: int, predicted
 
 def _history_results(found: HistoryCalibration) -> _Results:
     return _Results(found, found.to_dict(), found.summary())
-
-
-def _write(folder: Path, results: _Results) -> None:
-    batch.write(folder, figures={"calibration": results.found.plot()}, result=results.numbers)
-    if isinstance(results.found, Calibration):
-        results.found.to_csv(folder / "ensemble.csv")

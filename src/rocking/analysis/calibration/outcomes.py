@@ -391,7 +391,7 @@ def calibrate(
     (True, True)
     """
     tested = list(motions)
-    observed = _observed(overturned, len(tested))
+    observed = checked_outcomes(overturned, len(tested))
     space = Space.of(p, alpha, restitution, two_sided=two_sided)
     _check(seed, lapse, candidates, ensemble)
     rng = np.random.default_rng(seed)
@@ -466,7 +466,7 @@ def _side_dispersions(space: Space, populations: Floats) -> Floats:
     return sides
 
 
-def _observed(overturned: ArrayLike, count: int) -> Flags:
+def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
     """Outcomes as an array of their own that nobody can change.
 
     Raises

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +18,8 @@ from rocking.motion.named import named_motion
 
 #: The decimal comma of a number.
 _DECIMAL_COMMA: Final = re.compile(r"(?<=\d),(?=\d+(?:[eE][+-]?\d+)?$)")
+
+_FOLDER: Final = re.compile(r"[\w-][\w. -]*(?<![. ])")
 
 _ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
 
@@ -56,12 +58,14 @@ class _Table:
             raise UnreadableRecord(f"{self.path}, line {line}: {text!r} is not {what}; correct it") from None
 
 
-def read(path: Path, *, channel: str | None, dt: float | None, units: str | None) -> Outcomes | History:
-    """Read a table; its columns say which of the two it is.
+def read(
+    path: Path, *, channel: str | None, dt: float | None, units: str | None
+) -> Outcomes | dict[str, Outcomes] | History:
+    """Read a table; its columns say what it is.
 
     Outcomes: `motion` (a record file, relative to the table's folder, or a shipped record) and `overturned` (1 or 0,
-    yes or no); also, if there are such columns, `scale`, `channel` and `group`. A history: `time_s`, and `rotation_rad`
-    or `rotation_deg`.
+    yes or no); also, if there are such columns, `scale`, `channel` and `group`. With a column `specimen`, outcomes of
+    several specimens by their names. A history: `time_s`, and `rotation_rad` or `rotation_deg`.
 
     Raises
     ------
@@ -70,7 +74,10 @@ def read(path: Path, *, channel: str | None, dt: float | None, units: str | None
     """
     table = _table(path)
     if {"motion", "overturned"} <= set(table.columns):
-        return _outcomes(table, channel=channel, dt=dt, units=units)
+        about = {"channel": channel, "dt": dt, "units": units}
+        if "specimen" not in table.columns:
+            return _outcomes(table, **about)
+        return {name: _outcomes(each, **about) for name, each in _by_specimen(table).items()}
     for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
         if {"time_s", column} <= set(table.columns):
             return History(table.numbers("time_s"), unit * table.numbers(column))
@@ -105,7 +112,23 @@ def _table(path: Path) -> _Table:
     return _Table(path, tuple(columns), named)
 
 
-def _outcomes(table: _Table, *, channel: str | None, dt: float | None, units: str | None) -> Outcomes:
+def _by_specimen(table: _Table) -> dict[str, _Table]:
+    """Rows of each specimen, in the order in which the specimens come."""
+    rows: dict[str, list[tuple[int, dict[str, str]]]] = {}
+    for line, row in table.rows:
+        name = table.convert(line, row["specimen"], _folder_name, "the name of a specimen (letters, digits, . _ -)")
+        rows.setdefault(name, []).append((line, row))
+    return {name: replace(table, rows=tuple(some)) for name, some in rows.items()}
+
+
+def _folder_name(text: str) -> str:
+    """Name that can also be that of a folder."""
+    if not _FOLDER.fullmatch(text):
+        raise ValueError(text)
+    return text
+
+
+def _outcomes(table: _Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
     motions, overturned = [], []
     for line, row in table.rows:
         overturned.append(
