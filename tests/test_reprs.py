@@ -1,5 +1,7 @@
 """What every public result says of itself at the prompt: a line or two, no arrays, numbers with their units."""
 
+import copy
+import pickle
 import re
 from collections.abc import Iterator
 from types import MappingProxyType
@@ -55,13 +57,23 @@ RESULTS = {
     "critical amplitude": lambda path: rocking.chattering.critical_report(2.0, 0.92),
     "episodes": lambda path: rocking.chattering.chattering_episodes(rocking.simulate(BLOCK, RECORD)),
     "treatment": lambda path: rocking.Certified(),
-    "validation": lambda path: rocking.calibrate(
-        MOTIONS,
-        [rocking.simulate(BLOCK, one, model="linear").overturned for one in MOTIONS],
-        candidates=256,
-        two_sided=False,
-    ).cross_validate(folds=3),
+    "calibration": lambda path: calibrated(),
+    "calibrated history": lambda path: rocking.calibrate_history(*released(), alpha=0.2),
+    "validation": lambda path: calibrated().cross_validate(folds=3),
 }
+
+
+def calibrated():
+    overturned = [rocking.simulate(BLOCK, one, model="linear").overturned for one in MOTIONS]
+    return rocking.calibrate(MOTIONS, overturned, candidates=256, two_sided=False)
+
+
+def released():
+    times = np.linspace(0.0, 3.0, 301)
+    response = rocking.simulate(
+        rocking.Block.from_parameters(p=3.0, alpha=0.2), None, initial_rotation=0.1, duration=4.0
+    )
+    return times, response.rotation(times)
 
 
 def parts_of(value: object, name: str, seen: set[int]) -> Iterator[tuple[str, object]]:
@@ -88,6 +100,14 @@ def test_what_is_shown_at_the_prompt_is_a_sentence_without_arrays(result, table)
         assert len(shown) <= LONGEST, f"{name}: {len(shown)} characters: {shown[:200]}"
         assert "array(" not in shown, f"{name}: {shown}"
         assert "np.float" not in shown, f"{name}: {shown}"
+
+
+@pytest.mark.parametrize("result", RESULTS)
+def test_a_result_can_be_kept_in_a_file_and_sent_to_another_process(result, table):
+    found = RESULTS[result](table)
+    again = pickle.loads(pickle.dumps(found))
+    assert type(again) is type(found)
+    assert repr(again) == repr(found) == repr(copy.deepcopy(found))
 
 
 @pytest.mark.parametrize("result", ["fragility", "risk", "rule", "channel", "survey", "validation", "shipped"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -405,7 +404,7 @@ def _result(problem: _HistoryProblem, logs: Floats) -> HistoryCalibration:
         estimates[one.name] = Measured(one.sign * math.exp(log), math.exp(log) * math.sqrt(variance), at_bound)
     return HistoryCalibration(
         block=problem.block(logs),
-        estimates=MappingProxyType(estimates),
+        estimates=estimates,
         covariance=covariance,
         times=problem.history.times,
         residuals=residuals,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -142,7 +141,7 @@ class Calibration:
     @property
     def dispersion(self) -> Mapping[str, float]:
         """Standard deviation of each parameter's logarithm from test to test."""
-        return MappingProxyType({name: estimate.dispersion for name, estimate in self.estimates.items()})
+        return {name: estimate.dispersion for name, estimate in self.estimates.items()}
 
     def predict(
         self, motions: Motion | Sequence[Motion], *, threads: int | None = None, progress: bool | None = None
@@ -409,8 +408,8 @@ def calibrate(
     return Calibration(
         blocks=space.blocks(evidence.candidates.points[kept]),
         weights=times / ensemble,
-        estimates=MappingProxyType(_estimates(space, final)),
-        draws=MappingProxyType(space.named(population.unpacked(final)[0])),
+        estimates=_estimates(space, final),
+        draws=space.named(population.unpacked(final)[0]),
         probabilities=evidence.probabilities(final).mean(axis=0),
         observed=observed,
         model=model,

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -98,7 +97,7 @@ class Space:
         if two_sided and SIDED in bounds:
             # No wider than the bounds of a side let it be: else a box around narrow bounds would be all but empty.
             ratio = min(math.log(LARGEST_RATIO), math.log(bounds[SIDED][1] / bounds[SIDED][0]))
-        return cls(tuple(bounds), MappingProxyType(known), lower, upper, ratio)
+        return cls(tuple(bounds), known, lower, upper, ratio)
 
     @property
     def two_sided(self) -> bool:
