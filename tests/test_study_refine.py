@@ -16,7 +16,8 @@ import rocking
 from rocking.motion.exceedance import exceedances
 from rocking.progress import Progress
 from rocking.studies import read_study, refine
-from rocking.studies.units import OUTCOMES, name_of
+from rocking.studies.outcomes import OUTCOMES
+from rocking.studies.units import name_of
 
 TOLERANCE = 1e-3
 SCALES = np.linspace(4.0, 20.0, 9)
@@ -262,9 +263,8 @@ def test_chattering_that_was_cut_off_or_is_not_proven_is_no_verdict():
         "complete_chattering": np.array([0, 0, 1, 0, 1, 1]),
         "stalled": np.array([0, 0, 0, 0, 0, 1]),
     }
-    overturning, chattering = refine._verdicts(np.array([outcomes[name] for name in OUTCOMES], dtype=float))
-    assert overturning.tolist() == [-1, -1, -1, 1, 0, 0]
-    assert chattering.tolist() == [-1, -1, 1, 0, 1, -1]
+    assert refine._verdict("overturning", outcomes).tolist() == [-1, -1, -1, 1, 0, 0]
+    assert refine._verdict("complete_chattering", outcomes).tolist() == [-1, -1, 1, 0, 1, -1]
 
 
 def test_the_bar_says_which_round_it_is_and_what_is_counted(tmp_path, monkeypatch):
@@ -291,6 +291,7 @@ def test_simulations_that_were_stopped_are_no_verdict(tmp_path):
     known = (results.overturned | ~results.stopped).values
     changes = (results.overturned.values[:, 1:] != results.overturned.values[:, :-1]) & known[:, 1:] & known[:, :-1]
     assert (~known).any()
+    assert not (results.overturned & results.stopped).any()  # a verdict asks for no more than the latter
     assert found.sizes["change"] == changes.sum()
     wide = (found.high - found.low > 0.01 * found.high).values
     assert np.array_equal(wide, ~found.known.values)

@@ -199,7 +199,8 @@ def _created(file: Path, folder: str, unit_blocks: int | None) -> Study:
     described = read_study(file)
     for sentence in described.skipped:
         note(f"left out: {sentence}")
-    return study_of(place_of(folder), described.product, unit_blocks, described.report, described.refine)
+    wanted = described.report, described.refine, described.outcomes
+    return study_of(place_of(folder), described.product, unit_blocks, *wanted)
 
 
 def _executor(workers: int | None, scheduler: str | None) -> contextlib.AbstractContextManager[Executor | None]:

@@ -68,6 +68,13 @@ class StudyView:
         self.study = rocking.study(folder)
         if not self.study.status.done:
             raise StudyError(f"nothing of the study in {folder} is done yet: rocking study run {folder}")
+        kept = self.study.store.grid.outcomes
+        self.quantities = {name: label for name, label in QUANTITIES.items() if name in kept}
+        if not self.quantities:
+            raise StudyError(
+                f"the study in {folder} keeps only {', '.join(kept)}; a map needs one of {', '.join(QUANTITIES)}. See "
+                f"its numbers: rocking study export {folder} results.csv"
+            )
         blocks = self.study.product.blocks
         self._columns: dict[str, Floats] = {name: getattr(blocks, name)[:, 0] for name in _PARAMETERS}
         if not (blocks.is_symmetric and _is_grid(list(self._columns.values()))):
@@ -96,7 +103,7 @@ class StudyView:
             "scales": np.asarray(product.scales.values, dtype=float).tolist(),
             "motions": self._names("motion"),
             "polarities": ["+" if sign > 0 else "-" for sign in product.signs],
-            "quantities": [{"name": name, "label": label} for name, label in QUANTITIES.items()],
+            "quantities": [{"name": name, "label": label} for name, label in self.quantities.items()],
         }
 
     def slice(self, texts: Mapping[str, str]) -> Payload:
@@ -115,9 +122,10 @@ class StudyView:
         """
         axes = self.axes()
         x, y = (self._axis(texts.get(which, ""), axes) for which in ("x", "y"))
-        quantity = texts.get("quantity", "overturned")
-        if x == y or quantity not in QUANTITIES:
-            raise InvalidOption("a map of a study needs two different axes and one of its quantities")
+        quantity = texts.get("quantity", next(iter(self.quantities)))
+        if x == y or quantity not in self.quantities:
+            kept = ", ".join(self.quantities)
+            raise InvalidOption(f"a map of this study needs two different axes and one quantity of {kept}")
         if axes[x].size * axes[y].size > _MOST:
             raise InvalidOption(f"{axes[x].size} by {axes[y].size} points are too many for a map")
         values = np.full((axes[y].size, axes[x].size), np.nan)

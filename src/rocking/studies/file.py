@@ -23,6 +23,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.named_pulses import pulse_family
 from rocking.product import Product, Scales
+from rocking.studies.outcomes import OUTCOMES, chosen_outcomes
 from rocking.studies.refine import Tolerances, tolerances_of
 from rocking.studies.report import FragilityPlan, ReportPlan, SpectrumPlan
 from rocking.treatment import treatment
@@ -59,6 +60,7 @@ polarity = "+"                  # or "-", "both"
 model = "nonlinear"             # or "linear"
 chattering = "certified"
 # duration = 40.0
+# outcomes = ["overturned", "peak_rotation"]   # keep these only; with stalled, unfinished, stopped, which always are
 
 [report.fragility]              # what `rocking study report` makes; may be changed later
 measure = "pga"                 # pga, pgv, sa (with period, damping), pga_ratio, pgv_ratio
@@ -74,12 +76,16 @@ def _is_text(value: Any) -> bool:
     return isinstance(value, str)
 
 
+def _is_list_of_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_is_text, value))
+
+
 #: Keys of every table.
 _KEYS: Final[Mapping[str, frozenset[str]]] = {
     "blocks": frozenset({"p", "alpha", "restitution", "csv"}),
     "motions": frozenset({"records", "channel", "vertical", "units", "dt", "skip_unreadable", "pulses"}),
     "scales": frozenset({"factor", "pga", "pgv", "sa", "period", "damping", "polarity", "refine"}),
-    "simulation": frozenset({"model", "chattering", "duration"}),
+    "simulation": frozenset({"model", "chattering", "duration", "outcomes"}),
     "report": frozenset({"fragility", "spectrum"}),
 }
 
@@ -87,7 +93,7 @@ _KEYS: Final[Mapping[str, frozenset[str]]] = {
 _KINDS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
     **dict.fromkeys(("csv", "vertical", "units", "polarity", "model", "chattering"), ("text", _is_text)),
     "channel": ("text or a whole number", lambda value: _is_text(value) or type(value) is int),
-    "records": ("a list of texts", lambda value: isinstance(value, list) and all(map(_is_text, value))),
+    **dict.fromkeys(("records", "outcomes"), ("a list of texts", _is_list_of_texts)),
     "skip_unreadable": ("true or false", lambda value: isinstance(value, bool)),
     "pulses": ("tables, [[motions.pulses]]", lambda value: all(isinstance(each, dict) for each in value)),
 }
@@ -113,12 +119,15 @@ class StudyFile:
         What is to be made of the results.
     refine : mapping or None
         Tolerances to which scales are refined, by verdict.
+    outcomes : tuple of str
+        What is kept of each simulation.
     """
 
     product: Product
     skipped: tuple[str, ...]
     report: ReportPlan | None
     refine: Tolerances | None = None
+    outcomes: tuple[str, ...] = OUTCOMES
 
 
 def read_study(path: str | Path) -> StudyFile:
@@ -175,7 +184,9 @@ class _Reader:
                 chattering,
                 rules.get("duration"),
             )
-        return StudyFile(product, tuple(skipped), self._report(), self._refine(product))
+        with self._line_told("simulation", "outcomes"):
+            kept = chosen_outcomes(rules.get("outcomes"))
+        return StudyFile(product, tuple(skipped), self._report(kept), self._refine(product, kept), kept)
 
     def _scales(self) -> Scales:
         given = {
@@ -185,12 +196,12 @@ class _Reader:
         with self._lines_told("scales"):
             return Scales.of(period=given.get("period"), damping=given.get("damping", 0.05), **measures)
 
-    def _refine(self, product: Product) -> Tolerances | None:
+    def _refine(self, product: Product, kept: tuple[str, ...]) -> Tolerances | None:
         refine = self.tables.get("scales", {}).get("refine")
         with self._line_told("scales", "refine"):
-            return None if refine is None else tolerances_of(product, refine)
+            return None if refine is None else tolerances_of(product, refine, kept)
 
-    def _report(self) -> ReportPlan | None:
+    def _report(self, kept: tuple[str, ...]) -> ReportPlan | None:
         if "report" not in self.tables:
             return None
         plans: dict[str, Any] = {}
@@ -207,6 +218,7 @@ class _Reader:
                     raise self._wrong(table, key, f"[{table}] has no {key}; it takes {', '.join(known)}")
             with self._lines_told(table):
                 plans[name] = kind(**given)
+                plans[name].check(kept)
         return ReportPlan(**plans)
 
     def _check_keys(self) -> None:

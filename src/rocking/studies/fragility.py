@@ -21,7 +21,7 @@ from rocking.errors import InvalidOption
 from rocking.product import Product, block_coordinates
 from rocking.progress import Progress
 from rocking.result import Result, table_of_some
-from rocking.studies.ratios import peak_ratios
+from rocking.studies.ratios import peak_ratios, require_limits
 from rocking.studies.store import Store
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def pooled_fragility(
     store: Store, measure: Measure, limits: Mapping[str, float] = OVERTURNING, confidence: float = 0.9
 ) -> Fragility:
     """Fit one curve to the outcomes of all blocks."""
+    require_limits(store.grid.outcomes, limits)
     product = store.product
     units, which = np.unique(measure.unit_of(product.blocks, product.model), return_inverse=True)
     motions, scales, _, _ = product.shape
@@ -77,6 +78,7 @@ def block_fragilities(
     progress: bool | None = None,
 ) -> BlockFragilities:
     """Fit a curve to the outcomes of each block."""
+    require_limits(store.grid.outcomes, limits)
     motions, scales, polarities, count = store.grid.shape
     shape = len(limits), count
     kept = {name: np.full(shape, np.nan) for name in _KEPT}

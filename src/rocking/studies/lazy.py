@@ -14,7 +14,7 @@ from rocking.arrays import Floats
 from rocking.engine import OUTCOME
 from rocking.errors import StudyError
 from rocking.studies.store import Store
-from rocking.studies.units import OUTCOMES, Key, exact, name_of
+from rocking.studies.units import Key, exact, name_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,8 +50,7 @@ class _Outcome(BackendArray):
     def _unit(self, key: Key) -> Floats:
         outcomes = self._store.outcomes(key)
         if outcomes is not None:
-            values: Floats = outcomes[OUTCOMES.index(self._name)]
-            return values
+            return outcomes[self._name]
         if self._complete:
             raise StudyError(f"unit {name_of(key)} is gone since these results were opened: run the study again")
         return np.full(self._store.grid.counts(key), np.nan)

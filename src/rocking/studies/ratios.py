@@ -2,23 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
+from rocking.analysis.fragility.fit import checked_limit
 from rocking.arrays import Floats
 from rocking.engine import require_finished
 from rocking.errors import StudyError
+from rocking.studies.outcomes import require
 from rocking.studies.store import Store
-from rocking.studies.units import OUTCOMES
 
 #: Simulations that are held in memory at a time.
 _HELD: Final = 4_000_000
 
 
+def require_ratios(kept: Sequence[str], what: str) -> None:
+    """Check that the outcomes that are kept tell peak rotations over slenderness.
+
+    Raises
+    ------
+    InvalidOption
+        If they do not; the message says what needs them.
+    """
+    require(kept, ["overturned", "peak_rotation"], what)
+
+
+def require_limits(kept: Sequence[str], limits: Mapping[str, float]) -> None:
+    """Check that the outcomes that are kept tell whether limits are passed: overturning needs no peak rotation.
+
+    Raises
+    ------
+    InvalidOption
+        If they do not, or a limit is none.
+    """
+    finite = [name for name, limit in limits.items() if math.isfinite(checked_limit(limit, name))]
+    if finite:
+        require_ratios(kept, f"limits.{finite[0]}")
+    else:
+        require(kept, ["overturned"], "a fragility")
+
+
 def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     """Peak rotation over the slenderness, infinite where a block overturned, for a range of blocks after the other.
+
+    Of blocks that stand it is NaN where the study keeps no peak rotation: whoever needs it asks `require_ratios` first.
 
     Parameters
     ----------
@@ -73,10 +103,11 @@ def _read(store: Store, shape: tuple[int, int, int], unit: int, blocks: slice) -
         if outcomes is None:
             raise StudyError("units are gone since the report was begun: run the study again")
         motions, scales, polarities, whole = store.grid.ranges(key)
-        named = dict(zip(OUTCOMES, outcomes[..., blocks.start - whole.start : blocks.stop - whole.start], strict=True))
+        some = slice(blocks.start - whole.start, blocks.stop - whole.start)
+        named = {name: values[..., some] for name, values in outcomes.items()}
         require_finished(named["unfinished"].astype(bool))
         _require_whole(named["stopped"])
         there = ratios[motions, scales, polarities]
-        found = np.where(named["overturned"] != 0.0, np.inf, named["peak_rotation"] / alpha)
+        found = np.where(named["overturned"] != 0.0, np.inf, named.get("peak_rotation", np.nan) / alpha)
         there[...] = found[:, :, : there.shape[2]]
     return ratios

@@ -13,7 +13,7 @@ import functools
 import hashlib
 import io
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -25,8 +25,9 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.errors import InvalidOption, StudyError
 from rocking.product import Product, block_coordinates
 from rocking.studies import inputs
+from rocking.studies.outcomes import require
 from rocking.studies.store import Store, readable, sealed, unsealed
-from rocking.studies.units import OUTCOMES, Key, Line, PointsWork, name_of
+from rocking.studies.units import Key, Line, PointsWork, name_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,6 +47,12 @@ VERDICTS: Final[tuple[Verdict, ...]] = get_args(Verdict)
 _ABOVE: Final[Mapping[Verdict, tuple[str, str]]] = {
     "overturning": ("overturns", "whether the scale above overturns the block, and the one below does not"),
     "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not at the one below"),
+}
+
+#: Outcomes that a verdict is told from, besides those that are always kept.
+_NEEDED: Final[Mapping[str, Sequence[str]]] = {
+    "overturning": ("overturned",),
+    "complete_chattering": ("rests", "complete_chattering"),
 }
 
 #: Neither: a simulation was given up or stopped before, or a rest is not proven.
@@ -151,7 +158,7 @@ class Round:
         self.chosen = brackets.wide(tolerances)
         count = len(self.chosen)
         most = math.prod(store.grid.unit)
-        self.grid = Line(count, min(most, max(_LEAST, math.ceil(count / _UNITS))))
+        self.grid = Line(count, min(most, max(_LEAST, math.ceil(count / _UNITS))), store.grid.outcomes)
         self._now = functools.cache(lambda motion: store.product.scales.now(store.product.motions[motion]))
 
     def create(self) -> None:
@@ -203,6 +210,7 @@ class Round:
             which=which,
             factors=signs * (self.brackets.middle[chosen] / now[which]),  # to the last bit as of `Scales.factors`
             unit=self.grid.unit,
+            outcomes=self.grid.outcomes,
         )
 
     def label(self, key: Key) -> str:
@@ -217,8 +225,8 @@ class Round:
         """Bytes of a unit; None where it is not done."""
         return self.store.place.get(self.label(key))
 
-    def outcomes(self, key: Key) -> Floats | None:
-        """Outcomes of a unit, shape (outcomes, points); None where it is not done.
+    def outcomes(self, key: Key) -> Mapping[str, Floats] | None:
+        """Outcomes of a unit by name, shape (points,) each; None where it is not done.
 
         Raises
         ------
@@ -226,7 +234,7 @@ class Round:
             If it is damaged; the message names it.
         """
         data = self.raw(key)
-        return None if data is None else readable(data, (self.grid.simulations(key),), self.grid.unit, self.label(key))
+        return None if data is None else readable(data, self.grid, (self.grid.simulations(key),), self.label(key))
 
     def after(self) -> Brackets:
         """Brackets after this round, whose units are done.
@@ -236,12 +244,13 @@ class Round:
         StudyError
             If one is damaged or gone.
         """
-        verdicts = np.empty((len(VERDICTS), len(self.chosen)), dtype=np.int8)
+        verdicts = np.full((len(VERDICTS), len(self.chosen)), _UNKNOWN, dtype=np.int8)
         for key in self.grid:
             outcomes = self.outcomes(key)
             if outcomes is None:
                 raise StudyError(f"{self.store.place}: unit {self.label(key)} is gone: run the study again")
-            verdicts[:, self.grid.range(key)] = _verdicts(outcomes)
+            for verdict in self.tolerances:
+                verdicts[VERDICTS.index(verdict), self.grid.range(key)] = _verdict(verdict, outcomes)
         which = self.brackets.verdict[self.chosen]
         return self.brackets.halved(self.chosen, verdicts[which, np.arange(len(which))])
 
@@ -291,13 +300,14 @@ def refinement(store: Store) -> Refinement | None:
     return Refinement(tolerances, len(begun), done, last.grid.total, last.is_last)
 
 
-def tolerances_of(product: Product, refine: float | Mapping[str, float]) -> Tolerances:
+def tolerances_of(product: Product, refine: float | Mapping[str, float], kept: Sequence[str]) -> Tolerances:
     """Return tolerances by verdict, checked; a number alone is one for overturning.
 
     Raises
     ------
     InvalidOption
-        If one is out of its range, there is no such verdict, or there are no scales to refine between.
+        If one is out of its range, there is no such verdict, there are no scales to refine between, or the outcomes
+        that are kept do not tell the verdict.
     """
     given = refine if isinstance(refine, Mapping) else {"overturning": refine}
     others = [name for name in given if name not in VERDICTS]
@@ -306,6 +316,8 @@ def tolerances_of(product: Product, refine: float | Mapping[str, float]) -> Tole
         raise InvalidOption(f"refine takes a number, or tolerances for {' and '.join(VERDICTS)}, {what}")
     _require_order(product)
     names = [verdict for verdict in VERDICTS if verdict in given]
+    for verdict in names:
+        require(kept, _NEEDED[verdict], f"a refinement of {_worded(verdict)}")
     return {verdict: checks.within(given[verdict], "refine", InvalidOption, 1e-12, 0.5) for verdict in names}
 
 
@@ -412,21 +424,21 @@ def grid_brackets(store: Store, of: Collection[str]) -> Brackets:
     """Find changes of verdicts between neighbouring scales of the grid, all of whose units are done."""
     _require_order(store.product)
     verdicts = np.full((len(VERDICTS), *store.grid.shape), _UNKNOWN, dtype=np.int8)
-    wanted = [VERDICTS.index(verdict) for verdict in of]
     for key in store.grid:
         outcomes = store.outcomes(key)
         if outcomes is None:
             raise StudyError(f"{store.place}: unit {name_of(key)} is gone: run the study again")
-        verdicts[wanted, *store.grid.ranges(key)] = _verdicts(outcomes)[wanted]
+        for verdict in of:
+            verdicts[VERDICTS.index(verdict), *store.grid.ranges(key)] = _verdict(verdict, outcomes)
     here, above = verdicts[:, :, :-1], verdicts[:, :, 1:]
     found = np.nonzero((here != above) & (here != _UNKNOWN) & (above != _UNKNOWN))
-    verdict, motion, scale, polarity, block = found
-    order = np.lexsort((scale, block, polarity, motion, verdict))
-    verdict, motion, scale, polarity, block = (index[order] for index in found)
+    which, motion, scale, polarity, block = found
+    order = np.lexsort((scale, block, polarity, motion, which))
+    which, motion, scale, polarity, block = (index[order] for index in found)
     levels = store.product.scales.values
-    holds = above[verdict, motion, scale, polarity, block] == 1
+    holds = above[which, motion, scale, polarity, block] == 1
     known = np.ones(len(motion), dtype=bool)
-    return Brackets(verdict, motion, polarity, block, levels[scale], levels[scale + 1], holds, known)
+    return Brackets(which, motion, polarity, block, levels[scale], levels[scale + 1], holds, known)
 
 
 def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
@@ -437,11 +449,12 @@ def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
     StudyError
         If units are missing or damaged.
     InvalidOption
-        If there is no such verdict, or the study has no two scales in increasing order.
+        If there is no such verdict, the study does not keep its outcomes, or has no two scales in increasing order.
     """
     import xarray as xr
 
     checks.one_of(verdict, "verdict", InvalidOption, VERDICTS)
+    require(store.grid.outcomes, _NEEDED[verdict], f"a critical scale of {_worded(verdict)}")
     brackets = found_brackets(store, verdict)
     above, meaning = _ABOVE[verdict]
     product = store.product
@@ -469,12 +482,13 @@ def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
     )
 
 
-def _verdicts(outcomes: Floats) -> NDArray[np.int8]:
-    """Verdicts on each simulation, shape (verdicts, ...), from its outcomes, shape (outcomes, ...)."""
-    named = {name: values != 0.0 for name, values in zip(OUTCOMES, outcomes, strict=True)}
-    cut = ~named["overturned"] & (named["unfinished"] | named["stopped"])
-    unproven = (cut & ~named["rests"]) | named["stalled"]
-    return np.stack([_where_known(named["overturned"], cut), _where_known(named["complete_chattering"], unproven)])
+def _verdict(verdict: str, outcomes: Mapping[str, Floats]) -> NDArray[np.int8]:
+    """Verdict on each simulation from its outcomes; what was given up or stopped has not overturned yet."""
+    cut = (outcomes["unfinished"] != 0.0) | (outcomes["stopped"] != 0.0)
+    if verdict == "overturning":
+        return _where_known(outcomes["overturned"] != 0.0, cut)
+    unproven = (cut & (outcomes["rests"] == 0.0)) | (outcomes["stalled"] != 0.0)
+    return _where_known(outcomes["complete_chattering"] != 0.0, unproven)
 
 
 def _where_known(holds: Flags, unknown: Flags) -> NDArray[np.int8]:
@@ -483,4 +497,8 @@ def _where_known(holds: Flags, unknown: Flags) -> NDArray[np.int8]:
 
 def _told(tolerances: Tolerances) -> str:
     """Write tolerances in a few words."""
-    return ", ".join(f"{tolerance:g} ({verdict.replace('_', ' ')})" for verdict, tolerance in tolerances.items())
+    return ", ".join(f"{tolerance:g} ({_worded(verdict)})" for verdict, tolerance in tolerances.items())
+
+
+def _worded(verdict: str) -> str:
+    return verdict.replace("_", " ")

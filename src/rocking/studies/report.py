@@ -13,6 +13,7 @@ from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.intensity import Measure, MeasureName
 from rocking.errors import InvalidOption, StudyError
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
+from rocking.studies.ratios import require_limits, require_ratios
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.store import Store
 
@@ -63,6 +64,21 @@ class FragilityPlan:
             if not (isinstance(limit, (int, float)) and limit >= 0.0):
                 raise InvalidOption(f"limits.{name} must be a rotation over slenderness or inf, not {limit!r}")
 
+    def check(self, kept: Sequence[str]) -> None:
+        """Check that the outcomes that a study keeps are enough.
+
+        Parameters
+        ----------
+        kept : sequence of str
+            Names of the outcomes.
+
+        Raises
+        ------
+        InvalidOption
+            If they are not; the message says what is missing.
+        """
+        require_limits(kept, self.limits)
+
 
 @dataclass(frozen=True)
 class SpectrumPlan:
@@ -84,6 +100,21 @@ class SpectrumPlan:
     def __post_init__(self) -> None:
         for value in checks.numbers(self.fractiles, "fractiles", InvalidOption).ravel():
             checks.share(float(value), "each of fractiles", InvalidOption)
+
+    def check(self, kept: Sequence[str]) -> None:
+        """Check that the outcomes that a study keeps are enough.
+
+        Parameters
+        ----------
+        kept : sequence of str
+            Names of the outcomes.
+
+        Raises
+        ------
+        InvalidOption
+            If they are not; the message says what is missing.
+        """
+        require_ratios(kept, "a spectrum")
 
 
 @dataclass(frozen=True)

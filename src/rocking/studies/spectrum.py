@@ -16,7 +16,7 @@ from rocking.errors import InvalidOption
 from rocking.product import block_coordinates
 from rocking.result import Result, table_of_some
 from rocking.studies.fragility import plane_of
-from rocking.studies.ratios import peak_ratios
+from rocking.studies.ratios import peak_ratios, require_ratios
 from rocking.studies.store import Store
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES) -> Stud
     """Fractiles over motions and polarities of peak rotation over slenderness, for each scale and block."""
     import xarray as xr
 
+    require_ratios(store.grid.outcomes, "a spectrum")
     shares = np.array([checks.share(value, "each of fractiles", InvalidOption) for value in fractiles])
     product, count = store.product, store.grid.shape[3]
     values = np.empty((len(shares), product.scales.count, count))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -16,10 +16,14 @@ from rocking.errors import StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.product import Product
 from rocking.studies import inputs
+from rocking.studies.outcomes import OUTCOMES, told
 from rocking.studies.place import Place
-from rocking.studies.units import Axes, DamagedUnit, Grid, Key, Work, decoded, key_of, name_of
+from rocking.studies.units import Axes, DamagedUnit, Grid, Key, Line, Work, decoded, key_of, name_of
 
+#: Format of a store; of one of chosen outcomes, which who knows only the first would take for damage.
 FORMAT: Final = 2
+_CHOSEN: Final = 3
+
 _ARRAY: Final = "result"
 
 #: What is in the place of a study whose creation was cut off; that of an object store keeps a clock as well.
@@ -54,7 +58,7 @@ class Store:
         self._setup = functools.lru_cache(1)(lambda unit: product.setup(grid.ranges((0, 0, 0, unit))[3]))
 
     @classmethod
-    def create(cls, place: Place, product: Product, unit: Axes) -> Store:
+    def create(cls, place: Place, product: Product, unit: Axes, outcomes: tuple[str, ...]) -> Store:
         """Write an empty store; `study.json` last, so that half a store is none.
 
         Raises
@@ -63,12 +67,12 @@ class Store:
             If there is something else in the place.
         """
         _require_free(place)
-        grid = Grid(product.shape, unit)
+        grid = Grid(product.shape, unit, outcomes)
         archive = inputs.to_bytes(product)
         place.put("inputs.npz", archive)
         place.put("zarr.json", _GROUP.encode())
         place.put(f"{_ARRAY}/zarr.json", grid.metadata().encode())
-        about = {
+        about: dict[str, Any] = {
             "format": FORMAT,
             "version": VERSION,
             "kernels": fingerprint(),
@@ -77,6 +81,8 @@ class Store:
             "inputs": hashlib.sha256(archive).hexdigest(),
             "parts": inputs.hashes(product),
         }
+        if outcomes != OUTCOMES:
+            about |= {"format": _CHOSEN, "outcomes": list(outcomes)}
         place.put("study.json", sealed(about))
         return cls(place, product, grid)
 
@@ -96,7 +102,7 @@ class Store:
                 f"inputs.npz in {place} is missing or damaged; restore it, or create the study again elsewhere"
             )
         product = inputs.from_bytes(archive)
-        grid = Grid(product.shape, tuple(about["unit"]))
+        grid = Grid(product.shape, tuple(about["unit"]), tuple(about.get("outcomes", OUTCOMES)))
         for name, text in (("zarr.json", _GROUP), (f"{_ARRAY}/zarr.json", grid.metadata())):
             if place.get(name) != text.encode():
                 place.put(name, text.encode())
@@ -117,8 +123,8 @@ class Store:
                 f"{VERSION} (kernels {fingerprint()}): run it with that version, or create it again elsewhere"
             )
 
-    def check_inputs(self, product: Product) -> None:
-        """Check that these inputs are those of the store.
+    def check_inputs(self, product: Product, outcomes: tuple[str, ...]) -> None:
+        """Check that these inputs are those of the store, and that it keeps these outcomes.
 
         Raises
         ------
@@ -126,6 +132,8 @@ class Store:
             If they differ; the message says in which parts.
         """
         changed = inputs.changes(inputs.hashes(product), described(self.place)["parts"], product.motions)
+        if outcomes != self.grid.outcomes:
+            changed.append(f"the outcomes ({told(self.grid.outcomes)} then; {told(outcomes)} now)")
         if changed:
             raise StudyError(
                 f"{self.place} holds a study of other inputs ({', '.join(changed)} changed), {len(self.done())} of "
@@ -147,7 +155,7 @@ class Store:
         """Return all that a worker needs for a unit."""
         motions, scales, polarities, _ = self.grid.ranges(key)
         factors = self._factors(key[0])[:, scales, polarities]
-        return Work(self._setup(key[3]), self.product.motions[motions], factors, self.grid.unit)
+        return Work(self._setup(key[3]), self.product.motions[motions], factors, self.grid.unit, self.grid.outcomes)
 
     def _factors_of(self, unit: int) -> Floats:
         """Factors on the motions of a unit, shape (motions, scales, polarities)."""
@@ -168,8 +176,8 @@ class Store:
         """Bytes of a unit; None where it is not done."""
         return self.place.get(f"{_ARRAY}/{name_of(key)}")
 
-    def outcomes(self, key: Key) -> Floats | None:
-        """Outcomes of a unit, shape (outcomes, motions, scales, polarities, blocks); None where it is not done.
+    def outcomes(self, key: Key) -> Mapping[str, Floats] | None:
+        """Outcomes of a unit by name, shape (motions, scales, polarities, blocks) each; None where it is not done.
 
         Raises
         ------
@@ -179,11 +187,11 @@ class Store:
         data = self.raw(key)
         if data is None:
             return None
-        return readable(data, self.grid.counts(key), self.grid.unit, self.label(key))
+        return readable(data, self.grid, self.grid.counts(key), self.label(key))
 
 
-def readable(data: bytes, counts: tuple[int, ...], unit: tuple[int, ...], label: str) -> Floats:
-    """Outcomes of a unit from its bytes, shape (outcomes, *counts).
+def readable(data: bytes, grid: Grid | Line, counts: tuple[int, ...], label: str) -> Mapping[str, Floats]:
+    """Outcomes of a unit from its bytes by name, shape (*counts) each.
 
     Raises
     ------
@@ -191,7 +199,7 @@ def readable(data: bytes, counts: tuple[int, ...], unit: tuple[int, ...], label:
         If they are damaged; the message names the unit.
     """
     try:
-        return decoded(data, counts, unit)
+        return decoded(data, grid.outcomes, counts, grid.unit)
     except DamagedUnit as error:
         raise StudyError(f"unit {label} is damaged, {error}: verify(repair=True) computes it again") from None
 
@@ -215,9 +223,10 @@ def described(place: Place) -> dict[str, Any]:
     about = unsealed(data)
     if about is None:
         raise StudyError(f"study.json in {place} is damaged: restore it, or create the study again elsewhere")
-    if about["format"] != FORMAT:
+    if about["format"] not in (FORMAT, _CHOSEN):
         raise StudyError(
-            f"the study in {place} is of format {about['format']}, this program knows {FORMAT}: use its version"
+            f"the study in {place} is of format {about['format']}, this program knows {FORMAT} and {_CHOSEN}: use its "
+            "version"
         )
     return about
 

@@ -28,6 +28,7 @@ from rocking.product import Polarity, Product, Scales
 from rocking.studies import store as stores
 from rocking.studies.export import export
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
+from rocking.studies.outcomes import OUTCOMES, chosen_outcomes
 from rocking.studies.place import Place, place_of, this_process
 from rocking.studies.refine import (
     Refinement,
@@ -45,7 +46,7 @@ from rocking.studies.report import Made, ReportPlan, keep, kept, report
 from rocking.studies.run import RunReport, Stop, run
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.store import Store
-from rocking.studies.units import OUTCOMES, Axes, Key, Work, compute
+from rocking.studies.units import Axes, Key, Work, compute
 from rocking.treatment import Treatment, treatment
 from rocking.treatment.base import Model
 
@@ -245,8 +246,9 @@ class Study:
         Returns
         -------
         xarray.Dataset
-            As from `simulate_many`: over (motion, scale, polarity, block), those that apply. While units are missing
-            every variable is of floats, NaN where its unit is not done, and a variable ``done`` says which are.
+            As from `simulate_many`: over (motion, scale, polarity, block), those that apply, with the outcomes that
+            the study keeps. While units are missing every variable is of floats, NaN where its unit is not done, and a
+            variable ``done`` says which are.
 
         Raises
         ------
@@ -257,7 +259,7 @@ class Study:
 
         done = self.store.done()
         complete = len(done) == len(self.store.grid)
-        outcomes: dict[str, Any] = {name: lazy(self.store, name, complete) for name in OUTCOMES}
+        outcomes: dict[str, Any] = {name: lazy(self.store, name, complete) for name in self.store.grid.outcomes}
         if not complete:
             outcomes["done"] = self._done_mask(done)
         return self.product.dataset(outcomes)
@@ -324,7 +326,7 @@ class Study:
         StudyError
             If units are missing or damaged, or the refinement is not done.
         InvalidOption
-            If there is no such verdict, or the study has no two scales in increasing order.
+            If there is no such verdict, the study does not keep its outcomes, or has no two scales in increasing order.
         """
         return critical_scales(self.store, verdict)
 
@@ -349,7 +351,7 @@ class Study:
         StudyError
             If units are missing or damaged.
         InvalidOption
-            If an argument is out of its range, or no lognormal fits.
+            If an argument is out of its range, the study does not keep what a limit needs, or no lognormal fits.
         """
         return pooled_fragility(self.store, Measure(measure, period, damping), limits, confidence)
 
@@ -378,7 +380,8 @@ class Study:
         StudyError
             If units are missing or damaged.
         InvalidOption
-            If an argument is out of its range. A block that no lognormal fits has a sentence in place of a curve.
+            If an argument is out of its range, or the study does not keep what a limit needs. A block that no lognormal
+            fits has a sentence in place of a curve.
         """
         return block_fragilities(self.store, Measure(measure, period, damping), limits, confidence, progress)
 
@@ -395,7 +398,7 @@ class Study:
         StudyError
             If units are missing or damaged.
         InvalidOption
-            If a fractile is out of its range.
+            If a fractile is out of its range, or the study does not keep overturned and peak_rotation.
         """
         return study_spectrum(self.store, fractiles)
 
@@ -491,6 +494,7 @@ def study(
     polarity: Polarity = "+",
     duration: float | None = None,
     refine: float | Mapping[str, float] | None = None,
+    outcomes: Sequence[str] | None = None,
     unit_blocks: int | None = None,
 ) -> Study:
     """Create a study, or open one that is there and check that its inputs are these.
@@ -509,6 +513,9 @@ def study(
         a block and the other does not, until it is narrower than this, relative to the scale: `Study.critical_scales`.
         ``{"complete_chattering": 1e-6}`` does so where one completes the first chattering and the other does not;
         ``"overturning"`` may be named beside it. May be given later for a study that is there.
+    outcomes : sequence of str, optional
+        Names of what is kept of each simulation, of the variables that `simulate_many` returns; by default all.
+        stalled, unfinished and stopped are always kept: they say which of the others are answers.
     unit_blocks : int, optional
         Blocks of a unit, a multiple of 512, of one motion, scale and polarity; by default a unit holds as many of all
         as take about five seconds, from a pilot.
@@ -521,7 +528,9 @@ def study(
     Raises
     ------
     StudyError
-        If there is no study and no inputs are given, it holds other inputs, or it is damaged.
+        If there is no study and no inputs are given, it holds other inputs or outcomes, or it is damaged.
+    InvalidOption
+        If an argument is out of its range, or `outcomes` leaves out what `refine` needs.
 
     Examples
     --------
@@ -549,7 +558,7 @@ def study(
         treatment(chattering),
         duration,
     )
-    return study_of(place, product, unit_blocks, refine=refine)
+    return study_of(place, product, unit_blocks, refine=refine, outcomes=chosen_outcomes(outcomes))
 
 
 def study_of(
@@ -558,6 +567,7 @@ def study_of(
     unit_blocks: int | None = None,
     plan: ReportPlan | None = None,
     refine: float | Mapping[str, float] | None = None,
+    outcomes: tuple[str, ...] = OUTCOMES,
 ) -> Study:
     """Create the study of a product in a place, or open the one that is there and check its inputs.
 
@@ -573,19 +583,23 @@ def study_of(
         What is to be made of the results; takes the place of what was.
     refine : float or mapping, optional
         Tolerance of the scales, or one for each verdict; may be given later.
+    outcomes : tuple of str
+        What is kept of each simulation, from `chosen_outcomes`.
 
     Raises
     ------
     StudyError
-        If there is one of other inputs, or it is damaged.
+        If there is one of other inputs or outcomes, or it is damaged.
+    InvalidOption
+        If a tolerance is out of its range, or `outcomes` leaves out what it needs.
     """
-    tolerances = None if refine is None else tolerances_of(product, refine)
+    tolerances = None if refine is None else tolerances_of(product, refine, outcomes)
     if stores.exists(place):
         found = Store.open(place)
-        found.check_inputs(product)
+        found.check_inputs(product, outcomes)
     else:
         unit = _pilot(product) if unit_blocks is None else (1, 1, 1, _checked_width(unit_blocks))
-        found = Store.create(place, product, unit)
+        found = Store.create(place, product, unit, outcomes)
     if plan is not None:
         keep(found, plan)
     if tolerances is not None:
@@ -611,7 +625,7 @@ def _pilot(product: Product) -> Axes:
     factors = np.array([[[product.scales.factors(motion).max()]]])
     announce(SIMULATIONS)
     setup = Product(some, (motion,), Scales(), "+", product.model, product.treatment, product.duration).setup()
-    work = Work(setup, (motion,), factors, (1, 1, 1, len(some)))
+    work = Work(setup, (motion,), factors, (1, 1, 1, len(some)), OUTCOMES)
     compute(work)  # compiles
     start = time.perf_counter()
     compute(work)

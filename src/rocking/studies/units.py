@@ -24,10 +24,6 @@ from rocking.engine import OUTCOME, Setup, Task, simulate_task
 from rocking.errors import StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
-from rocking.product import VARIABLES
-
-#: Outcomes of a simulation, in the order in which the array holds them.
-OUTCOMES: Final = tuple(VARIABLES)
 
 #: Checked, but not packed: packing would save two thirds of the bytes, and take 3 % of the time of the simulations.
 _LEVEL: Final = 0
@@ -61,10 +57,13 @@ class Grid:
         Numbers of motions, scales, polarities and blocks.
     unit : (um, us, uk, un)
         How many of each a unit holds; the last one along an axis may hold fewer.
+    outcomes : tuple of str
+        What is kept of each simulation, in the order in which the array holds it.
     """
 
     shape: Axes
     unit: Axes
+    outcomes: tuple[str, ...]
 
     @property
     def cells(self) -> Axes:
@@ -103,7 +102,7 @@ class Grid:
 
     def metadata(self) -> str:
         """Metadata of the array as Zarr 3 has it: one chunk a unit, in flat keys."""
-        return _metadata(self.shape, self.unit, ("motion", "scale", "polarity", "block"))
+        return _metadata(self.outcomes, self.shape, self.unit, ("motion", "scale", "polarity", "block"))
 
 
 @dataclass(frozen=True)
@@ -116,10 +115,13 @@ class Line:
         Number of simulations in all units.
     width : int
         How many a unit holds; the last one may hold fewer.
+    outcomes : tuple of str
+        What is kept of each simulation, in the order in which the array holds it.
     """
 
     total: int
     width: int
+    outcomes: tuple[str, ...]
 
     @property
     def unit(self) -> tuple[int]:
@@ -141,19 +143,21 @@ class Line:
 
     def metadata(self) -> str:
         """Metadata of the array as Zarr 3 has it."""
-        return _metadata((self.total,), self.unit, ("point",))
+        return _metadata(self.outcomes, (self.total,), self.unit, ("point",))
 
 
-def _metadata(shape: tuple[int, ...], unit: tuple[int, ...], dimensions: tuple[str, ...]) -> str:
+def _metadata(
+    outcomes: tuple[str, ...], shape: tuple[int, ...], unit: tuple[int, ...], dimensions: tuple[str, ...]
+) -> str:
     return json.dumps(
         {
             "zarr_format": 3,
             "node_type": "array",
-            "shape": [len(OUTCOMES), *shape],
+            "shape": [len(outcomes), *shape],
             "data_type": "float64",
             "chunk_grid": {
                 "name": "regular",
-                "configuration": {"chunk_shape": [len(OUTCOMES), *unit]},
+                "configuration": {"chunk_shape": [len(outcomes), *unit]},
             },
             "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
             "fill_value": "NaN",
@@ -162,7 +166,7 @@ def _metadata(shape: tuple[int, ...], unit: tuple[int, ...], dimensions: tuple[s
                 {"name": "gzip", "configuration": {"level": _LEVEL}},
             ],
             "dimension_names": ["outcome", *dimensions],
-            "attributes": {"outcomes": list(OUTCOMES)},
+            "attributes": {"outcomes": list(outcomes)},
         },
         indent=2,
     )
@@ -202,6 +206,8 @@ class Work:
         Factors on the motions.
     unit : (um, us, uk, un)
         What a full unit holds.
+    outcomes : tuple of str
+        What is kept of each simulation.
     program : str
         Who must compute it.
     """
@@ -210,15 +216,16 @@ class Work:
     motions: tuple[Motion, ...]
     factors: Floats
     unit: Axes
+    outcomes: tuple[str, ...]
     program: str = field(default_factory=program)
 
     def values(self, stop: threading.Event | None) -> Floats:
         """Simulate, and return the outcomes."""
         blocks = slice(0, len(self.setup.blocks))
-        values = blank(self.unit, (*self.factors.shape, blocks.stop))
+        values = blank(self.outcomes, self.unit, (*self.factors.shape, blocks.stop))
         for m, s, k in np.ndindex(self.factors.shape):
             task = Task(blocks, self.motions[m], float(self.factors[m, s, k]))
-            fill(values[:, m, s, k, blocks], simulate_task(self.setup, task, stop))
+            fill(values[:, m, s, k, blocks], self.outcomes, simulate_task(self.setup, task, stop))
         return values
 
 
@@ -238,6 +245,8 @@ class PointsWork:
         Factors on it; those with the same motion and factor stand together.
     unit : (int,)
         How many a full unit holds.
+    outcomes : tuple of str
+        What is kept of each simulation.
     program : str
         Who must compute it.
     """
@@ -247,16 +256,17 @@ class PointsWork:
     which: Integers
     factors: Floats
     unit: tuple[int]
+    outcomes: tuple[str, ...]
     program: str = field(default_factory=program)
 
     def values(self, stop: threading.Event | None) -> Floats:
         """Simulate, and return the outcomes."""
         count = len(self.factors)
-        values = blank(self.unit, (count,))
+        values = blank(self.outcomes, self.unit, (count,))
         changes = np.flatnonzero((np.diff(self.which) != 0) | (np.diff(self.factors) != 0.0)) + 1
         for start, end in itertools.pairwise([0, *changes.tolist(), count]):
             task = Task(slice(start, end), self.motions[self.which[start]], float(self.factors[start]))
-            fill(values[:, start:end], simulate_task(self.setup, task, stop))
+            fill(values[:, start:end], self.outcomes, simulate_task(self.setup, task, stop))
         return values
 
 
@@ -273,17 +283,17 @@ def compute(work: Work | PointsWork, stop: threading.Event | None = None) -> byt
     return encoded(work.values(stop))
 
 
-def blank(unit: tuple[int, ...], counts: tuple[int, ...]) -> Floats:
-    """Room for the outcomes of a unit, NaN where it holds fewer simulations than a full one."""
-    shape = len(OUTCOMES), *unit
+def blank(names: tuple[str, ...], unit: tuple[int, ...], counts: tuple[int, ...]) -> Floats:
+    """Room for these outcomes of a unit, NaN where it holds fewer simulations than a full one."""
+    shape = len(names), *unit
     return np.empty(shape) if unit == counts else np.full(shape, np.nan)
 
 
-def fill(values: Floats, outcomes: NDArray[np.void]) -> None:
-    """Write outcomes of n simulations into an array, shape (outcomes, n): as many at a time as a cache holds."""
+def fill(values: Floats, names: tuple[str, ...], outcomes: NDArray[np.void]) -> None:
+    """Write these outcomes of n simulations into an array, shape (names, n): as many at a time as a cache holds."""
     for start in range(0, len(outcomes), _CACHED):
         some = slice(start, start + _CACHED)
-        for one, name in zip(values, OUTCOMES, strict=True):
+        for one, name in zip(values, names, strict=True):
             one[some] = outcomes[name][some]
 
 
@@ -292,8 +302,8 @@ def encoded(values: Floats) -> bytes:
     return gzip.compress(np.ascontiguousarray(values, "<f8").data, _LEVEL, mtime=0)
 
 
-def decoded(data: bytes, counts: tuple[int, ...], unit: tuple[int, ...]) -> Floats:
-    """Outcomes of a unit, shape (outcomes, *counts).
+def decoded(data: bytes, names: tuple[str, ...], counts: tuple[int, ...], unit: tuple[int, ...]) -> dict[str, Floats]:
+    """Outcomes of a unit by their names, each of shape (*counts).
 
     Raises
     ------
@@ -306,11 +316,12 @@ def decoded(data: bytes, counts: tuple[int, ...], unit: tuple[int, ...]) -> Floa
         raw = gzip.decompress(data)
     except (OSError, EOFError, zlib.error) as error:
         raise DamagedUnit(f"it cannot be unpacked: {error}") from None
-    size = 8 * len(OUTCOMES) * math.prod(unit)
+    size = 8 * len(names) * math.prod(unit)
     if len(raw) != size:
         raise DamagedUnit(f"it holds {len(raw)} bytes, not {size}")
-    values = np.frombuffer(raw, "<f8").reshape(len(OUTCOMES), *unit)
-    return np.asarray(values[(slice(None), *(slice(0, count) for count in counts))], dtype=np.float64)
+    values = np.frombuffer(raw, "<f8").reshape(len(names), *unit)
+    held = np.asarray(values[(slice(None), *(slice(0, count) for count in counts))], dtype=np.float64)
+    return dict(zip(names, held, strict=True))
 
 
 def exact(name: str, values: Floats) -> NDArray[Any]:

@@ -312,10 +312,17 @@ def _curve(
 
 def passed(ratio: Floats, limit: float, name: str) -> Floats:
     """Whether peak rotation over slenderness passes a limit: 1 or 0; infinite is overturning."""
-    what = f"the limit {name!r} (rotation over slenderness)"
-    if not checks.number(limit, what, InvalidOption) >= 0.0:
-        raise InvalidOption(f"{what} must be 0 or more, not {limit!r}")
+    limit = checked_limit(limit, name)
     return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
+
+
+def checked_limit(limit: float, name: str) -> float:
+    """Return a limit of peak rotation over slenderness, checked."""
+    what = f"the limit {name!r} (rotation over slenderness)"
+    least = checks.number(limit, what, InvalidOption)
+    if not least >= 0.0:
+        raise InvalidOption(f"{what} must be 0 or more, not {limit!r}")
+    return least
 
 
 def _limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
