@@ -60,7 +60,7 @@ polarity = "+"                  # or "-", "both"
 model = "nonlinear"             # or "linear"
 chattering = "certified"
 # duration = 40.0
-# outcomes = ["overturned", "peak_rotation"]   # keep these only; with stalled, unfinished, stopped, which always are
+# outcomes = ["overturned", "peak_rotation"]   # keep these, and stalled, unfinished and stopped; by default all
 
 [report.fragility]              # what `rocking study report` makes; may be changed later
 measure = "pga"                 # pga, pgv, sa (with period, damping), pga_ratio, pgv_ratio

@@ -20,7 +20,7 @@ from rocking.studies.outcomes import OUTCOMES, told
 from rocking.studies.place import Place
 from rocking.studies.units import Axes, DamagedUnit, Grid, Key, Line, Work, decoded, key_of, name_of
 
-#: Format of a store; of one of chosen outcomes, which who knows only the first would take for damage.
+#: Format of a store, and of one of chosen outcomes, which a program that knows none would take for damage.
 FORMAT: Final = 2
 _CHOSEN: Final = 3
 
