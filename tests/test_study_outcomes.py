@@ -107,7 +107,8 @@ def test_the_array_of_all_outcomes_is_described_to_the_byte_as_it_always_was(gri
 def test_the_order_of_the_store_is_that_of_the_outcomes_and_those_always_kept_may_be_named(complete, tmp_path):
     made(tmp_path, outcomes=["stopped", "overturned", "peak_rotation"]).run(threads=2)
     assert contents(tmp_path) == contents(complete)
-    assert json.loads(contents(complete)["study.json"])["outcomes"] == KEPT
+    about = json.loads(contents(complete)["study.json"])
+    assert (about["format"], about["outcomes"]) == (3, KEPT)
 
 
 def test_a_choice_is_resumed_verified_and_repaired(complete, tmp_path):
