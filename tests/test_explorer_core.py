@@ -611,6 +611,21 @@ def test_a_slice_of_a_study_is_its_results(study):
             assert values[row, column] == results.peak_rotation[1, 1, 1, np.flatnonzero(chosen.values)[0]]
 
 
+def test_a_verdict_that_the_duration_left_open_is_not_drawn_as_standing(tmp_path):
+    blocks = rocking.Blocks.grid(p=[1.5, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+    motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+    made = rocking.study(tmp_path / "cut", blocks, motion, factor=[0.01, 1.0], duration=0.9, unit_blocks=512)
+    made.run()
+    results = made.results()
+    assert results.stopped.values.any()
+    view = StudyView(tmp_path / "cut")
+    drawn = view.slice({"x": "p", "y": "scale", "quantity": "overturned"}).arrays["values"].reshape(2, 2)
+    chosen = results.isel(motion=0, block=np.flatnonzero(results.alpha.values == 0.1))
+    wanted = np.where(chosen.stopped & ~chosen.overturned, -1.0, chosen.overturned)
+    assert np.array_equal(drawn, wanted.reshape(2, 2))
+    assert (drawn == -1.0).any()
+
+
 def test_a_point_of_a_study_is_its_simulation(study):
     payload = study.slice({"x": "p", "y": "scale", "quantity": "peak_rotation", "motion_index": "1"})
     shelf = Shelf()

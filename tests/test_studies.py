@@ -22,6 +22,7 @@ import xarray as xr
 import rocking
 from rocking.studies import locks, units
 from rocking.studies import place as places
+from rocking.studies.file import read_study
 from rocking.studies.outcomes import OUTCOMES
 from rocking.studies.run import Stop
 from rocking.studies.units import DamagedUnit, Grid, decoded, encoded, key_of, name_of
@@ -636,3 +637,20 @@ def test_a_vertical_component_is_part_of_a_study(tmp_path):
     for other in (MOTIONS[0], MOTIONS[0].with_vertical(-MOTIONS[1])):
         with pytest.raises(rocking.StudyError, match="motion 0"):
             rocking.study(tmp_path / "study", BLOCKS, other)
+
+
+def test_what_would_be_ignored_of_a_study_that_is_there_is_refused(tmp_path):
+    rocking.study(tmp_path / "one", BLOCKS, MOTIONS, factor=[0.5, 1.0], unit_blocks=512)
+    with pytest.raises(rocking.errors.InvalidOption, match="pga belongs to blocks and motions"):
+        rocking.study(tmp_path / "one", pga=[1.0])
+    with pytest.raises(rocking.errors.InvalidOption, match="duration, outcomes belong to"):
+        rocking.study(tmp_path / "one", duration=3.0, outcomes=["rests"])
+    assert rocking.study(tmp_path / "one", refine=1e-2).status.refinement is not None
+
+
+@pytest.mark.parametrize("folder", [5, None])
+def test_a_folder_that_is_no_path_is_told(folder):
+    with pytest.raises(rocking.errors.StudyError, match="the folder of a study must be text or a path"):
+        rocking.study(folder, BLOCKS, MOTIONS)
+    with pytest.raises(rocking.errors.StudyError, match="the file of a study must be text or a path"):
+        read_study(folder)

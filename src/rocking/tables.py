@@ -59,6 +59,13 @@ def cell(entry: Any) -> str:
     return str(entry)
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number and its noun, as 1 polarity or 3 polarities."""
+    if number == 1:
+        return f"1 {noun}"
+    return f"{number} {noun[:-1]}ies" if noun.endswith("y") else f"{number} {noun}s"
+
+
 def range_text(values: Floats) -> str:
     """Lowest and highest of some numbers, or the one that they all are.
 

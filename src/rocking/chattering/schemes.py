@@ -18,6 +18,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.simulation import simulate
+from rocking.tables import counted
 from rocking.treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
 from rocking.treatment.base import Model
 
@@ -94,13 +95,13 @@ class SchemeOutcome:
         """Say in words where the scheme is wrong."""
         faults = []
         if self.false_rests.size:
-            faults.append(f"{_count(self.false_rests.size, 'false rest')}, the first at {self.false_rests[0]:.6f} s")
+            faults.append(f"{counted(self.false_rests.size, 'false rest')}, the first at {self.false_rests[0]:.6f} s")
         if self.missed.size:
-            faults.append(f"{_count(self.missed.size, 'rest')} missed, the first at {self.missed[0]:.6f} s")
+            faults.append(f"{counted(self.missed.size, 'rest')} missed, the first at {self.missed[0]:.6f} s")
         if self.overturns_wrongly:
             faults.append("overturns, wrongly" if self.response.overturned else "does not overturn, wrongly")
         if self.response.stalled:
-            faults.append(f"{_count(self.response.stalled, 'rest')} only as time no longer advanced")
+            faults.append(f"{counted(self.response.stalled, 'rest')} only as time no longer advanced")
         return "; ".join(faults) or "every rest found, no other"
 
 
@@ -293,13 +294,9 @@ def _account(certified: Response) -> str:
     if not widths.size:
         return f"no rest; {ending}"
     if np.isnan(widths).any():
-        return f"{_count(int(np.isnan(widths).sum()), 'rest')} not proven; {ending}"
+        return f"{counted(int(np.isnan(widths).sum()), 'rest')} not proven; {ending}"
     return f"every rest known to {widths.max():.0e} s; {ending}"
 
 
 def _impacts(response: Response) -> str:
     return str(len(response.impacts))
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

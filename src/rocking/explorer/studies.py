@@ -37,6 +37,9 @@ _LABELS: Final = {
 #: Parameters of a block.
 _PARAMETERS: Final = ("p", "alpha", "restitution")
 
+#: What is drawn for a block of which it is not known whether it overturns: the simulation was given up, or stopped.
+OPEN: Final = -1.0
+
 #: Quantities of a study that are drawn.
 QUANTITIES: Final = {
     "overturned": "Overturns",
@@ -130,7 +133,7 @@ class StudyView:
             raise InvalidOption(f"{axes[x].size} by {axes[y].size} points are too many for a map")
         values = np.full((axes[y].size, axes[x].size), np.nan)
         blocks = self._blocks(texts, {x, y})
-        results, product = self.study.results()[quantity], self.study.product
+        results, product = self._drawn(quantity), self.study.product
         scales = range(len(product.scales.values)) if "scale" in (x, y) else [self._scale(texts)]
         motions = range(len(product.motions)) if "motion" in (x, y) else [self._motion(texts)]
         at = {
@@ -171,6 +174,15 @@ class StudyView:
         blocks, k = self.study.product.blocks, round(chosen["block"]) - 1
         pairs = {name: getattr(blocks, name)[k] for name in _PARAMETERS}
         return {name: ",".join(repr(float(each)) for each in dict.fromkeys(pair)) for name, pair in pairs.items()}
+
+    def _drawn(self, quantity: str) -> Any:
+        """Outcome that is drawn; a verdict that a simulation left open is `OPEN`, and not that the block stands."""
+        results = self.study.results()
+        found = results[quantity]
+        if quantity != "overturned":
+            return found
+        is_open = (results.unfinished + results.stopped > 0) & (found == 0)
+        return found.astype(float).where(~is_open, OPEN)
 
     def _outcomes(self, results: Any, texts: Mapping[str, str], scale: int, motion: int) -> Floats:
         """Outcomes of all blocks under one motion at one scale."""

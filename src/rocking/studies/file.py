@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking import quantities
+from rocking import checks, quantities
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidMotion, RockingError, StudyError, UnreadableRecord
@@ -149,7 +149,7 @@ def read_study(path: str | Path) -> StudyFile:
     UnreadableRecord
         If a record cannot be read.
     """
-    file = Path(path)
+    file = checks.path(path, "the file of a study", StudyError)
     try:
         text = file.read_text("utf-8")
         tables = tomllib.loads(text)

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Final, Protocol
 
+from rocking import checks
 from rocking.errors import OutputError, StudyError
 from rocking.studies import locks
 
@@ -148,8 +149,9 @@ def place_of(where: str | Path) -> Place:
     Raises
     ------
     StudyError
-        If it is a file.
+        If it is a file, or neither text nor a path.
     """
+    checks.path(where, "the folder of a study", StudyError)
     if "://" in str(where):
         from rocking.studies.objects import ObjectStore
 

@@ -47,6 +47,7 @@ from rocking.studies.run import RunReport, Stop, run
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.store import Store
 from rocking.studies.units import Axes, Key, Work, compute
+from rocking.tables import counted
 from rocking.treatment import Treatment, treatment
 from rocking.treatment.base import Model
 
@@ -448,7 +449,8 @@ class Study:
 
     def __repr__(self) -> str:
         m, s, k, n = self.store.grid.shape
-        return f"<Study: {m} motions x {s} scales x {k} polarities x {n} blocks; {self.status}>"
+        sizes = counted(m, "motion"), counted(s, "scale"), counted(k, "polarity"), counted(n, "block")
+        return f"<Study: {' x '.join(sizes)}; {self.status}>"
 
     def _done_mask(self, done: set[Key]) -> np.ndarray[Any, np.dtype[np.bool_]]:
         mask = np.zeros(self.store.grid.shape, dtype=bool)
@@ -505,7 +507,8 @@ def study(
         Where the study is kept: a folder, or the URL of an object store as ``"s3://bucket/prefix"``, which
         needs obstore.
     blocks, motions
-        As for `simulate_many`; without both, the study must be there, and needs no script.
+        As for `simulate_many`; without both, the study must be there, and needs no script nor any other argument
+        (but `refine`).
     model, chattering, factor, pga, pgv, sa, period, damping, polarity, duration
         As for `simulate_many`.
     refine : float or mapping, optional
@@ -548,7 +551,12 @@ def study(
     if blocks is None or motions is None:
         if blocks is not None or motions is not None:
             raise InvalidOption("a new study needs blocks and motions; one that is there needs neither")
-        return Study(place, Store.open(place))
+        scaling = {"factor": factor, "pga": pga, "pgv": pgv, "sa": sa, "period": period}
+        _refuse_inputs({**scaling, "duration": duration, "outcomes": outcomes, "unit_blocks": unit_blocks})
+        found = Study(place, Store.open(place))
+        if refine is not None:
+            keep_plan(found.store, tolerances_of(found.product, refine, found.store.grid.outcomes))
+        return found
     product = Product(
         Blocks.of(blocks),
         tuple(several_motions(motions)),
@@ -559,6 +567,16 @@ def study(
         duration,
     )
     return study_of(place, product, unit_blocks, refine=refine, outcomes=chosen_outcomes(outcomes))
+
+
+def _refuse_inputs(given: Mapping[str, object]) -> None:
+    """Refuse what is said of a study that is opened by its folder alone: it would be ignored."""
+    told = [name for name, value in given.items() if value is not None]
+    if told:
+        raise InvalidOption(
+            f"{', '.join(told)} belong{'s' if len(told) == 1 else ''} to blocks and motions: give those as well, or "
+            "open the study by its folder alone"
+        )
 
 
 def study_of(

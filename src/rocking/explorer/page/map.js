@@ -380,7 +380,7 @@ export class View {
   kinds(quantity) {
     if (quantity === "outcome") return this.about.outcomes.map((/** @type {string} */ text, /** @type {number} */ k) => [k, text, OUTCOMES[k]]);
     if (quantity === "mode") return MODES;
-    if (quantity === "overturned") return [[0, "stays", "#d7e3f2"], [1, "overturns", "#c76b29"]];
+    if (quantity === "overturned") return [[0, "stays", "#d7e3f2"], [1, "overturns", "#c76b29"], [-1, "not known: ended before its verdict", "#8d8d8d"]];
     return null;
   }
 
