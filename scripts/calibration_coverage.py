@@ -1,6 +1,6 @@
 """Simulation-based calibration: measure how often the 90 % intervals of `rocking.calibrate` hold the truth.
 
-Run ``python scripts/calibration_coverage.py`` from the repository's root (half an hour of one core): it writes
+Run ``python scripts/calibration_coverage.py`` from the repository's root (forty minutes of one core): it writes
 docs/_tables/calibration-coverage.txt and docs/_static/calibration-ranks.png. Each truth is drawn from the prior, each
 test's block from the truth, and its outcome is simulated; data sets whose outcomes are all the same are drawn again,
 which leaves the check exact, since the fit sees them refused as well. The truth's rank among the draws of the posterior
@@ -29,7 +29,7 @@ DATA_SETS = 200
 PROCESSES = 2
 
 TESTS = 60
-CANDIDATES = 2048
+CANDIDATES = 4096
 LAPSE = 0.005
 BOUNDS = {"p": (1.0, 10.0), "alpha": (0.02, 0.5), "restitution": (0.3, 0.99)}
 BINS = 10
@@ -111,8 +111,9 @@ def draw(symmetric: list[dict[str, float]], two_sided: list[dict[str, float]], p
             )
             axes.set_xlabel(f"share of the posterior\nbelow the true {name.replace('_', ' ')}")
             axes.set_xlim(0.0, 1.0)
-            axes.set_ylim(0.0, None)
+            axes.set_xticks([0.0, 0.5, 1.0])
         row[0].set_ylabel(f"data sets, {sides}")
+    rows[0, 0].set_ylim(0.0, 1.1 * max(line.get_xy()[:, 1].max() for axes in rows.flat for line in axes.patches[1:]))
     rows[0, 3].set_axis_off()
     rows[0, 3].legend(*rows[0, 0].get_legend_handles_labels(), loc="center")
     figure.savefig(path, dpi=150)
