@@ -28,6 +28,7 @@ export class View {
     /** @type {any} */
     this.about = null;
     this.mark = [0, 0];
+    this.waiting = 0;
     /** @type {Record<string, HTMLElement>} */
     this.slices = {};
     this.form();
@@ -165,6 +166,8 @@ export class View {
     body.map = "running";
     let done = 0;
     this.complete = false;
+    window.clearTimeout(this.waiting); // that of a map that was given up may be long
+    this.waiting = 0;
     for await (const frame of frames("/api/map", this.asked(), signal)) {
       if (!this.about || done === 0) {
         this.about = JSON.parse(new TextDecoder().decode(frame));
@@ -216,9 +219,8 @@ export class View {
    * painting takes little from computing, which is done on the same cores. @param {number} started */
   soon(started) {
     if (this.waiting) return;
-    this.waiting = true;
     const wait = Math.max(90, 0.1 * (performance.now() - started));
-    window.setTimeout(() => { this.waiting = false; if (!this.complete) this.recolour(); }, wait);
+    this.waiting = window.setTimeout(() => { this.waiting = 0; if (!this.complete) this.recolour(); }, wait);
   }
 
   /** What can be taken away: the picture, the numbers, and code that computes them again. */
