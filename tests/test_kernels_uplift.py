@@ -146,3 +146,13 @@ def test_a_body_that_cannot_lift_off_to_a_side_only_does_to_the_other() -> None:
         assert uplift(in_units_of_g([0.0, 1.0], rows), (0.2, math.inf))[1] == AT_REST
     time, side, _ = uplift(in_units_of_g([0.0, 1.0], [[9.0, -20.0, 0.0]]), (0.2, math.inf))
     assert (time, side) == (pytest.approx(0.46), PLUS)
+
+
+@pytest.mark.parametrize(
+    "horizontal, side",
+    [([0.1, 0.0], MINUS), ([-0.1, 0.0], PLUS), ([0.0, 0.1], MINUS), ([0.0, -0.1], PLUS), ([0.0, 0.0], PLUS)],
+)
+def test_a_block_that_nothing_weighs_down_goes_where_the_motion_pushes(horizontal: list[float], side: int) -> None:
+    """At a vertical acceleration of -1.5 g both thresholds are passed at once, and no block can stay at rest."""
+    ground = in_units_of_g([0.0, 1.0], [horizontal], vertical=[[-1.5, 0.0]])
+    assert uplift(ground, (0.3, 0.3)) == (0.0, side, True)

@@ -124,7 +124,7 @@ def test_an_ambiguous_response_says_what_is_affected_and_what_to_do(ambiguous, s
     assert ambiguous.ambiguities == ("events",)
     assert shaken.ambiguities == ()
     verdict = ambiguous.summary().splitlines()[-1]
-    assert "changes times of events: scale the motion" in verdict
+    assert "changes times of events or impacts: scale the motion" in verdict
     assert "spread" in verdict
     assert "AMBIGUOUS" not in shaken.summary()
 

@@ -443,7 +443,8 @@ def _completes(response: rocking.Response) -> bool:
     plus, minus = response.block.uplift_thresholds(response.model)
     touching = (1.0 - TOUCH) * plus, (1.0 - TOUCH) * minus
     starts = exceedances(response.motion, (plus, minus), response.block.gravity)[:, 0]
-    stretches = exceedances(response.motion, touching, response.block.gravity)[:, 0]
+    # Thresholds are touched up to a share of themselves whatever the weight, also where there is none.
+    stretches = exceedances(response.motion, touching, (1.0 - TOUCH) * response.block.gravity)[:, 0]
     return len(np.unique(np.searchsorted(stretches, starts[starts < rests[0]], side="right"))) == 1
 
 
@@ -516,6 +517,10 @@ def _neighbours(given: Batch, sign: int, k: int) -> Iterator[Callable[[], rockin
             (p[k], alpha[k], np.minimum(restitution[k] * factor, 1.0)),
         ):
             yield simulated(rocking.Block.from_parameters(*(tuple(v) for v in values)), motion)
+    # Where the motion is zero, its last digits are those of the threshold.
+    push = ULP * min(block.uplift_thresholds(given.model))
+    for sign in (-1.0, 1.0):
+        yield simulated(block, motion + rocking.Motion(motion.breakpoints[[0, -1]], [[sign * push]]))
 
 
 def batches(seed: int, pairs: int, *, first: int = 0, vertical: bool = False) -> Iterator[Batch]:

@@ -45,18 +45,22 @@ def piece_before(ground: Ground, time: float) -> int:
 
 @inlined
 def back_within(ground: Ground, block: Record, scratch: Record, lifted: Uplift) -> tuple[int, float]:
-    """Piece and offset at which the motion is beyond neither threshold any more; it may jump from one to the other."""
+    """Piece and offset at which the motion is beyond neither threshold any more.
+
+    It may jump from one to the other and, where nothing weighs the block down, be beyond both.
+    """
     piece, offset, side = lifted.piece, lifted.offset, lifted.side
     while piece < last_piece(ground):
-        length = length_of(ground, piece)
-        held = time_beyond(ground, block, scratch, piece, offset, side)
-        if held == 0.0:
+        until = offset + time_beyond(ground, block, scratch, piece, offset, side)
+        if until == offset:
             side = 1 - side
-            held = time_beyond(ground, block, scratch, piece, offset, side)
-        if offset + held < length:
-            return piece, offset + held
-        piece += 1
-        offset = 0.0
+            until = offset + time_beyond(ground, block, scratch, piece, offset, side)
+        if until == offset:
+            return piece, offset
+        offset = until
+        if not offset < length_of(ground, piece):
+            piece += 1
+            offset = 0.0
     return piece, 0.0
 
 

@@ -59,6 +59,11 @@ def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offs
             to_plus, jump_plus = first_excess(A, degree, left, plus, -1.0, d)
             degree = push_series(ground, piece, offset, minus, 1.0, A, d)
             to_minus, jump_minus = first_excess(A, degree, left, minus, 1.0, d)
+            if to_plus == to_minus < np.inf:  # where nothing weighs the block down, both may be passed at once
+                if pushes_to_minus(ground, piece, offset + to_plus, A):
+                    to_plus = np.inf
+                else:
+                    to_minus = np.inf
             # A passing that rounding puts at the end of the piece is left to the next one, which may turn back.
             if to_plus < to_minus and offset + to_plus < length:
                 return Uplift(piece, offset + to_plus, 0, jump_plus)
@@ -66,6 +71,16 @@ def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offs
                 return Uplift(piece, offset + to_minus, 1, jump_minus)
         piece += 1
         offset = 0.0
+
+
+@inlined
+def pushes_to_minus(ground: Ground, piece: int, offset: float, A: Floats) -> bool:
+    """Whether the horizontal motion pushes a block to side - from here on; ``A`` is scratch space."""
+    degree = local_series(ground, piece, offset, 1.0, A)
+    lead = 0
+    while lead < degree and A[lead] == 0.0:
+        lead += 1
+    return bool(A[lead] > 0.0)
 
 
 @inlined

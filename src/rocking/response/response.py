@@ -182,7 +182,7 @@ class Response:
 
     @property
     def ambiguities(self) -> tuple[str, ...]:
-        """What makes the response ambiguous: "peak", "events" (a time of one of them), both or neither.
+        """What makes the response ambiguous: "peak", "events" (a time of one, or of an impact), both or neither.
 
         An ambiguous response is one of those that are possible. Scale the motion, or the initial state, by 1 plus some
         millionths, simulate each, and take the spread of the results for the answer.

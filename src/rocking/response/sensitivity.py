@@ -13,7 +13,7 @@ from rocking.kernels import state, variation
 from rocking.kernels.trace import Trail
 
 #: A response is ambiguous when changes of the motion, the initial state and the block by one unit in the last place
-#: move its peak by more than this fraction, or one of its events by more than this many seconds.
+#: move its peak by more than this fraction, or one of its events or impacts by more than this many seconds.
 AMBIGUITY: Final = 1e-6
 
 #: What a sensitivity is to.
@@ -65,10 +65,10 @@ class Sensitivity:
 
     def ambiguities(self, peak_rotation: float) -> tuple[str, ...]:
         """Which of "peak" and "events" one unit in the last place of everything changes visibly."""
-        peak, events = (_ULP * _total(values, QUANTITIES) for values in (self.peak, self.events))
+        peak, *times = (_ULP * _total(values, QUANTITIES) for values in (self.peak, self.events, self.impacts))
         known = {
             "peak": bool(np.all(peak <= AMBIGUITY * max(peak_rotation, 1e-300))),
-            "events": bool(np.all(events <= AMBIGUITY)),
+            "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
         }
         return tuple(name for name, is_known in known.items() if not is_known)
 

@@ -172,7 +172,7 @@ def _verdict(response: Response, known: Sensitivity) -> str:
         verdict += f"; {response.stalled} rest(s) not proven"
     ambiguities = known.ambiguities(response.peak_rotation)
     if ambiguities:
-        affected = {"peak": "the peak rotation", "events": "times of events"}
+        affected = {"peak": "the peak rotation", "events": "times of events or impacts"}
         verdict += (
             f"; AMBIGUOUS: one unit in the last place of the input changes "
             f"{' and '.join(affected[name] for name in ambiguities)}: scale the motion (or the initial state) "
