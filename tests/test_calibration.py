@@ -15,7 +15,7 @@ from rocking.analysis.calibration.evidence import Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
 from rocking.analysis.calibration.posterior import posterior
 from rocking.analysis.calibration.scores import Scores
-from rocking.analysis.calibration.search import r_hat
+from rocking.analysis.calibration.search import AGREEMENT, Problem, r_hat, search
 from rocking.analysis.calibration.space import Space
 
 HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
@@ -374,6 +374,21 @@ def test_where_candidates_are_does_not_change_the_posterior(threshold_evidence):
     weights = np.exp(more.log_weights)
     expected = np.exp(candidates.log_weights) @ candidates.points / np.exp(candidates.log_weights).sum()
     assert np.abs(weights @ more.points / weights.sum() - expected).max() < 0.02
+
+
+@pytest.mark.parametrize(("candidates", "goes_on"), [(512, True), (6000, False)])
+def test_a_search_goes_on_while_few_candidates_speak_for_what_it_found(threshold_evidence, candidates, goes_on):
+    evidence, thresholds = threshold_evidence
+    space = evidence.candidates.space
+
+    def tried(points):
+        return (points[:, 1:2] < thresholds).astype(np.float32)
+
+    found = search(Problem(space, evidence.observed, 0.01, tried), candidates, np.random.default_rng(5))
+    assert max(found.agreement.values()) < AGREEMENT
+    drawn = found.evidence.candidates.evenly + sum(count for count, _ in found.evidence.candidates.guides)
+    assert drawn == pytest.approx((13.0 / 7.0 if goes_on else 1.0) * candidates, rel=0.05)
+    assert (found.effective < 100.0) == goes_on
 
 
 def test_shares_are_sums_over_weighted_candidates(threshold_evidence):

@@ -331,8 +331,8 @@ def calibrate(
     lapse : float
         Chance that an outcome is not that of a rocking block at all.
     candidates : int
-        Blocks that are simulated under every motion, about; up to twice as many while runs disagree. A motion that is
-        given several times is simulated once.
+        Blocks that are simulated under every motion, about; up to twice as many while runs disagree, or while few of
+        them tell what a typical population does. A motion that is given several times is simulated once.
     ensemble : int
         Most blocks that are kept for predictions.
     threads, progress
@@ -361,9 +361,9 @@ def calibrate(
 
     The search is global. Two independent runs each fill the bounds evenly, then try blocks where their own fits say:
     first where they are fair, in the end where they are best. A candidate weighs what the density of candidates lacks,
-    so that the prior stays what it was (deterministic mixture; Owen and Zhou 2000). While the runs disagree they go on;
-    the result is drawn from the candidates of both. What is left of a disagreement, few effective candidates, or a
-    posterior that leans on a bound, is said in the summary.
+    so that the prior stays what it was (deterministic mixture; Owen and Zhou 2000). While the runs disagree, or few
+    candidates tell what a typical population does, they go on; the result is drawn from the candidates of both. What is
+    left of a disagreement, few effective candidates, or a posterior that leans on a bound, is said in the summary.
 
     Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
     predictions are not.

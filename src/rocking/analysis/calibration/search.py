@@ -27,11 +27,17 @@ from rocking.arrays import Flags, Floats
 RUNS: Final = 2
 
 #: A run's candidates come in parts of equal size: two that fill the space, then one for each exponent of the likelihood
-#: that guides it. While the runs disagree, they go on with more, this many times at most.
+#: that guides it. While the runs disagree, or too few candidates speak for what they found, they go on, this many times
+#: at most.
 _FILLING: Final = 2
 _EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
-_MORE_EXPONENTS: Final = (0.1, 0.3, 1.0)
+_WHERE_RUNS_DISAGREE: Final = (0.1, 0.3, 1.0)
+_WHERE_CANDIDATES_ARE_FEW: Final = (1.0, 1.0, 1.0)
 _MORE: Final = 2
+
+#: Effective candidates for a typical population that make the error of its likelihood small: a lone block that happens
+#: to fit makes a population look excellent, and intervals too narrow.
+_ENOUGH: Final = 100.0
 
 #: Draws from a posterior, and rounds of moves after each step of their tempering: where they guide the search, and
 #: where they are compared.
@@ -92,6 +98,11 @@ class Search:
     posteriors: tuple[Floats, ...]
 
     @property
+    def effective(self) -> float:
+        """Effective number of candidates that speak for a typical population."""
+        return float(np.median(self.evidence.effective(np.vstack(self.posteriors))))
+
+    @property
     def agreement(self) -> dict[str, float]:
         """R-hat between the runs of each parameter's centre, by name."""
         centres = [population.unpacked(one)[0] for one in self.posteriors]
@@ -100,15 +111,16 @@ class Search:
 
 
 def search(problem: Problem, candidates: int, rng: np.random.Generator) -> Search:
-    """Try about so many candidates; up to twice as many while the runs disagree."""
+    """Try about so many candidates; up to twice as many while runs disagree or too few speak for what they found."""
     part = max(candidates // (RUNS * (_FILLING + len(_EXPONENTS))), 1)
     streams = rng.spawn(RUNS)
     runs = [problem.filling(_FILLING * part, stream) for stream in streams]
     found = _guided(problem, runs, _EXPONENTS, part, streams)
     for _ in range(_MORE):
-        if max(found.agreement.values()) < AGREEMENT:
-            break
-        found = _guided(problem, found.runs, _MORE_EXPONENTS, part, streams)
+        if max(found.agreement.values()) >= AGREEMENT:
+            found = _guided(problem, found.runs, _WHERE_RUNS_DISAGREE, part, streams)
+        elif found.effective < _ENOUGH:
+            found = _guided(problem, found.runs, _WHERE_CANDIDATES_ARE_FEW, part, streams)
     return found
 
 
