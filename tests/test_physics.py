@@ -42,7 +42,7 @@ def test_no_impact_is_missed_in_the_linear_model(case: Case) -> None:
     assert_no_impact_is_missed(case)
 
 
-@settings(quick, max_examples=25)
+@settings(quick, max_examples=10)
 @given(cases(model="nonlinear"))
 def test_no_impact_is_missed_in_the_nonlinear_model(case: Case) -> None:
     assert_no_impact_is_missed(case)
