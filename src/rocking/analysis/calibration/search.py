@@ -121,6 +121,8 @@ def search(problem: Problem, candidates: int, rng: np.random.Generator) -> Searc
             found = _guided(problem, found.runs, _WHERE_RUNS_DISAGREE, part, streams)
         elif found.effective < _ENOUGH:
             found = _guided(problem, found.runs, _WHERE_CANDIDATES_ARE_FEW, part, streams)
+        else:
+            break
     return found
 
 
