@@ -64,7 +64,7 @@ def all_motions():
         record = rocking.records.load(name)
         start, end = strong_part(record)
         trimmed = record.processed(trim=(max(start - 5.0, 0.0), min(end + 10.0, record.duration)))
-        found.append(trimmed.scaled(pga=rocking.Block(1.0, 1.0).gravity))
+        found.append(trimmed.scaled(pga=rocking.Block(half_width=1.0, half_height=1.0).gravity))
     return found
 
 

@@ -100,7 +100,7 @@ def blocks_table():
     """Lowest amplitude of a one-sine of half a second that overturns blocks of four sizes."""
     rows = []
     for radius, theirs in OTHERS.items():
-        block = rocking.Block(radius * math.sin(0.2), radius * math.cos(0.2))
+        block = rocking.Block(half_width=radius * math.sin(0.2), half_height=radius * math.cos(0.2))
         ours = lowest_amplitude(block, "one-sine", 4.0 * math.pi / block.sides[0].p, np.linspace(1.001, 6.0, 51))
         within = "yes" if abs(ours - theirs) <= OTHERS_ERROR else "no"
         rows.append((f"{radius:g}", f"{theirs:.5f}", f"{ours:.8f}", f"{ours - theirs:+.1e}", within))

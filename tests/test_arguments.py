@@ -10,7 +10,7 @@ from rocking import Block, Blocks, InvalidBlock, InvalidMotion, InvalidOption
 from rocking.analysis.survey import survey
 from rocking.named_pulses import named_pulse
 
-BLOCK = Block(0.12, 0.55)
+BLOCK = Block(width=0.24, height=1.1)
 MOTION = rocking.pulses.one_sine(3.0, 1.0)
 
 TAKES_A_MOTION = {
@@ -65,7 +65,7 @@ def test_what_is_no_block_is_refused_and_told_how_to_become_one(take, block):
 
 
 def test_blocks_are_gathered_from_one_from_several_and_from_themselves():
-    blocks = Blocks.of([BLOCK, Block(0.2, 1.0)])
+    blocks = Blocks.of([BLOCK, Block(half_width=0.2, half_height=1.0)])
     assert Blocks.of(blocks) is blocks
     assert Blocks.of(BLOCK)[0] == Block.from_parameters(BLOCK.p, BLOCK.alpha, BLOCK.restitution)
     with pytest.raises(InvalidBlock, match="select"):

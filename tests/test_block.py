@@ -18,7 +18,7 @@ sizes = st.floats(0.01, 20.0)
 def test_a_rectangle_is_the_body_with_its_own_inertia(b, h):
     if math.atan2(b, h) > 0.9:
         return
-    rectangle = Block(b, h)
+    rectangle = Block(half_width=b, half_height=h)
     body = Block.from_pivots((b, b), h, math.sqrt((b * b + h * h) / 3.0))
     for name in ("p", "alpha", "restitution", "radius"):
         assert getattr(body, name) == pytest.approx(getattr(rectangle, name), rel=1e-13)
@@ -54,12 +54,12 @@ def test_two_sided_body_from_unequal_pivots():
 @given(st.floats(0.0, 50.0))
 def test_frame_is_the_lagrangian_of_columns_and_beam(gamma):
     b, h = 0.5, 3.0
-    frame, radius = Block.from_frame(b, h, gamma), math.hypot(b, h)
+    frame, radius = Block.from_frame(half_width=b, half_height=h, mass_ratio=gamma), math.hypot(b, h)
     # Kinetic energy of one column about its corner, plus its share of a beam that moves with its top (2R away).
     inertia = 4.0 / 3.0 * radius**2 + 4.0 * gamma * radius**2
     stiffness = 9.80665 * radius * (1.0 + 2.0 * gamma)
     assert frame.p == pytest.approx(math.sqrt(stiffness / inertia), rel=1e-13)
-    assert frame.alpha == Block(b, h).alpha
+    assert frame.alpha == Block(half_width=b, half_height=h).alpha
 
 
 @given(st.floats(0.0, 50.0))
@@ -83,7 +83,9 @@ def test_a_frames_restitution_conserves_angular_momentum_at_the_impact(gamma):
         return spin + moment(right, velocity(arm)) + beam
 
     expected = about_the_new_corner(left) / about_the_new_corner(right)
-    assert Block.from_frame(b, h, gamma).restitution == pytest.approx(expected, rel=1e-12)
+    assert Block.from_frame(half_width=b, half_height=h, mass_ratio=gamma).restitution == pytest.approx(
+        expected, rel=1e-12
+    )
 
 
 def test_thresholds_of_both_models():
@@ -94,48 +96,48 @@ def test_thresholds_of_both_models():
 
 
 def test_inertia_needs_the_mass():
-    assert Block(0.2, 1.0).inertia is None
-    assert Block(0.2, 1.0, mass=300.0).inertia == pytest.approx(300.0 * 4.0 / 3.0 * 1.04)
+    assert Block(half_width=0.2, half_height=1.0).inertia is None
+    assert Block(half_width=0.2, half_height=1.0, mass=300.0).inertia == pytest.approx(300.0 * 4.0 / 3.0 * 1.04)
 
 
 def test_parameters_give_the_rectangles_radius():
-    block = Block(0.3, 1.1)
+    block = Block(half_width=0.3, half_height=1.1)
     assert Block.from_parameters(block.p, block.alpha).radius == pytest.approx(block.radius, rel=1e-14)
 
 
 @pytest.mark.parametrize(
     ("make", "word"),
     [
-        (lambda: Block(0.0, 1.0), "half_width"),
-        (lambda: Block(0.2, -1.0), "half_height"),
-        (lambda: Block(math.nan, 1.0), "half_width"),
-        (lambda: Block(0.2, math.inf), "half_height"),
-        (lambda: Block("wide", 1.0), "half_width"),
-        (lambda: Block(0.2, 1.0, restitution=0.0), "restitution"),
-        (lambda: Block(0.2, 1.0, restitution=1.01), "restitution"),
-        (lambda: Block(0.2, 1.0, restitution=(0.9, 0.9, 0.9)), "pair"),
-        (lambda: Block(1.0, 0.5), "restitution="),
-        (lambda: Block(0.2, 1.0, gravity=0.0), "gravity"),
-        (lambda: Block(0.2, 1.0, mass=-1.0), "mass"),
+        (lambda: Block(half_width=0.0, half_height=1.0), "half_width"),
+        (lambda: Block(half_width=0.2, half_height=-1.0), "half_height"),
+        (lambda: Block(half_width=math.nan, half_height=1.0), "half_width"),
+        (lambda: Block(half_width=0.2, half_height=math.inf), "half_height"),
+        (lambda: Block(half_width="wide", half_height=1.0), "half_width"),
+        (lambda: Block(half_width=0.2, half_height=1.0, restitution=0.0), "restitution"),
+        (lambda: Block(half_width=0.2, half_height=1.0, restitution=1.01), "restitution"),
+        (lambda: Block(half_width=0.2, half_height=1.0, restitution=(0.9, 0.9, 0.9)), "pair"),
+        (lambda: Block(half_width=1.0, half_height=0.5), "restitution="),
+        (lambda: Block(half_width=0.2, half_height=1.0, gravity=0.0), "gravity"),
+        (lambda: Block(half_width=0.2, half_height=1.0, mass=-1.0), "mass"),
         (lambda: Block.from_parameters(-1.0, 0.2), "p must"),
         (lambda: Block.from_parameters(1.0, math.pi / 2), "pi/2"),
         (lambda: Block.from_parameters(1.0, 0.97), "restitution="),
         (lambda: Block.from_pivots((0.2, 0.0), 1.0, 0.3), "distances"),
         (lambda: Block.from_pivots((2.0, 2.0), 0.1, 0.3), "restitution="),
-        (lambda: Block.from_frame(0.2, 1.0, -0.1), "mass_ratio"),
-        (lambda: Block.from_frame(0.2, 1.0, 1e300), "mass_ratio"),
-        (lambda: Block(math.inf, 1.0), "half_width"),
-        (lambda: Block(1e-300, 1.0), "half_width"),
-        (lambda: Block(1e-12, 1.0), "alpha"),
-        (lambda: Block(0.2e14, 1e14), "p (from"),
-        (lambda: Block(0.2, 1.0, gravity=1e200), "gravity"),
-        (lambda: Block(0.2, 1.0, mass=1e300), "mass"),
+        (lambda: Block.from_frame(half_width=0.2, half_height=1.0, mass_ratio=-0.1), "mass_ratio"),
+        (lambda: Block.from_frame(half_width=0.2, half_height=1.0, mass_ratio=1e300), "mass_ratio"),
+        (lambda: Block(half_width=math.inf, half_height=1.0), "half_width"),
+        (lambda: Block(half_width=1e-300, half_height=1.0), "half_width"),
+        (lambda: Block(half_width=1e-12, half_height=1.0), "alpha"),
+        (lambda: Block(half_width=0.2e14, half_height=1e14), "p (from"),
+        (lambda: Block(half_width=0.2, half_height=1.0, gravity=1e200), "gravity"),
+        (lambda: Block(half_width=0.2, half_height=1.0, mass=1e300), "mass"),
         (lambda: Block.from_parameters(1e200, 0.2), "p must"),
         (lambda: Block.from_parameters(1e-200, 0.2), "p must"),
         (lambda: Block.from_parameters(1.0, 1e-200), "alpha"),
         (lambda: Block.from_parameters(1.0, 0.2, 1e-300), "restitution"),
         (lambda: Block.from_pivots((0.2, 0.2), 1.0, 1e200), "radius_of_gyration"),
-        (lambda: Block("0.2", 1.0), "half_width must be a positive number, in m, not '0.2'"),
+        (lambda: Block(half_width="0.2", half_height=1.0), "half_width must be a positive number, in m, not '0.2'"),
         (lambda: Block.from_parameters(True, 0.2), "p must be a positive number, in rad/s, not True"),
     ],
 )
@@ -194,7 +196,7 @@ def test_numbers_of_any_real_type_are_numbers(kind):
 
 
 def test_a_block_shows_itself_in_one_short_line():
-    assert repr(Block(0.12, 0.55)) == (
+    assert repr(Block(width=0.24, height=1.1)) == (
         "<Block: rectangular block, 0.24 m x 1.1 m; p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184>"
     )
     two_sided = repr(Block.from_parameters((2.0 / 3.0, 1.0), 0.2, 0.9))
@@ -205,7 +207,7 @@ def test_a_block_shows_itself_in_one_short_line():
 
 @pytest.mark.parametrize(
     ("block", "corners", "ratio"),
-    [(Block(0.2, 1.0), 4, 0.2), (Block.from_pivots((0.2, 0.15), 0.7, 0.4), 3, 0.5)],
+    [(Block(half_width=0.2, half_height=1.0), 4, 0.2), (Block.from_pivots((0.2, 0.15), 0.7, 0.4), 3, 0.5)],
 )
 def test_a_notebook_shows_the_block_to_scale_in_the_colour_of_the_text(block, corners, ratio):
     page = block._repr_html_()

@@ -11,12 +11,14 @@ from scipy.stats import norm
 import rocking
 from rocking.analysis.calibration import population
 from rocking.analysis.calibration.candidates import WIDENED, Candidates
+from rocking.analysis.calibration.diagnostics import leaning
 from rocking.analysis.calibration.evidence import Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
 from rocking.analysis.calibration.posterior import posterior
 from rocking.analysis.calibration.scores import Scores
 from rocking.analysis.calibration.search import AGREEMENT, Problem, r_hat, search
 from rocking.analysis.calibration.space import Space
+from rocking.analysis.calibration.tables import read_ensemble
 
 HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
 STEP = 0.02
@@ -59,6 +61,28 @@ def unseen():
 
 
 # Outcomes: overturned or not.
+
+
+def test_two_sides_by_housners_rule_are_those_of_one_rectangle():
+    space = Space.of((1.0, 8.0), (0.05, 0.5), "housner", two_sided=True)
+    points = space.spread_evenly(200, np.random.default_rng(3))
+    blocks, named = space.blocks(points), space.named(points)
+    compared = 0
+    for k, block in enumerate(blocks):
+        plus, minus = np.tan(blocks.alpha[k])
+        half_width, offset = 0.5 * (plus + minus), 0.5 * (minus - plus)  # over half the height
+        if abs(offset) > 0.5 * half_width:
+            continue  # slendernesses in a ratio of nearly 3
+        half_height = 0.75 * block.gravity / named["p"][k] ** 2 / np.hypot(half_width, 1.0)
+        truth = rocking.Block(half_width=half_width * half_height, half_height=half_height, offset=offset * half_height)
+        for side, other in zip(block.sides, truth.sides, strict=True):
+            found, wanted = ((each.p, each.alpha, each.restitution) for each in (side, other))
+            assert found == pytest.approx(wanted, rel=1e-12)
+        compared += 1
+    assert compared > 150
+    np.testing.assert_allclose(rocking.Blocks(blocks.p, blocks.alpha).restitution, blocks.restitution, rtol=1e-6)
+    symmetric = Space.of(2.0, (0.05, 0.5), "housner", two_sided=False)
+    assert set(symmetric.blocks(symmetric.spread_evenly(20, np.random.default_rng(3))).p.ravel()) == {2.0}
 
 
 def test_what_a_hidden_block_will_do_is_predicted(found, unseen):
@@ -230,7 +254,7 @@ def test_few_candidates_are_told():
     motions = bursts(40, seed=9)
     found = rocking.calibrate(motions, outcomes(motions), candidates=128)
     assert found.diagnostics.effective < 20.0
-    assert any("candidates tell what a typical population does" in note for note in found.diagnostics.notes)
+    assert any("candidates can tell what a typical population does" in note for note in found.diagnostics.notes)
 
 
 def test_the_summary_has_every_parameter_and_the_scores(found):
@@ -641,3 +665,66 @@ def test_a_mistaken_history_is_refused(change, word):
     arguments = {"times": TIMES, "rotation": released()} | change
     with pytest.raises(rocking.InvalidOption, match=word):
         rocking.calibrate_history(**arguments)
+
+
+def test_fragility_and_spectrum_take_the_weights_and_the_model_of_the_calibration(found, unseen):
+    motions = unseen[0][:12]
+    levels = np.array([1.0, 2.0, 3.0, 4.5, 6.0, 8.0])
+    fitted = found.fragility(motions, levels=levels)
+    assert fitted.model == "linear"
+    assert "weighted" in fitted.description
+    assert "linear model" in fitted.description
+    outcomes = fitted.outcomes
+    seen = outcomes[np.isclose(outcomes.pga_m_s2, 3.0)]
+    shares = [np.average(one.overturned, weights=one.weight) for _, one in seen.groupby("motion", sort=False)]
+    # What is predicted for each motion is that share, allowing for few candidates and for a lapse.
+    effective = found.diagnostics.effective
+    expected = (effective * np.array(shares) + 0.5) / (effective + 1.0)
+    scaled = [motion.scaled(pga=3.0) for motion in motions]
+    assert found.predict(scaled) == pytest.approx(found.lapse + (1.0 - 2.0 * found.lapse) * expected, abs=1e-6)
+    nonlinear = found.fragility(motions, levels=levels, model="nonlinear")
+    assert "nonlinear model" in nonlinear.description
+    assert nonlinear.curves[0].median != fitted.curves[0].median
+    spectrum = found.spectrum(scaled)
+    assert spectrum.data.model == "linear"
+    assert float(spectrum.overturned_share[12]) == pytest.approx(np.mean(shares), abs=1e-12)
+    # A larger body of the same shape overturns more seldom.
+    assert float(spectrum.overturned_share[0]) < float(spectrum.overturned_share[-1])
+    assert "weighted" in spectrum.summary()
+
+
+def test_an_ensemble_is_read_as_it_was_written(found, tmp_path):
+    found.to_csv(tmp_path / "ensemble.csv")
+    read = read_ensemble(tmp_path / "ensemble.csv")
+    assert read.model == found.model
+    assert read.weights == pytest.approx(found.weights, rel=1e-9)
+    for name in ("p", "alpha", "restitution"):
+        assert getattr(read.blocks, name) == pytest.approx(getattr(found.blocks, name), rel=1e-9)
+    text = (tmp_path / "ensemble.csv").read_text()
+    for spoilt, said in (
+        (text.replace("weight", "wait", 1), "line 1: no ensemble"),
+        (text.replace("linear", "cubic", 1), "line 2: 'cubic' is not linear or nonlinear"),
+        (text.replace("linear", "nonlinear", 1), "one model"),
+    ):
+        (tmp_path / "spoilt.csv").write_text(spoilt)
+        with pytest.raises(rocking.UnreadableRecord, match=said):
+            read_ensemble(tmp_path / "spoilt.csv")
+
+
+def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(shaken):
+    space = Space.of((3.0, 3.0), (0.1, 0.2), (0.9, 0.9), two_sided=False)
+    assert space.known == {"p": 3.0, "restitution": 0.9}
+    with pytest.raises(rocking.InvalidOption, match=r"by simulate, .* by fragility"):
+        rocking.calibrate(*shaken, p=(3.0, 3.0), alpha=0.2, restitution=(0.9, 0.9))
+    with pytest.raises(rocking.InvalidOption, match=r"by simulate, .* by fragility"):
+        rocking.calibrate_history([0.0, 0.1], [0.1, 0.1], p=3.0, alpha=0.2, restitution=0.9, initial_rotation=0.1)
+
+
+@pytest.mark.parametrize("share, told", [(0.08, True), (0.03, False)])
+def test_a_posterior_whose_interval_ends_at_a_bound_is_told(share, told):
+    space = Space.of((1.0, 10.0), 0.2, 0.9, two_sided=False)
+    ends = np.log([9.9, 3.0])
+    centres = np.repeat(ends, [round(1000 * share), 1000 - round(1000 * share)])[:, None]
+    notes = [str(one) for one in leaning(space, centres)]
+    assert len(notes) == told
+    assert all("8 % of the posterior" in note and "sets the upper end of the interval" in note for note in notes)

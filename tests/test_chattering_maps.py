@@ -17,7 +17,7 @@ from rocking.motion.exceedance import exceedances
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
 THRESHOLD = BLOCK.gravity * 0.2
-STATUE = rocking.Block(half_width=0.12, half_height=0.55)
+STATUE = rocking.Block(width=0.24, height=1.1)
 
 
 def outcome_of(motion, block=BLOCK, model="linear"):
@@ -98,6 +98,36 @@ def test_an_uplift_by_hardly_more_than_rounding_is_complete_only_if_proven():
     assert above in (Outcome.COMPLETE, Outcome.UNPROVEN)
     assert bool(dataset.complete[1, 0]) == (above == Outcome.COMPLETE)
     assert bool(np.isfinite(dataset.upper[1, 0])) == (above == Outcome.COMPLETE)
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_at_the_threshold_nothing_lifts_a_block_whichever_way_its_peak_was_rounded(model):
+    block = rocking.Block.from_parameters(p=2.1, alpha=0.17, restitution=0.95)
+    pulses = families.ricker(block, model=model)
+    omega = np.linspace(0.5, 8.0, 31)
+    peaks = [pulses(1.0, ratio).motion.pga / min(block.uplift_thresholds(model)) for ratio in omega]
+    assert max(peaks) > 1.0
+    dataset = chattering_map(pulses, {"a": [1.0, 1.0 + 1e-9], "omega": omega})
+    assert (dataset.outcome.values[0] == Outcome.NO_UPLIFT).all()
+    assert (dataset.outcome.values[1] == Outcome.COMPLETE).all()
+
+
+def test_a_weight_that_falls_lifts_a_block_whose_motion_does_not_reach_the_threshold():
+    motion = lobes(0.9, 0.9)
+    falling = rocking.Motion.from_samples([0.0, -0.3 * BLOCK.gravity, -0.3 * BLOCK.gravity, 0.0], motion.duration / 3.0)
+    assert outcome_of(motion) is Outcome.NO_UPLIFT
+    assert outcome_of(motion.with_vertical(falling)) is not Outcome.NO_UPLIFT
+
+
+def test_the_title_of_a_map_says_what_is_the_same_all_over_it():
+    sine = chattering_map(families.sine(BLOCK, model="linear"), {"a": [0.9, 1.03], "omega": [1.0, 2.0]})
+    assert sine.plot().get_suptitle() == "first uplift under sine, alpha = 0.2 rad, restitution = 0.92, linear model"
+    assert sine.plot(title="mine").get_suptitle() == "mine"
+    slenderness = chattering_map(
+        lambda a, alpha: families.sine(rocking.Block.from_parameters(2.0, alpha, 0.9))(a, 2.0),
+        {"a": [0.9, 1.03], "alpha": [0.1, 0.2]},
+    )
+    assert slenderness.plot().get_suptitle() == "first uplift under sine, restitution = 0.9, nonlinear model"
 
 
 def test_a_map_tells_its_outcomes_and_units_and_can_be_stored(tmp_path):
@@ -249,7 +279,9 @@ def test_a_delay_changes_no_episode():
 
 
 def test_shaking_ends_when_the_block_has_overturned():
-    response = rocking.simulate(rocking.Block(0.05, 0.25), rocking.records.load("ridgecrest-clc-360"))
+    response = rocking.simulate(
+        rocking.Block(half_width=0.05, half_height=0.25), rocking.records.load("ridgecrest-clc-360")
+    )
     assert response.overturned
     found = chattering_episodes(response)
     assert len(found.episodes) == 3

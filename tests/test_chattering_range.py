@@ -1,10 +1,16 @@
 """The theory over its whole range of frequency and restitution, against many digits and against limits."""
 
+import math
+
 import numpy as np
 import pytest
+from flint import arb, ctx
+from mpmath import mpf, workdps
+from oracles.sine_chattering import settle
 from oracles.slow_sine import rest_time
 
 from rocking import chattering
+from rocking.kernels.sine.critical import distance_exponent
 
 #: Shares of a_cr - 1, some close to either side of one.
 SHARES = (1e-3, 0.4, 0.95, 1.003)
@@ -28,6 +34,35 @@ def assert_agrees(share, omega, eta):
 @pytest.mark.parametrize("share", SHARES)
 def test_times_and_verdicts_agree_with_many_digits(share, omega, eta):
     assert_agrees(share, omega, eta)
+
+
+@pytest.mark.parametrize("distance", [1e-4, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("eta", [0.3, 0.92])
+@pytest.mark.parametrize("omega", [0.06, 0.1, 0.15, 2.0, 30.0])
+def test_near_the_critical_amplitude_a_time_is_as_accurate_as_the_amplitude_allows(omega, eta, distance):
+    """Two ulp of a, by the documented slope, that of the power law, and by the true one, which may be less steep."""
+    a = float(chattering.critical_amplitude(omega, eta)) - distance
+    time = float(chattering.chattering_time(a, omega, eta))
+    with ctx.workprec(200):
+        proven = settle(a, omega, eta, width=1e-24).time.mid()
+        earlier = settle(arb(a) - 1e-9 * distance, omega, eta, width=1e-24).time.mid()
+        slope = float((proven - earlier) / (1e-9 * distance))
+        error = abs(float(proven - time))
+    law = distance_exponent(eta) * (math.pi / omega - time) / distance
+    assert 0.95 * slope < law
+    assert error < 1e-13 * time + 2.0**-51 * min(slope, law)
+
+
+@pytest.mark.parametrize("omega", [1e-3, 0.01])
+@pytest.mark.parametrize("share", [1e-3, 1e-6])
+def test_under_very_slow_forcing_too(omega, share):
+    critical = float(chattering.critical_amplitude(omega, 0.3))
+    a = critical - share * (critical - 1.0)
+    time = float(chattering.chattering_time(a, omega, 0.3))
+    with workdps(60):
+        expected = rest_time(a, omega, 0.3)
+        slope = (expected - rest_time(mpf(a) - mpf(critical - a) / 10**9, omega, 0.3)) / (critical - a) * 10**9
+        assert abs(expected - time) < 1e-13 * time + 2.0**-51 * slope
 
 
 @pytest.mark.slow

@@ -4,13 +4,16 @@ import importlib
 import inspect
 import json
 import os
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import rocking
 from rocking.cli import app
 
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
@@ -94,7 +97,11 @@ def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command)
     path = files(tmp_path)[name]
     options = [*BLOCK, "--units", "g"] if command == "simulate" else ["--units", "g"]
     code, out, err = run(command, path, *options)
-    assert (code, out) == (2, "")
+    # What each file of a folder holds is listed, and why it cannot be read.
+    listed = ["empty", "binary", "npts", "token", "nan"] if (command, name) == ("records", "folder") else []
+    assert code == 2
+    told = (re.split(r": |, line", line)[0] for line in out.splitlines() if line)
+    assert sorted(Path(each).name for each in told) == sorted(listed)
     assert err.count("\n") == 1
     assert err.startswith("rocking: ")
     assert path.name in err
@@ -117,7 +124,7 @@ def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command)
         ([RECORD, *BLOCK, "--chattering", "time=3"], "eq76, eq77, exact"),
         ([RECORD, *BLOCK, "--chattering", "time"], "sinusoidal"),
         ([RECORD, *BLOCK, "--duration", "-3"], "duration"),
-        ([RECORD, *BLOCK, "--scale", "nan"], "scale"),
+        ([RECORD, *BLOCK, "--scale", "nan"], "--scale must be"),
         ([RECORD, *BLOCK, "--bogus"], "--bogus"),
         ([RECORD, *BLOCK, "--p"], "--p"),
         (["ridgecrest-clc-9", *BLOCK], "ridgecrest-clc-9"),
@@ -162,6 +169,25 @@ def test_a_closed_pipe_is_no_traceback():
         process.stdout.close()
         process.wait(timeout=60)
         assert b"Traceback" not in process.stderr.read()
+
+
+def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
+    probe = (
+        "import sys\n"
+        "class Interrupted:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'cyclopts':\n"
+        "            raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Interrupted())\n"
+        "from rocking.__main__ import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "")
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
+    assert project["project"]["scripts"]["rocking"] == "rocking.__main__:main"
+    done = subprocess.run([sys.executable, "-m", "rocking", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == rocking.__version__
 
 
 def test_help_starts_without_the_heavy_libraries():

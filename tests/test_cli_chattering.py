@@ -168,7 +168,7 @@ def test_paper_draws_a_figure_for_other_parameters(run, tmp_path):
     code, out, err = run("paper", "--figure", 5, "--eta", 0.8, "--omega", 3, "--out", tmp_path)
     assert (code, err) == (0, "")
     assert out.startswith("Fig. 5: chattering time against amplitude; omega = 3, eta = 0.8\n")
-    assert f"{critical_amplitude(3.0, 0.8):.7g} here" in out
+    assert f"critical amplitude a_cr: {critical_amplitude(3.0, 0.8):.7g}\n" in out
     code, out, _ = run("paper", "--figure", 1, "--alpha", "20deg", "--out", tmp_path)
     assert code == 0
     assert "alpha = 0.349065850399 rad" in out

@@ -350,6 +350,57 @@ def test_units_and_step_apply_to_those_of_several_files_that_do_not_say_theirs(r
     assert code == 2 and "the units are g" in err
 
 
+def test_a_channel_is_for_those_of_several_files_that_hold_several(run, folder):
+    two = Path(__file__).parent / "data" / "formats" / "two.v1"
+    (folder / "two.v1").write_bytes(two.read_bytes())
+    code, out, _ = run("simulate", folder, *BLOCK, "--channel", "90 Deg", "--json")
+    assert code == 0
+    assert len(json.loads(out)["records"]) == 4
+    code, out, _ = run("records", folder, "--channel", "90 Deg", "--json")
+    held = {Path(each["file"]).name: [one["name"] for one in each["channels"]] for each in json.loads(out)["files"]}
+    assert held == {"two.v1": ["90 Deg"], **{f"r{k}.AT2": ["90"] for k in range(3)}}
+    # Each file that holds several must have it, and so must a file alone.
+    assert "no channel 'NS'; give one of 1 '90 Deg', 2 'Up'" in run("simulate", folder, *BLOCK, "--channel", "NS")[2]
+    assert "no channel 'NS'" in run("simulate", folder / "r0.AT2", *BLOCK, "--channel", "NS")[2]
+
+
+def test_why_files_of_a_folder_are_refused_is_told_in_options(run, tmp_path):
+    for k in range(7):
+        (tmp_path / f"r{k}.csv").write_text("".join(f"{0.01 * n},{0.1 * (-1) ** n}\n" for n in range(300)))
+    code, out, err = run("records", tmp_path)
+    assert code == 2 and "units=" not in out and out.count("give --units as one of") == 7
+    assert err.startswith("rocking: 7 of 7 files cannot be read: ") and err.endswith(
+        f"{tmp_path / 'r4.csv'} and 2 more\n"
+    )
+    uneven = tmp_path / "r0.csv"
+    uneven.write_text("".join(f"{0.01 * n + 0.003 * (n % 2)},{0.1 * (-1) ** n}\n" for n in range(300)))
+    code, out, _ = run("records", uneven, "--units", "g")
+    assert code == 0 and "uneven" in out and "None" not in out
+    assert json.loads(run("records", uneven, "--units", "g", "--json")[1])["channels"][0]["step_s"] is None
+
+
+def test_a_folder_is_listed_although_some_files_cannot_be_read(run, folder):
+    (folder / "notes.txt").write_text("These are records.\n")
+    code, out, err = run("records", folder)
+    assert code == 2
+    assert err == f"rocking: 1 of 4 files cannot be read: {folder / 'notes.txt'}\n"
+    assert out.count("PEER AT2") == 3 and f"{folder / 'notes.txt'}: this is text in no format known here" in out
+    code, out, _ = run("records", folder, "--json")
+    assert code == 2
+    files = json.loads(out)["files"]
+    assert [("error" in each, Path(each["file"]).name) for each in files][-1] == (True, "notes.txt")
+    assert len(files) == 4
+    code, out, err = run("records", folder / "notes.txt")
+    assert (code, out) == (2, "") and "this is text in no format known here" in err
+
+
+def test_a_hyphen_is_a_polarity(run):
+    records = [RECORD, OTHER, "el-centro-meloland-360", "--levels", "0.1g:1.2g:12", *BLOCK, "--json"]
+    apart, joined = (run("fragility", *records, *polarity) for polarity in (["--polarity", "-"], ["--polarity=-"]))
+    assert apart == joined
+    assert apart[0] == 0
+
+
 @pytest.mark.parametrize(
     ("option", "value", "sentence"),
     [
@@ -372,7 +423,7 @@ def test_a_sensible_scaling_is_not_noted(run):
         assert run("simulate", RECORD, *BLOCK, *scaling)[::2] == (0, "")
 
 
-@pytest.mark.parametrize("heading", ["t_ms,a_ms2\n", ""])
+@pytest.mark.parametrize("heading", ["t,a_ms2\n", ""])
 def test_a_step_that_no_record_has_is_noted(run, tmp_path, heading):
     record = tmp_path / "record.csv"
     record.write_text(heading + "0,0\n10,1.2\n20,-0.5\n30,0\n")
@@ -508,9 +559,9 @@ def test_a_calibration_draws_what_it_found(run, tmp_path):
 
 def test_a_coefficient_of_friction_is_put_to_the_test(run):
     out = run("simulate", "ridgecrest-clc-090", "--width", 0.24, "--height", 1.1, "--friction", 0.24)[1]
-    assert re.search(r"slides at 0.24 +yes, first at 23\d\.\d{4} s", out)
+    assert re.search(r"friction 0.24 +is not enough: the block slides, first at 23\d\.\d{4} s", out)
     out = run("simulate", "ridgecrest-clc-090", "--width", 0.24, "--height", 1.1, "--friction", 0.3)[1]
-    assert re.search(r"slides at 0.3 +no", out)
+    assert re.search(r"friction 0.3 +is enough: the block does not slide", out)
     both = "ridgecrest-clc-090", "el-centro-meloland-270"
     out = run("simulate", *both, "--width", 0.24, "--height", 1.1, "--friction", 0.24, "--json")[1]
     times = [row["sliding_time_s"] for row in json.loads(out)["records"]]

@@ -132,7 +132,7 @@ def test_forces_are_those_of_an_independent_program(radius, overturned, force, f
 
     The table of "Under this pulse" in the public repository Numerics-in-Motion/blocks, and two digits more of its run.
     """
-    block = Block(radius * np.sin(0.2), radius * np.cos(0.2))
+    block = Block(half_width=radius * np.sin(0.2), half_height=radius * np.cos(0.2))
     response = simulate(block, rocking.pulses.one_sine(2.0 * GRAVITY * np.tan(0.2), 2.0))
     assert response.overturned == overturned
     # The last digit printed there.
@@ -194,6 +194,6 @@ def test_a_base_lifts_off_where_the_normal_force_ends(part: int) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, -0.3, np.nan, "0.3", True])
 def test_a_friction_coefficient_is_a_positive_number(friction) -> None:
-    response = simulate(Block(0.2, 1.0), None, initial_rotation=0.1)
+    response = simulate(Block(half_width=0.2, half_height=1.0), None, initial_rotation=0.1)
     with pytest.raises(rocking.InvalidOption, match="friction must be a positive number"):
         response.sliding_time(friction)

@@ -76,7 +76,7 @@ def test_a_measure_in_the_blocks_own_units_serves_blocks_of_all_sizes():
 
 def test_what_cannot_be_compared_is_told_in_one_sentence():
     pulse = rocking.pulses.half_sine(1.0, 1.0)
-    with pytest.raises(rocking.InvalidOption, match="fewer than two motions overturn a block"):
+    with pytest.raises(rocking.InvalidOption, match="give two motions or more, not one"):
         compare_measures(SLENDER, pulse, progress=False)
     with pytest.raises(rocking.InvalidOption, match="periods must be one or more positive"):
         compare_measures(SLENDER, [pulse, pulse], periods=[0.0], progress=False)
@@ -95,3 +95,24 @@ def test_the_command_prints_and_writes_the_comparison(run, tmp_path):
     assert rows[0]["dispersion"] == pytest.approx(abs(math.log(first[0][0] / first[1][0])) / math.sqrt(2.0))
     header = (tmp_path / "measures.csv").read_text("utf-8").splitlines()[0]
     assert header.startswith("measure,unit,median_intensity,dispersion,")
+
+
+def test_a_block_of_weight_two_counts_as_two_blocks():
+    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.4, 0.7, 1.0, 1.4)]
+    a, b = (rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0))
+    twice, weighted, alike = (
+        compare_measures(blocks, motions, weights=weights)
+        for blocks, weights in (([a, a, b], None), ([a, b], [2.0, 1.0]), ([a, b], None))
+    )
+    for name in ("median_intensity", "dispersion"):
+        assert weighted[name].values == pytest.approx(twice[name].values, rel=1e-9)
+        assert weighted[name].values != pytest.approx(alike[name].values, rel=1e-3)
+    assert "2 blocks, weighted" in weighted.summary()
+
+
+def test_the_figure_has_the_order_of_the_table():
+    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.4, 0.7, 1.0, 1.4)]
+    found = compare_measures(rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), motions)
+    drawn = [label.get_text() for label in found.plot().axes[0].get_yticklabels()]
+    rows = found.summary().splitlines()[3:]
+    assert all(row.startswith(name) for row, name in zip(rows, drawn, strict=True))

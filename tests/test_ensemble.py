@@ -148,10 +148,10 @@ def test_treatments_are_passed_on(records):
 
 
 def test_one_block_and_lists_of_blocks(records):
-    block = Block(0.2, 1.0)
+    block = Block(half_width=0.2, half_height=1.0)
     alone = simulate_many(block, records[0])
     assert alone.sizes == {"motion": 1, "block": 1}
-    pair = simulate_many([block, Block(0.15, 1.0)], records[:2])
+    pair = simulate_many([block, Block(half_width=0.15, half_height=1.0)], records[:2])
     assert float(pair.peak_rotation[0, 0]) == float(alone.peak_rotation[0, 0])
 
 
@@ -181,12 +181,12 @@ def test_the_result_can_be_written_and_says_what_it_is(records, tmp_path):
 )
 def test_bad_options_are_refused(records, options, word):
     with pytest.raises(InvalidOption, match=word):
-        simulate_many(Block(0.2, 1.0), records[0], **options)
+        simulate_many(Block(half_width=0.2, half_height=1.0), records[0], **options)
 
 
 def test_nothing_to_simulate_is_refused(records):
     with pytest.raises(InvalidOption, match="at least one motion"):
-        simulate_many(Block(0.2, 1.0), [])
+        simulate_many(Block(half_width=0.2, half_height=1.0), [])
     with pytest.raises(InvalidBlock, match="at least one"):
         simulate_many([], records[0])
     with pytest.raises(InvalidOption, match="duration="):
@@ -205,7 +205,9 @@ rocking.simulate_many(blocks, motion)
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
 def test_an_interrupt_returns_at_once(records):
-    simulate_many(Block(0.2, 1.0), records[2])  # so that the other process finds the kernels compiled
+    simulate_many(
+        Block(half_width=0.2, half_height=1.0), records[2]
+    )  # so that the other process finds the kernels compiled
     command = [sys.executable, "-c", LONG]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "ready\n"

@@ -296,6 +296,23 @@ def test_a_block_by_its_parameters_with_two_sides(opened):
     assert page.text("#figures div:first-child dd").startswith("overturns") == response.overturned
 
 
+def test_a_block_off_its_middle_is_described_by_its_pivots_as_well(opened):
+    page = opened(STATUE)
+    offset = page.page.locator("#offset")
+    page.rested(lambda: (offset.fill("0.03"), offset.press("Enter")))
+    assert query_of(page)["offset"] == "0.03"
+    assert page.text("#derived").startswith("To the right p = ")
+    page.rested(lambda: page.page.select_option("#shape", "pivots"))
+    found = query_of(page)
+    assert [float(each) for each in found["pivots"].split(",")] == pytest.approx([0.09, 0.15], rel=1e-3)
+    assert "width" not in found and "restitution" not in found
+    block = rocking.Block.from_pivots(
+        [float(each) for each in found["pivots"].split(",")], float(found["height_of_mass"]), float(found["gyration"])
+    )
+    response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled(pga=0.4 * 9.80665))
+    assert page.text("#figures div:first-child dd").startswith("overturns") == response.overturned
+
+
 @pytest.mark.parametrize(
     ("kind", "value", "target"),
     [

@@ -194,6 +194,12 @@ def test_the_default_case_chatters():
 
 # As Python, and as a command
 
+ECCENTRIC = [
+    {"p": "2.9858,3.0053", "alpha": "0.27417,0.155"},
+    {"width": "0.3", "height": "1.1", "offset": "-0.03"},
+    {"pivots": "0.2,0.15", "height_of_mass": "60cm", "gyration": "0.4"},
+]
+
 CASES = [
     STATUE,
     {**STATUE, "model": "linear", "restitution": "0.9"},
@@ -206,6 +212,7 @@ CASES = [
     },
     {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "sa": "0.5g@1", "chattering": "interval=1e-3"},
     {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "duration": "235"},
+    *({**block, "motion": "el-centro-meloland-270"} for block in ECCENTRIC),
 ]
 
 
@@ -251,22 +258,28 @@ def test_what_the_command_line_cannot_do_is_not_given_as_a_command():
 
 
 RESPONSES = {
-    "sizes": lambda: rocking.simulate(rocking.Block(0.12, 0.55), rocking.records.load("ridgecrest-clc-090")),
+    "sizes": lambda: rocking.simulate(
+        rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
+    ),
     "scaled": lambda: rocking.simulate(
-        rocking.Block(0.12, 0.55, restitution=0.8), rocking.records.load("ridgecrest-clc-090").scaled(pga=3.0)
+        rocking.Block(width=0.24, height=1.1, restitution=0.8),
+        rocking.records.load("ridgecrest-clc-090").scaled(pga=3.0),
     ),
     "two-sided": lambda: rocking.simulate(
         rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4), rocking.pulses.one_sine(4.0, 1.0), model="linear"
     ),
+    "off its middle": lambda: rocking.simulate(
+        rocking.Block(width=0.3, height=1.1, offset=0.03), rocking.pulses.one_sine(4.0, 1.0)
+    ),
     "free": lambda: rocking.simulate(
-        rocking.Block(0.12, 0.55, gravity=1.62), None, initial_rotation=0.05, initial_velocity=-0.1
+        rocking.Block(width=0.24, height=1.1, gravity=1.62), None, initial_rotation=0.05, initial_velocity=-0.1
     ),
     "own motion": lambda: rocking.simulate(
-        rocking.Block(0.12, 0.55), rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.ricker(1.0, 2.0),
+        rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(4.0, 1.0) + rocking.pulses.ricker(1.0, 2.0),
         chattering="velocity", duration=3.0,
     ),
     "processed": lambda: rocking.simulate(
-        rocking.Block(0.12, 0.55), rocking.records.load("ridgecrest-clc-090").processed(trim=(200.0, 250.0))
+        rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090").processed(trim=(200.0, 250.0))
     ),
 }  # fmt: skip
 
@@ -524,6 +537,55 @@ def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
         if len(response.chattering):
             rest = response.chattering["end"][0] - response.events["time"][0]
             assert found["rest"][row, column] == pytest.approx(rest, rel=1e-5)
+
+
+@pytest.mark.parametrize("block", ECCENTRIC)
+@pytest.mark.parametrize("x", ["p", "restitution"])
+def test_the_case_at_a_point_of_a_map_of_an_eccentric_block(block, x):
+    case = read_case({**block, "motion": "one-sine:amplitude=4,frequency=1"}, Shelf())
+    grid = maps.grid_of(case, {"x": x, "y": "a", "x_from": "0.7", "x_to": "0.95", "y_to": "3", "points": "8"})
+    found = filled(grid)
+    for row, column in ((1, 2), (5, 6)):
+        texts = maps.texts_at(grid, float(grid.x.values[column]), float(grid.y.values[row]))
+        response = read_case(texts, Shelf()).simulate()
+        if x == "p":
+            assert [side.restitution for side in response.block.sides] == pytest.approx(
+                [side.restitution for side in case.block.sides], rel=1e-12
+            )
+        peak = np.inf if response.overturned else response.peak_rotation / min(case.block.alpha)
+        assert found["peak"][row, column] == pytest.approx(peak, rel=1e-5, abs=1e-12)
+
+
+@pytest.mark.parametrize("block", ECCENTRIC)
+def test_an_eccentric_block_is_not_mapped_over_one_slenderness_of_both_sides(block):
+    texts = {**block, "motion": "one-sine:amplitude=4,frequency=1"}
+    with pytest.raises(InvalidOption, match="is mapped over omega, p, restitution, a, pga, not over 'alpha'"):
+        maps.grid_of(read_case(texts, Shelf()), {"x": "alpha", "y": "a"})
+    assert "alpha" in maps.axes_of(read_case({**texts, "restitution": "0.9"}, Shelf()))
+
+
+def test_a_map_of_an_eccentric_block_is_written_with_all_of_it(run):
+    for block in ECCENTRIC:
+        case = read_case({**block, "motion": "one-sine:amplitude=4,frequency=1"}, Shelf())
+        grid = maps.grid_of(case, {"x": "omega", "y": "a", "x_from": "2", "x_to": "3", "points": "8"})
+        program, *arguments = shlex.split(map_code.as_command(grid))
+        code, out, _ = run(*arguments, "--json")
+        assert (program, code) == ("rocking", 0)
+        assert json.loads(out)["restitution"] == [side.restitution for side in case.block.sides]
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [
+        {"width": "0.3", "height": "1", "p": "2"},
+        {"pivots": "0.2,0.1", "gyration": "0.4"},
+        {"p": "2", "alpha": "0.2", "offset": "0.1"},
+        {"offset": "0.1"},
+    ],
+)
+def test_a_block_that_is_half_described_is_refused(texts):
+    with pytest.raises(InvalidBlock, match="a block has either width and height"):
+        read_case({**texts, "motion": "none"}, Shelf())
 
 
 def test_the_case_at_a_point_of_a_map_of_a_record():

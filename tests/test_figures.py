@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from rocking.plot import (
     DrawnSequence,
     FragilityLine,
+    HazardLine,
     Parameter,
+    RiskLine,
     ScaledMotion,
     SpectrumCurves,
     fragility_figure,
@@ -20,7 +23,9 @@ from rocking.plot import (
     outcomes_figure,
     regions_figure,
     response_figure,
+    risk_figure,
     spectrum_figure,
+    survival_figure,
 )
 from rocking.plot.ida import levels_reaching
 
@@ -116,12 +121,29 @@ def trials_of(sides=2, **options):
     rng = np.random.default_rng(1)
     probabilities, values = rng.uniform(size=80), np.exp(rng.normal(size=(50, sides)))
     names = ("p (rad/s)", "alpha (rad)", "restitution")
-    parameters = [Parameter(name, values, np.array([[1.0, 0.5, 2.0]] * sides)) for name in names]
+    parameters = [Parameter(name, values, np.array([[1.0, 0.5, 2.0]] * sides), (0.1, 9.0)) for name in names]
     fell = probabilities > rng.uniform(size=80)
     weights = np.full(50, 0.02)
     return outcomes_figure(
         probabilities=probabilities, overturned=fell, parameters=parameters, weights=weights, **options
     )
+
+
+def risk_of(**options):
+    x = np.geomspace(0.05, 2.0, 80)
+    lines = [RiskLine(f"{name}: once in 460 years (210 to 830)", x * np.exp(-x)) for name in ("half", "overturning")]
+    hazard = HazardLine(1e-3 * x**-2.0, (0.1, 1.0))
+    return risk_figure(
+        intensity=x, hazard=hazard, lines=lines, **({"intensity_label": "peak ground acceleration (g)"} | options)
+    )
+
+
+def survival_of(**options):
+    x = np.geomspace(0.05, 2.0, 80)
+    label = "at most, with 10000 years without overturning (95 %)"
+    hazard = HazardLine(1e-3 * x**-2.0, (0.1, 1.0))
+    texts = {"intensity_label": "peak ground acceleration (g)", "largest_label": label}
+    return survival_figure(intensity=x, largest=1e-3 / x, hazard=hazard, **(texts | options))
 
 
 def measured_of(**options):
@@ -141,6 +163,8 @@ FIGURES = {
     "ida of two": (lambda **options: ida_of(2, **options), 4.2),
     "ida of twelve": (lambda **options: ida_of(12, **options), 4.8),
     "fragility": (fragility_of, 3.6),
+    "risk": (risk_of, 4.8),
+    "survival": (survival_of, 3.6),
     "map": (map_of, 3.8),
     "outcomes": (outcomes_of, 3.8),
 }
@@ -204,15 +228,40 @@ def test_a_spectrum_of_two_motions_names_them_and_has_no_fractiles():
 
 def test_the_fractiles_of_a_spectrum_are_told_apart_by_their_widths():
     figure = spectrum_of(6)
-    assert entries(figure) == ["α = 0", "each of 6 motions", "median", "16, 84 % of the motions are below"]
-    widths = [handle.get_linewidth() for handle in figure.legends[0].legend_handles[2:]]
-    assert [line.get_linewidth() for line in figure.axes[0].lines[-3:]] == [widths[1], widths[0], widths[1]]
+    crosses = "beyond: overturns"
+    assert entries(figure) == ["α = 0", "each of 6 motions", "median", "16, 84 % of the motions are below", crosses]
+    widths = [handle.get_linewidth() for handle in figure.legends[0].legend_handles[2:4]]
+    lines = [line for line in figure.axes[0].lines if line.get_linestyle() != "None"]
+    assert [line.get_linewidth() for line in lines[-3:]] == [widths[1], widths[0], widths[1]]
     assert not figure.axes[0].texts
-    assert entries(spectrum_of(6, 3))[3:] == ["each of 6 motions", "median"]
+    assert entries(spectrum_of(6, 3))[3:] == ["each of 6 motions", "median", crosses]
     assert entries(spectrum_of(6, fractiles=[0.45, 0.75, 0.9]))[2:] == [
         "45 % of the motions are below",
         "75, 90 % of the motions are below",
+        crosses,
     ]
+
+
+def test_where_blocks_overturn_the_lines_of_a_spectrum_end_in_crosses():
+    x = np.arange(1.0, 8.0)
+    peaks = np.array([[0.1, 0.2, np.inf, 0.4, np.inf, 0.6, 0.7]])
+    curve = SpectrumCurves("", peaks, peaks, np.isinf(peaks[0]).astype(float))
+    figure = spectrum_figure(x=x, curves=[curve], fractiles=[0.5], motions=["a"], x_label="p")
+    _, crosses = figure.axes[0].lines
+    np.testing.assert_array_equal(crosses.get_xydata(), [[2.0, 0.2], [4.0, 0.4], [6.0, 0.6]])
+    assert entries(figure) == ["beyond: overturns"]
+    standing = curve._replace(singles=0.0 * np.nan_to_num(peaks, posinf=0.0))
+    assert not spectrum_figure(x=x, curves=[standing], fractiles=[0.5], motions=["a"], x_label="p").legends
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 15, 200])
+def test_impacts_are_counted_by_whole_numbers(count):
+    figure = intervals_figure(intervals=0.8 ** np.arange(1.0, count + 1.0), eta=0.9)
+    figure.draw_without_rendering()
+    for panel in figure.axes:
+        low, high = panel.get_xlim()
+        assert low < 1.0 and high > count
+        assert all(tick == round(tick) for tick in panel.get_xticks() if low <= tick <= high)
 
 
 @pytest.mark.parametrize(("ends", "numbers"), [((1.0, 6.0), "1 1.5 2 3 4 5 6"), ((0.3, 60.0), "0.5 1 2 5 10 20 50")])
@@ -308,7 +357,9 @@ def test_tests_are_drawn_in_the_order_of_their_probability_and_blocks_by_weight(
     assert sorted(numbers) == list(range(1, 81))
     assert set(fell.get_ydata()) == {1.0} and set(stood.get_ydata()) == {0.0}
     assert [sum(stairs.get_data().values) for stairs in first.patches] == pytest.approx([1.0, 1.0])
-    assert entries(trials_of(1))[3:] == ["blocks", "centre: median and 90 %"]
+    assert entries(trials_of(1))[3:] == ["bound", "both sides", "centre: median and 90 %"]
+    assert {line.get_xdata()[0] for line in first.lines if line.get_label() == "bound"} == {0.1, 9.0}
+    assert len({first.patches[k].get_edgecolor() for k in (0, 1)} | {to_rgba(curve.get_color())}) == 3
 
 
 def test_dots_of_a_fragility_say_what_they_pool():

@@ -330,6 +330,11 @@ def test_knet_shorter_than_its_duration_is_refused(file: Callable[[str], Path]) 
     lines = (written.FOLDER / "knet.ns").read_text().splitlines(keepends=True)
     message = complaint(file("".join(lines[:-13])))
     assert "line 12: 2 s at 100 Hz make 200 samples but 96 follow" in message
+    for short in (1, 8, 40):
+        cut = "".join(lines).split()[:-short]
+        head = "".join(lines[:17])
+        path = file(head + " ".join(cut[len(head.split()) :]))
+        assert f"2 s at 100 Hz make 200 samples but {200 - short} follow" in complaint(path)
     for key, value in (("Scale Factor      3920", "Scale Factor      0"), ("100Hz", "0Hz"), ("100Hz", "fast")):
         assert "get the record again" in complaint(file("".join(lines).replace(key, value)))
 
@@ -779,6 +784,23 @@ def test_other_formats_go_through_obspy(form: str, file: Callable[[bytes], Path]
     (channel,) = channels(path, units="cm/s2")
     assert (channel.name, channel.dt, len(channel.acceleration)) == ("HNZ", 0.01, 50)
     np.testing.assert_allclose(channel.acceleration, 0.03 * np.arange(50), rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("form", ["MSEED", "SLIST", "TSPAIR"])
+@pytest.mark.filterwarnings("ignore")
+def test_what_obspy_reads_of_a_file_without_its_end_is_refused(form: str, file: Callable[[bytes], Path]) -> None:
+    content = waveform(form, 9000)
+    (whole,) = channels(file(content), units="gal")
+    assert len(whole.acceleration) == 9000
+    cut = content[:-900] if form == "MSEED" else b"\n".join(content.splitlines()[:-10])
+    assert "get the whole file again" in complaint(file(cut), units="gal")
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_numbers_that_do_not_pass_miniseed_s_own_check_are_refused(file: Callable[[bytes], Path]) -> None:
+    content = bytearray(waveform("MSEED", 9000))
+    content[2000] ^= 7
+    assert "integrity check" in complaint(file(bytes(content)), units="gal")
 
 
 def test_pickles_are_never_opened(file: Callable[[bytes], Path]) -> None:

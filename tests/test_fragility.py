@@ -13,7 +13,7 @@ from scipy import stats
 from scipy.optimize import minimize
 
 import rocking
-from rocking import fit_fragility, fragility
+from rocking import InvalidOption, fit_fragility, fragility
 from rocking.block import Blocks
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "fragility.py"
@@ -364,7 +364,7 @@ def test_the_figure_shows_curves_bands_and_shares():
         ([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [1, 1, 0, 1, 0, 0], "contradict a curve that rises"),
         ([1.0, 2.0, 4.0], [0, 1, 0], "contradict a curve that rises"),
         ([2.0, 2.0, 2.0], [0, 1, 0], r"all outcomes are at one intensity, 2 m/s\^2"),
-        ([1.0], [1], "all of the 1 outcomes"),
+        ([1.0], [1], "the only outcome exceeds"),
     ],
 )
 def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity, exceeded, sentence):
@@ -467,3 +467,67 @@ def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert runpy.run_path(str(EXAMPLE))["main"]() == pytest.approx(0.642368, abs=1e-6)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"fragility.png", "fragility.xml", "ida.png"}
+
+
+def test_a_block_of_weight_two_counts_as_two_blocks():
+    motions = [rocking.pulses.one_sine(1.0, f) for f in np.linspace(0.4, 1.5, 8)]
+    a, b = (rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0))
+    levels = np.linspace(2.0, 12.0, 16)
+    twice = fragility([a, a, b], motions, levels=levels).curves[0]
+    weighted = fragility([a, b], motions, levels=levels, weights=[2.0, 1.0])
+    curve = weighted.curves[0]
+    assert (curve.median, curve.dispersion) == pytest.approx((twice.median, twice.dispersion), rel=1e-9)
+    # The region's shape depends a little on how many outcomes there are, its size does not.
+    assert curve.median_interval == pytest.approx(twice.median_interval, rel=5e-3)
+    assert curve.dispersion_interval == pytest.approx(twice.dispersion_interval, rel=5e-2)
+    alike = fragility([a, b], motions, levels=levels).curves[0]
+    assert abs(curve.median / alike.median - 1.0) > 0.01
+    assert "2 blocks, weighted" in weighted.description
+    by_block = weighted.outcomes.groupby("block").weight.unique()
+    assert [weights.tolist() for weights in by_block] == [pytest.approx([4 / 3]), pytest.approx([2 / 3])]
+    for band in ("likelihood", "bootstrap"):
+        options = {"levels": levels, "band": band, "samples": 50}
+        one, other = (fragility([a, b], motions, weights=[w, 3.0 * w], **options).curves[0] for w in (1.0, 1e-6))
+        assert one.median_interval == pytest.approx(other.median_interval, rel=1e-9)
+
+
+@pytest.mark.parametrize("weights, word", [([1.0], "2 blocks"), ([1.0, -1.0], "0 or more"), ([0.0, 0.0], "not all 0")])
+def test_weights_that_weigh_nothing_are_refused(weights, word):
+    block = rocking.Block.from_parameters(p=1.5, alpha=0.2, restitution=0.9)
+    with pytest.raises(InvalidOption, match=word):
+        fragility([block, block], [rocking.pulses.one_sine(1.0, 1.0)], levels=[1.0, 5.0], weights=weights)
+
+
+def test_what_cannot_be_told_is_left_out_with_its_reason():
+    block = rocking.Block.from_parameters(p=1.5, alpha=(0.2, 0.25), restitution=0.9)
+    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.4, 0.9, 1.2, 1.6)]
+    levels = np.linspace(1.0, 16.0, 46)
+    two = fragility(block, motions[:2], levels=levels)
+    assert "2 motions cannot tell how far motions differ; give 3 or more" in two.summary()
+    assert "0 to infinity" in two.summary()
+    assert math.isnan(two.curves[0].goodness.p_value)
+    assert "no p of fit" in two.summary()
+    assert "one polarity only" in two.summary()
+    assert two.to_dict()["notes"] == list(two.notes)
+    assert (two.curves[0].median_interval, two.curves[0].dispersion_interval) == ((0.0, math.inf), (0.0, math.inf))
+    figure = two.plot()
+    axes = figure.axes[0]
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert any(text.startswith("no band: 2 motions") for text in texts)
+    assert axes.get_ylabel() == "probability of overturning"
+    four = fragility(block, motions, levels=levels, polarity="both")
+    assert not any("polarity" in note or "infinity" in note for note in four.notes)
+    rate = two.annual_rate(rocking.HazardCurve([0.5, 20.0], [1e-1, 1e-4])).rates[0]
+    assert rate.interval == (0.0, math.inf)
+
+
+def test_outcomes_of_one_cluster_at_one_intensity_are_no_independent_trials():
+    levels, exceeded = [1.0, 2.0, 3.0, 4.0, 5.0], [2, 20, 50, 70, 100]
+    independent = fit_fragility(levels, exceeded, trials=100).curves[0]
+    together = fit_fragility(levels, exceeded, trials=100, clusters=range(5)).curves[0]
+    assert independent.independent
+    assert not together.independent
+    assert math.isfinite(independent.goodness.p_value)
+    assert math.isnan(together.goodness.p_value)
+    widths = [one.median_interval[1] / one.median_interval[0] for one in (independent, together)]
+    assert widths[0] != pytest.approx(widths[1], rel=1e-3)

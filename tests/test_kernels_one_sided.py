@@ -12,6 +12,7 @@ from rocking.kernels import status
 from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.ground import Ground
 from rocking.kernels.state import Record, new_scratch
+from rocking.kernels.uplift import next_uplift
 
 G = 9.81
 
@@ -210,3 +211,12 @@ def test_a_march_of_a_ball_without_a_table_of_rows_is_the_same() -> None:
     kept, alone = thrown(ground, ball(0.9), 0.5), run(ground, block=ball(0.9), velocity=0.5, rows=0, keep=False)
     for name in ("peak", "peak_time", "impacts", "rests", "rested", "end"):
         assert kept.at[name] == alone.at[name]
+
+
+def test_what_has_one_side_is_lifted_to_no_other() -> None:
+    """Whatever pushes the other way as it lifts off: a spring that is pressed, or a weight that is gone."""
+    for body, ground in (
+        (one_sided(0.0, 1.0, -0.1, 0.5), in_units_of_g([0.0, 1.0], [[0.05, 0.0]])),
+        (one_sided(0.0, 1.0, 1.0, 0.5), in_units_of_g([0.0, 1.0], [[0.05, 0.0]], vertical=[[-2.0, 0.0]])),
+    ):
+        assert next_uplift(ground, body, new_scratch(), 0, 0.0, math.inf).side == 0

@@ -91,7 +91,8 @@ def test_the_ratio_to_half_a_period_depends_on_the_frequency_too(figures):
 
 
 def test_eq_76_is_worst_at_the_corner(figures):
-    corner = stated(figures[6], "Eq. 76 there, at omega = 0.5, eta = 0.5")
+    corner = stated(figures[6], "a_cr there, at omega = 0.5, eta = 0.5")
+    assert corner.formula == "Eq. 76"
     assert (corner.paper, corner.here) == (pytest.approx(1.0935, abs=1e-5), pytest.approx(1.082087, abs=1e-6))
 
 
@@ -100,6 +101,38 @@ def test_a_statement_knows_its_difference():
     assert Statement("words", '"small"', 1.75).difference is None
     assert Statement("a number", 1.5, 1.75).shown() == "1.5 in the paper, 1.75 here, +0.25"
     assert Statement("words", '"small"', 1.75).shown() == '"small" in the paper, 1.75 here'
+
+
+def test_what_a_formula_gives_does_not_stand_in_the_paper_and_what_it_is_silent_on_has_ours_alone():
+    by_formula = Statement("a_cr", 1.5, 1.75, formula="Eq. 76")
+    assert by_formula.shown() == "1.5 by Eq. 76, 1.75 here, +0.25"
+    assert by_formula.cells() == ("1.5, Eq. 76", "1.75", "+0.25")
+    silent = Statement("rests", None, 4.0)
+    assert (silent.shown(), silent.cells(), silent.difference) == ("4", ("", "4", ""), None)
+
+
+@pytest.mark.parametrize("number", FIGURES)
+def test_of_other_parameters_nothing_is_said_to_stand_in_the_paper_that_does_not(number):
+    given = {name: PARAMETERS[name] for name in accepted(number)}
+    for statement in paper_figure(number, **given).statements:
+        line = f"{statement.claim}: {statement.shown()}"
+        assert "(paper" not in line and "not given" not in line
+        if isinstance(statement.paper, float) and number not in (4, 6):
+            assert statement.formula.startswith("Eq. ") and " in the paper" not in line
+
+
+@pytest.mark.parametrize(
+    ("a", "omega", "eta", "beginning", "end"),
+    [
+        (1.03, 2.0, 0.92, "first rest, s before that of certified", '"properly" in the paper, 0.0213 here'),
+        (1.07, 2.0, 0.8, "first rest, s before that of certified", "0.0901"),
+        (1.06, 2.0, 0.92, "first rest, beside that of certified", "neither rests"),
+        (1.0386, 4.0, 0.92, "first rest, beside that of certified", "only chattering threshold rests"),
+    ],
+)
+def test_figure_10_says_which_response_rests_first(a, omega, eta, beginning, end):
+    rest = stated(paper_figure(10, a=a, omega=omega, eta=eta), f"chattering threshold: {beginning}")
+    assert rest.shown() == end
 
 
 # The data
@@ -216,7 +249,7 @@ def test_a_drawing_that_there_is_none_of_is_refused(figures):
 
 
 def test_a_folder_that_is_none_is_an_output_error(figures, tmp_path):
-    with pytest.raises(rocking.OutputError, match="another folder"):
+    with pytest.raises(rocking.OutputError, match=r"there is no folder .*nowhere; make it"):
         figures[3].write(tmp_path / "nowhere")
 
 
@@ -493,6 +526,26 @@ def test_figure_3_has_one_panel_where_its_cases_are_the_same():
     assert len(figure.draw().axes) == 1
     assert list(figure.tables["ratios"]) == ["n", "ratio_a"]
     np.testing.assert_array_equal(figure.tables["ratios"]["ratio_a"], interval_ratios(1.02, 3.0, 0.8, 100))
+
+
+@pytest.mark.parametrize("number", [9, 10, 11])
+def test_the_detail_of_a_response_is_a_panel_whose_time_is_shaded_wide_enough_to_be_seen(figures, number):
+    drawing = figures[number].draw()
+    response, excitation, detail = drawing.axes
+    assert not response.child_axes
+    (shaded,) = response.patches
+    low, high = detail.get_xlim()
+    assert (shaded.get_x(), shaded.get_x() + shaded.get_width()) == pytest.approx((low, high))
+    assert high - low > 0.005 * (response.get_xlim()[1] - response.get_xlim()[0])
+    assert response.get_xlim() == excitation.get_xlim() == (0.0, 2.5)
+    magnified = [line.get_ydata()[(line.get_xdata() > low) & (line.get_xdata() < high)] for line in detail.lines[1:]]
+    assert max(np.max(np.abs(values)) for values in magnified) > 0.5 * detail.get_ylim()[1]
+
+
+def test_an_initiation_that_the_certified_response_has_not_names_the_scheme_that_has_it(figures):
+    texts = {number: [text.get_text() for text in figures[number].draw().axes[1].texts] for number in (10, 11)}
+    assert texts[10] == ["1st initiation", "2nd initiation"]
+    assert texts[11] == ["1st initiation", r"2nd initiation, by $VelTol/(p\alpha) = 5\cdot 10^{-2}$ alone"]
 
 
 @pytest.mark.parametrize("eta", [0.01, 0.5, 0.99])

@@ -217,3 +217,18 @@ def test_no_text_covers_another_text():
     for number, box in enumerate(boxes):
         assert not any(box.overlaps(other) for other in boxes[:number])
         assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1
+
+
+def words_in(axes):
+    return [text.get_text() for text in axes.texts]
+
+
+def test_two_different_sides_are_named_with_their_scales():
+    rotation, motion = figure_of().axes
+    assert words_in(rotation) == ["side +: 1 is 11.5°", "side −: 1 is 14.3°"]
+    assert words_in(motion) == ["lifts to side −", "lifts to side +"]
+    above, below = motion.texts
+    assert (above.xy[1], below.xy[1]) == (0.25, -0.2)
+    assert words_in(figure_of(units="rad").axes[0]) == ["side +", "side −"]
+    equal = figure_of(slenderness=(0.2, 0.2))
+    assert not any(words_in(axes) for axes in equal.axes)

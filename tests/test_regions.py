@@ -167,3 +167,32 @@ def test_regions_are_told_apart_in_grey():
     for hatch in set(hatches):
         alike = sorted(value for value, other in zip(grey, hatches, strict=True) if other == hatch)
         assert np.all(np.diff(alike) > 0.08)
+
+
+def lines_of(figure):
+    *_, lines = figure.axes[0].collections
+    return lines.get_segments()
+
+
+def test_a_strip_has_no_lines_around_it_that_would_hide_it_and_its_name_says_so():
+    thin = map_of([stack(-3, 5.0, -2, 5.05, -1, 8.0, 0)] * 3)
+    assert [line[0, 1] for line in lines_of(thin)] == [8.0]
+    assert entries(thin) == ["no uplift", "rests (a strip)", "rocks", "overturns after 0"]
+    thick = map_of([stack(-3, 5.0, -2, 6.0, -1, 8.0, 0)] * 3)
+    assert [line[0, 1] for line in lines_of(thick)] == [5.0, 6.0, 8.0]
+    assert entries(thick) == ["no uplift", "rests", "rocks", "overturns after 0"]
+
+
+def test_a_speck_makes_no_mark_and_no_gap_in_the_boundary_that_it_lies_on():
+    columns = [stack(-3, 5.0, 0), stack(-3, 5.0, -2, 5.0001, 0), stack(-3, 5.0, 0)]
+    figure = map_of(columns)
+    np.testing.assert_allclose([line[[0, -1], 0] for line in lines_of(figure)], [[0.0, 0.5], [0.5, 1.5], [1.5, 2.0]])
+    assert entries(figure) == ["no uplift", "overturns after 0"]
+    edged = [shape for shape in figure.axes[0].collections[:-1] if np.max(shape.get_linewidth()) > 0.0]
+    assert to_rgb("#5d7da6") not in [tuple(shape.get_facecolor()[0][:3]) for shape in edged]
+
+
+def test_of_blocks_that_stay_those_that_rest_are_drawn_darkest():
+    handles = map_of([stack(-3, 2.0, -2, 5.0, -1)] * 2).legends[0].get_patches()
+    none, rests, rocks = (sum(to_rgb(handle.get_facecolor())) for handle in handles)
+    assert rests < rocks - 0.5 < none

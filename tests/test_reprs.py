@@ -47,7 +47,7 @@ RESULTS = {
     ),
     "risk": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10).annual_rate(SITE),
     "survey": lambda path: survey(BLOCK, {"one": RECORD, "two": -RECORD}),
-    "rule": lambda path: rocking.rules.west([BLOCK, rocking.Block(0.2, 1.0)], RECORD),
+    "rule": lambda path: rocking.rules.west([BLOCK, rocking.Block(half_width=0.2, half_height=1.0)], RECORD),
     "check": lambda path: rocking.rules.check(BLOCK, {"one": RECORD}, rules=["west"]),
     "channel": lambda path: formats.channels(path)[0],
     "contents": lambda path: catalogue.contents(path),
@@ -122,7 +122,8 @@ def test_a_small_peak_is_told_with_its_digits():
 def test_a_mean_rate_says_a_year_and_a_validation_says_how_often():
     fitted = rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10)
     assert re.fullmatch(
-        r"<Rate: overturning: \S+ a year \(\S+ to \S+\), once in \S+ years>", repr(fitted.annual_rate(SITE).rates[0])
+        r"<Rate: overturning: \S+ a year \(\S+ to \S+\), once in \S+ years \(\S+ to \S+\)>",
+        repr(fitted.annual_rate(SITE).rates[0]),
     )
     assert repr(RESULTS["validation"](None)).startswith("<Validation: 15 tests, each left out once: accuracy ")
 

@@ -132,7 +132,7 @@ def test_a_response_that_nobody_can_know_is_flagged():
     base, nudged = simulate(block, record), simulate(block, record.scaled(1 + 2**-52))
     assert base.ambiguous
     assert abs(base.events["time"][-1] - nudged.events["time"][-1]) > 1e-6
-    assert not simulate(Block(half_width=0.12, half_height=0.55), record).ambiguous
+    assert not simulate(Block(width=0.24, height=1.1), record).ambiguous
 
 
 @pytest.mark.parametrize("how", ["velocity", "interval", "time"])

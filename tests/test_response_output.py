@@ -53,7 +53,7 @@ def test_a_response_and_its_sensitivity_show_themselves_in_one_short_line(shaken
 
 
 def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(shaken, fallen):
-    for response in (shaken, fallen, simulate(Block(0.2, 1.0), None)):
+    for response in (shaken, fallen, simulate(Block(half_width=0.2, half_height=1.0), None)):
         page = response._repr_html_()
         ElementTree.fromstring(page)
         assert "currentColor" in page and "#" not in page
@@ -64,7 +64,7 @@ def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(s
 
 
 def test_what_takes_a_pass_along_the_response_is_found_once(monkeypatch):
-    response = simulate(Block(0.12, 0.55), rocking.pulses.one_sine(3.0, 1.0))
+    response = simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
     first = response.to_dict()
     monkeypatch.setattr(Contact, "largest", None)
     monkeypatch.setattr(Contact, "first", None)
@@ -104,7 +104,7 @@ def test_a_change_beyond_all_numbers_leaves_no_digit_that_is_told_as_known(chang
 
 
 def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():
-    block, record = Block(half_width=0.12, half_height=0.55), rocking.records.load("ridgecrest-clc-090")
+    block, record = Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
     texts = [simulate(block, motion).summary() for motion in (record, record.scaled(1.0 + 1e-6))]
     shown, other = (re.findall(r"^(uplift|rest) +([\d.]+) s", text, re.MULTILINE) for text in texts)
     assert len(shown) == 12
@@ -130,7 +130,7 @@ def test_an_ambiguous_response_says_what_is_affected_and_what_to_do(ambiguous, s
 
 
 def test_the_dictionary_is_plain_and_names_its_units(shaken, fallen):
-    for response in (shaken, fallen, simulate(Block(0.2, 1.0), None, initial_rotation=0.05)):
+    for response in (shaken, fallen, simulate(Block(half_width=0.2, half_height=1.0), None, initial_rotation=0.05)):
         result = response.to_dict()
         assert json.loads(json.dumps(result, allow_nan=False)) == result
         assert "_per_" not in json.dumps(result)
@@ -141,7 +141,7 @@ def test_the_dictionary_is_plain_and_names_its_units(shaken, fallen):
     assert shaken.to_dict()["motion"]["pga_m_s2"] == shaken.motion.pga
     assert shaken.to_dict()["tipping_time_s"] is None
     assert fallen.to_dict()["tipping_time_s"] == fallen.tipping_time
-    assert simulate(Block(0.2, 1.0), None).to_dict()["motion"] is None
+    assert simulate(Block(half_width=0.2, half_height=1.0), None).to_dict()["motion"] is None
 
 
 def test_histories_are_a_data_frame_over_time(shaken):
@@ -252,6 +252,29 @@ def test_no_time_beside_another_has_more_digits_than_it():
     known = simulate(block, rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, 1.2 * critical), model="linear")
     assert re.fullmatch(r"\d+\.\d{4} s", digits.peak_time_text(known))
     assert re.fullmatch(r"\d+\.\d{4} s", digits.tipping_text(known))
+
+
+@pytest.mark.parametrize(
+    ("below", "told"),
+    [
+        (1e-4, r"at about \d+\.\d{3} s \(\+- 0\.00\d s if the motion is off by a millionth\); rest proven"),
+        (1e-11, r"at about \d+ s \(far from it if the motion is off by a millionth\); rest proven"),
+    ],
+)
+def test_a_time_of_rest_is_told_no_better_than_the_motion_is_known(below, told):
+    """A bracket of 1e-13 s beside a time that a millionth of the motion moves by seconds said too much."""
+    amplitude, block = 3.0, Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    critical = math.acosh(1.0 + 0.5 / (amplitude * (amplitude - 1.0))) / 2.0  # Housner (1963)
+    pulse = rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, critical * (1.0 - below))
+    response = simulate(block, pulse, model="linear")
+    assert not response.overturned
+    (rest,) = re.findall(r"^rest +(.*)$", response.summary(), re.MULTILINE)
+    assert re.fullmatch(told, rest), rest
+    assert "bracket" not in rest
+    free = simulate(block, None, model="linear", initial_rotation=0.2 * (1.0 - 1e-9)).summary()
+    assert "if the initial state is off by a millionth); rest proven" in free
+    by_threshold = simulate(block, pulse, model="linear", chattering="velocity").summary()
+    assert "if the motion is off by a millionth); by the treatment, not proven" in by_threshold
 
 
 def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():

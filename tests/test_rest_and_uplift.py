@@ -93,3 +93,10 @@ def test_a_sample_exactly_at_the_threshold_does_not_uplift_a_block(model: str, o
     assert response.peak_rotation <= 1e-13
     assert result.peak_rotation.item() <= 1e-13
     assert result.uplifts.item() == int(np.sum(response.events["kind"] == "uplift"))
+
+
+def test_a_response_lasts_until_its_last_rest() -> None:
+    """To the last digit: the rotation at the time of the rest is zero, not unknown."""
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.5)
+    response = simulate(block, Motion([0.0, 0.3], [[-0.3 * GRAVITY]]))
+    assert response.rotation(response.events["time"][-1]) == 0.0

@@ -3,6 +3,8 @@
 import copy
 import math
 import pickle
+import subprocess
+import sys
 
 import pytest
 from matplotlib.figure import Figure
@@ -126,7 +128,7 @@ HEADERS = {
     ("OverturningMap", "boundaries"): "boundary_frequency,boundary_amplitude,mode_below,mode_above",
     ("IncrementalDynamicAnalysis", "levels"): "motion,level_m_s2,block,p_rad_s,alpha_rad,restitution,"
     "peak_rotation_rad,peak_over_alpha,overturned",
-    ("IncrementalDynamicAnalysis", "bands"): "band_motion,band_block,band_start_m_s2,band_end_m_s2",
+    ("IncrementalDynamicAnalysis", "bands"): "motion,block,band_start_m_s2,band_end_m_s2",
     ("MeasureComparison", "measures"): "measure,unit,median_intensity,dispersion,dispersion_low,dispersion_high,"
     "dispersion_of_all",
     ("MeasureComparison", "intensities"): "measure,motion,block,unit,intensity",
@@ -155,7 +157,7 @@ def test_the_rows_of_a_table_are_the_values_of_the_result(results):
         assert float(spectrum.peak_over_alpha.sel(at)) == row.peak_over_alpha
         assert math.isinf(row.peak_over_alpha) == row.overturned
     bands = scaled.to_dataframe("bands")
-    assert bands.band_motion.tolist() == ["one-sine"] * len(scaled.bands(0))
+    assert bands.motion.tolist() == ["one-sine"] * len(scaled.bands(0))
     ends = list(zip(bands.band_start_m_s2, bands.band_end_m_s2, strict=True))
     assert str(ends) == str(scaled.bands(0))
 
@@ -235,3 +237,22 @@ def test_whatever_is_returned_shows_itself_in_a_few_lines(find):
     assert type(found).__name__ in repr(found)
     assert len(repr(found)) < 400
     assert repr(found).count("\n") < 4
+
+
+def test_why_a_file_cannot_be_written_is_said_without_the_library_s_internals(tmp_path):
+    program = (
+        "import resource, sys, numpy, xarray, rocking\n"
+        "from rocking.tables import write_netcdf\n"
+        "dataset = xarray.Dataset({'numbers': ('x', numpy.random.default_rng(1).random(100_000))})\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))\n"
+        "try:\n"
+        "    write_netcdf(sys.argv[1], dataset)\n"
+        "except rocking.OutputError as error:\n"
+        "    print(error)\n"
+    )
+    command = [sys.executable, "-c", program, tmp_path / "large.nc"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (
+        done.stdout
+        == f"{tmp_path / 'large.nc'} cannot be written: File too large; nothing of it was kept; choose another place\n"
+    )

@@ -1,5 +1,6 @@
 """Annual rates from fragility and hazard, against closed forms and quadrature."""
 
+import itertools
 import json
 import math
 import re
@@ -8,11 +9,13 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
+import scipy.integrate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rocking
 from rocking import HazardCurve, InvalidOption
+from rocking.analysis.fragility.observed import read_observed
 from rocking.analysis.intensity import Measure
 
 G = 9.80665
@@ -55,10 +58,37 @@ def test_against_a_power_of_the_intensity_the_rate_is_that_of_cornell(median: fl
     assert found.annual_rate == pytest.approx(expected, rel=1e-11)
     assert found.probability(50.0) == pytest.approx(1.0 - math.exp(-50.0 * expected), rel=1e-10)
     assert found.survival(50.0) == pytest.approx(math.exp(-50.0 * expected), rel=1e-10)
-    # Each factor of the power moves the middle of the contributions down by k dispersion^2.
-    middle = curve.median * math.exp(-k * curve.dispersion**2)
-    assert found.intensities[1] == pytest.approx(middle, rel=1e-8)
-    assert found.intensities[2] == pytest.approx(middle * math.exp(0.994457883 * curve.dispersion), rel=1e-6)
+    # By parts the share of the motions below x is Phi(z + k dispersion) - Phi(z) rate(x)/total.
+    for share, x in zip((0.16, 0.5, 0.84), found.intensities, strict=True):
+        z = math.log(x / curve.median) / curve.dispersion
+        moved, chance = (0.5 * math.erfc(-at / math.sqrt(2.0)) for at in (z + k * curve.dispersion, z))
+        assert moved - chance * 1e-3 * x**-k / expected == pytest.approx(share, abs=1e-9)
+
+
+@pytest.mark.parametrize("exponent", [1.2, 2.5, 4.0])
+def test_the_rate_below_an_intensity_is_that_of_the_weaker_motions(exponent: float) -> None:
+    """Motions of x to x + dx come |d rate(x)| times a year, and P(x) of them exceed the limit."""
+    fitted = fragility_with(0.3 * G, 0.4)
+    intensity = np.array([0.1, 0.3, 0.9]) * G
+    risk = fitted.annual_rate(HazardCurve(intensity, 1e-3 * (intensity / G) ** -exponent))
+    found, curve = risk.rates[0], fitted.curves[0]
+
+    def from_motions(low: float, high: float) -> float:
+        def density(log: float) -> float:
+            chance = 0.5 * math.erfc(-(log - math.log(curve.median)) / curve.dispersion / math.sqrt(2.0))
+            return chance * exponent * 1e-3 * math.exp(-exponent * (log - math.log(G)))
+
+        return scipy.integrate.quad(density, math.log(low), math.log(high), epsabs=0.0, epsrel=1e-11, limit=500)[0]
+
+    everything = from_motions(1e-3 * G, 1e6 * G)
+    assert found.annual_rate == pytest.approx(everything, rel=1e-6)
+    shares = [from_motions(1e-3 * G, x) / everything for x in found.intensities]
+    assert shares == pytest.approx([0.16, 0.5, 0.84], abs=1e-6)
+    assert found.below == pytest.approx(from_motions(1e-3 * G, 0.1 * G) / everything, rel=1e-6)
+    assert found.above == pytest.approx(from_motions(0.9 * G, 1e6 * G) / everything, rel=1e-6)
+    line = risk.plot().axes[1].lines[0]
+    x, y = line.get_xdata()[200], line.get_ydata()[200]
+    assert y == pytest.approx(from_motions(x * G / 1.001, x * G * 1.001) / everything / (2 * math.log(1.001)), rel=1e-4)
 
 
 @settings(deadline=None, max_examples=8)
@@ -72,11 +102,96 @@ def test_against_any_hazard_curve_the_rate_is_the_integral(median: float, beta: 
     assert 0.0 <= found.below + found.above <= 1.0 + 1e-12
 
 
+def flat_fragility(dispersion: float) -> rocking.Fragility:
+    """Two stripes, which are fitted exactly: as wide as wanted."""
+    apart = math.exp(2.0 * dispersion * float(mpmath.sqrt(2) * mpmath.erfinv(0.5)))
+    return rocking.fit_fragility([1.0, apart], [25, 75], trials=100)
+
+
+@pytest.mark.parametrize("exponent, dispersion", [(12.0, 1.1), (8.0, 2.0), (20.0, 1.5), (30.0, 3.0), (3.0, 40.0)])
+def test_steep_hazards_and_flat_fragilities_have_the_rate_and_the_intensities_of_the_closed_form(
+    exponent: float, dispersion: float
+) -> None:
+    hazard = HazardCurve([1.0, 1.5], [1e-2, 1e-2 * 1.5**-exponent])
+    fitted = flat_fragility(dispersion)
+    found = fitted.annual_rate(hazard).rates[0]
+    with mpmath.workdps(60):
+        a, b = (mpmath.mpf(float(value[0])) for value in fitted.curves[0].fitted)
+        k = (mpmath.log(hazard.rate[0]) - mpmath.log(hazard.rate[1])) / mpmath.log(mpmath.mpf("1.5"))
+        expected = mpmath.mpf(float(hazard.rate[0])) * mpmath.exp(k * a / b + (k / b) ** 2 / 2)
+
+        def share_below(x: float) -> float:
+            z = a + b * mpmath.log(mpmath.mpf(x))
+            rate = mpmath.mpf(float(hazard.rate[0])) * mpmath.mpf(x) ** -k
+            return float(mpmath.ncdf(z + k / b) - mpmath.ncdf(z) * rate / expected)
+
+        if expected < mpmath.mpf("1e300"):
+            assert found.annual_rate == pytest.approx(float(expected), rel=1e-10)
+        else:
+            assert found.annual_rate == math.inf
+        for share, x in zip((0.16, 0.5, 0.84), found.intensities, strict=True):
+            # An intensity below the smallest number is 0.
+            if x > 0.0:
+                assert share_below(x) == pytest.approx(share, abs=1e-9)
+            else:
+                assert share_below(5e-324) > share
+    assert found.below > 0.99
+
+
+@pytest.mark.parametrize("ends", [(1.0, 1.0001), (5.0, 5.5), (0.01, 0.011)])
+def test_shares_far_out_in_either_tail_keep_their_digits(ends: tuple[float, float]) -> None:
+    hazard = HazardCurve(np.linspace(*ends, 4), [1e-2, 8e-3, 1e-3, 1e-7])
+    fitted = fragility_with(1.0, 0.05)
+    found = fitted.annual_rate(hazard).rates[0]
+    with mpmath.workdps(600):
+        parts = closed_parts(fitted.curves[0], hazard)
+        total = mpmath.fsum(parts)
+        assert found.annual_rate == pytest.approx(float(total), rel=1e-9)
+        first, last = (product(fitted.curves[0], hazard, float(x)) for x in hazard.intensity[[0, -1]])
+        assert found.below == pytest.approx(float((parts[0] - first) / total), rel=1e-9, abs=1e-300)
+        assert found.above == pytest.approx(float((parts[-1] + last) / total), rel=1e-9, abs=1e-300)
+        for share, intensity in zip((0.16, 0.5, 0.84), found.intensities, strict=True):
+            up_to = mpmath.fsum(closed_parts(fitted.curves[0], hazard, intensity))
+            up_to -= product(fitted.curves[0], hazard, intensity)
+            assert float(up_to / total) == pytest.approx(share, abs=1e-9)
+
+
+def closed_parts(curve: object, hazard: HazardCurve, until: float = math.inf) -> list[mpmath.mpf]:
+    """Rates from each segment, up to an intensity, each by its own closed form."""
+    a, b = (mpmath.mpf(float(value[0])) for value in curve.fitted)
+    x, rate = ([mpmath.log(mpmath.mpf(float(value))) for value in values] for values in (hazard.intensity, hazard.rate))
+    k = [(rate[i] - rate[i + 1]) / (x[i + 1] - x[i]) for i in range(len(x) - 1)]
+    c = [rate[i] + k[i] * x[i] for i in range(len(k))]
+    ends = [-mpmath.inf, *x, mpmath.inf]
+    stop = mpmath.log(mpmath.mpf(until)) if until < math.inf else mpmath.inf
+    parts = []
+    for i, (low, high) in enumerate(itertools.pairwise(ends)):
+        j = min(max(i - 1, 0), len(k) - 1)
+        last = min(high, stop)
+        if last <= low:
+            break
+        chance = mpmath.ncdf(a + b * last + k[j] / b) - mpmath.ncdf(a + b * low + k[j] / b)
+        parts.append(mpmath.exp(c[j] + k[j] * a / b + (k[j] / b) ** 2 / 2) * chance)
+    return parts
+
+
+def product(curve: object, hazard: HazardCurve, intensity: float) -> mpmath.mpf:
+    """Probability at an intensity times the rate of reaching it, on the line between points or on its extension."""
+    a, b = (mpmath.mpf(float(value[0])) for value in curve.fitted)
+    x, rate = ([mpmath.log(mpmath.mpf(float(value))) for value in values] for values in (hazard.intensity, hazard.rate))
+    at = mpmath.log(mpmath.mpf(intensity))
+    i = max(sum(each <= at for each in x[1:-1]), 0)
+    line = rate[i] + (rate[i + 1] - rate[i]) * (at - x[i]) / (x[i + 1] - x[i])
+    return mpmath.exp(line) * mpmath.ncdf(a + b * at)
+
+
 def test_a_steep_fragility_is_exceeded_as_often_as_its_median() -> None:
     hazard = HazardCurve([1.0, 2.0, 4.0, 8.0], [1e-2, 3e-3, 4e-4, 2e-5])
     rate = fragility_with(3.0, 0.01).annual_rate(hazard).rates[0]
     assert rate.annual_rate == pytest.approx(float(hazard.rate_of(3.0)), rel=1e-3)
-    assert rate.intensities == pytest.approx((2.97, 3.0, 3.03), rel=2e-3)
+    # All motions above the median exceed it: those below x are what the hazard curve loses between the two.
+    remaining = hazard.rate_of(rate.intensities) / hazard.rate_of(3.0)
+    assert remaining == pytest.approx([0.84, 0.5, 0.16], rel=5e-3)
 
 
 def test_the_interval_is_that_of_the_fragility() -> None:
@@ -215,3 +330,141 @@ def test_a_table_has_one_site_only(tmp_path: Path, site: int) -> None:
     path.write_text("pga_g,annual_rate\n0.1,0.9\n0.2,0.5\n")
     with pytest.raises(InvalidOption, match="site"):
         HazardCurve.read(path, site=site)
+
+
+def test_a_return_period_has_the_digits_that_its_interval_leaves() -> None:
+    fitted = rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
+    risk = fitted.annual_rate(HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4]))
+    one = risk.rates[0]
+    assert one.return_interval == (1.0 / one.interval[1], 1.0 / one.interval[0])
+    assert re.fullmatch(r"once in \d\d0 years \(\d\d0 to \d\d0\)", one.in_words())
+    assert one.in_words() in repr(one)
+    assert "peak ground acceleration (g) below which 16, 50, 84 % of the rate arises" in risk.summary()
+
+
+def test_the_figure_has_the_hazard_curve_and_the_shares_of_the_rate_on_axes_of_their_own() -> None:
+    fitted = fragility_with(3.0, 0.4)
+    risk = fitted.annual_rate(HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4]))
+    figure = risk.plot()
+    above, below = figure.axes
+    assert (above.get_yscale(), below.get_yscale()) == ("log", "linear")
+    line = below.lines[0]
+    assert np.trapezoid(line.get_ydata(), np.log(line.get_xdata())) == pytest.approx(1.0, abs=2e-3)
+    assert any(risk.rates[0].in_words() in text.get_text() for text in figure.legends[0].get_texts())
+
+
+def test_figures_of_the_steepest_hazards_are_drawn() -> None:
+    risk = flat_fragility(3.0).annual_rate(HazardCurve([1.0, 1.5], [1e-2, 1e-2 * 1.5**-30.0]))
+    assert risk.plot().axes
+    assert "99" in risk.summary() or "100 %" in risk.summary()
+
+
+def test_survival_is_what_the_rate_and_the_curve_say() -> None:
+    fitted = fragility_with(3.0, 0.4)
+    hazard = HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])
+    rate = fitted.annual_rate(hazard).rates[0]
+    long, short = fitted.survival(10_000.0, hazard), fitted.survival(10.0, hazard)
+    assert long.probability == pytest.approx(math.exp(-10_000.0 * rate.annual_rate))
+    assert long.contradicts
+    assert not short.contradicts
+    assert "so they contradict each other" in long.summary()
+    assert "do not contradict" in short.summary()
+    chances = fitted.curves[0].probability(long.intensity)
+    assert chances == pytest.approx([0.05, 0.16, 0.5, 0.84, 0.95])
+    # At the largest rate the limit would have been exceeded with the confidence asked for.
+    assert np.exp(-10_000.0 * chances * long.largest_rate) == pytest.approx(0.05)
+    assert float(fitted.curves[0].probability(long.unlikely)) == pytest.approx(0.95)
+    alone = fitted.survival(10_000.0)
+    assert math.isnan(alone.probability)
+    assert "hazard" not in alone.summary()
+    assert "most likely never" in repr(alone)
+    for one in (long, short, alone):
+        assert one.plot().axes
+    with pytest.raises(InvalidOption, match="limit_state"):
+        fitted.survival(10.0, limit_state="none")
+    with pytest.raises(InvalidOption, match="years"):
+        fitted.survival(0.0)
+
+
+def test_observed_outcomes_make_a_fragility_a_rate_and_a_survival(run, tmp_path: Path) -> None:
+    site = tmp_path / "site.csv"
+    site.write_text("pga_g,annual_rate\n0.05,0.05\n0.2,0.005\n1.0,0.00005\n")
+    seen = tmp_path / "seen.csv"
+    intensity = [0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6] * 3
+    fell = [0, 0, 1, 0, 1, 1, 0, 1, 0, 0, 0, 1, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1, 1, 1]
+    seen.write_text("PGA (g),overturned\n" + "".join(f"{x},{y}\n" for x, y in zip(intensity, fell, strict=True)))
+    out = tmp_path / "out"
+    code, text, _ = run("fragility", "--outcomes", seen, "--hazard", site, "--standing", "5000", "--out", out)
+    assert code == 0
+    assert "24 observed outcomes in seen.csv" in text
+    assert "the probability of 5000 years without it" in text
+    written = json.loads((out / "result.json").read_text())
+    expected = rocking.fit_fragility(np.multiply(intensity, G), fell)
+    assert written["curves"][0]["median"] == pytest.approx(expected.curves[0].median)
+    hazard = HazardCurve.read(site)
+    assert written["risk"]["rates"][0]["annual_rate"] == pytest.approx(
+        expected.annual_rate(hazard).rates[0].annual_rate
+    )
+    assert written["survival"]["probability"] == pytest.approx(expected.survival(5000.0, hazard).probability)
+    assert (out / "survival.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("table", "options", "said"),
+    [
+        ("pga_g,fell\n0.1,0\n", [], "line 1: the columns must be overturned and either motion or one of pga_g"),
+        ("pga_g,overturned\n0.1,maybe\n", [], "line 2: 'maybe' is not 0 or 1"),
+        ("sa_g,overturned\n0.1,0\n0.2,1\n", [], "--period"),
+        ("pga_g,overturned\n0.1,0\n0.2,1\n", ["--width", "0.3"], "leave --width out"),
+        ("pga_g,overturned\n0.1,0\n0.2,1\n", ["el-centro-meloland-270"], "leave records out"),
+        ("pga_g,overturned\n0.1,0\n0.2,1\n", [], "separated"),
+    ],
+)
+def test_what_is_no_table_of_outcomes_is_refused(run, tmp_path: Path, table: str, options: list, said: str) -> None:
+    seen = tmp_path / "seen.csv"
+    seen.write_text(table)
+    code, _, error = run("fragility", *options, "--outcomes", seen)
+    assert code == 2
+    assert said in error
+
+
+def test_counts_groups_and_motions_are_taken(tmp_path: Path) -> None:
+    path = tmp_path / "seen.csv"
+    path.write_text("pgv_cm_s,overturned,trials,group\n10,1,10,a\n20,4,10,b\n40,8,10,c\n")
+    found = rocking.fit_fragility(**read_observed(path, Measure("pga")))
+    assert (found.measure, found.curves[0].trials.tolist()) == (Measure("pgv"), [10.0, 10.0, 10.0])
+    assert found.range == pytest.approx((0.1, 0.4))
+    assert not found.curves[0].independent
+    path.write_text(
+        "motion,scale,overturned\nel-centro-meloland-270,1,no\nel-centro-meloland-270,2,yes\n"
+        "ridgecrest-clc-090,1,yes\nridgecrest-clc-360,1,no\n"
+    )
+    found = rocking.fit_fragility(**read_observed(path, Measure("pgv")))
+    record = rocking.records.load("el-centro-meloland-270")
+    assert found.curves[0].intensity[:2] == pytest.approx([record.pgv, 2.0 * record.pgv])
+    assert found.curves[0].clusters == 3
+    with pytest.raises(InvalidOption, match="own unit"):
+        read_observed(path, Measure("pgv_ratio"))
+
+
+def test_an_ensemble_has_its_weights_and_its_model_on_the_command_line(run, tmp_path: Path) -> None:
+    table = tmp_path / "ensemble.csv"
+    table.write_text(
+        "p_plus_rad_s,p_minus_rad_s,alpha_plus_rad,alpha_minus_rad,restitution_plus,restitution_minus,weight,model\n"
+        "1.5,1.5,0.2,0.22,0.9,0.9,0.75,linear\n3,3,0.2,0.2,0.9,0.9,0.25,linear\n"
+    )
+    records = [name for name in rocking.records.names() if not name.endswith("up")]
+    given = ["fragility", *records, "--levels", "1:12:12", "--ensemble", table]
+    code, out, _ = run(*given, "--json")
+    assert code == 0
+    blocks = rocking.Blocks([[1.5, 1.5], [3.0, 3.0]], [[0.2, 0.22], [0.2, 0.2]], [[0.9, 0.9], [0.9, 0.9]])
+    motions = [rocking.records.load(name) for name in records]
+    options = {"levels": np.linspace(1.0, 12.0, 12), "weights": [0.75, 0.25]}
+    expected = {model: rocking.fragility(blocks, motions, model=model, **options) for model in ("linear", "nonlinear")}
+    found = json.loads(out)
+    assert found["curves"][0]["median"] == pytest.approx(expected["linear"].curves[0].median)
+    said = json.loads(run(*given, "--model", "nonlinear", "--json")[1])
+    assert said["curves"][0]["median"] == pytest.approx(expected["nonlinear"].curves[0].median)
+    assert "leave --p out" in run(*given, "--p", "3")[2]
+    assert "2 blocks, weighted" in run("spectrum", *records[:2], "--ensemble", table)[1]
+    assert "2 blocks, weighted" in run("measures", *records[:2], "--ensemble", table)[1]

@@ -173,6 +173,26 @@ def test_a_check_sets_the_rules_beside_the_exact_answer(record):
         assert f"West: {words} of 2" in text
 
 
+def test_a_block_that_stands_here_and_falls_under_less_is_counted_by_itself(run):
+    """A rocking block may stand a motion that is stronger than one that overturns it."""
+    statue, name = rocking.Block(width=0.24, height=1.1), "ridgecrest-tow2-090"
+    motions = {name: rocking.records.load(name), "ridgecrest-clc-090": rocking.records.load("ridgecrest-clc-090")}
+    found = rules.check(statue, motions, rules=["west"])
+    odd, plain = found.rows()
+    assert (odd["overturned"], odd["falls_under_less"], plain["falls_under_less"]) == (False, True, False)
+    factor = odd["lowest_factor"]
+    assert factor < 1.0 and factor * odd["exact"] == pytest.approx(1.0)
+    assert rocking.simulate(statue, motions[name].scaled(1.001 * factor)).overturned
+    assert odd["verdict"] == f"stands here, falls at x {factor:.2f}"
+    assert found.falls_under_less == (True, False)
+    # West says that both fall: wrong of the second, and nothing can be right of the first.
+    assert "West: right 0, unsafe 0, over-conservative 1 of 1" in found.summary()
+    assert "not counted: 1 of 2" in found.summary()
+    assert "and exactly: from 1 on the block overturns" not in found.summary()
+    _, out, _ = run("check", name, "--width", "0.24", "--height", "1.1", "--rules", "west")
+    assert f"stands here, falls at x {factor:.2f}" in out
+
+
 @pytest.mark.slow
 def test_the_tables_of_the_trial_are_those_that_the_script_makes():
     path = Path(__file__).resolve().parents[1] / "scripts" / "rules_trial.py"
@@ -196,7 +216,10 @@ def test_the_command_prints_and_writes_the_check(run, tmp_path):
     (row,) = json.loads((tmp_path / "result.json").read_text("utf-8"))["records"]
     assert row["west"] == rules.west(TOMBSTONE, rocking.records.load(RECORD)).ratio[0]
     header = (tmp_path / "check.csv").read_text("utf-8").splitlines()[0]
-    assert header == "record,pga_g,pgv_m_s,west,ishiyama,exact,peak_over_slenderness,overturned,verdict"
+    assert header == (
+        "record,motion,block,p_rad_s,alpha_rad,restitution,pga_g,pgv_m_s,west,ishiyama,exact,lowest_factor,"
+        "peak_over_slenderness,overturned,falls_under_less,verdict"
+    )
 
 
 def test_a_rule_that_does_not_exist_is_told_by_the_option(run):

@@ -170,7 +170,7 @@ def test_blocks_that_rest_together_are_lifted_together(lobes, omega, eta, thresh
 
 def test_schemes_that_do_not_apply_are_listed_with_the_reason():
     record = rocking.records.load("ridgecrest-clc-090").processed(trim=(225.0, 245.0))
-    comparison = compare_schemes(rocking.Block(0.12, 0.55), record, schemes=[rocking.AsymptoticTime()])
+    comparison = compare_schemes(rocking.Block(width=0.24, height=1.1), record, schemes=[rocking.AsymptoticTime()])
     assert comparison.outcomes == ()
     ((scheme, reason),) = comparison.not_applicable
     assert scheme == rocking.AsymptoticTime()

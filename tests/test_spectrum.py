@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import rocking
-from rocking.analysis.spectrum import fractiles_of, rocking_spectrum
+from rocking.analysis.spectrum import fractiles_of, rocking_spectrum, weighted_fractiles
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "rocking_spectrum.py"
 PULSES = [rocking.pulses.one_sine(5.0, frequency) for frequency in (0.5, 0.8, 1.3, 2.0)]
@@ -56,7 +56,7 @@ def test_housners_restitution_goes_with_each_slenderness():
 
 
 def test_sizes_are_half_diagonals_of_rectangles():
-    block = rocking.Block(0.2, 1.0)
+    block = rocking.Block(half_width=0.2, half_height=1.0)
     result = rocking_spectrum(PULSES[3], alpha=block.alpha, size=[block.radius])
     assert float(result.p[0]) == pytest.approx(block.p, rel=1e-14)
     assert float(result["size"][0]) == pytest.approx(block.radius, rel=1e-14)
@@ -128,6 +128,17 @@ def test_what_makes_no_spectrum_is_refused(changes, word):
         rocking_spectrum(arguments.pop("motions"), **arguments)
 
 
+def test_the_title_of_a_figure_says_what_the_legend_need_not():
+    one = rocking_spectrum(PULSES[0], alpha=[0.2], p=[2.0, 3.0]).plot()
+    assert "alpha = 0.2 rad (11.46°), nonlinear model" in one.get_suptitle()
+    two = rocking_spectrum(PULSES[0], alpha=[0.2, 0.3], p=[2.0, 3.0]).plot()
+    assert "alpha" not in two.get_suptitle()
+    assert [text.get_text() for text in two.legends[0].get_texts()[:2]] == [
+        "alpha = 0.2 rad (11.46°)",
+        "alpha = 0.3 rad (17.19°)",
+    ]
+
+
 def test_a_figure_of_too_many_curves_is_refused(spectrum):
     more = rocking_spectrum(PULSES[0], alpha=[0.1, 0.15, 0.2, 0.25, 0.3], p=[2.0])
     with pytest.raises(rocking.InvalidOption, match="at most 4"):
@@ -141,3 +152,29 @@ def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
     # Responses to one of its records are ambiguous: the last place of a machine's sine changes their peaks by 1e-4.
     assert runpy.run_path(str(EXAMPLE))["main"]() == pytest.approx(-0.9367, abs=5e-4)
     assert (tmp_path / "out" / "spectrum.png").stat().st_size > 10_000
+
+
+@given(
+    arrays(float, st.integers(1, 9), elements=st.sampled_from([0.5, 1.0, 2.0, math.inf])),
+    st.data(),
+    st.floats(0.01, 0.99),
+)
+def test_a_weight_counts_as_often_as_it_says(values, data, share):
+    counts = data.draw(arrays(int, values.shape, elements=st.integers(1, 4)))
+    repeated = np.sort(np.repeat(values, counts))
+    expected = repeated[math.ceil(share * len(repeated) * (1.0 - 1e-12)) - 1]
+    assert weighted_fractiles(values, counts.astype(float), np.array([share]))[0] == expected
+
+
+def test_an_ensemble_of_one_block_has_the_spectrum_of_its_shape():
+    motions = [rocking.pulses.one_sine(4.0, f) for f in (0.5, 1.0, 2.0)]
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    p = [1.0, 2.0, 3.0]
+    grid = rocking_spectrum(motions, alpha=[0.2], restitution=[0.9], p=p)
+    ensemble = rocking_spectrum(motions, blocks=block, p=p)
+    assert ensemble.peak_rotation.values[:, 0] == pytest.approx(grid.peak_rotation.values[:, 0, 0], rel=1e-12)
+    assert ensemble.overturned_share.values.tolist() == grid.overturned_share.values[0, 0].tolist()
+    assert ensemble.plot().axes
+    for wrong, word in (({"alpha": [0.2], "blocks": block}, "of their own"), ({"p": [1.0]}, "give alpha=")):
+        with pytest.raises(rocking.InvalidOption, match=word):
+            rocking_spectrum(motions, **wrong)

@@ -367,6 +367,65 @@ def test_a_damaged_unit_is_named_and_computed_again_on_request(complete, tmp_pat
     assert path.read_bytes() == sound
 
 
+@pytest.mark.parametrize("name", ["zarr.json", "result/zarr.json", "runs.jsonl"])
+@pytest.mark.parametrize("kept", ["nothing", "half", "gone"])
+def test_verify_sees_what_describes_a_study_cut_or_emptied_and_mends_it(tmp_path, name, kept):
+    made(tmp_path).run()
+    path = tmp_path / name
+    sound = path.read_bytes()
+    if kept == "gone":
+        path.unlink()
+    else:
+        path.write_bytes(b"" if kept == "nothing" else sound[: len(sound) // 2])
+    study = rocking.study(tmp_path)
+    (fault,) = study.verify()
+    assert fault.startswith(f"{name} is damaged")
+    assert study.status.complete  # the results do not depend on it
+    assert study.verify(repair=True) == [fault]
+    assert study.verify() == rocking.study(tmp_path).verify() == []
+    if name == "runs.jsonl":
+        assert study.status.runs[-1]["event"] == "repaired"
+    else:
+        assert path.read_bytes() == sound
+
+
+def test_verify_sees_a_log_that_ends_before_the_last_run(tmp_path):
+    study = made(tmp_path)
+    study.run()
+    log = tmp_path / "runs.jsonl"
+    first = log.read_bytes()
+    assert len(first.splitlines()) == 2
+    (tmp_path / "result" / name_of(next(iter(study.store.grid)))).unlink()
+    study.run()
+    whole = log.read_bytes()
+    assert study.verify() == []
+    entries = [json.loads(line) for line in first.splitlines()]
+    entries[-1]["done"] -= 1  # as if the first run had left a unit
+    log.write_text("".join(json.dumps(entry) + "\n" for entry in entries))
+    assert study.verify() == ["runs.jsonl is damaged: it ends before the last run"]
+    log.write_bytes(whole + b"3\n")
+    assert study.verify() == ["runs.jsonl is damaged: 1 line of it cannot be read whole"]
+
+
+def test_a_study_that_may_not_be_written_to_can_be_opened(tmp_path, monkeypatch):
+    made(tmp_path).run()
+    (tmp_path / "zarr.json").write_bytes(b"")
+
+    def refuse(*_):
+        raise AssertionError("nothing is written when a study is opened")
+
+    monkeypatch.setattr(places.Folder, "put", refuse)
+    assert rocking.study(tmp_path).results().peak_rotation.load().size
+
+
+def test_a_damaged_plan_of_a_report_is_told(tmp_path):
+    study = made(tmp_path)
+    study.run()
+    (tmp_path / "report.json").write_bytes(b'{"fragility": ')
+    (fault,) = study.verify()
+    assert fault.startswith("report.json is damaged")
+
+
 def test_a_unit_that_is_another_s_is_found_by_computing_it_again(tmp_path):
     study = made(tmp_path)
     study.run()

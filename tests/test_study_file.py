@@ -1,5 +1,6 @@
 """A study from a text file, through the commands: the same as from Python, and every mistake with its line."""
 
+import csv
 import json
 from pathlib import Path
 
@@ -56,13 +57,104 @@ def test_the_template_describes_a_study(tmp_path):
     assert read_study(path).product.shape == (2, 3, 1, 320)
 
 
+GRID = 'p = "1:6:5"\nalpha = ["10deg", 0.2]\nrestitution = 0.9\n'
+
+
+@pytest.mark.parametrize(
+    ("keys", "blocks"),
+    [
+        (
+            'width = [0.3, "40cm"]\nheight = 1.1\noffset = [-0.03, 0.0]\n',
+            [rocking.Block(width=w, height=1.1, offset=s) for w in (0.3, 0.4) for s in (-0.03, 0.0)],
+        ),
+        (
+            "pivots = [0.2, 0.15]\nheight_of_mass = 0.6\ngyration = [0.4, 0.5]\nrestitution = 0.8\n",
+            [rocking.Block.from_pivots((0.2, 0.15), 0.6, k, restitution=0.8) for k in (0.4, 0.5)],
+        ),
+        (
+            "pivots = [[0.2, 0.15], [0.1, 0.1]]\nheight_of_mass = 0.6\ngyration = 0.4\n",
+            [rocking.Block.from_pivots(pair, 0.6, 0.4) for pair in ((0.2, 0.15), (0.1, 0.1))],
+        ),
+    ],
+)
+def test_blocks_are_rectangles_or_bodies_on_pivots_as_well(file, keys, blocks):
+    file.write_text(TEXT.replace(GRID, keys))
+    found, truth = read_study(file).product.blocks, rocking.Blocks.of(blocks)
+    for name in ("p", "alpha", "restitution"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(truth, name))
+
+
+@pytest.mark.parametrize(
+    ("table", "blocks"),
+    [
+        (
+            "p_plus,p_minus,alpha_plus,alpha_minus\n2.9858,3.0053,0.27417,0.155\n",
+            [rocking.Block.from_parameters((2.9858, 3.0053), (0.27417, 0.155))],
+        ),
+        (
+            "width,height,offset\n0.3,1.1,-0.03\n40cm,1.1,0\n",
+            [rocking.Block(width=0.3, height=1.1, offset=-0.03), rocking.Block(width=0.4, height=1.1)],
+        ),
+        (
+            "pivots_plus,pivots_minus,height_of_mass,gyration,restitution\n0.2,0.15,0.6,0.4,0.8\n",
+            [rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4, restitution=0.8)],
+        ),
+    ],
+)
+def test_a_table_may_hold_blocks_of_two_sides(tmp_path, file, table, blocks):
+    (tmp_path / "blocks.csv").write_text(table)
+    file.write_text(TEXT.replace(GRID, 'csv = "blocks.csv"\n'))
+    found, truth = read_study(file).product.blocks, rocking.Blocks.of(blocks)
+    for name in ("p", "alpha", "restitution"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(truth, name))
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        (
+            "width = 0.3\n",
+            r"line 1: \[blocks\] needs p and alpha, or width and height, or pivots, height_of_mass and gyr",
+        ),
+        ("p = 2\nalpha = 0.2\noffset = 0.1\n", "or csv; it has p, alpha and offset"),
+        ("width = 0.3\nheight = 1\noffset = 0.2\n", "line 4: offset must be at most a quarter of the width, 0.075 m"),
+        ("pivots = [0.2]\nheight_of_mass = 1\ngyration = 1\n", "line 2: pivots must be a pair"),
+        ("pivots = [0.2, -1]\nheight_of_mass = 1\ngyration = 1\n", "line 2: pivots must be a positive length"),
+        ("pivots = [0.2, 0.1]\nheight_of_mass = 1\ngyration = 0\n", "line 4: gyration must be a positive length"),
+    ],
+)
+def test_blocks_that_are_none_are_told_with_their_line(file, keys, words):
+    file.write_text(TEXT.replace(GRID, keys))
+    with pytest.raises(rocking.StudyError, match=words):
+        read_study(file)
+
+
+def test_a_table_of_blocks_that_are_none_is_told_with_its_line(tmp_path, file):
+    file.write_text(TEXT.replace(GRID, 'csv = "blocks.csv"\n'))
+    (tmp_path / "blocks.csv").write_text("width,height,offset\n0.3,1.1,0\n0.3,1.1,0.2\n")
+    with pytest.raises(rocking.StudyError, match=r"blocks\.csv, line 3: offset must be at most"):
+        read_study(file)
+    (tmp_path / "blocks.csv").write_text("p_plus,p_minus,alpha\n2,2,0.2\n2,3,0.2\n")
+    with pytest.raises(rocking.StudyError, match=r"no rigid body has p = 2 and 3 .* restitution=.* \(block 1\)"):
+        read_study(file)
+
+
 def test_blocks_come_from_a_table_as_well(tmp_path, file):
     (tmp_path / "blocks.csv").write_text("p,alpha,restitution\n2.0,12deg,0.9\n3.0,0.2,0.85\n")
-    grid = 'p = "1:6:5"\nalpha = ["10deg", 0.2]\nrestitution = 0.9\n'
-    file.write_text(TEXT.replace(grid, 'csv = "blocks.csv"\n'))
+    file.write_text(TEXT.replace(GRID, 'csv = "blocks.csv"\n'))
     blocks = read_study(file).product.blocks
     np.testing.assert_allclose(blocks.alpha[:, 0], [np.deg2rad(12.0), 0.2])
     assert blocks.restitution[:, 0].tolist() == [0.9, 0.85]
+    # As spreadsheets write it where the comma is the decimal sign.
+    (tmp_path / "blocks.csv").write_text(
+        "\ufeffp; alpha ;restitution;Bemerkung\r\n2,0;12deg;0,9;\r\n3;0,2;0,85;x\r\n;;;\r\n"
+    )
+    again = read_study(file).product.blocks
+    assert (again.p.tolist(), again.alpha.tolist()) == (blocks.p.tolist(), blocks.alpha.tolist())
+    assert again.restitution.tolist() == blocks.restitution.tolist()
+    (tmp_path / "blocks.csv").write_bytes("p;alpha;name\n2;0,2;Säule\n".encode("latin-1"))
+    with pytest.raises(rocking.StudyError, match="no text table in UTF-8"):
+        read_study(file)
     (tmp_path / "blocks.csv").write_text("p,alpha\n2.0,0.2\nfast,0.2\n")
     with pytest.raises(rocking.StudyError, match=r"blocks\.csv, line 3: p takes a number"):
         read_study(file)
@@ -98,7 +190,7 @@ def test_blocks_come_from_a_table_as_well(tmp_path, file):
         ("[motions]", '[motions]\nunits = "furlong"', 7, "units"),
         ("[motions]", "[motions]\ndt = -1", 7, "dt must be a positive number"),
         ("[motions]", '[motions]\nskip_unreadable = "no"', 7, "must be true or false"),
-        ("[motions]", '[motions]\nvertical = "9"', 8, "no such file or shipped record for the vertical motion"),
+        ("[motions]", '[motions]\nvertical = "9"', 8, "no file or shipped record '9' for the vertical motion"),
         ("[blocks]", "[blocks", 1, "no TOML file"),
     ],
 )
@@ -142,7 +234,17 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
         "refinement": None,
     }
     assert "20 units are sound" in run("study", "verify", folder, "--recompute", 2)[1]
+    lost = max((folder / "result").glob("c.*"))
+    unit = lost.read_bytes()
+    lost.unlink()
+    told = run("study", "verify", folder)[1]
+    assert told == f"19 units are sound; 1 of 20 is missing: rocking study run {folder}\n"
+    lost.write_bytes(unit)
     assert run("study", "export", folder, table)[0] == 0
+    with table.open() as rows:
+        pairs = {(row["record"], row["motion"]) for row in csv.DictReader(rows)}
+    assert ("el-centro-meloland-270", "el-centro-meloland-270") in pairs
+    assert sorted(record for record, _ in pairs) == ["", "", "", "", "el-centro-meloland-270"]
     product = read_study(file).product
     reference = rocking.simulate_many(
         product.blocks, product.motions, factor=[0.5, 1.0], polarity="both", model="linear", chattering="certified=1e-9"
@@ -154,7 +256,28 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
     assert code == 2
     assert "c.0.0.0.0.0 is damaged" in out
     assert err.count("\n") == 1
-    assert "1 of them repaired" in run("study", "verify", folder, "--repair")[1]
+    code, _, err = run("study", "export", folder, tmp_path / "again.csv")
+    assert code == 2
+    assert "c.0.0.0.0.0 is damaged" in err and "rocking study verify FOLDER --repair computes it again" in err
+    assert "verify(" not in out + err
+    assert "1 fault repaired" in run("study", "verify", folder, "--repair")[1]
+    (folder / "records.json").write_text("{}")
+    code, out, _ = run("study", "verify", folder)
+    assert code == 2 and "records.json" in out and "is damaged: create the study again from its file" in out
+    assert run("study", "create", file, folder)[0] == 0
+    assert run("study", "verify", folder)[0] == 0
+
+
+def test_a_study_names_its_records_as_its_file_does(file, tmp_path):
+    (tmp_path / "recs").mkdir()
+    values = "\n".join(f"{0.01 * k},{0.1 * (-1) ** k}" for k in range(300))
+    for name in ("a", "b"):
+        (tmp_path / "recs" / f"{name}.csv").write_text(f"time (s),EW (g)\n{values}\n")
+    file.write_text(
+        TEXT.replace('records = ["el-centro-meloland-270"]', 'records = ["recs", "el-centro-meloland-270"]')
+    )
+    found = read_study(file)
+    assert found.records == ("recs/a.csv", "recs/b.csv", "el-centro-meloland-270", "", "", "", "")
 
 
 def test_another_study_in_the_same_folder_is_refused(run, file, tmp_path):

@@ -96,6 +96,17 @@ def test_one_curve_for_all_blocks_is_fitted_to_all_their_simulations(study, meas
     assert found.trials.sum() == reference.trials.sum()
 
 
+def test_blocks_of_one_curve_count_by_their_weights(study):
+    weights = np.linspace(1.0, 3.0, len(BLOCKS))
+    found = study.fragility(weights=weights)
+    reference = rocking.fragility(BLOCKS, MOTIONS, levels=LEVELS, weights=weights)
+    for one, other in zip(found.curves, reference.curves, strict=True):
+        assert (one.median, one.dispersion) == pytest.approx((other.median, other.dispersion), rel=1e-9)
+        assert one.median_interval == pytest.approx(other.median_interval, rel=1e-6)
+    assert abs(found.curves[0].median / study.fragility().curves[0].median - 1.0) > 1e-3
+    assert "weighted" in found.description
+
+
 def test_a_spectrum_is_the_fractiles_of_the_simulations(study):
     table = rocking.simulate_many(BLOCKS, MOTIONS, pga=LEVELS)
     found = study.spectrum([0.5])
@@ -127,12 +138,12 @@ def test_a_block_that_no_curve_fits_says_why(tmp_path):
     assert found.fault.values[0, 0] == ""
     assert "none of the 72 outcomes exceeds the limit" in found.fault.values[0, 1]
     assert np.isnan(found["median"].values[0, 1])
-    assert "1 curves cannot be fitted" in found.summary()
+    assert "; 1 curve cannot be fitted (fault says why)" in found.summary()
 
 
 def test_a_study_that_is_not_complete_has_no_report(tmp_path):
     study = rocking.study(tmp_path, BLOCKS, MOTIONS, pga=LEVELS, unit_blocks=512)
-    with pytest.raises(rocking.StudyError, match="72 of 72 units are missing"):
+    with pytest.raises(rocking.StudyError, match="units are missing, 72 of 72"):
         study.fragility()
 
 
@@ -200,3 +211,6 @@ def test_the_figures_draw_every_block(study):
     spectrum = study.spectrum().plot()
     marks = sum(len(one.get_offsets()) for axes in spectrum.axes[:4] for one in axes.collections)
     assert marks == 4 * 12
+    shown = f"{len(MOTIONS)} motions, nonlinear model; 4 of {len(LEVELS)} scales are shown"
+    assert spectrum.get_suptitle() == shown
+    assert shown in study.spectrum().summary().splitlines()[0]

@@ -15,12 +15,16 @@ from scipy.optimize import brentq
 import rocking
 from rocking import InvalidMotion, InvalidOption, Motion
 from rocking.block import Blocks
+from rocking.chattering.maps import Case, chattering_map
 from rocking.explorer.case import read_case, texts_of
+from rocking.explorer.maps import grid_of, parts
 from rocking.explorer.shelf import Shelf
 from rocking.kernels import state
 from rocking.kernels.certificate import arc_bounds, bounds_on_motion, prove_rest, side_bounds
-from rocking.motion.exceedance import exceedances
+from rocking.motion.exceedance import exceedances, lifting_factors
+from rocking.plausibility import vertical_notes
 from rocking.problem import ground_of, records_of, rules_of
+from rocking.tables import plain
 from rocking.treatment import treatment
 
 G = 9.80665
@@ -256,7 +260,7 @@ def test_forces_carry_the_weight_in_the_frame_of_the_ground() -> None:
 
 def test_a_block_at_rest_leaves_the_ground_where_its_weight_is_gone() -> None:
     motion = Motion([0.0, 2.0], [[0.0, 0.0]]).with_vertical(Motion([0.0, 2.0], [[0.0, -G]]))
-    response = rocking.simulate(rocking.Block(0.2, 1.0), motion)
+    response = rocking.simulate(rocking.Block(half_width=0.2, half_height=1.0), motion)
     assert response.lift_off_time == pytest.approx(1.0, abs=1e-9)
 
 
@@ -315,20 +319,58 @@ def test_the_command_takes_a_vertical_component_from_a_record_or_a_channel(run) 
 
 
 @pytest.mark.parametrize("name", ["7", "no-such-record"])
-def test_a_vertical_component_that_is_not_there_is_refused(run, name: str) -> None:
+def test_a_vertical_component_that_is_not_there_is_refused(run, tmp_path: Path, name: str) -> None:
     size = ["--width", "0.5", "--height", "2.0"]
     code, _, err = run("simulate", TWO, *size, "--channel", "1", "--vertical", name)
     assert (code, err.count("\n")) == (2, 1)
-    assert f"no channel {name!r}" in err
+    assert f"there is no channel, file or shipped record {name!r}; give one of 2 'Up'" in err
+    alone = tmp_path / "single1.csv"
+    alone.write_text("".join(f"{0.01 * k},{0.1 * (-1) ** k}\n" for k in range(300)))
+    code, _, err = run("simulate", alone, *size, "--units", "g", "--vertical", name)
+    assert (code, err.count("\n")) == (2, 1)
+    assert f"record {name!r}, and this file holds the horizontal motion alone; give the path of the file" in err
     code, _, err = run("simulate", "el-centro-meloland-270", *size, "--vertical", name)
     assert (code, err.count("\n")) == (2, 1)
-    assert "has no channels" in err
+    assert f"there is no file or shipped record {name!r} for the vertical motion" in err and "has no channels" in err
 
 
 def test_a_part_after_the_vertical_component_has_none() -> None:
     motion = wave(3.0, 1).with_vertical(wave(2.0, 2, count=100))
     assert motion.processed(trim=(1.0, 3.0)).vertical.duration == pytest.approx(1.0)
     assert motion.processed(trim=(2.5, 3.0)).vertical is None
+
+
+@pytest.mark.parametrize(
+    ("fine", "coarse"), [(0.01, 0.02), (0.01, 0.03), (0.02, 0.01), (0.005, 0.0078125), (0.01, 0.01)]
+)
+@pytest.mark.parametrize("trim", [(0.11, 1.53), (0.213, 0.233), (1.0, 1.5), (0.0, 4.0), (3.0, 3.99)])
+def test_components_are_cut_at_the_same_instants_whatever_their_steps(
+    fine: float, coarse: float, trim: tuple[float, float]
+) -> None:
+    push, lift = wave(3.0, 1, dt=fine, count=round(4.5 / fine)), wave(2.0, 2, dt=coarse, count=201)
+    part = push.with_vertical(lift).processed(trim=trim)
+    start = push.processed(trim=trim).history[-1].split()[-2].split("-")[0]
+    times = np.linspace(0.0, part.duration, 1001)[1:-1]
+    inside = times < part.vertical.duration if part.vertical is not None else times < 0.0
+    assert part.acceleration(times) == pytest.approx(push.acceleration(times + float(start)), abs=1e-9)
+    if part.vertical is None:
+        assert float(start) >= lift.duration
+        return
+    expected = lift.acceleration(times[inside] + float(start))
+    assert part.vertical.acceleration(times[inside]) == pytest.approx(expected, abs=1e-9)
+    assert part.vertical.duration == pytest.approx(min(part.duration, lift.duration - float(start)), abs=1e-12)
+
+
+def test_a_vertical_component_on_multiples_of_the_step_stays_even_and_can_be_filtered() -> None:
+    push, lift = wave(3.0, 1, dt=0.01, count=401), wave(2.0, 2, dt=0.04, count=101)
+    for trim, step in {(0.11, 3.53): 0.01, (0.2, 3.6): 0.04}.items():
+        part = push.with_vertical(lift).processed(trim=trim, band_pass=(0.5, 10.0))
+        assert (part.step, part.vertical.step) == (0.01, step)
+    pulse = rocking.pulses.ricker(1.0, 1.0)
+    both = pulse.with_vertical(lift).processed(trim=(0.5123, 0.5321))
+    assert both.vertical.acceleration(0.01) == pytest.approx(lift.acceleration(0.5223), abs=1e-12)
+    both = push.with_vertical(pulse).processed(trim=(0.51, 1.53))
+    assert both.vertical.acceleration(0.345) == pytest.approx(pulse.acceleration(0.855), abs=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -344,6 +386,56 @@ def test_stretches_beyond_the_threshold_are_those_of_the_weighted_threshold(seed
     near = np.min(np.abs(times[:, None] - found.ravel()), axis=1) < 1e-9
     assert len(found) > 3
     assert np.array_equal(inside[~near], beyond[~near])
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_levels_begin_where_a_motion_with_its_vertical_component_lifts_a_block(model: str) -> None:
+    block = block_for(2.0, 0.2, 0.5)
+    alone = wave(2.0, 5)
+    motion = alone.with_vertical(wave(5.0, 6))
+    found = rocking.incremental_dynamic_analysis(block, motion, model=model, tolerance=1e-2)
+    lifting = found.lowest_uplift / motion.pga
+    for excess, uplifts in ((1.0 - 1e-9, 0), (1.0 + 1e-9, 1)):
+        response = rocking.simulate(block, motion.scaled(lifting * excess), model=model)
+        assert min(len(response.events), 1) == uplifts
+    assert found.lowest_uplift < min(block.uplift_thresholds(model))
+    assert found.level.values[0] == found.lowest_uplift
+    horizontal = rocking.incremental_dynamic_analysis(block, alone, model=model, tolerance=1e-2)
+    assert horizontal.lowest_uplift == pytest.approx(min(block.uplift_thresholds(model)))
+
+
+def test_levels_of_a_block_with_two_sides_begin_at_the_side_that_the_motion_lifts() -> None:
+    block = rocking.Block.from_parameters(p=2.0, alpha=(0.1, 0.2), restitution=0.5)
+    push = Motion.from_samples([0.0, 1.0, 0.0], 0.2)  # to side -, whose slenderness is 0.2
+    found = rocking.incremental_dynamic_analysis(block, push, tolerance=1e-2)
+    assert found.lowest_uplift == pytest.approx(G * math.tan(0.2))
+    pair = [block.uplift_thresholds("nonlinear")]
+    curved = rocking.pulses.one_sine(1.0, 1.0)
+    assert lifting_factors(curved, pair) == pytest.approx([G * math.tan(0.1)], rel=1e-12)
+
+
+def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:
+    push = Motion.from_samples([0.0, 1.0, 0.0], 0.2)
+    heavy = push.with_vertical(Motion.from_samples([0.0, 9.0, 0.0], 0.2))
+    with pytest.raises(InvalidOption, match="no motion lifts a block at any level"):
+        rocking.incremental_dynamic_analysis(block_for(2.0, 0.2, 0.5), heavy)
+
+
+def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_component() -> None:
+    shelf = Shelf()
+    key = shelf.give(wave(20.0, 5).with_vertical(wave(40.0, 6)))
+    case = read_case({"p": "2", "alpha": "0.2", "restitution": "0.5", "motion": f"given:{key}"}, shelf)
+    axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "0.3", "points": "16"}
+    grid = grid_of(case, axes)
+    found = np.empty(grid.x.values.size * grid.y.values.size)
+    for part in parts(grid, threads=1):
+        found[part.points] = part.values[0]
+
+    def at(p: float, pga: float) -> Case:
+        return Case(block_for(p, 0.2, 0.5), case.motion.scaled(pga=pga * G), case.model)
+
+    singly = chattering_map(at, {"p": grid.x.values, "pga": grid.y.values}).outcome.values
+    assert np.array_equal(found.reshape(grid.shape), singly.T)
 
 
 def test_a_page_of_a_response_shows_its_vertical_component_too() -> None:
@@ -381,3 +473,216 @@ def test_certified_rests_hold_what_all_impacts_give(seed: int, model: str, p: fl
             break
         assert first["lower"] - 1e-12 <= second["upper"]
         assert second["lower"] <= first["upper"] + 1e-12
+
+
+@pytest.mark.parametrize("seconds", [1.0, 2.5])
+def test_a_duration_within_the_vertical_component_leaves_the_verdict_open(seconds: float) -> None:
+    motion = Motion.from_samples(np.zeros(11), 0.1).with_vertical(Motion.from_samples(np.zeros(31), 0.1))
+    block = block_for(2.0, 0.2)
+    response = rocking.simulate(block, motion, duration=seconds)
+    assert response.stopped
+    assert "has not moved by" in response.summary()
+    assert bool(rocking.simulate_many(rocking.Blocks.of([block]), motion, duration=seconds).stopped.item())
+    over = rocking.simulate(block, motion, duration=3.0)
+    assert not over.stopped
+    assert not bool(rocking.simulate_many(rocking.Blocks.of([block]), motion, duration=3.0).stopped.item())
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_without_a_push_a_two_sided_block_lifts_off_to_side_plus(model: str) -> None:
+    """As the documentation says, whatever rounding makes of the two instants at which its thresholds vanish."""
+    random, flat, sides = np.random.default_rng(0), Motion.from_samples([0.0, 0.0], 1.0), []
+    for _ in range(200):
+        times = [0.0, random.uniform(0.05, 0.3), 0.4 + random.uniform(0.0, 0.2), 0.8]
+        lift = Motion.from_points(times, [0.0, -G * random.uniform(1.01, 3.0), random.uniform(-0.2, 2.0), 0.0])
+        block = rocking.Block.from_parameters(
+            p=tuple(random.uniform(1.0, 3.0, 2)), alpha=tuple(random.uniform(0.1, 0.4, 2)), restitution=0.8
+        )
+        sides.append(int(rocking.simulate(block, flat.with_vertical(lift), model=model).events["side"][0]))
+    assert sides == [1] * 200
+
+
+@pytest.mark.parametrize("push", [1e-15, -1e-15])
+def test_the_least_push_chooses_the_side_of_an_uplift_without_weight(push: float) -> None:
+    lift = Motion.from_points([0.0, 0.1, 0.4, 0.8], [0.0, -2.0 * G, -2.0 * G, 0.0])
+    motion = Motion.from_samples([push * G, push * G], 1.0).with_vertical(lift)
+    block = rocking.Block.from_parameters(p=(1.7, 2.1), alpha=(0.13, 0.31), restitution=0.8)
+    assert rocking.simulate(block, motion).events["side"][0] == -np.sign(push)
+
+
+def test_a_touch_without_speed_is_no_impact_and_calls_itself_ambiguous() -> None:
+    """Without a push and with a weight of -1 a block swings about alpha as a pendulum, back to zero and zero speed."""
+    seconds, block = 12.0, rocking.Block.from_parameters(p=3.0, alpha=0.2, restitution=0.5)
+    for count in (2, 7, 50, 1201):
+        lift = Motion.from_samples(np.full(count, -2.0 * G), seconds / (count - 1))
+        motion = Motion.from_samples(np.zeros(count), seconds / (count - 1)).with_vertical(lift)
+        response = rocking.simulate(block, motion, duration=seconds)
+        assert len(response.impacts) == 0
+        assert response.peak_rotation == pytest.approx(0.4, abs=1e-12)
+        assert response.ambiguities == ("touch",)
+        together = rocking.simulate_many(rocking.Blocks.of([block]), motion, duration=seconds)
+        assert int(together.impacts.item()) == 0
+        assert together.peak_rotation.item() == pytest.approx(0.4, abs=1e-12)
+
+
+def test_a_block_at_rest_at_the_end_bears_its_weight_again() -> None:
+    up = Motion.from_samples(np.full(11, 1.03 * G), 0.1)
+    response = rocking.simulate(block_for(2.0, 0.2), Motion.from_samples(np.zeros(11), 0.1).with_vertical(up))
+    assert response.minimum_normal_force == 1.0
+
+
+def forces_before_rest(block: rocking.Block, motion: Motion, rest: float, side: int) -> tuple[float, float]:
+    """Both forces over the weight as the impacts accumulate at a rest: at zero rotation and speed, by Newton's law."""
+    assert motion.vertical is not None
+    push, weight = float(motion.acceleration(rest)) / G, 1.0 + float(motion.vertical.acceleration(rest)) / G
+    turn = block.p**2 * (weight * math.sin(block.alpha) + side * push * math.cos(block.alpha))
+    along = 0.75 / block.p**2 * turn  # R u''/g of a rectangle, whose p^2 is 3 g/(4 R)
+    return push - side * along * math.cos(block.alpha), weight - along * math.sin(block.alpha)
+
+
+def small_record(seed: int) -> tuple[rocking.Block, Motion]:
+    """A block that chatters to rest under short records while the ground still moves, mostly in both directions."""
+    random = np.random.default_rng(seed)
+    count, strength = int(random.integers(8, 40)), random.uniform(2.2, 4.0)
+
+    def smooth(peak: float) -> Motion:
+        samples = np.convolve(random.normal(size=count + 4), np.ones(5), "valid")
+        return Motion.from_samples(samples * peak / np.max(np.abs(samples)), 0.05)
+
+    motion = smooth(strength)
+    lift = smooth(random.uniform(0.5, 8.0))
+    return block_for(3.0, 0.22, float(random.uniform(0.3, 0.93))), motion.with_vertical(lift)
+
+
+@pytest.mark.parametrize("seed", [57, 86, 176, 220, 263])
+def test_extreme_forces_hold_those_of_the_last_impacts_before_a_rest(seed: int) -> None:
+    """Also of the impacts that are closed by proof: where forces change until the rest, the last are extreme."""
+    block, motion = small_record(seed)
+    response, judged = rocking.simulate(block, motion), 0
+    for row in response.chattering:
+        rest = float(row["end"])
+        for side in (1, -1):
+            horizontal, vertical = forces_before_rest(block, motion, rest, side)
+            assert response.minimum_normal_force <= vertical + 1e-8
+            assert response.required_friction >= abs(horizontal) / vertical - 1e-8
+            judged += 1
+    assert judged >= 2
+
+
+def el_centro() -> Motion:
+    horizontal = rocking.records.load("el-centro-meloland-270")
+    return horizontal.with_vertical(rocking.records.load("el-centro-meloland-up"))
+
+
+def test_the_figure_of_a_response_moves_the_thresholds_with_the_weight_and_shows_the_vertical_motion() -> None:
+    """No uplift is drawn where the motion is within the thresholds: the block of the report lifted at 0.175 g."""
+    block = rocking.Block(width=0.5, height=2.0)
+    response = rocking.simulate(block, el_centro())
+    figure = response.plot()
+    assert figure.get_suptitle().endswith("under el-centro-meloland-270 with vertical el-centro-meloland-up")
+    _, ground, vertical = (axes for axes in figure.axes if axes.get_ylabel())
+    assert "vertical" in vertical.get_ylabel()
+    lines = [line.get_xydata() for line in ground.lines]
+    acceleration = next(line for line in lines if np.ptp(line[:, 0]) and len(line) > 2)
+    upper = next(line for line in lines if len(line) > 2 and np.all(line[:, 1] > 0.0))
+    uplift = response.events["time"][0]
+    pushed, needed = (np.interp(uplift, line[:, 0], line[:, 1]) for line in (acceleration, upper))
+    assert pushed == pytest.approx(needed, rel=1e-6)
+    assert needed != pytest.approx(block.uplift_thresholds()[1] / G, rel=1e-3)
+    trace = next(line.get_xydata() for line in vertical.lines if len(line.get_xydata()) > 2)
+    assert trace[:, 1] == pytest.approx(el_centro().vertical.acceleration(trace[:, 0]) / G)
+    assert set(el_centro().vertical.breakpoints[400:500]) <= set(el_centro().drawing_times(0.0, 20.0))
+
+
+def test_the_summary_says_by_what_the_vertical_motion_multiplies_the_thresholds() -> None:
+    response = rocking.simulate(rocking.Block(width=0.5, height=2.0), el_centro())
+    low, high = el_centro().vertical.extremes
+    expected = f"0.2500 g, times the weight over that at rest, {1.0 + low / G:.4f} to {1.0 + high / G:.4f}"
+    assert expected in response.summary()
+    assert response.to_xarray(dt=0.1).attrs["vertical_motion"] == "el-centro-meloland-up"
+
+
+@pytest.mark.parametrize(
+    ("vertical", "said"),
+    [
+        ("el-centro-meloland-270", "the vertical motion is the horizontal one itself"),
+        ("el-centro-meloland-360", "the channel '360' looks horizontal"),
+        ("ridgecrest-clc-up", "the vertical motion is of the station 'CI.CLC"),
+        ("ridgecrest-clc-up", "do both start at the same time?"),
+    ],
+)
+def test_a_vertical_component_that_looks_like_a_mistake_is_computed_with_a_note(run, vertical: str, said: str) -> None:
+    statue = ["--width", "0.24", "--height", "1.1"]
+    code, _, err = run("simulate", "el-centro-meloland-270", "--vertical", vertical, *statue)
+    assert code == 0
+    assert "rocking: note: el-centro-meloland-270: " in err and said in err
+    code, _, err = run("simulate", "el-centro-meloland-270", "--vertical", "el-centro-meloland-up", *statue)
+    assert (code, err) == (0, "")
+
+
+def test_components_that_last_very_different_times_are_noted() -> None:
+    part = el_centro().vertical.processed(trim=(0.0, 20.0))
+    assert vertical_notes(el_centro().with_vertical(part)) == (
+        "the horizontal motion lasts 56.93 s, the vertical one 20 s: do both start at the same time?",
+    )
+
+
+def test_tables_of_many_records_name_the_vertical_components(tmp_path: Path) -> None:
+    alone = rocking.records.load("el-centro-meloland-360")
+    motions = [el_centro(), alone]
+    names = ["el-centro-meloland-up", ""]
+    block = rocking.Block(width=0.24, height=1.1)
+    spectrum = rocking.rocking_spectrum(motions, alpha=[0.2], p=[2.0, 3.0])
+    ida = rocking.incremental_dynamic_analysis(block, motions, tolerance=1e-2)
+    measures = rocking.compare_measures(block, motions, tolerance=1e-2)
+    for found, table in ((spectrum, "peaks"), (ida, "levels"), (measures, "intensities")):
+        rows = found.to_dataframe(table)
+        assert list(dict.fromkeys(rows[rows.motion == "el-centro-meloland-270"].vertical)) == names[:1]
+        assert list(dict.fromkeys(rows[rows.motion == "el-centro-meloland-360"].vertical)) == names[1:]
+        assert "el-centro-meloland-up" in json.dumps(plain(found.to_dict()))
+    assert set(ida.to_dataframe("bands").vertical) == set(names)
+    assert "el-centro-meloland-270 with vertical el-centro-meloland-up" in ida.summary()
+    curve = rocking.fragility(block, motions, levels=np.linspace(2.0, 3.6, 33))
+    assert set(curve.outcomes.vertical) == set(names)
+    curve.to_nrml(tmp_path / "f.xml")
+    assert "noDamageLimit" not in (tmp_path / "f.xml").read_text("utf-8")
+    assert "vertical" not in rocking.rocking_spectrum(alone, alpha=[0.2], p=[2.0]).to_dataframe("peaks")
+
+
+def test_a_jump_beyond_one_threshold_lifts_off_though_the_other_is_only_reached() -> None:
+    """With a weight of -1 and a push of the threshold to side +, that of side - is just reached, and the other far."""
+    lift = Motion.from_samples([-2.0 * G, -2.0 * G], 1.0)
+    block, peaks = block_for(2.0, 0.2), []
+    for push in (-0.2, -0.2 - 1e-12):
+        motion = Motion.from_samples([push * G, (push + 0.05) * G], 1.0).with_vertical(lift)
+        response = rocking.simulate(block, motion, model="linear", duration=0.5)
+        assert len(response.impacts) == 0
+        assert response.rotation(0.2) == pytest.approx(0.031311, abs=1e-6)
+        peaks.append(response.peak_rotation)
+    assert peaks[0] == pytest.approx(peaks[1], abs=1e-10)
+
+
+@pytest.mark.parametrize("seed", [86, 263])
+def test_extreme_forces_hold_the_impacts_up_to_a_duration_that_ends_before_their_rest(seed: int) -> None:
+    block, motion = small_record(seed)
+    rest = float(rocking.simulate(block, motion).chattering["end"][0])
+    before, after = (rocking.simulate(block, motion, duration=rest + shift) for shift in (-1e-9, 1e-9))
+    assert before.moves_at_end and not after.moves_at_end
+    assert before.minimum_normal_force == pytest.approx(after.minimum_normal_force, abs=1e-7)
+    assert before.required_friction == pytest.approx(after.required_friction, abs=1e-7)
+
+
+def test_a_grazing_turn_of_a_block_that_has_weight_is_no_touch_in_doubt() -> None:
+    """An impact without speed goes over and comes back: the block goes on alike with it and without."""
+    motion = Motion([0.0, 1.0], [[-0.3 * G]]).with_vertical(Motion([0.0, 1.0], [[0.001 * G]]))
+    for speed in (-0.22345021816950641, -0.2234502181695064):
+        response = rocking.simulate(
+            block_for(2.0, 0.2, 0.8),
+            motion,
+            model="linear",
+            initial_rotation=0.05,
+            initial_velocity=speed,
+            duration=0.6,
+        )
+        assert response.rotation(0.5) == pytest.approx(6.727e-5, abs=1e-8)
+        assert response.ambiguities == ()

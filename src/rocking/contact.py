@@ -2,9 +2,33 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
+from rocking import checks
 from rocking.arrays import Floats
+from rocking.errors import InvalidOption
+
+#: Coefficients of friction beyond those of any two materials.
+_ROUGHEST: Final = 3.0
+
+
+def friction_coefficient(value: object) -> float:
+    """Return a coefficient of friction.
+
+    Raises
+    ------
+    InvalidOption
+        If it is not positive, or larger than that of any two materials.
+    """
+    coefficient = checks.positive(value, "friction", InvalidOption)
+    if coefficient > _ROUGHEST:
+        raise InvalidOption(
+            "friction must be a coefficient (friction over normal force, about 0.6 of stone on stone) of at most "
+            f"{_ROUGHEST:g}, not {coefficient:g}; of an angle of friction take the tangent"
+        )
+    return coefficient
 
 
 def contact_forces(

@@ -214,7 +214,7 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
             break
         _march_together(ground, rules, (bodies, states), chosen, step, substeps)
     _march_on(ground, rules, bodies, states, stop)
-    outcomes = _outcomes(states, task.motion.duration)
+    outcomes = _outcomes(states, task.motion.end)
     outcomes["complete_chattering"] = _complete(ground, bodies, states)
     return outcomes
 

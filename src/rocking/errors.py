@@ -32,6 +32,24 @@ class StudyError(RockingError):
     """A study is damaged, held by another process, or not the one that is meant."""
 
 
+class DamagedStudy(StudyError):
+    """A unit of a study is damaged, and can be computed again.
+
+    Attributes
+    ----------
+    fault : str
+        Which unit it is, and what is wrong with it.
+    """
+
+    def __init__(self, fault: str) -> None:
+        super().__init__(fault)
+        self.fault = fault
+
+    def __str__(self) -> str:
+        """Say how it is mended, too."""
+        return f"{self.fault}: the study's verify(repair=True) computes it again"
+
+
 class OutsideFit(UserWarning):
     """A fitted formula was asked for values beyond those it was fitted to."""
 

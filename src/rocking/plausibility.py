@@ -6,8 +6,12 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
+import numpy as np
+
 from rocking.block import Block
+from rocking.block.body import bodies_of
 from rocking.constants import STANDARD_GRAVITY
+from rocking.motion import measures, records
 from rocking.motion.motion import Motion
 
 #: Peak accelerations of ground motions that were ever of interest, g.
@@ -18,26 +22,44 @@ _STRONGEST: Final = 5.0
 _FASTEST: Final = 5.0
 _COARSEST: Final = 0.1
 
+#: Times of a record are even but for this part of a step; more gaps than this part of the steps are none.
+_UNEVEN: Final = 0.02
+_FEW_GAPS: Final = 0.05
+
 #: Levels without a unit that look as if they were in g; they are taken for m/s^2.
 _PERHAPS_IN_G: Final = 1.5
 _UNITLESS: Final = re.compile(r"[\d.+-]+(?:e[+-]?\d+)?", re.IGNORECASE)
+
+#: A restitution less certain than this is worth a note.
+_UNCERTAIN: Final = 0.01
 
 #: Larger blocks are no blocks, m.
 _LARGEST: Final = 30.0
 
 _CHANNEL: Final = re.compile(r"channel \d+ ['\"]([^'\"]*)['\"]|direction ([\w-]+)")
 _VERTICAL: Final = re.compile(r"(up|down|dn|dwn|ver|vert|vertical|u-?d|z|v|[a-z]{2}z)\b.*", re.IGNORECASE)
+_HORIZONTAL: Final = re.compile(
+    r"(\d{2,3}|n|e|s|w|ns|ew|n-s|e-w|[ns] ?\d{1,2} ?[ew]|north|east|south|west|h[12]|[a-z]{2}[ne12])( deg.*)?",
+    re.IGNORECASE,
+)
+#: What ends a record's description: event and station, where they are known, and the channel.
+_STATION: Final = re.compile(r".*, station (?!line |channel )(.*?), channel \d")
+_EVENT: Final = re.compile(r".*, event (.*?)(?:, station .*)?, channel \d")
+
+#: Components that start together last about as long: the shorter one at least this part of the longer one.
+_ALIKE: Final = 0.75
+
 _HEADING_UNITS: Final = re.compile(r"heading units (\S+?),")
 _UNITS: Final = re.compile(r"(?<!heading )units ([^\s,]+)")
 
 
 def motion_notes(motion: Motion) -> tuple[str, ...]:
-    """Return what looks like a mistake in a motion that shakes a block horizontally; empty if nothing does.
+    """Return what looks like a mistake in a motion that shakes a block; empty if nothing does.
 
     Parameters
     ----------
     motion : Motion
-        A record, for what its file says; or any motion, for its peak.
+        A record, for what its file says; or any motion, for its peak. Its vertical component counts, too.
 
     Returns
     -------
@@ -54,7 +76,35 @@ def motion_notes(motion: Motion) -> tuple[str, ...]:
     direction = _direction(motion)
     if _VERTICAL.fullmatch(direction):
         notes += (f"the channel {direction!r} looks vertical, but it is taken for a horizontal motion",)
-    return notes
+    return notes + vertical_notes(motion)
+
+
+def vertical_notes(motion: Motion) -> tuple[str, ...]:
+    """Return what looks like a mistake in the vertical component of a motion; empty if nothing does, or it has none.
+
+    Examples
+    --------
+    >>> from rocking import records
+    >>> horizontal = records.load("el-centro-meloland-270")
+    >>> vertical_notes(horizontal.with_vertical(records.load("el-centro-meloland-up")))
+    ()
+    >>> vertical_notes(horizontal.with_vertical(horizontal))
+    ('the vertical motion is the horizontal one itself: name its own channel or file',)
+    """
+    vertical = motion.vertical
+    if vertical is None:
+        return ()
+    if _is_multiple(motion, vertical):
+        return ("the vertical motion is the horizontal one itself: name its own channel or file",)
+    notes = [f"the vertical motion: {sentence}" for sentence in reading_notes(vertical)]
+    direction = _direction(vertical)
+    if _HORIZONTAL.fullmatch(direction):
+        notes.append(f"the channel {direction!r} looks horizontal, but it is taken for the vertical motion")
+    for what, known in (("station", _station), ("event", _event)):
+        theirs, ours = known(vertical), known(motion)
+        if theirs and ours and _spelled(theirs) != _spelled(ours):
+            notes.append(f"the vertical motion is of the {what} {theirs!r}, the horizontal one of {ours!r}")
+    return (*notes, *_timing_notes(motion, vertical))
 
 
 def reading_notes(motion: Motion) -> tuple[str, ...]:
@@ -70,11 +120,28 @@ def reading_notes(motion: Motion) -> tuple[str, ...]:
     step = motion.step or motion.duration / len(motion.coefficients)
     if motion.description.family.endswith("record") and step > _COARSEST:
         notes.append(f"the sampling step is {step:.3g} s, too coarse for a record: are the times in seconds?")
+    if motion.step is None and motion.description.family.endswith("record"):
+        notes += _gap_notes(motion)
     text = motion.description.text
     heading, taken = _HEADING_UNITS.search(text), _UNITS.search(text)
     if heading is not None and taken is not None and heading[1] != taken[1]:
         notes.append(f"the file's heading says {heading[1]}, but the numbers are taken for {taken[1]}")
     return tuple(notes)
+
+
+def _gap_notes(motion: Motion) -> list[str]:
+    """Say where times of a record leave one or more of its even steps out."""
+    steps = np.diff(motion.breakpoints)
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(np.abs(steps - usual) > _UNEVEN * usual)
+    left_out = np.round(steps[gaps] / usual)
+    if not 0 < len(gaps) <= _FEW_GAPS * len(steps) or np.any(np.abs(steps[gaps] - left_out * usual) > _UNEVEN * usual):
+        return []
+    first = float(motion.breakpoints[gaps[0]])
+    return [
+        f"the times go on by {usual:g} s, but by {steps[gaps[0]]:.3g} s after {first:.6g} s"
+        f"{' and elsewhere' if len(gaps) > 1 else ''}: are rows missing? A straight line joins the samples"
+    ]
 
 
 def level_notes(text: str, value: float, option: str) -> tuple[str, ...]:
@@ -102,7 +169,7 @@ def level_notes(text: str, value: float, option: str) -> tuple[str, ...]:
 
 
 def block_notes(block: Block) -> tuple[str, ...]:
-    """Return what looks like a mistake in the sizes of a block; empty if nothing does.
+    """Return what looks like a mistake in the sizes or the sides of a block; empty if nothing does.
 
     Examples
     --------
@@ -119,7 +186,28 @@ def block_notes(block: Block) -> tuple[str, ...]:
     if block.half_width is not None and block.half_height is not None and block.half_width > block.half_height:
         width, height = 2.0 * block.half_width, 2.0 * block.half_height
         notes.append(f"the block is wider, {width:g} m, than it is high, {height:g} m: are the sizes swapped?")
-    return tuple(notes)
+    return (*notes, *_side_notes(block))
+
+
+def _side_notes(block: Block) -> Iterator[str]:
+    """Sentences on two different sides."""
+    slender, stocky = sorted(block.sides, key=lambda side: side.alpha)
+    if slender.alpha == stocky.alpha:
+        return
+    if slender.p <= stocky.p:
+        yield (
+            f"the more slender side has no larger p, {slender.p:g} rad/s, than the other, so that the mass lies as far "
+            "from its centre as the pivots do: are the sides of p swapped, or its digits too few?"
+        )
+    p, alpha, restitution = (
+        np.array([[getattr(side, name) for side in block.sides]]) for name in ("p", "alpha", "restitution")
+    )
+    found = bodies_of(p, alpha)
+    if np.array_equal(found.restitution, restitution) and found.uncertainty[0] > _UNCERTAIN:
+        yield (
+            f"the digits of p and alpha tell the restitution to +-{found.uncertainty[0]:.1g} only: give more of them, "
+            "or give restitution="
+        )
 
 
 def _strength_notes(motion: Motion) -> Iterator[str]:
@@ -136,6 +224,55 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
             f"the peak velocity is {motion.pgv:.3g} m/s, too much for a ground motion: are units and step right, or is "
             "an offset left?"
         )
+
+
+def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
+    """Sentences on components that seem to start at different times."""
+    (start, end), (first, last) = (measures.significant_span(each) for each in (motion, vertical))
+    if last < start or first > end:
+        yield (
+            f"the horizontal motion is strong from {start:.4g} s to {end:.4g} s, the vertical one from {first:.4g} s "
+            f"to {last:.4g} s: do both start at the same time?"
+        )
+    elif min(motion.duration, vertical.duration) < _ALIKE * max(motion.duration, vertical.duration):
+        yield (
+            f"the horizontal motion lasts {motion.duration:.4g} s, the vertical one {vertical.duration:.4g} s: do both "
+            "start at the same time?"
+        )
+
+
+def _is_multiple(motion: Motion, other: Motion) -> bool:
+    """Whether one motion is a multiple of the other one."""
+    if not np.array_equal(motion.breakpoints, other.breakpoints):
+        return False
+    one, two = motion.coefficients[:, 0], other.coefficients[:, 0]
+    at = int(np.argmax(np.abs(one)))
+    if one[at] == 0.0 or two[at] == 0.0:
+        return False
+    return bool(np.allclose(two, two[at] / one[at] * one, rtol=0.0, atol=1e-6 * abs(two[at])))
+
+
+def _station(motion: Motion) -> str:
+    """Return the station of a record, or an empty text."""
+    if motion.name in records.names():
+        return records.info(motion.name).station
+    return _found(_STATION, motion)
+
+
+def _event(motion: Motion) -> str:
+    """Return the earthquake of a record, or an empty text."""
+    if motion.name in records.names():
+        return records.info(motion.name).event
+    return _found(_EVENT, motion)
+
+
+def _found(pattern: re.Pattern[str], motion: Motion) -> str:
+    found = pattern.search(motion.description.text)
+    return found[1].strip() if found else ""
+
+
+def _spelled(text: str) -> str:
+    return re.sub(r"\W+", " ", text).strip().casefold()
 
 
 def _direction(motion: Motion) -> str:

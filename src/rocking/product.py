@@ -220,7 +220,8 @@ class Product:
     def _coordinates(self) -> dict[str, Any]:
         about = {"measure": self.scales.measure or "factor", "units": self.scales.units, **self.scales.options}
         return {
-            "motion": ("motion", _names(self.motions)),
+            "motion": ("motion", names_of(self.motions)),
+            **verticals_of(self.motions),
             "scale": ("scale", self.scales.values, about),
             "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in self.signs]),
             **block_coordinates(self.blocks),
@@ -238,7 +239,13 @@ class Product:
         }
 
 
-def _names(motions: Sequence[Motion]) -> list[str]:
+def verticals_of(motions: Sequence[Motion]) -> dict[str, Any]:
+    """Names of the vertical components, as a coordinate of the dimension ``motion``; none where no motion has one."""
+    names = ["" if motion.vertical is None else motion.vertical.name for motion in motions]
+    return {"vertical": ("motion", names)} if any(motion.vertical for motion in motions) else {}
+
+
+def names_of(motions: Sequence[Motion]) -> list[str]:
     """Names of motions, numbered where several share one: a row of a table must say which it is."""
     shared = {name for name, count in Counter(motion.name for motion in motions).items() if count > 1}
     seen: Counter[str] = Counter()

@@ -32,6 +32,17 @@ _phrased: Callable[[str], str] = _as_it_is
 _told: set[str] | None = None
 
 
+def phrased(sentence: str) -> str:
+    """Return a sentence in the words of where it is said: the command line names options in place of arguments.
+
+    Examples
+    --------
+    >>> phrased('polarity="both" counts both')
+    'polarity="both" counts both'
+    """
+    return _phrased(sentence)
+
+
 def note(sentence: str) -> None:
     """Say a sentence on stderr, on a line of its own, to whom `notes_for` has chosen.
 

@@ -12,6 +12,7 @@ import numpy as np
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.formats.units import find_unit
+from rocking.tables import decimal
 
 #: What reads one number of an option: its text and the option's name, to SI units.
 Quantity = Callable[[str, str], float]
@@ -27,6 +28,7 @@ _WRITTEN: Final = re.compile(
 _ANGLES: Final = {"": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0}
 _FREQUENCIES: Final = {"": 1.0, "hz": 1.0, "rad/s": 0.5 / math.pi}
 _VELOCITIES: Final = {"": 1.0, "m/s": 1.0, "cm/s": 0.01}
+_LENGTHS: Final = {"": 1.0, "m": 1.0, "cm": 0.01}
 _TIMES: Final = {"": 1.0, "s": 1.0}
 
 
@@ -67,6 +69,14 @@ def duration(text: str, option: str) -> float:
     return _in_units(_TIMES, text, option, "a time as 1.5 (s)")
 
 
+def length(text: str, option: str) -> float:
+    """Return a positive length, m, from "0.2m", "20cm" or "0.2" (m)."""
+    value = _in_units(_LENGTHS, text, option, "a length as 0.2, 0.2m or 20cm")
+    if not value > 0.0:
+        raise InvalidOption(f"{option} must be a positive length, in m, not {text.strip()}")
+    return value
+
+
 def tilt(text: str, option: str) -> float:
     """Return an angle, rad, as `angle`, of a block that stands: below pi/2, and no degrees without their unit."""
     value = angle(text, option)
@@ -87,6 +97,17 @@ def sides(text: str, option: str, quantity: Quantity = number) -> float | list[f
     return found[0] if len(found) == 1 else found
 
 
+def bounds(text: str, option: str, quantity: Quantity = number) -> float | tuple[float, ...]:
+    """Return one number, which is known, or two: the lowest and the highest that are thinkable."""
+    found = [quantity(part, option) for part in text.split(",")]
+    if len(found) > 2:
+        raise InvalidOption(
+            f"{option} takes a number, if it is known, or two with a comma between, the lowest and the highest "
+            f"thinkable, not {text!r}"
+        )
+    return found[0] if len(found) == 1 else tuple(found)
+
+
 def values(text: str, option: str, quantity: Quantity = number) -> Floats:
     """Return numbers from "1,2,5" or from "START:STOP:COUNT", with ":log" at the end for equal ratios."""
     parts = text.split(":")
@@ -98,10 +119,15 @@ def values(text: str, option: str, quantity: Quantity = number) -> Floats:
     if not 2 <= count <= _MOST:
         raise InvalidOption(f"{option} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}")
     if len(parts) == 3:
-        return np.linspace(start, stop, count)
+        return _decimals(np.linspace(start, stop, count))
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
         raise InvalidOption(f"{option}: a range with :log needs positive ends, not {text!r}")
-    return np.geomspace(start, stop, count)
+    return _decimals(np.geomspace(start, stop, count))
+
+
+def _decimals(numbers: Floats) -> Floats:
+    """Numbers as people write them: 0.3, not 0.30000000000000004."""
+    return np.array([decimal(value) for value in numbers])
 
 
 def _in_units(units: Mapping[str, float], text: str, option: str, wanted: str) -> float:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import csv
+import errno
 import io
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+import re
+import shutil
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -19,9 +25,22 @@ from rocking.errors import OutputError
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.figure import Figure
 
 #: Wider than any table, so that none is wrapped or cut.
-_WIDTH = 100_000
+_WIDTH: Final = 100_000
+
+#: Bytes of a dataset that may be held in memory once more.
+_IN_MEMORY: Final = 1 << 28
+
+#: Rounding of a number that some operations made.
+_ROUNDING: Final = 2.0**-50
+
+#: Letters of a name that nobody else has.
+_HASH: Final = 8
+
+#: A number with a decimal comma, and maybe a unit.
+_WITH_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*[a-zA-Z°/%]*)")
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
@@ -59,11 +78,36 @@ def cell(entry: Any) -> str:
     return str(entry)
 
 
-def counted(number: int, noun: str) -> str:
-    """Return a number and its noun, as 1 polarity or 3 polarities."""
+def counted(number: float, noun: str) -> str:
+    """Return a number and its noun, as 1 polarity, 3 polarities or 0.5 years."""
     if number == 1:
         return f"1 {noun}"
-    return f"{number} {noun[:-1]}ies" if noun.endswith("y") else f"{number} {noun}s"
+    text = f"{number:g}" if isinstance(number, float) else f"{number}"
+    return f"{text} {noun[:-1]}ies" if noun.endswith("y") else f"{text} {noun}s"
+
+
+def known_digits(value: float, interval: tuple[float, float]) -> tuple[str, str]:
+    """Value and ends of its interval as text, to the digits that the interval leaves, and two at least.
+
+    Examples
+    --------
+    >>> known_digits(464.8, (206.1, 826.0)), known_digits(2.1515, (2.1503, 2.1534))
+    (('460', '210 to 830'), ('2.1515', '2.1503 to 2.1534'))
+    >>> known_digits(276.0, (0.0, math.inf))
+    ('280', '0 to infinity')
+    """
+    low, high = interval
+    width = high - low
+    # Two digits of the width.
+    last = math.floor(math.log10(width)) - 1 if 0.0 < width < math.inf else math.inf
+
+    def text(number: float) -> str:
+        if number == 0.0 or not math.isfinite(number):
+            return "infinity" if math.isinf(number) else f"{number:g}"
+        digits = int(max(2, math.floor(math.log10(abs(number))) - last + 1))
+        return f"{float(f'{number:.{digits - 1}e}'):.{max(digits, 6)}g}"
+
+    return text(value), f"{text(low)} to {text(high)}"
 
 
 def range_text(values: Floats) -> str:
@@ -89,6 +133,41 @@ def named(quantity: str, unit: str) -> str:
     return quantity if unit == "1" else f"{quantity}_{unit.replace('/', '_').replace('^', '')}"
 
 
+def decimal(value: float) -> float:
+    """Return a number without the rounding in its last digit, so that it is written as people write it.
+
+    Examples
+    --------
+    >>> 0.1 + 0.2, decimal(0.1 + 0.2), decimal(1.0 / 3.0)
+    (0.30000000000000004, 0.3, 0.3333333333333333)
+    """
+    written = float(f"{value:.12g}")
+    return written if abs(written - value) <= _ROUNDING * abs(value) else value
+
+
+def frame_of(rows: Sequence[Mapping[str, Any]], unread: Mapping[str, str]) -> pd.DataFrame:
+    """Rows of records as a data frame, and a row for each that could not be read, with the reason as its verdict.
+
+    Whole numbers and truth values stay such beside rows that have none.
+
+    Examples
+    --------
+    >>> print(frame_of([{"record": "a", "rests": 2, "verdict": "rocks"}], {"b": "no numbers"}))
+      record  rests              verdict
+    0      a      2                rocks
+    1      b   <NA>  skipped: no numbers
+    """
+    import pandas as pd
+
+    skipped = [{"record": record, "verdict": f"skipped: {reason}"} for record, reason in unread.items()]
+    frame = pd.DataFrame([*rows, *skipped])
+    for name in rows[0] if skipped else ():
+        kinds = {type(row[name]) for row in rows}
+        if kinds <= {bool, int}:
+            frame[name] = frame[name].astype("boolean" if kinds == {bool} else "Int64")
+    return frame
+
+
 def data_frame(part: xr.Dataset) -> pd.DataFrame:
     """Rows for each point of a dataset, in columns named with their units: dimensions, coordinates, variables."""
     # A dimension alone, without labels, only counts the rows.
@@ -96,6 +175,30 @@ def data_frame(part: xr.Dataset) -> pd.DataFrame:
     columns = dict.fromkeys([*rows, *part.coords, *part.data_vars])
     frame = part.to_dataframe().reset_index()[[*columns]]
     return frame.rename(columns=lambda name: named(str(name), part[name].attrs.get("units", "1")))
+
+
+def csv_rows(text: str) -> list[tuple[int, list[str]]]:
+    r"""Return line number and cells of each row of a CSV table that holds any.
+
+    Where semicolons are between the columns of the first one, a comma is the decimal sign, and becomes a point.
+
+    Examples
+    --------
+    >>> csv_rows("p;alpha\n2,5;12,5deg\n")
+    [(1, ['p', 'alpha']), (2, ['2.5', '12.5deg'])]
+    """
+    lines = text.splitlines()
+    semicolons = ";" in next((line for line in lines if line.strip()), "")
+    reader = csv.reader(lines, delimiter=";" if semicolons else ",")
+    rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(map(str.strip, row))]
+    if not semicolons:
+        return rows
+    return [(number, [_with_point(cell) for cell in row]) for number, row in rows]
+
+
+def _with_point(cell: str) -> str:
+    found = _WITH_COMMA.fullmatch(cell)
+    return f"{found[1]}.{found[2]}" if found else cell
 
 
 def rows_of(table: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
@@ -122,33 +225,108 @@ def to_json(result: Mapping[str, Any]) -> str:
     return json.dumps(plain(result), indent=2, allow_nan=False)
 
 
+@contextlib.contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Give a path to write to, beside a file, which it then becomes: whole, on the disk, or not at all.
+
+    What is no file but can be written to (a device, a pipe) is given itself.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written; what was there before is then left as it is.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> file = Path(tempfile.mkdtemp()) / "table.csv"
+    >>> with whole_file(file) as beside:
+    ...     _ = beside.write_text("time_s")
+    ...     file.exists()
+    False
+    >>> file.read_text()
+    'time_s'
+    """
+    wanted = checks.path(path, "path of a file", OutputError)
+    try:
+        if wanted.exists() and not wanted.is_file() and not wanted.is_dir():
+            yield wanted
+            return
+        target = wanted.resolve()  # a link is kept, and what it leads to is replaced
+        if not target.parent.is_dir():
+            raise OutputError(
+                f"{path} cannot be written: there is no folder {target.parent}; make it, or choose another"
+            )
+        beside = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:_HASH]}.part{target.suffix}")
+        try:
+            yield beside
+            with beside.open("rb+") as file:
+                os.fsync(file.fileno())
+            if target.exists():
+                shutil.copymode(target, beside)
+            beside.replace(target)
+        finally:
+            beside.unlink(missing_ok=True)
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise OutputError(
+            f"{path} cannot be written: {reason}; nothing of it was kept; choose another place"
+        ) from error
+
+
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text file.
+    """Write a text file, whole or not at all.
 
     Raises
     ------
     OutputError
         If it cannot be written.
     """
-    try:
-        checks.path(path, "path of a file", OutputError).write_text(text, "utf-8")
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}; choose another place") from error
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
+    """Write a file, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    with whole_file(path) as beside:
+        beside.write_bytes(content)
 
 
 def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
-    """Write a dataset to a NetCDF file.
+    """Write a dataset to a NetCDF file, whole or not at all.
 
     Raises
     ------
     OutputError
         If it cannot be written.
     """
-    folder = checks.path(path, "path of a file", OutputError).parent
-    if not folder.is_dir():
-        raise OutputError(f"{path} cannot be written: there is no folder {folder}; make it, or choose another place")
-    try:
-        dataset.to_netcdf(path, engine="h5netcdf")
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else error
-        raise OutputError(f"{path} cannot be written: {reason}; choose another place") from error
+    # HDF5 ends the process where it meets a full disk; so it writes to memory as long as that is no burden.
+    if dataset.nbytes <= _IN_MEMORY:
+        content: Any = dataset.to_netcdf(engine="h5netcdf")
+        write_bytes(path, content)
+        return
+    with whole_file(path) as beside:
+        if shutil.disk_usage(beside.parent).free < dataset.nbytes + _IN_MEMORY:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        try:
+            dataset.to_netcdf(beside, engine="h5netcdf")
+        except (OSError, RuntimeError) as error:  # the library's text is for its authors
+            raise OSError(getattr(error, "errno", None) or errno.EIO, "") from error
+
+
+def write_figure(path: str | Path, figure: Figure, **options: Any) -> None:
+    """Write a figure in the format of the file's suffix, whole or not at all; options are those of its ``savefig``.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=Path(path).suffix.removeprefix("."), **options)
+    write_bytes(path, drawn.getvalue())

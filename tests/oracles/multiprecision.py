@@ -1,289 +1,474 @@
 """The same motion in 60-digit arithmetic: arcs by Taylor series, impacts by Newton, the end of chattering.
 
+A series about a time converges at least in the disc of radius R in which Picard's iteration keeps the rotation within
+one radian of its value at the centre: so its coefficients are at most 1/R^n (Cauchy), whatever terms vanish, and it
+is carried on until what is left out counts for nothing.
+
 The intervals of a chattering sequence that stays within one piece of the motion are, two impacts at a time, a
 series in the powers of e+ e- (the return map is analytic and its multiplier at rest is e+ e-). Extrapolation
 that removes one power after the other therefore gives the time of rest to full precision after few impacts.
+
+Numbers are midpoints of Arb's balls, which are several times as fast as mpmath's; what is returned is mpmath's.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import inf, log, log2
+from operator import mul
 from typing import Any
 
 import numpy as np
+from flint import arb, ctx
 from mpmath import MPContext
+from numpy.typing import NDArray
 
 from oracles.problem import Problem
 
+DIGITS = 60
 mp = MPContext()
-mp.dps = 60
-SETTLED = mp.mpf("1e-32")
-NEGLIGIBLE = mp.mpf("1e-56")
-ROUNDED = mp.mpf("1e-14")
-HIGHEST_ORDER = 90
+mp.dps = DIGITS
+ROUNDED = 2.0**-44
+HIGHEST_ORDER = 400
+MOST_STEPS = 20_000
 GRID = np.unique(np.concatenate([[0.0], 2.0 ** -np.arange(1.0, 60.0), np.linspace(0.0, 1.0, 257)]))
 """Where series are first looked at, in shares of a span: an arc can end long before its series loses reach."""
+FINER = 64
+"""Into so many parts an interval of the grid is divided where a curve may dip below zero between its ends."""
 
 Number = Any
-"""An mpf of the context above."""
+"""An mpf of the context above in what is returned; an arb of radius zero elsewhere."""
 
 
 @dataclass
 class Course:
-    """What happened, in mpf: (time, kind, side), (time, side entered, speed before, speed after), peak."""
+    """What happened, in mpf: (time, kind, side), (time, side entered, speed before and after), peak up to each rest."""
 
     events: list[tuple[Number, str, int]] = field(default_factory=list)
     impacts: list[tuple[Number, int, Number, Number]] = field(default_factory=list)
-    peak: Number = 0
+    peaks: list[Number] = field(default_factory=list)
+
+    @property
+    def peak(self) -> Number:
+        return max(self.peaks, default=mp.mpf(0))
+
+    @property
+    def overturned(self) -> bool:
+        return bool(self.events) and self.events[-1][1] == "overturn"
 
 
-def follow(problem: Problem, *, rotation: float = 0.0, velocity: float = 0.0, most_impacts: int = 4000) -> Course:
-    """Whole response from time zero until the block rests for good or overturns."""
-    course = Course()
-    side = int(np.sign(rotation) or np.sign(velocity))
-    time, u, v = mp.mpf(0), mp.mpf(abs(rotation)), mp.mpf(side * velocity)
-    while True:
-        if side == 0:
-            time, side = _next_uplift(problem, time)
-            if side == 0:
-                return course
-            course.events.append((time, "uplift", side))
-            u = v = mp.mpf(0)
-        time, overturned = _rock(problem, course, time, side, u, v, most_impacts)
-        if overturned:
-            return course
-        course.events.append((time, "rest", 0))
-        side = 0
+def follow(
+    problem: Problem,
+    *,
+    rotation: float = 0.0,
+    velocity: float = 0.0,
+    most_impacts: int = 4000,
+    closest: float = inf,
+    slack: float = 0.0,
+    digits: int = DIGITS,
+    reach: float = 0.125,
+) -> Course:
+    """Whole response from time zero until the block rests for good or overturns.
+
+    Impacts of a sequence are followed until less than `closest` seconds are left of it, and its limit is known. A
+    threshold counts as passed once the motion is beyond it by `slack` of it; `reach` is the length of steps over the
+    radius of convergence.
+    """
+    with ctx.workdps(digits):
+        return _Follower(problem, most_impacts, closest, slack, reach).whole(rotation, velocity)
 
 
-def rest_time(problem: Problem, time: float, side: int, speed: float, *, most_impacts: int = 4000) -> Number:
+def rest_time(
+    problem: Problem, time: float, side: int, speed: float, *, most_impacts: int = 4000, digits: int = DIGITS
+) -> Number:
     """Instant at which the impacts accumulate, from the side entered at an impact and the speed there."""
-    course = Course()
-    rest, overturned = _rock(problem, course, mp.mpf(time), side, mp.mpf(0), mp.mpf(speed), most_impacts)
-    if overturned:
-        raise AssertionError("the block overturns instead of coming to rest")
-    return rest
-
-
-def _rock(
-    problem: Problem, course: Course, time: Number, side: int, u: Number, v: Number, most_impacts: int
-) -> tuple[Number, bool]:
-    """Follow arcs and impacts until rest (True: overturning) and say when."""
-    tail = _Tail(mp.mpf(problem.restitution[0]) * mp.mpf(problem.restitution[1]))
-    if u == 0 and v > 0:
-        tail.add(problem.piece(_below(time))[1], time)
-    for n in range(most_impacts):
-        time, w, overturned = _arc(problem, course, time, side, u, v)
+    with ctx.workdps(digits):
+        follower = _Follower(problem, most_impacts)
+        rest, overturned = follower.rock(arb(time), side, arb(0), arb(speed))
         if overturned:
-            course.events.append((time, "overturn", side))
-            return time, True
-        u, v = mp.mpf(0), mp.mpf(problem.side(side)[2]) * w
-        side = -side
-        course.impacts.append((time, side, w, v))
-        if n % 2 == 1:
-            rest = tail.add(problem.piece(_below(time))[1], time)
-            if rest is not None and min(problem.restoring(float(rest), i) for i in (1, -1)) > 0.0:
-                return rest, False
-    raise AssertionError(f"no rest within {most_impacts} impacts")
+            raise AssertionError("the block overturns instead of coming to rest")
+        return _told(rest)
+
+
+def _told(x: arb) -> Number:
+    mantissa, exponent = x.mid().man_exp()
+    return mp.mpf((int(mantissa), int(exponent)))
+
+
+def _digits(share: float) -> arb:
+    """10 to the minus so many of the digits."""
+    return arb(10) ** -int(share * ctx.dps)
+
+
+class _Follower:
+    """One block under one motion."""
+
+    def __init__(
+        self, problem: Problem, most_impacts: int, closest: float = inf, slack: float = 0.0, reach: float = 0.125
+    ) -> None:
+        self.problem = problem
+        self.most_impacts = most_impacts
+        self.closest = closest
+        self.slack = slack
+        self.reach = reach
+        self.course = Course()
+        self.peak = arb(0)
+        self.linear = problem.model == "linear"
+        self.gravity = arb(problem.gravity)
+        self.fallen = (arb.pi() / 2).mid()
+
+    def whole(self, rotation: float, velocity: float) -> Course:
+        side = int(np.sign(rotation) or np.sign(velocity))
+        time, u, v = arb(0), arb(abs(rotation)), arb(side * velocity)
+        overturned = False
+        while not overturned:
+            if side == 0:
+                found = self.next_uplift(time)
+                if found is None:
+                    break
+                time, side = found
+                self.note(time, "uplift", side)
+                u = v = arb(0)
+            self.peak = arb(0)
+            time, overturned = self.rock(time, side, u, v)
+            if not overturned:
+                self.note(time, "rest", 0)
+            self.course.peaks.append(mp.pi / 2 if overturned else _told(self.peak))
+            side = 0
+        return self.course
+
+    def note(self, time: arb, kind: str, side: int) -> None:
+        self.course.events.append((_told(time), kind, side))
+
+    def rock(self, time: arb, side: int, u: arb, v: arb) -> tuple[arb, bool]:
+        """Follow arcs and impacts until rest (True: overturning) and say when."""
+        tail = _Tail(arb(self.problem.restitution[0]) * arb(self.problem.restitution[1]))
+        if u == 0 and v > 0:
+            tail.add(self.problem.piece(_below(time))[1], time)
+        for n in range(self.most_impacts):
+            time, w, overturned = self.arc(time, side, u, v)
+            if overturned:
+                self.note(time, "overturn", side)
+                return time, True
+            u, v = arb(0), (arb(self.problem.side(side)[2]) * w).mid()
+            side = -side
+            self.course.impacts.append((_told(time), side, _told(w), _told(v)))
+            if n % 2 == 1:
+                rest = tail.add(self.problem.piece(_below(time))[1], time)
+                if rest is not None and float(rest - time) < self.closest and self.is_pressed(rest):
+                    return rest, False
+        raise AssertionError(f"no rest within {self.most_impacts} impacts")
+
+    def is_pressed(self, time: arb) -> bool:
+        """Whether the ground presses the block down on both sides."""
+        push, weight, _ = self.motion(time)
+        return all(self.restoring(side, [side * push[0]], weight) > 0 for side in (1, -1))
+
+    def arc(self, time: arb, side: int, u: arb, v: arb) -> tuple[arb, arb, bool]:
+        """End of an arc, the speed there, and whether the block overturned."""
+        for _ in range(MOST_STEPS):
+            series, span, end = self.series(time, side, u, v)
+            most = sum((abs(c) * span**n for n, c in enumerate(series)), arb(0))
+            impact = _first_root(series if u != 0 else series[1:], span)
+            overturn = None
+            if most >= self.fallen:
+                overturn = _first_root([self.fallen - series[0], *(-c for c in series[1:])], span)
+            if overturn is not None and (impact is None or overturn < impact):
+                return (time + overturn).mid(), _slope(series, overturn), True
+            if not most <= self.peak:
+                self.note_peak(series, span if impact is None else impact)
+            if impact is not None:
+                return (time + impact).mid(), -_slope(series, impact), False
+            u, v = _value(series, span), _slope(series, span)
+            time = (time + span).mid() if end is None else end
+        raise AssertionError(f"neither impact nor fall within {MOST_STEPS} steps")
+
+    def motion(self, time: arb) -> tuple[list[arb], list[arb], arb | None]:
+        """Push and weight, over those of gravity, about a time, and the end of what they hold for."""
+        near = _below(time)
+        start, end, coefficients = self.problem.piece(near)
+        since, _, lifts = self.problem.vertical_piece(near)
+        push = [c / self.gravity for c in _shifted(coefficients, time - arb(start))]
+        weight = [c / self.gravity for c in _shifted(lifts, time - arb(since))]
+        weight[0] += 1
+        return push, weight, None if end == inf else arb(end)
+
+    def restoring(self, side: int, push: list[arb], weight: list[arb]) -> arb:
+        p, alpha, _ = (arb(x) for x in self.problem.side(side))
+        if self.linear:
+            return p * p * (weight[0] * alpha + push[0])
+        return p * p * (weight[0] * alpha.sin() + push[0] * alpha.cos())
+
+    def series(self, time: arb, side: int, u: arb, v: arb) -> tuple[list[arb], arb, arb | None]:
+        """Taylor coefficients of |theta|, a span on which they give it to all digits, and its end if a piece ends."""
+        push, weight, end = self.motion(time)
+        push = [side * a for a in push]
+        radius = self.radius(side, push, weight, u, v, 64.0 if end is None else float(end - time))
+        span = arb(self.reach * radius)
+        if u == 0 and v > 0:
+            restoring = self.restoring(side, push, weight)
+            if restoring > 0:
+                span = min(span, (3 * v / restoring).mid())
+        if end is not None and end - time <= span:
+            span = (end - time).mid()
+        else:
+            end = None
+        grow = self.grow_linear if self.linear else self.grow_nonlinear
+        p, alpha, _ = (arb(x) for x in self.problem.side(side))
+        series = grow(p * p, alpha, push, weight, u, v, _Remainder(span, radius))
+        return [c.mid() for c in series], span, end
+
+    def radius(self, side: int, push: list[arb], weight: list[arb], u: arb, v: arb, longest: float) -> float:
+        """Radius of a disc about a time in which the rotation stays within a radian of its value at the centre."""
+        p, alpha, _ = self.problem.side(side)
+        pushes, weights = ([abs(float(c)) for c in series] for series in (push, weight))
+        arm = 1.0 + abs(alpha - float(u)) if self.linear else 1.55  # cosh(1) bounds both |sin| and |cos|
+        arms = 1.0 if self.linear else 1.55
+        speed = abs(float(v))
+        radius = min(longest, 4.0 / p) / self.reach
+        while True:
+            most = arm * np.polynomial.polynomial.polyval(radius, weights)
+            most += arms * np.polynomial.polynomial.polyval(radius, pushes)
+            if speed * radius + 0.5 * p * p * most * radius * radius <= 0.99:
+                return float(radius)
+            radius *= 0.8
+
+    @staticmethod
+    def grow_linear(
+        stiffness: arb, alpha: arb, push: list[arb], weight: list[arb], u: arb, v: arb, remainder: "_Remainder"
+    ) -> list[arb]:
+        """u'' = -p^2 (W (alpha - u) + A)."""
+        series, arms = [u, v], [alpha - u, -v]
+        for n in range(HIGHEST_ORDER):
+            if remainder.is_negligible(series):
+                return series
+            force = sum(map(mul, weight, arms[n::-1]), push[n] if n < len(push) else arb(0))
+            series.append(-stiffness * force / ((n + 1) * (n + 2)))
+            arms.append(-series[-1])
+        raise AssertionError("a series does not converge")
+
+    @staticmethod
+    def grow_nonlinear(
+        stiffness: arb, alpha: arb, push: list[arb], weight: list[arb], u: arb, v: arb, remainder: "_Remainder"
+    ) -> list[arb]:
+        """u'' = -p^2 (W S + A C) with S = sin(alpha - u), C = cos(alpha - u), S' = -C u', C' = S u'."""
+        series, rates, S, C = [u, v], [v], [(alpha - u).sin()], [(alpha - u).cos()]
+        for n in range(HIGHEST_ORDER):
+            if remainder.is_negligible(series):
+                return series
+            force = sum(map(mul, weight, reversed(S)), sum(map(mul, push, reversed(C)), arb(0)))
+            series.append(-stiffness * force / ((n + 1) * (n + 2)))
+            sine, cosine = (sum(map(mul, rates, reversed(terms)), arb(0)) / (n + 1) for terms in (C, S))
+            S.append(-sine)
+            C.append(cosine)
+            rates.append((n + 2) * series[-1])
+        raise AssertionError("a series does not converge")
+
+    def note_peak(self, series: list[arb], span: arb) -> None:
+        self.peak = max(self.peak, series[0], _value(series, span))
+        rate = _derivative(series)
+        for low, high in _fallings(rate, span):
+            beyond = _beyond(rate, high)
+            if beyond is not None and beyond <= span:
+                self.peak = max(self.peak, _value(series, _polished(rate, low, beyond)))
+
+    def next_uplift(self, time: arb) -> tuple[arb, int] | None:
+        """First passing of a threshold and its side; None when there is none any more.
+
+        Both are passed at once where nothing weighs the block down: then the push chooses the side, or else it is +.
+        """
+        while True:
+            push, weight, end = self.motion(time)
+            if end is None:
+                return None
+            passings = {side: _passing(self.excess(side, push, weight), end - time) for side in (1, -1)}
+            passed = [side for side in passings if passings[side] is not None]
+            if passed:
+                first = min(passed, key=lambda side: float(passings[side]))
+                after = passings[first]
+                if len(passed) == 2 and abs(passings[1] - passings[-1]) <= _digits(0.5) * (end - time):
+                    first = _pushed_side(push, after, end - time)
+                return (time + after).mid(), first
+            time = end
+
+    def excess(self, side: int, push: list[arb], weight: list[arb]) -> list[arb]:
+        """By how much the motion passes a side's threshold, as a polynomial."""
+        alpha = arb(self.problem.side(side)[1])
+        threshold = alpha if self.linear else alpha.tan()
+        count = max(len(push), len(weight))
+        pushes, weights = ([*series, *[arb(0)] * (count - len(series))] for series in (push, weight))
+        excess = [-side * a - threshold * w for a, w in zip(pushes, weights, strict=True)]
+        excess[0] -= arb(self.slack) * threshold
+        return [c.mid() for c in excess]
+
+
+class _Remainder:
+    """Whether what a series leaves out counts, given that its coefficients are at most 1/radius^n."""
+
+    def __init__(self, span: arb, radius: float) -> None:
+        self.span, self.ratio = float(span), log(float(span) / radius)
+        self.wanted = -ctx.dps * log(10.0)
+        self.largest = 0.0
+        self.power = 1.0
+        self.order = 0
+
+    def is_negligible(self, series: list[arb]) -> bool:
+        """Of the velocity times the span; beside its largest term, or beside (a digit to the power of) two."""
+        while self.order < len(series) - 1:
+            self.order += 1
+            self.power *= self.span
+            self.largest = max(self.largest, self.order * abs(float(series[self.order])) * self.power)
+        left_out = (self.order + 1) * self.ratio + log(2.0 * (self.order + 2))
+        return left_out <= max(self.wanted + log(self.largest) if self.largest > 0.0 else -inf, 2.5 * self.wanted)
 
 
 class _Tail:
     """Extrapolation of every second impact time within one piece of the motion."""
 
-    def __init__(self, ratio: Number) -> None:
+    def __init__(self, ratio: arb) -> None:
         self.ratio = ratio
         self.piece_end: float = -np.inf
-        self.row: list[Number] = []
+        self.row: list[arb] = []
 
-    def add(self, piece_end: float, time: Number) -> Number | None:
+    def add(self, piece_end: float, time: arb) -> arb | None:
         """Take one more impact time; the limit of the sequence once it is settled and within the piece."""
         if piece_end != self.piece_end:
             self.piece_end, self.row = piece_end, []
         previous, self.row = self.row, [time]
-        power = mp.mpf(1)
+        power = arb(1)
         for older in previous:
             power *= self.ratio
-            self.row.append((self.row[-1] - power * older) / (1 - power))
+            self.row.append(((self.row[-1] - power * older) / (1 - power)).mid())
         if len(self.row) < 4:
             return None
         changes = [abs(self.row[k] - self.row[k - 1]) for k in (-1, -2)]
-        settled = max(changes) < SETTLED and self.row[-1] < self.piece_end
+        settled = max(changes) < _digits(8 / 15) and self.row[-1] < self.piece_end
         return self.row[-1] if settled else None
 
 
-def _below(time: Number) -> float:
+def _below(time: arb) -> float:
     """Largest double not above `time`: the piece that holds at a rounded time must not be the next one."""
     near = float(time)
     return near if near <= time else float(np.nextafter(near, -np.inf))
 
 
-def _arc(
-    problem: Problem, course: Course, time: Number, side: int, u: Number, v: Number
-) -> tuple[Number, Number, bool]:
-    """End of an arc, the speed there, and whether the block overturned."""
-    while True:
-        series, span = _series(problem, time, side, u, v)
-        impact = _first_root(series if u != 0 else series[1:], span)
-        overturn = _first_root([mp.pi / 2 - series[0], *(-c for c in series[1:])], span)
-        _note_peak(course, series, span if impact is None else impact)
-        if overturn is not None and (impact is None or overturn < impact):
-            course.peak = mp.pi / 2
-            return time + overturn, _slope(series, overturn), True
-        if impact is not None:
-            return time + impact, -_slope(series, impact), False
-        time, u, v = time + span, _value(series, span), _slope(series, span)
-        time = _onto_breakpoint(problem, time)
-
-
-def _onto_breakpoint(problem: Problem, time: Number) -> Number:
-    nearest = problem.breakpoints[np.argmin(np.abs(problem.breakpoints - float(time)))]
-    return mp.mpf(float(nearest)) if abs(time - float(nearest)) < mp.mpf("1e-50") else time
-
-
-def _series(problem: Problem, time: Number, side: int, u: Number, v: Number) -> tuple[list[Number], Number]:
-    """Taylor coefficients of |theta| about `time`, and a span on which they give it to all digits."""
-    p, alpha, _ = (mp.mpf(x) for x in problem.side(side))
-    start, end, coefficients = problem.piece(_below(time))
-    push = [side * a / mp.mpf(problem.gravity) for a in _shifted(coefficients, time - mp.mpf(start))]
-    span = min(mp.mpf(end) - time, 1 / (2 * p))
-    restoring = _restoring(problem.model, p, alpha, push[0])
-    if u == 0 and v > 0 and restoring > 0:
-        span = min(span, 3 * v / restoring)
-    grow = _grow_linear if problem.model == "linear" else _grow_nonlinear
-    series = grow(p, alpha, push, u, v, span)
-    while _size(series, span, -1) > NEGLIGIBLE * _scale(series, span):
-        span /= 2
-    return series, span
-
-
-def _size(series: list[Number], span: Number, k: int) -> Number:
-    n = len(series)
-    return abs(series[k]) * span ** (n + k) + abs(series[k - 1]) * span ** (n + k - 1)
-
-
-def _scale(series: list[Number], span: Number) -> Number:
-    return max(abs(c) * span**n for n, c in enumerate(series[:4]))
-
-
-def _restoring(model: str, p: Number, alpha: Number, push: Number) -> Number:
-    if model == "linear":
-        return p * p * (alpha + push)
-    return p * p * (mp.sin(alpha) + push * mp.cos(alpha))
-
-
-def _shifted(coefficients: Any, offset: Number) -> list[Number]:
+def _shifted(coefficients: NDArray[np.float64], offset: arb) -> list[arb]:
     """Coefficients of the same polynomial about a point further on (repeated Horner division)."""
-    shifted = [mp.mpf(float(c)) for c in coefficients]
+    shifted = [arb(float(c)) for c in coefficients]
     n = len(shifted)
+    if offset == 0:
+        return shifted
     for first in range(n - 1):
         for k in range(n - 2, first - 1, -1):
             shifted[k] += offset * shifted[k + 1]
     return shifted
 
 
-def _enough(series: list[Number], span: Number) -> bool:
-    return len(series) > 6 and _size(series, span, -1) < NEGLIGIBLE * _scale(series, span)
+def _derivative(series: list[arb]) -> list[arb]:
+    return [n * c for n, c in enumerate(series)][1:]
 
 
-def _grow_linear(p: Number, alpha: Number, push: list[Number], u: Number, v: Number, span: Number) -> list[Number]:
-    series = [u, v]
-    for n in range(HIGHEST_ORDER):
-        force = series[n] - (push[n] if n < len(push) else 0) - (alpha if n == 0 else 0)
-        series.append(p * p * force / ((n + 1) * (n + 2)))
-        if n >= len(push) and _enough(series, span):
-            break
-    return series
-
-
-def _grow_nonlinear(p: Number, alpha: Number, push: list[Number], u: Number, v: Number, span: Number) -> list[Number]:
-    """u'' = -p^2 (S + push C) with S = sin(alpha - u), C = cos(alpha - u), S' = -C u', C' = S u'."""
-    series, S, C = [u, v], [mp.sin(alpha - u)], [mp.cos(alpha - u)]
-    for n in range(HIGHEST_ORDER):
-        force = S[n] + mp.fsum(push[k] * C[n - k] for k in range(min(n + 1, len(push))))
-        series.append(-p * p * force / ((n + 1) * (n + 2)))
-        S.append(-mp.fsum(C[n - k] * (k + 1) * series[k + 1] for k in range(n + 1)) / (n + 1))
-        C.append(mp.fsum(S[n - k] * (k + 1) * series[k + 1] for k in range(n + 1)) / (n + 1))
-        if n >= len(push) and _enough(series, span):
-            break
-    return series
-
-
-def _value(series: list[Number], s: Number) -> Number:
-    total = mp.mpf(0)
+def _value(series: Sequence[arb], s: arb) -> arb:
+    total = arb(0)
     for c in reversed(series):
         total = total * s + c
-    return total
+    return total.mid()
 
 
-def _slope(series: list[Number], s: Number) -> Number:
-    return _value([n * c for n, c in enumerate(series)][1:], s)
+def _slope(series: list[arb], s: arb) -> arb:
+    return _value(_derivative(series), s)
 
 
-def _first_root(series: list[Number], span: Number) -> Number | None:
+def _first_root(series: list[arb], span: arb) -> arb | None:
     """First sign change from positive of a series on (0, span], found in double and then polished."""
     for low, high in _fallings(series, span):
         beyond = _beyond(series, high)
-        if beyond is not None:
+        if beyond is not None and beyond <= span:
             return _polished(series, low, beyond)
-    return None
+    # Double may not see a root that is next to the end.
+    return _polished(series, arb(0), span) if _value(series, span) <= 0 < series[0] else None
 
 
-def _beyond(series: list[Number], high: Number) -> Number | None:
+def _beyond(series: list[arb], high: arb) -> arb | None:
     """The end of an interval, or a point hardly after it where the root is so close that double sees it before."""
-    for end in (high, high * (1 + ROUNDED)):
+    for end in (high, (high * (1 + ROUNDED)).mid()):
         if _value(series, end) <= 0:
             return end
     return None
 
 
-def _fallings(series: list[Number], span: Number) -> list[tuple[Number, Number]]:
-    """Intervals of the grid over which a series falls from positive to zero or below, in double."""
+def _fallings(series: list[arb], span: arb) -> list[tuple[arb, arb]]:
+    """Intervals over which a series falls from positive to zero or below, in double."""
     scaled = [c * span**n for n, c in enumerate(series)]
     size = max(abs(c) for c in scaled)
-    values = np.polynomial.polynomial.polyval(GRID, [float(c / size) for c in scaled])
+    if size == 0:
+        return []
+    doubles = np.array([float(c / size) for c in scaled])
+    values = np.polynomial.polynomial.polyval(GRID, doubles)
     values[0] = 1.0 if values[1] > 0.0 else values[0]
+    grid, values = _refined(doubles, values)
     falling = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))
-    return [(mp.mpf(float(GRID[k])) * span, mp.mpf(float(GRID[k + 1])) * span) for k in falling]
+    return [(arb(float(grid[k])) * span, (arb(float(grid[k + 1])) * span).mid()) for k in falling]
 
 
-def _polished(series: list[Number], low: Number, high: Number) -> Number:
-    """Newton kept inside a bracket; past 35 digits one more step doubles them."""
-    enough = mp.mpf("1e-35") * high
-    root = (low + high) / 2
-    for _ in range(400):
+def _refined(doubles: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], Any]:
+    """Add points where a curve that is positive at both ends of an interval may, by its curvature, dip between."""
+    n = np.arange(len(doubles))
+    bend = float(np.sum(n * (n - 1) * np.abs(doubles)))
+    least = np.minimum(values[:-1], values[1:])
+    widths = np.diff(GRID)
+    doubtful = np.flatnonzero((least > 0.0) & (least <= 0.125 * bend * widths**2))
+    if len(doubtful) == 0:
+        return GRID, values
+    shares = np.arange(1, FINER) / FINER
+    points = (GRID[doubtful, np.newaxis] + widths[doubtful, np.newaxis] * shares).ravel()
+    grid = np.concatenate([GRID, points])
+    order = np.argsort(grid, kind="stable")
+    return grid[order], np.concatenate([values, np.polynomial.polynomial.polyval(points, doubles)])[order]
+
+
+def _polished(series: list[arb], low: arb, high: arb) -> arb:
+    """Newton kept inside a bracket; past half the digits one more step doubles them."""
+    enough = _digits(0.58) * high
+    rate = _derivative(series)
+    low = (low * (1 - ROUNDED)).mid()  # where double may have seen a root too early
+    root = ((low + high) / 2).mid()
+    for _ in range(int(8 * log2(10.0) * ctx.dps)):
         value = _value(series, root)
         low, high = (root, high) if value > 0 else (low, root)
-        slope = _slope(series, root)
-        following = root - value / slope if slope != 0 else low
+        slope = _value(rate, root)
+        following = (root - value / slope).mid() if slope != 0 else low
         if abs(following - root) <= enough:
-            return following - _value(series, following) / _slope(series, following)
-        root = following if low < following < high else (low + high) / 2
+            slope = _value(rate, following)
+            return (following - _value(series, following) / slope).mid() if slope != 0 else following
+        root = following if low < following < high else ((low + high) / 2).mid()
     raise AssertionError("no convergence on a root")
 
 
-def _note_peak(course: Course, series: list[Number], span: Number) -> None:
-    course.peak = max(course.peak, series[0], _value(series, span))
-    rate = [n * c for n, c in enumerate(series)][1:]
-    for low, high in _fallings(rate, span):
-        beyond = _beyond(rate, high)
-        if beyond is not None:
-            course.peak = max(course.peak, _value(series, _polished(rate, low, beyond)))
+def _passing(excess: list[arb], span: arb) -> arb | None:
+    """First time in [0, span) from which a polynomial is positive; None when there is none."""
+    span = span.mid()
+    sizes = [abs(c) * span**n for n, c in enumerate(excess)]
+    nothing = _digits(0.8) * max(1, *sizes)
+    leading = [c for c, size in zip(excess, sizes, strict=True) if size > nothing]
+    if not leading:
+        return None
+    if leading[0] > 0:
+        return arb(0)
+    gap = [-c if size > nothing else arb(0) for c, size in zip(excess, sizes, strict=True)]
+    while gap[0] == 0:
+        gap = gap[1:]
+    root = _first_root(gap, span)
+    return root if root is not None and root < span else None
 
 
-def _next_uplift(problem: Problem, time: Number) -> tuple[Number, int]:
-    """First passing of a threshold: the double-precision root, polished."""
-    near, side = problem.next_uplift(_below(time))
-    if side == 0:
-        return mp.inf, 0
-    start, _, coefficients = problem.piece(near)
-    excess = [-side * mp.mpf(float(c)) for c in coefficients]
-    excess[0] -= _threshold(problem, side)
-    root = mp.mpf(near) - mp.mpf(start)
-    if near == start and excess[0] > 0:
-        return mp.mpf(near), side
-    for _ in range(8):
-        root -= _value(excess, root) / _slope(excess, root)
-    return max(time, mp.mpf(start) + root), side
-
-
-def _threshold(problem: Problem, side: int) -> Number:
-    alpha = mp.mpf(problem.side(side)[1])
-    return mp.mpf(problem.gravity) * (alpha if problem.model == "linear" else mp.tan(alpha))
+def _pushed_side(push: list[arb], after: arb, span: arb) -> int:
+    """Side to which the motion pushes from some time on."""
+    here = list(push)
+    for first in range(len(here) - 1):
+        for k in range(len(here) - 2, first - 1, -1):
+            here[k] += after * here[k + 1]
+    sizes = [abs(c) * span**n for n, c in enumerate(here)]
+    for c, size in zip(here, sizes, strict=True):
+        if size > _digits(0.5) * max(sizes):
+            return -1 if c > 0 else 1
+    return 1

@@ -137,21 +137,29 @@ def _sensible_span(problem: Problem, time: float, side: int, u: float, v: float)
 def equation_of_motion(problem: Problem, side: int, time: float) -> Callable[..., tuple[float, float]]:
     """Right side f(s, (u, u')) of the equation of motion, s = t - time, in the piece that holds at `time`."""
     p, alpha, _ = problem.side(side)
-    start, _, coefficients = problem.piece(time)
-    offset = time - start
-    descending = coefficients[::-1].tolist()
+    horizontal, vertical = (
+        (time - start, coefficients[::-1].tolist())
+        for start, _, coefficients in (problem.piece(time), problem.vertical_piece(time))
+    )
 
-    def push(s: float) -> float:
+    def over_gravity(component: tuple[float, list[float]], s: float) -> float:
+        offset, descending = component
         a = 0.0
         for c in descending:
             a = a * (offset + s) + c
-        return side * a / problem.gravity
+        return a / problem.gravity
+
+    def push(s: float) -> float:
+        return side * over_gravity(horizontal, s)
+
+    def weight(s: float) -> float:
+        return 1.0 + over_gravity(vertical, s)
 
     def linear(s: float, y: NDArray[np.float64]) -> tuple[float, float]:
-        return y[1], p * p * (y[0] - alpha - push(s))
+        return y[1], p * p * (weight(s) * (y[0] - alpha) - push(s))
 
     def nonlinear(s: float, y: NDArray[np.float64]) -> tuple[float, float]:
-        return y[1], -p * p * (sin(alpha - y[0]) + push(s) * cos(alpha - y[0]))
+        return y[1], -p * p * (weight(s) * sin(alpha - y[0]) + push(s) * cos(alpha - y[0]))
 
     return linear if problem.model == "linear" else nonlinear
 

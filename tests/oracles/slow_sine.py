@@ -11,8 +11,8 @@ from mpmath import mpf
 #: Digits beyond the smallest arc that is resolved.
 _DIGITS = 60
 
-#: Speed over the first speed at which a sequence is taken for complete.
-_STILL = mpf(10) ** -9
+#: What remains, over what has passed and over what is left of half a period, at which a sequence is taken for complete.
+_LITTLE = mpf(10) ** -9
 
 _MOST_IMPACTS = 20_000
 
@@ -25,7 +25,7 @@ def rest_time(a, omega, eta, digits=_DIGITS):
             return mpf(0) if a == 1 else None
         phase = mpmath.asin(1 / a)
         half_period = mpmath.pi / omega
-        tau, speed, side, first = mpf(0), mpf(0), -1, None
+        tau, speed, side = mpf(0), mpf(0), -1
         for _ in range(_MOST_IMPACTS):
             arc = _Arc(a, omega, omega * tau + phase, speed, side)
             duration = arc.root(half_period - tau)
@@ -34,11 +34,12 @@ def rest_time(a, omega, eta, digits=_DIGITS):
             tau += duration
             speed = -eta * arc.speed(duration)
             side = -side
-            first = first or speed
-            if speed < _STILL * first:
-                # What is left, a billionth, is a geometric sum to a billionth of itself.
-                pulls = [1 + s * a * mpmath.sin(omega * tau + phase) for s in (side, -side)]
-                return tau + 2 * speed * (1 / pulls[0] + eta / pulls[1]) / (1 - eta**2)
+            # One side pulls with less and less as half a period ends, and then not at all.
+            pulls = [1 + s * a * mpmath.sin(omega * tau + phase) for s in (side, -side)]
+            remaining = 2 * speed * (1 / pulls[0] + eta / pulls[1]) / (1 - eta**2)
+            if 0 < remaining < _LITTLE * min(tau, half_period - tau):
+                # A geometric sum, to about a billionth of itself: the pulls change by so little until it is over.
+                return tau + remaining
         raise AssertionError("too many impacts")
 
 

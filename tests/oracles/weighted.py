@@ -7,7 +7,7 @@ from mpmath import MPContext
 mp = MPContext()
 mp.dps = 60
 NEGLIGIBLE = mp.mpf("1e-50")
-ORDER = 40
+ORDER = 64
 Number = Any
 Line = tuple[float, float]
 

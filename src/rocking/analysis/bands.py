@@ -60,8 +60,8 @@ class Levels:
             return f"{low:.5g} to {high:.5g}"
         if math.isnan(low) and math.isnan(high):
             return f"at every level looked at, {self._range(self.at[0], self.at[-1])}"
-        inside = self._range(self.at[0], high) if math.isnan(low) else self._range(low, self.at[-1])
-        return f"at all levels looked at, {inside}"
+        open_end = f"up to {high:.5g}{self.unit}" if math.isnan(low) else f"from {low:.5g}{self.unit} on"
+        return f"at all levels looked at {open_end}"
 
     def _range(self, low: float, high: float) -> str:
         return f"{low:.5g}{self.unit}" if low == high else f"{low:.5g} to {high:.5g}{self.unit}"

@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.intensity import Measure
-from rocking.analysis.levels import described
-from rocking.arrays import Floats
+from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled
+from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption
 from rocking.motion import accepted
 from rocking.motion.motion import Motion
 from rocking.result import Result
-from rocking.tables import text_table
+from rocking.tables import counted, text_table
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def compare_measures(
     periods: ArrayLike = (0.5, 1.0, 2.0),
     damping: float = 0.05,
     model: Model = "nonlinear",
+    weights: ArrayLike | None = None,
     tolerance: float = 1e-4,
     threads: int | None = None,
     progress: bool | None = None,
@@ -57,6 +58,8 @@ def compare_measures(
         Their fraction of critical damping.
     model : {"nonlinear", "linear"}
         Equation of motion.
+    weights : array_like, optional
+        How much each of several blocks counts, as those of a calibration; by default all alike.
     tolerance : float
         Width of the intensities at overturning, relative to them.
     threads, progress
@@ -70,7 +73,8 @@ def compare_measures(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, fewer than two motions overturn a block, or a block never comes to rest.
+        If an argument is out of its range, fewer than two motions are given or overturn a block, or a block never comes
+        to rest.
     InvalidMotion
         If a motion is zero throughout.
 
@@ -99,6 +103,9 @@ def compare_measures(
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / (g tan α) 0.67', 'p PGV / (g tan α) 0.02']
     """
     many, shaken = Blocks.of(blocks), accepted.several_motions(motions)
+    shares = mean_one(weights, len(many))
+    if len(shaken) < 2:
+        raise InvalidOption("measures are compared by how motions scatter: give two motions or more, not one")
     times = checks.positive_numbers(periods, "periods", InvalidOption)
     scaled = incremental_dynamic_analysis(
         many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress
@@ -121,8 +128,10 @@ def compare_measures(
     )
     if np.any(np.isfinite(level).sum(axis=0) < 2):
         raise InvalidOption("fewer than two motions overturn a block, however strong; a dispersion needs more")
-    found = _dataset(measures, intensity, scaled.motion.values)
-    return MeasureComparison(found.assign_attrs(blocks=described(blocks), model=model))
+    named_motions = {name: scaled[name] for name in ("motion", "vertical") if name in scaled.coords}
+    found = _dataset(measures, intensity, named_motions, shares)
+    about = {"blocks": pooled(blocks, weights), "model": model, "sides_differ": scaled.sides_differ}
+    return MeasureComparison(found.assign_attrs(about))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -145,11 +154,15 @@ class MeasureComparison(Result):
         }
     )
 
+    def _order(self) -> Integers:
+        """Positions of the measures, the most efficient first."""
+        return np.argsort(self.data.dispersion_of_all.values, kind="stable")
+
     def summary(self) -> str:
         """Measures in a table, the most efficient first."""
         data = self.data
         several = data.sizes["block"] > 1
-        order = np.argsort(data.dispersion_of_all.values, kind="stable")
+        order = self._order()
         best = data.dispersion_of_all.values.min()
         rows = [
             [
@@ -162,13 +175,15 @@ class MeasureComparison(Result):
             ]
             for k in order
         ]
-        head = f"{data.blocks}, {data.model} model: intensities at which {data.sizes['motion']} motions overturn"
+        count = counted(data.sizes["motion"], "motion")
+        head = f"{data.blocks}, {data.model} model: intensities at which {count} overturn"
         columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if several else [])]
         text = [head, "", text_table([*columns, "over the best"], rows)]
         spared = int(np.sum(np.isnan(data.intensity.values[0])))
         if spared:
-            text.append(f"left out: {spared} pairs of block and motion that overturn at no level looked at")
-        return "\n".join(text)
+            pairs = "1 pair" if spared == 1 else f"{spared} pairs"
+            text.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
+        return "\n".join(text + ([f"note: {REVERSED_TOO}"] if data.sides_differ else []))
 
     def to_dict(self) -> dict[str, Any]:
         """Measures and their dispersions by name."""
@@ -178,6 +193,7 @@ class MeasureComparison(Result):
             "blocks": data.blocks,
             "model": data.model,
             "motions": [str(name) for name in data.motion.values],
+            **({"verticals": [str(name) for name in data.vertical.values]} if "vertical" in data.coords else {}),
             "measures": [
                 {
                     "measure": str(data.measure.values[k]),
@@ -190,7 +206,7 @@ class MeasureComparison(Result):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the dispersion of each measure with its interval.
+        """Draw the dispersion of each measure with its interval, the most efficient first, as in `summary`.
 
         Parameters
         ----------
@@ -203,25 +219,31 @@ class MeasureComparison(Result):
         """
         from rocking.plot import dispersions_figure
 
-        data = self.data
+        data, order = self.data, self._order()
         return dispersions_figure(
-            names=[str(name) for name in data.measure.values],
-            dispersion=data.dispersion.values,
-            low=data.dispersion_low.values,
-            high=data.dispersion_high.values,
-            title=title or f"{data.blocks}, {data.model} model, {data.sizes['motion']} motions",
+            names=[str(name) for name in data.measure.values[order]],
+            dispersion=data.dispersion.values[order],
+            low=data.dispersion_low.values[order],
+            high=data.dispersion_high.values[order],
+            title=title or f"{data.blocks}, {data.model} model, {counted(data.sizes['motion'], 'motion')}",
             ax=ax,
             figsize=figsize,
         )
 
 
-def _dataset(measures: Sequence[Measure], intensity: Floats, motions: Floats) -> xr.Dataset:
+def _dataset(
+    measures: Sequence[Measure], intensity: Floats, motions: dict[str, xr.DataArray], shares: Floats
+) -> xr.Dataset:
+    """Intensities at overturning and their dispersions; `shares` are the weights of the blocks, 1 in the mean."""
     import xarray as xr
 
     logarithm = np.log(intensity)
+    weight = np.where(np.isfinite(logarithm[0]), shares, 0.0)
     count = np.isfinite(logarithm[0]).sum(axis=0)
     within = logarithm - np.nanmean(logarithm, axis=1, keepdims=True)
-    pooled = np.sqrt(np.nansum(within**2, axis=(1, 2)) / (count.sum() - count.size))
+    about_own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / np.sum(shares * (count - 1)))
+    mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
+    of_all = np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / (weight.sum() - 1.0)
     # Motions are what is drawn: those of several blocks are the same.
     low, high = _interval_factors(int(count.min()) - 1)
     spread = "standard deviation of the logarithm of the intensity at overturning"
@@ -230,22 +252,22 @@ def _dataset(measures: Sequence[Measure], intensity: Floats, motions: Floats) ->
             "intensity": (("measure", "motion", "block"), intensity, {"long_name": "lowest intensity that overturns"}),
             "median_intensity": (
                 "measure",
-                np.exp(np.nanmean(logarithm, axis=(1, 2))),
+                np.exp(mean),
                 {"long_name": "median of the intensities at overturning, in the measure's unit"},
             ),
-            "dispersion": ("measure", pooled, {"units": "1", "long_name": f"{spread} about each block's own mean"}),
-            "dispersion_low": ("measure", low * pooled, {"units": "1", "long_name": "lower end of its interval"}),
-            "dispersion_high": ("measure", high * pooled, {"units": "1", "long_name": "upper end of its interval"}),
+            "dispersion": ("measure", about_own, {"units": "1", "long_name": f"{spread} about each block's own mean"}),
+            "dispersion_low": ("measure", low * about_own, {"units": "1", "long_name": "lower end of its interval"}),
+            "dispersion_high": ("measure", high * about_own, {"units": "1", "long_name": "upper end of its interval"}),
             "dispersion_of_all": (
                 "measure",
-                np.nanstd(logarithm, axis=(1, 2), ddof=1),
+                np.sqrt(of_all),
                 {"units": "1", "long_name": f"{spread} about one mean of all blocks"},
             ),
         },
         {
             "measure": [_name(measure) for measure in measures],
             "unit": ("measure", [measure.units for measure in measures]),
-            "motion": motions,
+            **motions,
         },
     )
 

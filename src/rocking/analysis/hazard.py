@@ -6,7 +6,7 @@ import csv
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +18,11 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.tables import text_table
 
-#: Headings of an intensity in a table, with the factor to SI units.
-_HEADINGS: Final = {
+if TYPE_CHECKING:
+    from rocking.plot import HazardLine
+
+#: Headings of an intensity in a table, with its measure and the factor to SI units.
+HEADINGS: Final = {
     "pga_g": ("pga", STANDARD_GRAVITY),
     "pga_m_s2": ("pga", 1.0),
     "pgv_m_s": ("pgv", 1.0),
@@ -30,6 +33,9 @@ _HEADINGS: Final = {
 
 #: Names of intensities in OpenQuake's files, with the factor to SI units.
 _OPENQUAKE: Final = {"PGA": ("pga", STANDARD_GRAVITY), "PGV": ("pgv", 0.01), "SA": ("sa", STANDARD_GRAVITY)}
+
+#: Rates that a figure's axis has room for.
+_DRAWN: Final = (1e-200, 1e200)
 
 _POE: Final = re.compile(r"poe-([0-9.eE+-]+)")
 
@@ -136,6 +142,13 @@ class HazardCurve:
         with np.errstate(divide="ignore", over="ignore"):
             return as_asked(np.asarray(np.exp(factors[segment] - exponents[segment] * np.log(at))))
 
+    def line(self, intensity: Floats) -> HazardLine:
+        """Return rates at intensities (SI) as a figure takes them: neither 0 nor infinite."""
+        from rocking.plot import HazardLine
+
+        low, high = self.measure.scale * self.intensity[[0, -1]]
+        return HazardLine(np.clip(self.rate_of(intensity), *_DRAWN), (float(low), float(high)))
+
     def powers(self) -> tuple[Floats, Floats]:
         """Exponent k and logarithm of c of each segment, on which the rate is c intensity^-k."""
         x, y = np.log(self.intensity), np.log(self.rate)
@@ -185,7 +198,7 @@ def _of_file(file: Path, intensity: Floats, rate: Floats, measure: Measure) -> H
         raise InvalidOption(f"{file}: {error}") from None
 
 
-def _heading(cell: str) -> str:
+def heading_of(cell: str) -> str:
     """Name of a column as it is known here: "PGA (m/s^2)" is pga_m_s2."""
     return re.sub(r"[^a-z0-9]+", "_", cell.lower().replace("^", "")).strip("_")
 
@@ -195,14 +208,14 @@ def _from_table(lines: list[str], path: str, period: float | None) -> tuple[Floa
     # Where semicolons are between the columns, a comma is the decimal sign.
     apart, decimal = (";", ",") if told and ";" in told[0] else (",", ".")
     rows = list(csv.reader(told, delimiter=apart))
-    heading = [_heading(cell) for cell in rows[0]] if rows else []
-    found = [cell for cell in heading if cell in _HEADINGS]
+    heading = [heading_of(cell) for cell in rows[0]] if rows else []
+    found = [cell for cell in heading if cell in HEADINGS]
     if len(found) != 1 or "annual_rate" not in heading:
         raise InvalidOption(
-            f"{path}: a hazard curve needs a heading with annual_rate and one of {', '.join(_HEADINGS)}, "
+            f"{path}: a hazard curve needs a heading with annual_rate and one of {', '.join(HEADINGS)}, "
             f"not {', '.join(rows[0]) if rows else 'nothing'}"
         )
-    kind, factor = _HEADINGS[found[0]]
+    kind, factor = HEADINGS[found[0]]
     columns = [heading.index(found[0]), heading.index("annual_rate")]
     points = []
     for k, row in enumerate(rows[1:], start=2):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -14,14 +15,16 @@ from rocking import checks
 from rocking.analysis.bands import Levels
 from rocking.analysis.boundaries import Boundaries, boundaries
 from rocking.analysis.intensity import Measure, MeasureName
-from rocking.analysis.levels import described, several_motions, simulate_levels
+from rocking.analysis.levels import REVERSED_TOO, described, several_motions, simulate_levels
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
+from rocking.motion.description import labelled
+from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.result import Result
-from rocking.tables import named, text_table
+from rocking.tables import counted, named, text_table
 from rocking.treatment import Certified
 from rocking.treatment.base import Model
 
@@ -148,7 +151,8 @@ def incremental_dynamic_analysis(
     flat = grid.reshape(len(grid), -1).astype(np.int64)
     edges = boundaries(table.level.values, flat, overturned, tolerance=width, progress=progress)
     found = _dataset(table, _bands(flat, edges), many, how)
-    return IncrementalDynamicAnalysis(found.assign_attrs(blocks=described(blocks), lowest_uplift=first))
+    about = {"blocks": described(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
+    return IncrementalDynamicAnalysis(found.assign_attrs(about))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -176,7 +180,14 @@ class IncrementalDynamicAnalysis(Result):
         part = super()._table(name)
         if name == "levels":
             return part
-        return part.assign(band_motion=("band", self.data.motion.values[self.data.band_motion.values]))
+        at = self.data.band_motion.values  # under the names of the other table, so that the two can be joined
+        labels = {
+            name: ("band", self.data[name].values[at])
+            for name in ("motion", "vertical", "record")
+            if name in self.data.coords
+        }
+        block = ("band", self.data.band_block.values)
+        return part[[]].assign(labels | {"block": block, "band_start": part.band_start, "band_end": part.band_end})
 
     def bands(self, motion: int, block: int = 0) -> list[tuple[float, float]]:
         """Return the bands of levels that overturn a block under a motion, both by position.
@@ -195,15 +206,29 @@ class IncrementalDynamicAnalysis(Result):
         data = self.data
         many = data.sizes["block"] > 1
         looked_at = Levels.of(data)
+        what = "record" if "record" in data.coords else "motion"
         rows = [
-            [str(data.motion.values[m]), *([b] if many else []), looked_at.overturning(self.bands(m, b))]
+            [
+                self._with_vertical(str(data[what].values[m]), m),
+                *([b] if many else []),
+                looked_at.overturning(self.bands(m, b)),
+            ]
             for m in range(data.sizes["motion"])
             for b in range(data.sizes["block"])
         ]
-        what = data.blocks if not many else f"{data.sizes['block']} blocks"
-        table = text_table(["motion", *(["block"] if many else []), "overturns"], rows)
-        head = f"{what}, {data.model} model; {data.level.label} that overturns"
-        return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table])
+        blocks = data.blocks if not many else counted(data.sizes["block"], "block")
+        table = text_table([what, *(["block"] if many else []), "overturns"], rows)
+        head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
+        notes = [f"note: {REVERSED_TOO}"] if data.sides_differ else []
+        return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table, *notes])
+
+    def _label(self, motion: int) -> str:
+        """Name a motion, by its position, with its vertical component."""
+        return self._with_vertical(str(self.data.motion.values[motion]), motion)
+
+    def _with_vertical(self, name: str, motion: int) -> str:
+        vertical = str(self.data.vertical.values[motion]) if "vertical" in self.data.coords else ""
+        return labelled(name, (), vertical)
 
     def to_dict(self) -> dict[str, Any]:
         """Levels, peaks and bands by name; units are in the names."""
@@ -219,6 +244,7 @@ class IncrementalDynamicAnalysis(Result):
             "motions": [
                 {
                     "name": str(data.motion.values[m]),
+                    **({"vertical": str(data.vertical.values[m])} if "vertical" in data.coords else {}),
                     "block": b,
                     named("overturning_level", units): float(lowest[m, b]),
                     "overturns": [
@@ -262,7 +288,7 @@ class IncrementalDynamicAnalysis(Result):
         for m in range(data.sizes["motion"]):
             bands = data.level.scale * np.array(self.bands(m, block)).reshape(-1, 2)
             bands = np.where(np.isnan(bands), ends, bands)
-            motions.append(ScaledMotion(str(data.motion.values[m]), levels, peaks[m], bands))
+            motions.append(ScaledMotion(self._label(m), levels, peaks[m], bands))
         what = data.blocks if data.sizes["block"] == 1 else f"block {block}"
         return ida_figure(
             motions=motions,
@@ -274,9 +300,19 @@ class IncrementalDynamicAnalysis(Result):
 
 
 def _lowest_uplift(blocks: Blocks, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
-    """Lowest level of the measure at which a motion's peak reaches a block's threshold."""
-    lifting = np.array([min(block.uplift_thresholds(model)) for block in blocks]) / measure.unit_of(blocks, model)
-    return float(min(lifting) * min(value / motion.pga for value, motion in zip(values, motions, strict=True)))
+    """Lowest level of the measure from which on a motion lifts a block; its vertical component is scaled with it.
+
+    Raises
+    ------
+    InvalidOption
+        If none does at any level.
+    """
+    thresholds = np.array([block.uplift_thresholds(model) for block in blocks])
+    factors = np.array([lifting_factors(motion, thresholds, blocks.gravity) for motion in motions])
+    lowest = float(np.min(factors * values[:, None] / measure.unit_of(blocks, model)))
+    if math.isinf(lowest):
+        raise InvalidOption("no motion lifts a block at any level: none pushes towards a side as its weight allows")
+    return lowest
 
 
 def _until_overturned(

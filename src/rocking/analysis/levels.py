@@ -3,32 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from rocking import checks
 from rocking.analysis.intensity import Measure
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
-from rocking.errors import InvalidMotion
+from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import accepted
 from rocking.motion.motion import Motion
+from rocking.tables import counted
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
+#: Where only motions as they are were simulated, though the sides of a block differ.
+REVERSED_TOO: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
+
+
 def described(blocks: Blocks | Block | Sequence[Block]) -> str:
     """Name blocks in a few words: one by its sizes or parameters, several by their number."""
     only = only_block(blocks)
     if only is None:
-        return f"{len(Blocks.of(blocks))} blocks"
+        return counted(len(Blocks.of(blocks)), "block")
     if not isinstance(blocks, Blocks):
         return only.description
     return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
+
+
+def pooled(blocks: Blocks | Block | Sequence[Block], weights: ArrayLike | None) -> str:
+    """Name blocks whose outcomes are pooled, and say whether one counts more than another."""
+    if only_block(blocks) is not None:
+        return described(blocks)
+    return f"{described(blocks)}, {'all of equal weight' if weights is None else 'weighted'}"
+
+
+def mean_one(weights: ArrayLike | None, count: int) -> Floats:
+    """Weights of blocks, one each and 1 in the mean; all 1 where none are given.
+
+    Raises
+    ------
+    InvalidOption
+        If they are not one finite number for each block, none of them negative, and not all 0.
+    """
+    if weights is None:
+        return np.ones(count)
+    given = checks.numbers(weights, "weights", InvalidOption)
+    if given.shape != (count,):
+        raise InvalidOption(f"weights must hold one number for each of {counted(count, 'block')}, not {given.shape}")
+    if not (np.all(np.isfinite(given) & (given >= 0.0)) and given.sum() > 0.0):
+        raise InvalidOption("weights must be finite numbers of 0 or more, and not all 0")
+    return np.asarray(given * (count / given.sum()))
 
 
 def only_block(blocks: Blocks | Block | Sequence[Block]) -> Block | None:

@@ -41,6 +41,13 @@ NO_UPLIFT: Final = -3
 RESTS: Final = -2
 ROCKS: Final = -1
 
+_NAMES: Final = {
+    NO_UPLIFT: "no uplift",
+    RESTS: "rests before the pulse is over",
+    ROCKS: "rocks until the pulse is over",
+    0: "overturns without impact",
+}
+
 #: Families of one amplitude and one frequency; the others of `rocking.pulses` are given as functions.
 _FAMILIES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
@@ -113,7 +120,7 @@ def overturning_map(
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> result = overturning_map("half-sine", block, amplitudes=[0.5, 1.5, 2.5], frequencies=[2.0], model="linear")
     >>> [mode_name(mode) for mode in result.mode.values[:, 0]]
-    ['no uplift', 'rocks', 'overturns without impact']
+    ['no uplift', 'rocks until the pulse is over', 'overturns without impact']
     >>> print(f"{float(result.overturning_amplitude[0]):.7f}")
     1.8007239
     """
@@ -149,11 +156,11 @@ def mode_name(mode: int) -> str:
 
     Examples
     --------
-    >>> mode_name(-2), mode_name(0), mode_name(1), mode_name(4)
-    ('rests', 'overturns without impact', 'overturns after 1 impact', 'overturns after 4 impacts')
+    >>> mode_name(-2), mode_name(0), mode_name(1)
+    ('rests before the pulse is over', 'overturns without impact', 'overturns after 1 impact')
     """
     if mode <= 0:
-        return {NO_UPLIFT: "no uplift", RESTS: "rests", ROCKS: "rocks", 0: "overturns without impact"}[int(mode)]
+        return _NAMES[int(mode)]
     return f"overturns after {mode} impact{'s' if mode > 1 else ''}"
 
 
@@ -189,8 +196,8 @@ class OverturningMap(Result):
         already does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and above it.
 
         A mode is a whole number (`mode_name` says it in words). -3: no uplift. -2: rests, that is complete chattering
-        brings the block to rest at least once before the pulse is over. -1: rocks, that is it comes to rest only after
-        the pulse. n >= 0: overturns, after n impacts since it last uplifted.
+        brings the block to rest at least once before the pulse is over. -1: rocks until the pulse is over, that is it
+        comes to rest only after it. n >= 0: overturns, after n impacts since it last uplifted.
     """
 
     TABLES = MappingProxyType(

@@ -6,18 +6,20 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
+from rocking.analysis.levels import mean_one, pooled
 from rocking.arrays import Floats
-from rocking.block import Blocks
+from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.motion.accepted import several_motions
 from rocking.motion.description import labelled
 from rocking.motion.motion import Motion
 from rocking.result import Result, table_of_some
@@ -31,6 +33,11 @@ if TYPE_CHECKING:
 
 Abscissa = Literal["p", "period", "size"]
 
+#: Frequency parameters of an ensemble's spectrum, over its own median.
+_FACTORS: Final = np.geomspace(0.5, 2.0, 25)
+
+_HALF: Final = np.array([0.5])
+
 #: Most curves that one figure shows.
 _MOST_CURVES = 4
 
@@ -38,10 +45,12 @@ _MOST_CURVES = 4
 def rocking_spectrum(
     motions: Motion | Sequence[Motion],
     *,
-    alpha: ArrayLike,
+    alpha: ArrayLike | None = None,
     p: ArrayLike | None = None,
     size: ArrayLike | None = None,
     restitution: ArrayLike | None = None,
+    blocks: Blocks | Block | Sequence[Block] | None = None,
+    weights: ArrayLike | None = None,
     fractiles: Sequence[float] = (0.16, 0.5, 0.84),
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",
@@ -49,26 +58,31 @@ def rocking_spectrum(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> RockingSpectrum:
-    """Peak rotation against the frequency parameter or the size, for slendernesses and restitutions.
+    """Peak rotation against the frequency parameter or the size, for slendernesses and restitutions or an ensemble.
 
     Parameters
     ----------
     motions : Motion or sequence of Motion
         m motions.
-    alpha : array_like
-        Slendernesses, rad.
+    alpha : array_like, optional
+        Slendernesses, rad; or give `blocks`.
     p : array_like
         Frequency parameters, rad/s; or give `size`.
     size : array_like
         Half diagonals R of rectangular blocks, m: p = sqrt(3 g/(4 R)); or give `p`.
     restitution : array_like, optional
         Restitutions; Housner's from each alpha by default.
+    blocks : Blocks, Block or sequence of Block, optional
+        An ensemble in place of slendernesses and restitutions, as that of a calibration: all are made larger or smaller
+        together, so that their median p is each of `p` (by default half to twice their own), and keep their shapes.
+    weights : array_like, optional
+        How much each block of the ensemble counts; by default all alike.
     fractiles : sequence of float
-        Shares, in (0, 1), of motions that stay below the fractile curves.
+        Shares, in (0, 1), of motions (and of the ensemble's weight) that stay below the fractile curves.
     model, chattering, threads, progress
         As for `simulate_many`.
     gravity : float
-        Acceleration of gravity, m/s^2.
+        Acceleration of gravity, m/s^2; an ensemble has its own.
 
     Returns
     -------
@@ -85,9 +99,11 @@ def rocking_spectrum(
     Notes
     -----
     A block that overturns has no largest rotation, so it counts as infinitely large: fractiles are interpolated in the
-    ordered peaks, and are infinite where that share of the motions, or the next motion above it, overturns.
+    ordered peaks, and are infinite where that share of the motions, or the next motion above it, overturns. Those of an
+    ensemble are the lowest peaks that the share of the weight does not pass.
 
-    The blocks are symmetric, so a motion and its mirror image give the same peaks.
+    Blocks of slendernesses are symmetric, so a motion and its mirror image give the same peaks. Those of an ensemble
+    may not be, and their peaks are over the smaller slenderness.
 
     References
     ----------
@@ -104,17 +120,26 @@ def rocking_spectrum(
     >>> spectrum.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
     [0.367, inf, inf]
     """
-    rates = _rates(p, size, gravity)
     shares = _shares(fractiles)
+    options: dict[str, Any] = {"model": model, "chattering": chattering, "threads": threads, "progress": progress}
+    if blocks is not None:
+        if alpha is not None or restitution is not None:
+            raise InvalidOption(
+                "blocks have slendernesses and restitutions of their own: leave alpha and restitution out"
+            )
+        return RockingSpectrum(_ensemble_spectrum(Blocks.of(blocks), weights, motions, p, size, shares, options))
+    if alpha is None or weights is not None:
+        raise InvalidOption("give alpha= (slendernesses), or blocks= of an ensemble, which may have weights=")
+    rates = _rates(p, size, gravity)
     axes = {"p": rates, "alpha": checks.positive_numbers(alpha, "alpha", InvalidOption)}
     if restitution is not None:
         axes["restitution"] = checks.positive_numbers(restitution, "restitution", InvalidOption)
     shaken = motions if isinstance(motions, Sequence) else [motions]
     checks.grid_size({"motions": len(shaken)} | {name: len(axis) for name, axis in axes.items()}, InvalidOption)
-    blocks = Blocks.grid(**axes, gravity=gravity)
-    table = simulate_many(blocks, motions, model=model, chattering=chattering, threads=threads, progress=progress)
+    grid = Blocks.grid(**axes, gravity=gravity)
+    table = simulate_many(grid, motions, **options)
     require_finished(table.unfinished.values)
-    return RockingSpectrum(_spectrum(table, axes, blocks, shares))
+    return RockingSpectrum(_spectrum(table, axes, grid, shares))
 
 
 def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
@@ -141,6 +166,30 @@ def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
     return between
 
 
+def weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Floats:
+    """Lowest values that shares of the weight do not pass, along the first axis.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, ...)
+        Values; infinity stands for more than any number.
+    weights : ndarray, shape (n,)
+        Their weights.
+    shares : ndarray, shape (k,)
+        Shares from 0 to 1.
+
+    Returns
+    -------
+    ndarray, shape (k, ...)
+    """
+    order = np.argsort(values, axis=0, kind="stable")
+    ordered = np.take_along_axis(values, order, axis=0)
+    passed = np.cumsum(weights[order], axis=0)
+    # Rounding must not take a share that is met for one that is not.
+    enough = passed[None] >= shares.reshape(-1, *[1] * values.ndim) * passed[-1] * (1.0 - 1e-12)
+    return np.asarray(np.take_along_axis(ordered, np.argmax(enough, axis=1), axis=0))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class RockingSpectrum(Result):
     """Peak rotation against the frequency parameter or the size; from `rocking_spectrum`.
@@ -151,7 +200,8 @@ class RockingSpectrum(Result):
         Over (motion, alpha, restitution if given, p): peak_rotation (rad; pi/2 where the block
         overturns), peak_over_alpha (infinite where it overturns) and overturned. Over (fractile, alpha, ..., p):
         fractile_over_alpha. Over (alpha, ..., p): overturned_share. Coordinates besides: period 2 pi/p (s), and size R
-        (m) of the rectangular block.
+        (m) of the rectangular block. Of an ensemble peaks are over (motion, block, p), fractiles and shares over p
+        alone, p is the ensemble's median, and the blocks' weights (1 in the mean) are a coordinate.
     """
 
     TABLES = MappingProxyType(
@@ -185,12 +235,14 @@ class RockingSpectrum(Result):
         axes = [str(name) for name in data.overturned_share.dims]
         return {
             "motions": data.motion.values,
+            **({"verticals": data.vertical.values} if "vertical" in data.coords else {}),
+            **({"blocks": data.sizes["block"], "weights": data.weight.values} if self._of_ensemble else {}),
             "model": data.model,
             "chattering_treatment": data.chattering,
             "p_rad_s": data.p.values,
             "period_s": data.period.values,
             "size_m": data["size"].values,
-            "alpha_rad": data.alpha.values,
+            **({} if self._of_ensemble else {"alpha_rad": data.alpha.values}),
             **({"restitution": data.restitution.values} if "restitution" in data.dims else {}),
             "fractile": data.fractile.values,
             "axes": axes,
@@ -215,7 +267,8 @@ class RockingSpectrum(Result):
         against : {"p", "period", "size"}
             Abscissa.
         title : str
-            Title; by default the model and the number of motions.
+            Title; by default the motion or the number of motions, the block's slenderness (and restitution) if it is
+            one, and the model.
         figsize : (float, float), optional
             Width and height of a new figure, inches.
 
@@ -230,10 +283,11 @@ class RockingSpectrum(Result):
         named_curves = self._curves()
         if len(named_curves) > _MOST_CURVES:
             raise InvalidOption(f"a figure shows at most {_MOST_CURVES} curves, not {len(named_curves)}; select some")
+        alone = len(named_curves) == 1
         curves = [
             SpectrumCurves(
-                name,
-                one.peak_over_alpha.transpose("motion", "p").values,
+                "" if alone else name,
+                self._peaks_of_motions(one),
                 one.fractile_over_alpha.transpose("fractile", "p").values,
                 one.overturned_share.values,
             )
@@ -245,16 +299,30 @@ class RockingSpectrum(Result):
             fractiles=self.data.fractile.values.tolist(),
             motions=self._labels(),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
-            title=title or f"{self._motions()}, {self.data.model} model",
+            title=title
+            or ", ".join([self._motions(), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]),
             ax=ax,
             figsize=figsize,
         )
 
+    @property
+    def _of_ensemble(self) -> bool:
+        return "block" in self.data.dims
+
+    def _peaks_of_motions(self, one: xr.Dataset) -> Floats:
+        """Peaks under each motion, shape (motions, p): of an ensemble its median."""
+        if not self._of_ensemble:
+            return np.asarray(one.peak_over_alpha.transpose("motion", "p").values)
+        peaks = one.peak_over_alpha.transpose("block", "motion", "p").values
+        return np.asarray(weighted_fractiles(peaks, one.weight.values, _HALF)[0])
+
     def _labels(self) -> list[str]:
         """Names of the motions, with what was done to them."""
         names, histories = self.data.motion.values, self.data.histories
+        verticals = self.data.vertical.values if "vertical" in self.data.coords else [""] * len(names)
         return [
-            labelled(str(name), done.split("; ") if done else []) for name, done in zip(names, histories, strict=True)
+            labelled(str(name), done.split("; ") if done else [], str(vertical))
+            for name, done, vertical in zip(names, histories, verticals, strict=True)
         ]
 
     def _motions(self) -> str:
@@ -268,6 +336,8 @@ class RockingSpectrum(Result):
 
     def _curves(self) -> list[tuple[str, xr.Dataset]]:
         """Name and select each combination of slenderness and restitution."""
+        if self._of_ensemble:
+            return [(self.data.blocks, self.data)]
         stacked = self.data.stack(curve=[name for name in ("alpha", "restitution") if name in self.data.dims])
         return [(_curve_name(one), one) for one in (stacked.isel(curve=k) for k in range(stacked.sizes["curve"]))]
 
@@ -277,10 +347,56 @@ def _curve_name(one: xr.Dataset) -> str:
     return f"alpha = {float(one.alpha):.5g} rad ({math.degrees(one.alpha):.4g}°){restitution}"
 
 
-def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares: Floats) -> xr.Dataset:
-    """Ensemble over a grid of blocks as a spectrum, p last."""
+def _ensemble_spectrum(
+    blocks: Blocks,
+    weights: ArrayLike | None,
+    motions: Motion | Sequence[Motion],
+    p: ArrayLike | None,
+    size: ArrayLike | None,
+    shares: Floats,
+    options: dict[str, Any],
+) -> xr.Dataset:
+    """Spectrum of an ensemble, whose blocks are all made larger or smaller together, p last."""
     import xarray as xr
 
+    weight = mean_one(weights, len(blocks))
+    own = blocks.p.mean(axis=1)
+    median = float(weighted_fractiles(own, weight, _HALF)[0])
+    rates = median * _FACTORS if p is None and size is None else _rates(p, size, blocks.gravity)
+    count, n = len(rates), len(blocks)
+    checks.grid_size({"motions": len(several_motions(motions)), "blocks": n, "p": count}, InvalidOption)
+    factors = np.tile(rates / median, n)[:, None]
+    resized = blocks.select(np.repeat(np.arange(n), count))
+    table = simulate_many(
+        Blocks(resized.p * factors, resized.alpha, resized.restitution, gravity=blocks.gravity), motions, **options
+    )
+    require_finished(table.unfinished.values)
+    peak, overturned = (
+        table[name].transpose("motion", "block").values.reshape(-1, n, count)
+        for name in ("peak_rotation", "overturned")
+    )
+    over_alpha = np.where(overturned, np.inf, peak / blocks.alpha.min(axis=1)[:, None])
+    weights_of_all = np.tile(weight, len(peak))
+    return (
+        _described_spectrum(
+            table,
+            ("block", "p"),
+            (peak, over_alpha, overturned),
+            (
+                ("p",),
+                weighted_fractiles(over_alpha.reshape(-1, count), weights_of_all, shares),
+                np.average(overturned.reshape(-1, count), axis=0, weights=weights_of_all),
+            ),
+            {"p": rates, "fractile": shares},
+            blocks.gravity,
+        )
+        .assign_coords(weight=xr.DataArray(weight, dims="block"))
+        .assign_attrs(blocks=pooled(blocks, weights))
+    )
+
+
+def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares: Floats) -> xr.Dataset:
+    """Ensemble over a grid of blocks as a spectrum, p last."""
     names = [*(name for name in axes if name != "p"), "p"]
 
     def on_grid(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
@@ -288,7 +404,24 @@ def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares
 
     peak, overturned = on_grid(table.peak_rotation.values), on_grid(table.overturned.values)
     over_alpha = np.where(overturned, np.inf, peak / axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
-    radius = 0.75 * blocks.gravity / axes["p"] ** 2
+    found = tuple(names), fractiles_of(over_alpha, shares), overturned.mean(axis=0)
+    peaks = peak, over_alpha, overturned
+    return _described_spectrum(table, tuple(names), peaks, found, {**axes, "fractile": shares}, blocks.gravity)
+
+
+def _described_spectrum(
+    table: xr.Dataset,
+    names: tuple[str, ...],
+    peaks: tuple[Floats, Floats, np.ndarray[Any, Any]],
+    found: tuple[tuple[str, ...], Floats, Floats],
+    axes: dict[str, Floats],
+    gravity: float,
+) -> xr.Dataset:
+    """Peaks over (motion, *names), and the fractiles and shares found over their own dimensions, with their meaning."""
+    import xarray as xr
+
+    peak, over_alpha, overturned = peaks
+    dims, fractiles, share = found
     words = "over the slenderness; infinite where the block overturns"
     return xr.Dataset(
         {
@@ -300,28 +433,32 @@ def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares
             "peak_over_alpha": (("motion", *names), over_alpha, {"units": "1", "long_name": f"peak rotation {words}"}),
             "overturned": (("motion", *names), overturned, table.overturned.attrs),
             "fractile_over_alpha": (
-                ("fractile", *names),
-                fractiles_of(over_alpha, shares),
+                ("fractile", *dims),
+                fractiles,
                 {"units": "1", "long_name": f"fractile of the peak rotation {words}"},
             ),
             "overturned_share": (
-                names,
-                overturned.mean(axis=0),
+                dims,
+                share,
                 {"units": "1", "long_name": "share of the motions that overturn the block"},
             ),
         },
         {
             "motion": table.motion,
+            **{name: table[name] for name in ("vertical",) if name in table.coords},
             **{name: (name, values, {"units": _UNITS[name]}) for name, values in axes.items()},
-            "fractile": ("fractile", shares),
             "period": ("p", 2.0 * np.pi / axes["p"], {"units": "s", "long_name": "2 pi/p"}),
-            "size": ("p", radius, {"units": "m", "long_name": "half diagonal of the rectangular block"}),
+            "size": (
+                "p",
+                0.75 * gravity / axes["p"] ** 2,
+                {"units": "m", "long_name": "half diagonal of the rectangular block"},
+            ),
         },
         {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions", "histories")},
     )
 
 
-_UNITS = {"p": "rad/s", "alpha": "rad", "restitution": "1"}
+_UNITS = {"p": "rad/s", "alpha": "rad", "restitution": "1", "fractile": "1"}
 
 
 def _rates(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> Floats:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from rocking import checks
-from rocking.block import Block
+from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption, OutputError
+from rocking.contact import friction_coefficient
+from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
+from rocking.product import block_coordinates, names_of, verticals_of
 from rocking.progress import Progress, note
 from rocking.response import Response
 from rocking.response.digits import ratio_text
 from rocking.response.verdict import in_brief
 from rocking.simulation import simulate
-from rocking.tables import named, text_table, to_json, write_text
+from rocking.tables import counted, decimal, frame_of, named, text_table, to_json, write_bytes, write_text
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Columns for people; files hold all.
 _SHOWN: Final = {
@@ -46,23 +52,34 @@ class Survey:
         Response to each.
     friction : float or None
         Coefficient of friction at which sliding is looked for.
+    skipped : mapping of str to str
+        Records that could not be read, and why.
     """
 
     block: Block
     records: tuple[str, ...]
     responses: tuple[Response, ...]
     friction: float | None = None
+    skipped: Mapping[str, str] = field(default_factory=dict)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return what became of the block under each record; units are in the names."""
-        each = zip(self.records, self.responses, strict=True)
-        return [_row(name, response) | self._sliding(response) for name, response in each]
+        labels = record_columns(self.records, [motion_of(response) for response in self.responses])
+        block = block_columns(self.block)
+        each = zip(labels, self.responses, strict=True)
+        return [label | block | _row(response) | self._sliding(response) for label, response in each]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the table as a data frame, with a row for each record that could not be read."""
+        return frame_of(self.rows(), self.skipped)
 
     def summary(self) -> str:
         """Return the table for people."""
         known = [{"peak_over_slenderness": float(ratio_text(response))} for response in self.responses]
         rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
-        shown = _SHOWN if self.friction is None else _SHOWN | {_SLIDING: f"slides at {self.friction:g}, s"}
+        shown = (
+            _SHOWN if self.friction is None else _SHOWN | {_SLIDING: f"with friction {self.friction:g} slides at, s"}
+        )
         if any(row["processing"] for row in rows):
             shown = shown | {"processing": "done to the record"}
         table = text_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
@@ -74,7 +91,8 @@ class Survey:
         undecided = sum(response.stopped or response.unfinished for response in self.responses)
         count = "1 record" if len(self.records) == 1 else f"{len(self.records)} records"
         known = f", not decided under {undecided}" if undecided else ""
-        return f"{self.block.description}: {count}, overturned by {overturned}{known}"
+        unread = f"; {counted(len(self.skipped), 'record')} skipped" if self.skipped else ""
+        return f"{self.block.description}: {count}, overturned by {overturned}{known}{unread}"
 
     def __repr__(self) -> str:
         return f"<Survey: {self._count()}>"
@@ -88,10 +106,13 @@ class Survey:
             named("alpha", "rad"): [side.alpha for side in sides],
             "restitution": [side.restitution for side in sides],
         }
-        return {"block": block, "records": self.rows()}
+        friction = {} if self.friction is None else {"friction": self.friction}
+        return {"block": block, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
 
     def _sliding(self, response: Response) -> dict[str, float]:
-        return {} if self.friction is None else {_SLIDING: response.sliding_time(self.friction)}
+        if self.friction is None:
+            return {}
+        return {"friction": self.friction, _SLIDING: response.sliding_time(self.friction)}
 
     def folders(self) -> list[str]:
         """Return a name for a folder of each record, no two alike."""
@@ -111,17 +132,16 @@ class Survey:
         OutputError
             If they cannot be written.
         """
-        import pandas
-
-        frame = pandas.DataFrame(self.rows())
-        write_text(folder / "summary.json", to_json(self.to_dict()) + "\n")
-        write_text(folder / "summary.csv", frame.to_csv(index=False, lineterminator="\n"))
+        frame = self.to_dataframe()
+        digits: dict[str, Any] = {"index": False, "float_format": "%.15g"}
+        write_text(folder / "summary.csv", frame.to_csv(lineterminator="\n", **digits))
         try:
-            frame.to_excel(folder / "summary.xlsx", sheet_name="summary", freeze_panes=(1, 0), index=False)
+            workbook = io.BytesIO()
+            frame.to_excel(workbook, sheet_name="summary", freeze_panes=(1, 0), **digits)
+            write_bytes(folder / "summary.xlsx", workbook.getvalue())
         except ImportError:
             note("no summary.xlsx: install rocking[excel] for a workbook; summary.csv holds the same table")
-        except OSError as error:
-            raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another folder") from error
+        write_text(folder / "summary.json", to_json(self.to_dict()) + "\n")
 
 
 def survey(
@@ -159,29 +179,51 @@ def survey(
     Examples
     --------
     >>> import rocking
-    >>> block = rocking.Block(half_width=0.12, half_height=0.55)
+    >>> block = rocking.Block(width=0.24, height=1.1)
     >>> names = ["el-centro-meloland-270", "ridgecrest-clc-090"]
     >>> found = survey(block, {name: rocking.records.load(name) for name in names})
     >>> print(found.summary().splitlines()[0])
     rectangular block, 0.24 m x 1.1 m: 2 records, overturned by 1
     """
     checks.mapping(motions, "motions", InvalidOption, "{name: motion}")
+    if friction is not None:
+        friction_coefficient(friction)
     responses = []
     with Progress("simulating", total=len(motions), show=progress) as bar:
-        for name, motion in motions.items():
+        for motion in motions.values():
             responses.append(simulate(block, motion, **options))
-            _row(name, responses[-1])  # what takes long in it, the response keeps: while the bar is there
+            _row(responses[-1])  # what takes long in it, the response keeps: while the bar is there
             bar.advance()
     return Survey(block, tuple(motions), tuple(responses), friction)
 
 
-def _row(record: str, response: Response) -> dict[str, Any]:
-    motion = response.motion
-    assert motion is not None
+def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
+    """Name each record as it was asked for, and its motion as other analyses name it."""
+    names, verticals = names_of(motions), verticals_of(motions)
+    return [
+        {"record": record, "motion": names[k], **{name: column[1][k] for name, column in verticals.items()}}
+        for k, record in enumerate(records)
+    ]
+
+
+def block_columns(block: Block) -> dict[str, Any]:
+    """Describe a block in the columns of a table."""
+    columns = block_coordinates(Blocks.of(block))
+    numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
+    return {"block": block.description, **numbers}
+
+
+def motion_of(response: Response) -> Motion:
+    """Return the motion of a response that has one."""
+    assert response.motion is not None
+    return response.motion
+
+
+def _row(response: Response) -> dict[str, Any]:
+    motion = motion_of(response)
     return {
-        "record": record,
         named("duration", "s"): motion.duration,
-        named("pga", "g"): motion.pga / STANDARD_GRAVITY,
+        named("pga", "g"): decimal(motion.pga / STANDARD_GRAVITY),
         named("pgv", "m/s"): motion.pgv,
         "processing": "; ".join(motion.history),
         "verdict": in_brief(response),

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
+from rocking.block.body import bodies_of, refusal
 from rocking.block.single import ALPHA, GRAVITY, RESTITUTION, Block, Limits, P, one_block, within
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
@@ -28,7 +29,8 @@ class Blocks:
     alpha : array_like
         Slendernesses, rad.
     restitution : array_like, optional
-        Factors on the angular speed on leaving a side; Housner's from `alpha` by default.
+        Factors on the angular speed on leaving a side. By default those that conserve angular momentum: Housner's from
+        `alpha` where both sides are equal, else of the one rigid body whose sides have these p and alpha.
     gravity : float
         Acceleration of gravity, m/s^2.
 
@@ -37,7 +39,7 @@ class Blocks:
     Raises
     ------
     InvalidBlock
-        If a value is out of its range; the message says which block.
+        If a value is out of its range, or no restitution follows from p and alpha; the message says which block.
 
     Examples
     --------
@@ -59,16 +61,12 @@ class Blocks:
         *,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        angles = checks.numbers(alpha, "alpha", InvalidBlock)
-        with np.errstate(invalid="ignore"):
-            kept = (
-                1.0 - 1.5 * np.sin(angles) ** 2
-                if restitution is None
-                else checks.numbers(restitution, "restitution", InvalidBlock)
-            )
+        given: dict[str, ArrayLike] = {"p": p, "alpha": alpha}
+        if restitution is not None:
+            given["restitution"] = restitution
         try:
-            columns = [_columns(values) for values in (checks.numbers(p, "p", InvalidBlock), angles, kept)]
-            arrays = np.broadcast_arrays(*columns)
+            columns = [_columns(checks.numbers(values, name, InvalidBlock)) for name, values in given.items()]
+            arrays = list(np.broadcast_arrays(*columns))
         except ValueError:
             raise InvalidBlock(
                 "p, alpha and restitution must be numbers, or arrays of shape (n,) or (n, 2) with one n"
@@ -78,6 +76,8 @@ class Blocks:
         _check(
             arrays[1], ALPHA._replace(high=np.nextafter(ALPHA.high, 0.0)), "alpha must be from {:g} to below pi/2 rad"
         )
+        if restitution is None:
+            arrays.append(_conserved(*arrays))
         _check(arrays[2], RESTITUTION, "restitution must be in (0, 1], at least {:g}; give restitution=")
         for name, array in zip(("p", "alpha", "restitution"), arrays, strict=True):
             held = np.array(array)
@@ -128,7 +128,7 @@ class Blocks:
 
         Examples
         --------
-        >>> Blocks.of([Block(0.2, 1.0), Block(0.1, 0.5)]).p.shape
+        >>> Blocks.of([Block(width=0.4, height=2.0), Block(width=0.2, height=1.0)]).p.shape
         (2, 2)
         """
         if isinstance(blocks, Blocks):
@@ -212,6 +212,18 @@ def _columns(array: Floats) -> Floats:
     if array.ndim > 1:
         raise ValueError
     return np.repeat(np.atleast_1d(array)[:, None], 2, axis=1)
+
+
+def _conserved(p: Floats, alpha: Floats) -> Floats:
+    """Restitutions that conserve angular momentum, of the rigid bodies whose sides have these p and alpha."""
+    kept: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
+    sided = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
+    found = bodies_of(p[sided], alpha[sided])
+    if not found.known.all():
+        first = int(np.argmin(found.known))
+        raise InvalidBlock(f"{refusal(found, p[sided], alpha[sided], first)} (block {sided[first]})")
+    kept[sided] = found.restitution
+    return kept
 
 
 def _check(values: Floats, limits: Limits, rule: str) -> None:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Never
+
+import numpy as np
 
 from rocking import checks, svg
+from rocking.block.body import bodies_of, gyration_squared, refusal
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock, InvalidOption
 
@@ -31,6 +34,10 @@ GRAVITY: Final = Limits(1e-6, 1e6)
 RESTITUTION: Final = Limits(1e-9, 1.0)
 _LENGTH: Final = Limits(1e-20, 1e20)
 _MASS: Final = Limits(1e-30, 1e30)
+#: Rounding of a length that was computed, relative.
+_ROUNDING: Final = 1e-12
+#: Restitutions so near are one: that of a body, from p and alpha or from itself.
+_SAME_RESTITUTION: Final = 1e-9
 _HEAVIEST_BEAM: Final = 1e12
 #: Longer side of a block's picture, pixels.
 _PICTURED: Final = 120.0
@@ -74,12 +81,16 @@ class Block:
     Parameters
     ----------
     half_width, half_height : float
-        Half the width b and half the height h of a rectangular block, m.
+        Half the width b and half the height h of a rectangular block, m. Sizes are given by name.
     width, height : float
         The full sizes instead, m.
+    offset : float
+        Horizontal distance of the centre of mass from the middle of the width, m, positive to side +; a quarter of the
+        width at most.
     restitution : float or pair, optional
         Factor on the angular speed at an impact, in (0, 1]; a pair is (on leaving side +, on leaving side -).
-        By default Housner's, 1 - 1.5 sin(alpha)^2, which conserves angular momentum about the new pivot.
+        By default the one that conserves angular momentum about the new pivot: without an offset Housner's,
+        1 - 1.5 sin(alpha)^2.
     mass : float, optional
         Mass, kg; it only scales forces and moments of inertia.
     gravity : float
@@ -88,12 +99,18 @@ class Block:
     Raises
     ------
     InvalidBlock
-        If the sizes are neither two halves nor two full ones, one is not positive and finite, the restitution is
-        outside (0, 1], or Housner's is not positive.
+        If the sizes are neither two halves nor two full ones, one is not positive and finite, the offset is more than
+        a quarter of the width, the restitution is outside (0, 1], or angular momentum gives one that is not positive.
 
     Notes
     -----
     alpha = atan(b/h), R = hypot(b, h), p = sqrt(3 g/(4 R)) (paper, section 2; Housner 1963).
+
+    With an offset s the block is the body of `from_pivots` with distances (b - s, b + s), height h and radius of
+    gyration k = sqrt((b^2 + h^2)/3 - s^2). Its moment of inertia about the middle of the rectangle is that of an even
+    block: so it is where one half of the width is heavier than the other, or where the density grows along the width in
+    a straight line. At a quarter of the width all mass lies in one half. Of a body with its mass farther out, or
+    spread otherwise, give the radius of gyration to `from_pivots`.
 
     Examples
     --------
@@ -104,6 +121,8 @@ class Block:
     1.96133
     >>> Block(width=0.4, height=2.0)
     <Block: rectangular block, 0.4 m x 2 m; p = 2.6855 rad/s, alpha = 0.1974 rad, restitution = 0.94231>
+    >>> print("%.6f on leaving side +, %.6f on leaving side -" % Block(width=0.4, height=2.0, offset=0.03).restitution)
+    0.934223 on leaving side +, 0.950533 on leaving side -
     """
 
     sides: tuple[Side, Side]
@@ -111,26 +130,42 @@ class Block:
     description: str
     half_width: float | None
     half_height: float | None
+    offset: float
     mass: float | None
 
     def __init__(
         self,
+        *unnamed: Never,
         half_width: float | None = None,
         half_height: float | None = None,
-        *,
         width: float | None = None,
         height: float | None = None,
+        offset: float = 0.0,
         restitution: Number | Sequence[Number] | None = None,
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
+        _refuse_unnamed(unnamed)
         b, h = _half_sizes((half_width, half_height), (width, height))
         g = within(gravity, "gravity", GRAVITY, "m/s^2")
-        alpha, radius = math.atan2(b, h), math.hypot(b, h)
-        p = math.sqrt(0.75 * g / radius)
-        e = _restitutions(restitution, (housner_restitution(alpha),) * 2, _perhaps_swapped(b, h))
-        sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
-        _fill(self, sides, g, f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m", b, h, mass)
+        text = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
+        s = checks.finite(offset, "offset", InvalidBlock)
+        if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
+            raise InvalidBlock(
+                f"offset must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}: of a block with its mass "
+                "farther out the pivots and the radius of gyration must be given"
+            )
+        if s == 0.0:
+            alpha, radius = math.atan2(b, h), math.hypot(b, h)
+            p = math.sqrt(0.75 * g / radius)
+            e = _restitutions(restitution, (housner_restitution(alpha),) * 2, _perhaps_swapped(b, h))
+            sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
+        else:
+            sides = _sides_on_pivots(
+                (b - s, b + s), h, gyration_squared(b, h, s), g, restitution, _perhaps_swapped(b, h)
+            )
+            text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
+        _fill(self, sides, g, text, (b, h, s), mass)
 
     @classmethod
     def from_parameters(
@@ -150,19 +185,27 @@ class Block:
         alpha : float or pair
             Slenderness, rad, between 0 and pi/2.
         restitution : float or pair, optional
-            Factor on the angular speed on leaving a side, in (0, 1]; by default Housner's from alpha.
+            Factor on the angular speed on leaving a side, in (0, 1]. By default the one that conserves angular
+            momentum: Housner's where the sides are equal, else of the one rigid body that has these p and alpha.
         gravity : float
             Acceleration of gravity, m/s^2.
 
         Returns
         -------
         Block
-            Its radius is that of a rectangular block with the same p, R = 3 g/(4 p^2).
+            Its radii are those of that body, or where it has another restitution those of a rectangular block with the
+            same p, R = 3 g/(4 p^2).
 
         Raises
         ------
         InvalidBlock
-            If a parameter is out of its range.
+            If a parameter is out of its range, or without a restitution no rigid body has these sides, or p and alpha
+            have too few digits to tell it to 0.05.
+
+        Notes
+        -----
+        Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2. Sides
+        that agree to the digits that they are given to (three at least) count as equal. (Derived in the documentation.)
 
         Examples
         --------
@@ -170,13 +213,30 @@ class Block:
         0.92
         >>> Block.from_parameters(p=(2.5, 2.2), alpha=(0.12, 0.2), restitution=(0.9, 0.85)).alpha
         (0.12, 0.2)
+        >>> statue = Block.from_parameters(p=(2.9858, 3.0053), alpha=(0.27417, 0.155))
+        >>> print("%.3f on leaving side +, %.3f on leaving side -" % statue.restitution)
+        0.950 on leaving side +, 0.914 on leaving side -
         """
         g = within(gravity, "gravity", GRAVITY, "m/s^2")
         rates = [within(value, "p", P, "rad/s") for value in _pair(p, "p")]
         angles = [_angle(value) for value in _pair(alpha, "alpha")]
-        e = _restitutions(restitution, tuple(housner_restitution(angle) for angle in angles))
-        sides = tuple(Side(rates[i], angles[i], e[i], 0.75 * g / rates[i] ** 2) for i in range(2))
-        return _made(cls, (sides[0], sides[1]), g, "block from its parameters")
+        radii, text = [0.75 * g / rate**2 for rate in rates], "block from its parameters"
+        if rates[0] == rates[1] and angles[0] == angles[1]:
+            e = _restitutions(restitution, (housner_restitution(angles[0]),) * 2)
+        else:
+            both = np.array([rates]), np.array([angles])
+            found = bodies_of(*both)
+            if restitution is None and (reason := refusal(found, *both)):
+                raise InvalidBlock(reason)
+            conserved = found.restitution[0].tolist()
+            e = _restitutions(restitution, conserved)
+            if not found.alike[0] and all(abs(e[i] - conserved[i]) <= _SAME_RESTITUTION for i in range(2)):
+                depth = g * float(found.depth[0])
+                radii = [depth / math.cos(angle) for angle in angles]
+                k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
+                text = f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
+        sides = tuple(Side(rates[i], angles[i], e[i], radii[i]) for i in range(2))
+        return _made(cls, (sides[0], sides[1]), g, text)
 
     @classmethod
     def from_pivots(
@@ -220,7 +280,7 @@ class Block:
         --------
         A rectangle is the body with equal distances and I = m R^2/3:
 
-        >>> rectangle = Block(0.2, 1.0)
+        >>> rectangle = Block(half_width=0.2, half_height=1.0)
         >>> body = Block.from_pivots((0.2, 0.2), 1.0, (1.04 / 3) ** 0.5)
         >>> abs(body.p - rectangle.p) < 1e-15, abs(body.restitution - rectangle.restitution) < 1e-15
         (True, True)
@@ -229,24 +289,17 @@ class Block:
         h = _length(height, "height")
         k = _length(radius_of_gyration, "radius_of_gyration")
         g = within(gravity, "gravity", GRAVITY, "m/s^2")
-        radii = math.hypot(plus, h), math.hypot(minus, h)
-        inertias = [k * k + radius * radius for radius in radii]
-        kept = k * k + h * h - plus * minus
-        e = _restitutions(restitution, (kept / inertias[1], kept / inertias[0]))
-        sides = tuple(
-            Side(math.sqrt(g * radii[i] / inertias[i]), math.atan2((plus, minus)[i], h), e[i], radii[i])
-            for i in range(2)
-        )
+        sides = _sides_on_pivots((plus, minus), h, k * k, g, restitution)
         text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
-        return _made(cls, (sides[0], sides[1]), g, text, mass)
+        return _made(cls, sides, g, text, mass)
 
     @classmethod
     def from_frame(
         cls,
+        *,
         half_width: float,
         half_height: float,
         mass_ratio: float,
-        *,
         restitution: Number | Sequence[Number] | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> Block:
@@ -255,7 +308,7 @@ class Block:
         Parameters
         ----------
         half_width, half_height : float
-            Half the width and half the height of one column, m.
+            Half the width and half the height of one column, m. All are given by name.
         mass_ratio : float
             gamma: mass of the beam over the mass of all columns; 0 is a column alone.
         restitution : float or pair, optional
@@ -275,7 +328,8 @@ class Block:
 
         Examples
         --------
-        >>> column, frame = Block(0.5, 3.0), Block.from_frame(0.5, 3.0, mass_ratio=2.0)
+        >>> column = Block(half_width=0.5, half_height=3.0)
+        >>> frame = Block.from_frame(half_width=0.5, half_height=3.0, mass_ratio=2.0)
         >>> frame.alpha == column.alpha, round(frame.radius / column.radius, 12)
         (True, 1.4)
         """
@@ -398,7 +452,7 @@ def _made(
     cls: type[Block], sides: tuple[Side, Side], gravity: float, description: str, mass: float | None = None
 ) -> Block:
     block = cls.__new__(cls)
-    _fill(block, sides, gravity, description, None, None, mass)
+    _fill(block, sides, gravity, description, None, mass)
     return block
 
 
@@ -407,10 +461,10 @@ def _fill(
     sides: tuple[Side, Side],
     gravity: float,
     description: str,
-    half_width: float | None,
-    half_height: float | None,
+    rectangle: tuple[float, float, float] | None,
     mass: float | None,
 ) -> None:
+    """Fill in what a block is; of a rectangle also half its sizes and its offset, m."""
     for side in sides:
         within(side.p, "p (from the sizes)", P, "rad/s")
         within(side.alpha, "alpha (from the sizes)", ALPHA, "rad")
@@ -418,8 +472,9 @@ def _fill(
         "sides": sides,
         "gravity": gravity,
         "description": description,
-        "half_width": half_width,
-        "half_height": half_height,
+        "half_width": None if rectangle is None else rectangle[0],
+        "half_height": None if rectangle is None else rectangle[1],
+        "offset": 0.0 if rectangle is None else rectangle[2],
         "mass": None if mass is None else within(mass, "mass", _MASS, "kg"),
     }
     for name, value in fields.items():
@@ -454,17 +509,47 @@ def one_block(block: Block) -> Block:
     >>> one_block((0.2, 1.0))
     Traceback (most recent call last):
         ...
-    rocking.errors.InvalidBlock: a Block is needed, not a tuple: make one with Block(half_width, half_height), in m
+    rocking.errors.InvalidBlock: a Block is needed, not a tuple: make one with Block(width=, height=), in m
     """
     if not isinstance(block, Block):
         raise InvalidBlock(
-            f"a Block is needed, not a {type(block).__name__}: make one with Block(half_width, half_height), in m"
+            f"a Block is needed, not a {type(block).__name__}: make one with Block(width=, height=), in m"
         )
     return block
 
 
 def _checked_model(model: str) -> str:
     return checks.one_of(model, "model", InvalidOption, ("nonlinear", "linear"))
+
+
+def _refuse_unnamed(sizes: Sequence[object]) -> None:
+    """Refuse sizes without names, of which nobody sees whether they are halves."""
+    if sizes:
+        raise InvalidBlock(
+            f"the sizes of a block are given by name, not as {', '.join(map(checks.shown, sizes))}: width= and height= "
+            "for the full sizes, half_width= and half_height= for half of them, in m"
+        )
+
+
+def _sides_on_pivots(
+    distances: tuple[float, float],
+    height: float,
+    gyration_squared: float,
+    gravity: float,
+    restitution: object,
+    mend: str = "",
+) -> tuple[Side, Side]:
+    """Sides of a body from the distances of its pivots from the centre of mass, its height, m, and k^2, m^2."""
+    plus, minus = distances
+    radii = math.hypot(plus, height), math.hypot(minus, height)
+    inertias = [gyration_squared + radius * radius for radius in radii]
+    kept = gyration_squared + height * height - plus * minus
+    e = _restitutions(restitution, (kept / inertias[1], kept / inertias[0]), mend)
+    first, second = (
+        Side(math.sqrt(gravity * radius / inertia), math.atan2(distance, height), factor, radius)
+        for distance, radius, inertia, factor in zip(distances, radii, inertias, e, strict=True)
+    )
+    return first, second
 
 
 def _half_sizes(
@@ -509,7 +594,7 @@ def _perhaps_swapped(half_width: float, half_height: float) -> str:
     return f"swap its sizes, {2.0 * half_width:g} m wide and {2.0 * half_height:g} m high, if that is a slip, or "
 
 
-def _restitutions(given: object, default: tuple[float, ...], mend: str = "") -> tuple[float, float]:
+def _restitutions(given: object, default: Sequence[float], mend: str = "") -> tuple[float, float]:
     if given is None:
         if min(default) <= 0.0:
             raise InvalidBlock(

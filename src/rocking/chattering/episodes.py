@@ -105,7 +105,7 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     Examples
     --------
     >>> import rocking
-    >>> response = rocking.simulate(rocking.Block(0.12, 0.55), rocking.records.load("ridgecrest-clc-090"))
+    >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090"))
     >>> found = chattering_episodes(response)
     >>> len(found.episodes), bool((found.episodes["upper"] - found.episodes["lower"] < 1e-11).all())
     (6, True)

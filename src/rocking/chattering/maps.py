@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,8 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.chattering.families import Case, Family
+from rocking.constants import VERSION
 from rocking.errors import InvalidOption
 from rocking.motion.exceedance import exceedances
+from rocking.motion.motion import Motion
 from rocking.result import Result
 from rocking.simulation import simulate
 from rocking.tables import text_table
@@ -32,7 +34,7 @@ class Outcome(IntEnum):
     Attributes
     ----------
     NO_UPLIFT
-        The motion never passes a threshold.
+        The motion never passes a threshold, or by no more than rounding.
     COMPLETE
         Complete chattering: the block is proven to rest before the motion passes a threshold again. Under a sine this
         is the paper's definition, rest within half a period, a < a_cr.
@@ -43,8 +45,8 @@ class Outcome(IntEnum):
     OVERTURNS
         It overturns without ever coming to rest.
     UNPROVEN
-        Its first rest is not proven: double precision does not resolve the impacts, as where the motion passes a
-        threshold by no more than rounding, or they are more than a simulation's budget of steps.
+        Its first rest is not proven: double precision does not resolve the impacts, as where the motion first passes a
+        threshold by hardly more than rounding, or they are more than a simulation's budget of steps.
     """
 
     NO_UPLIFT = 0
@@ -53,6 +55,10 @@ class Outcome(IntEnum):
     RESTS_AT_LAST = 3
     OVERTURNS = 4
     UNPROVEN = 5
+
+
+#: Four ulp: by so much of itself a peak that was meant to be the threshold may exceed it.
+_ROUNDING: Final = 2.0**-50
 
 
 class _Point(NamedTuple):
@@ -109,7 +115,8 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> Chatt
     if len(parameters) != 2:
         raise InvalidOption(f"a map has two parameters, not {len(parameters)}")
     (first, x), (second, y) = ((name, _axis(values, name)) for name, values in parameters.items())
-    points = [_followed(family(float(one), float(other))) for one in x for other in y]
+    cases = [family(float(one), float(other)) for one in x for other in y]
+    points = [_followed(case) for case in cases]
     columns = {name: np.array(column) for name, column in zip(_Point._fields, zip(*points, strict=True), strict=True)}
     attributes = {
         "outcome": {
@@ -125,6 +132,7 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> Chatt
             for name, column in columns.items()
         },
         {first: x, second: y},
+        {"program": f"rocking {VERSION}", "case": _in_common(cases[0], cases[-1])},
     )
     return ChatteringMap(dataset.assign(complete=dataset.outcome == Outcome.COMPLETE))
 
@@ -178,7 +186,7 @@ class ChatteringMap(Result):
         labels : mapping of str to str, optional
             What to write at the axes in place of the parameters' names.
         title : str
-            Title of the figure.
+            Title; by default the motion, the block and the model, as far as they are the same all over the map.
         figsize : (float, float), optional
             Width and height of a new figure, inches.
         """
@@ -193,10 +201,18 @@ class ChatteringMap(Result):
             meanings=[_words(outcome) for outcome in Outcome],
             x_label=written.get(str(second), str(second)),
             y_label=written.get(str(first), str(first)),
-            title=title,
+            title=title or f"first uplift under {self.data.attrs['case']}",
             ax=ax,
             figsize=figsize,
         )
+
+
+def hardly_lifts(motion: Motion, thresholds: tuple[float, float], gravity: float) -> bool:
+    """Whether a motion passes the thresholds of the two sides (m/s^2) by no more than rounding, if at all."""
+    plus, minus = (threshold * (1.0 + _ROUNDING) for threshold in thresholds)
+    if motion.vertical is None and motion.pga > min(plus, minus):
+        return False
+    return not len(exceedances(motion, (plus, minus), gravity))
 
 
 def outcomes_of(ends: NDArray[np.void], later: Floats) -> NDArray[np.int64]:
@@ -229,10 +245,27 @@ def _words(outcome: Outcome) -> str:
     return outcome.name.lower().replace("_", " ")
 
 
+def _in_common(one: Case, other: Case) -> str:
+    """Say what two cases have in common: the motion's name, the proportions and the size of the block, the model."""
+    what = [
+        ("{}", *(case.motion.name for case in (one, other))),
+        ("alpha = {} rad", *(_of_sides(case, "alpha") for case in (one, other))),
+        ("restitution = {}", *(_of_sides(case, "restitution") for case in (one, other))),
+        ("{} model", one.model, other.model),
+    ]
+    return ", ".join(words.format(first) for words, first, last in what if first == last)
+
+
+def _of_sides(case: Case, name: str) -> str:
+    """Return a parameter of a case's block, once where both sides have the same."""
+    return ", ".join(dict.fromkeys(f"{getattr(side, name):.5g}" for side in case.block.sides))
+
+
 def _followed(case: Case) -> _Point:
     response = simulate(case.block, case.motion, model=case.model)
     events = response.events
-    if not len(events):
+    thresholds = case.block.uplift_thresholds(case.model)
+    if not len(events) or hardly_lifts(case.motion, thresholds, case.block.gravity):
         return _Point(Outcome.NO_UPLIFT, math.nan, math.nan, math.nan, math.nan, 0, False)
     uplift = float(events["time"][0])
     if response.unfinished and not len(response.chattering):
@@ -241,7 +274,7 @@ def _followed(case: Case) -> _Point:
         return _Point(Outcome.OVERTURNS, uplift, math.nan, math.nan, math.nan, 0, response.overturned)
     first = response.chattering[0]
     # The first exceedance is the one that lifted the block.
-    later = exceedances(case.motion, case.block.uplift_thresholds(case.model), case.block.gravity)[1:, 0]
+    later = exceedances(case.motion, thresholds, case.block.gravity)[1:, 0]
     return _Point(
         _outcome(float(first["upper"]), later),
         uplift,

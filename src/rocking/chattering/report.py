@@ -19,7 +19,7 @@ from rocking.chattering.theory.asymptotic import asymptotic_table, first_impact_
 from rocking.chattering.theory.duration import chattering_time, first_arc, sequence
 from rocking.chattering.theory.series import series_diagnosis
 from rocking.errors import InvalidOption, OutsideFit
-from rocking.tables import rows_of, text_table, to_json, write_text
+from rocking.tables import counted, rows_of, text_table, to_json, write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -133,10 +133,10 @@ class ChatteringReport:
         OutputError
             If they cannot be written.
         """
-        write_text(folder / "result.json", to_json(self.values) + "\n")
         write_text(folder / "impacts.csv", _csv(self.impacts))
         if self.cycles is not None:
             write_text(folder / "cycles.csv", _csv(self.cycles))
+        write_text(folder / "result.json", to_json(self.values) + "\n")
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the intervals between the impacts, and the ratios that tend to eta^2 where chattering is complete.
@@ -177,7 +177,7 @@ class ChatteringReport:
     def _bracket(self, bracket: dict[str, Any]) -> str:
         if math.isnan(bracket["upper"]):
             return "none"
-        return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {bracket['impacts']} impacts"
+        return f"{bracket['upper'] - bracket['lower']:.1e} wide, from {counted(bracket['impacts'], 'impact')}"
 
     def _pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
         if math.isnan(values["exact"]):
@@ -348,7 +348,7 @@ def _trust(series: dict[str, float]) -> str:
 
 
 def _resolved(impacts: int | None) -> str:
-    return "" if impacts is None else f", {impacts} impacts"
+    return "" if impacts is None else f", {counted(impacts, 'impact')}"
 
 
 def _csv(table: NDArray[np.void]) -> str:

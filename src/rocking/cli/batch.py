@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Sized
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from rocking.errors import OutputError
 from rocking.result import Result
-from rocking.tables import to_json, write_text
+from rocking.tables import to_json, write_figure, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from rocking.analysis.fragility.curve import Fragility
+    from rocking.cli.options import Records
+
+#: Resolution of figures as PNG.
+_DOTS_PER_INCH: Final = 160
 
 
 def is_single(names: Sequence[str], records: Sized) -> bool:
@@ -29,35 +35,50 @@ def write(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, A
     OutputError
         If one of them cannot be written.
     """
-    for stem, figure in figures.items():
-        write_figure(folder, stem, figure)
-    write_text(folder / "result.json", to_json(result) + "\n")
+    write_figures(folder, figures)
+    write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
 
 
-def write_figure(folder: Path, stem: str, figure: Figure) -> None:
-    """Write a figure as PNG and PDF into a folder.
+def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
+    """Write figures by name (PNG and PDF) into a folder.
 
     Raises
     ------
     OutputError
-        If it cannot be written.
+        If one of them cannot be written.
     """
-    try:
-        figure.savefig(folder / f"{stem}.png", dpi=160)
-        figure.savefig(folder / f"{stem}.pdf")
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
+    for stem, figure in figures.items():
+        write_figure(folder / f"{stem}.png", figure, dpi=_DOTS_PER_INCH)
+        write_figure(folder / f"{stem}.pdf", figure)
 
 
-def deliver(found: Result, stem: str, *, folder: Path | None, as_json: bool, **figure: Any) -> None:
-    """Write an analysis into a folder where there is one (figure, tables, dataset, result), and print it."""
+def deliver(
+    found: Result, stem: str, read: Records | None, *, folder: Path | None, as_json: bool, **figure: Any
+) -> None:
+    """Write an analysis into a folder where there is one (figure, tables, dataset, result), and print it.
+
+    Its tables name each motion by the record that was read, too, as those of other commands do.
+    """
     result = found.to_dict()
+    if read is not None:
+        result |= read.to_dict()
+        found = replace(found, data=found.data.assign_coords(record=("motion", [*read.motions])))
     if folder is not None:
         for table in found.TABLES:
             found.to_csv(folder / f"{table}.csv", table)
         found.to_netcdf(folder / f"{stem}.nc")
         write(folder, figures={stem: found.plot(**figure)}, result=result)
     show(result, found.summary(), as_json=as_json, folder=folder)
+
+
+def with_records(found: Fragility, read: Records) -> Fragility:
+    """Name the motion of each outcome by the record that was read, too."""
+    if found.outcomes is None:
+        return found
+    records = {row["motion"]: row["record"] for row in read.to_dict()["records"]}
+    named = found.outcomes.copy()
+    named.insert(0, "record", named["motion"].map(records))
+    return replace(found, outcomes=named)
 
 
 def show(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | None) -> None:

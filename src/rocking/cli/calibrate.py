@@ -19,8 +19,8 @@ from rocking.cli import batch
 from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledPulseOptions
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
-from rocking.quantities import Quantity, number, sides, tilt
-from rocking.tables import text_table
+from rocking.quantities import bounds, number, tilt
+from rocking.tables import counted, text_table
 from rocking.treatment.base import Model
 
 
@@ -59,7 +59,8 @@ def calibrate(
     alpha
         Likewise the slenderness, as 5deg,20deg or 0.1,0.3 (rad).
     restitution
-        Likewise the factor on the angular speed at an impact; of outcomes also housner, to follow from the slenderness.
+        Likewise the factor on the angular speed at an impact; of outcomes also housner, to follow from the slenderness
+        (of two sides as those of one rectangle).
     two_sided
         Whether the two sides of the block may differ; by default yes for outcomes, no for a history.
     candidates
@@ -77,9 +78,9 @@ def calibrate(
         The same seed gives the same result.
     """
     ranges = {
-        "p": None if p is None else _range(p, "--p", number),
-        "alpha": None if alpha is None else _range(alpha, "--alpha", tilt),
-        "restitution": restitution if restitution in (None, HOUSNER) else _range(restitution, "--restitution", number),
+        "p": None if p is None else bounds(p, "--p", number),
+        "alpha": None if alpha is None else bounds(alpha, "--alpha", tilt),
+        "restitution": restitution if restitution in (None, HOUSNER) else bounds(restitution, "--restitution", number),
     }
     start = None if initial_rotation is None else tilt(initial_rotation, "--initial-rotation")
     given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
@@ -123,9 +124,9 @@ class _Results:
 
     def write(self, folder: Path) -> None:
         """Write numbers, and figure and ensemble of a calibration."""
-        batch.write(folder, figures={"calibration": self.found.plot()} if self.found else {}, result=self.numbers)
         if isinstance(self.found, Calibration):
             self.found.to_csv(folder / "ensemble.csv")
+        batch.write(folder, figures={"calibration": self.found.plot()} if self.found else {}, result=self.numbers)
 
 
 def _refuse(belong_to: str, **given: object) -> None:
@@ -140,11 +141,6 @@ def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
     if len(motions) > 1:
         raise InvalidOption("a history has one motion of the base: give --motion, or one --pulse")
     return next(iter(motions.values()), None)
-
-
-def _range(text: str, option: str, quantity: Quantity) -> float | tuple[float, ...]:
-    ends = sides(text, option, quantity)
-    return ends if isinstance(ends, float) else tuple(ends)
 
 
 def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None) -> _Results:
@@ -180,7 +176,7 @@ def _of_outcomes(table: Outcomes, how: _How) -> _Results:
     if how.folds:
         scores = found.cross_validate(groups=table.groups, folds=how.folds).scores
         numbers["cross_validated"] = asdict(scores)
-        parts.append(f"left-out motions: {scores} ({how.folds} folds)")
+        parts.append(f"left-out motions: {scores} ({counted(how.folds, 'fold')})")
     if predicted:
         rows = [(name, float(chance)) for name, chance in predicted.items()]
         parts.append("\n" + text_table(["motion", "probability"], rows))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 from rocking.analysis.rules.check import check as run
@@ -40,7 +41,8 @@ def check(
     body = block.block()
     chosen = None if rules is None else [name.strip() for name in rules.split(",")]
     with output.folder() as folder:
-        found = run(body, motion.read_all(names), rules=chosen, model=model.model)
+        read = motion.read_all(names)
+        found = replace(run(body, read.motions, rules=chosen, model=model.model), skipped=read.skipped)
         result = found.to_dict()
         if folder is not None:
             found.to_csv(folder / "check.csv")

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from rocking import checks
+from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.fragility.fit import fragility as run
+from rocking.analysis.fragility.observed import read_observed
 from rocking.analysis.hazard import HazardCurve
+from rocking.analysis.intensity import Measure
 from rocking.cli import batch
 from rocking.cli.options import (
     BLOCK,
@@ -16,7 +22,7 @@ from rocking.cli.options import (
     MODEL,
     OUTPUT,
     RECORDS,
-    BlockOptions,
+    EnsembleOptions,
     MeasureOptions,
     MotionOptions,
     Names,
@@ -27,11 +33,15 @@ from rocking.errors import InvalidOption
 from rocking.product import Polarity
 from rocking.quantities import number
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 def fragility(
     *names: Names,
+    outcomes: Path | None = None,
     limits: str = "overturning",
-    polarity: Polarity = "+",
+    polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "+",
     confidence: float = 0.9,
     bootstrap: int = 0,
     seed: int = 0,
@@ -39,21 +49,27 @@ def fragility(
     hazard: Path | None = None,
     site: int = 0,
     years: float = 50.0,
+    standing: float | None = None,
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
+    block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
     model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Fit the probability that a block overturns, or passes a rotation, against the intensity of the motions.
 
-    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). With
-    --levels every motion is scaled to each (stripes); without, motions are taken as they are (a cloud). --out holds
-    fragility.png, .pdf, .csv, outcomes.csv (record, intensity, peak, outcome), result.json, and
-    fragility-continuous.xml and -discrete.xml (NRML 0.5).
+    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha), or the
+    ensemble of a calibration stands for it (--ensemble). With --levels every motion is scaled to each (stripes);
+    without, motions are taken as they are (a cloud). Or outcomes that were observed are fitted (--outcomes), without
+    records and block. --out holds fragility.png, .pdf, .csv, outcomes.csv (record, intensity, peak, outcome),
+    result.json, and fragility-continuous.xml and -discrete.xml (NRML 0.5).
 
     Parameters
     ----------
+    outcomes
+        CSV table of what was observed: a column overturned (1 or 0; with a column trials, how many of them), and the
+        intensity (pga_g, pgv_m_s, sa_g with --period) or the motion (a record file, or a shipped record, of which the
+        --measure is taken); and where wanted group: outcomes that belong together.
     limits
         Limit states, with commas between: overturning, or NAME=ROTATION over slenderness, as half=0.5.
     polarity
@@ -73,35 +89,81 @@ def fragility(
         Row of OpenQuake's file, from 0.
     years
         Time for which probabilities are given.
+    standing
+        Years for which the block has stood: adds how strongly and how often it was not shaken, and with --hazard how
+        probable that is; survival.png and .pdf to --out.
     """
-    body = block.block()
+    if outcomes is not None:
+        _refuse_beside_outcomes(names, block, motion, measure, limits, polarity)
+    bodies = {} if outcomes is not None else block.blocks(model)
     curve = None if hazard is None else HazardCurve.read(hazard, site=site, period=measure.period)
     checks.positive(years, "years", InvalidOption)
+    if standing is not None:
+        checks.positive(standing, "standing", InvalidOption)
+    bands: dict[str, Any] = {
+        "confidence": confidence,
+        "band": "bootstrap" if bootstrap != 0 else "likelihood",
+        "samples": bootstrap or 1,
+        "seed": seed,
+    }
     with output.folder() as folder:
-        fitted = run(
-            body,
-            list(motion.read_all(names).values()),
-            **measure.chosen(),
-            **model.chosen(),
-            limits=_limits(limits),
-            polarity=polarity,
-            confidence=confidence,
-            band="bootstrap" if bootstrap != 0 else "likelihood",
-            samples=bootstrap or 1,
-            seed=seed,
-        )
-        found, text = fitted.to_dict(), fitted.summary()
-        risk = None if curve is None else fitted.annual_rate(curve)
-        if risk is not None:
-            found["risk"], text = risk.to_dict(years), f"{text}\n\n{risk.summary(years)}"
+        read = None
+        if outcomes is not None:
+            wanted = Measure(measure.measure, measure.period, measure.damping)
+            observed = read_observed(outcomes, wanted, channel=motion.channel, dt=motion.dt, units=motion.units)
+            fitted = fit_fragility(**observed, **bands)
+        else:
+            read = motion.read_all(names)
+            fitted = run(
+                motions=list(read.motions.values()),
+                **measure.chosen(),
+                **model.chosen() | bodies,
+                limits=_limits(limits),
+                polarity=polarity,
+                **bands,
+            )
+        found, text = fitted.to_dict() | ({} if read is None else read.to_dict()), [fitted.summary()]
+        figures: dict[str, Callable[[], Figure]] = {"fragility": fitted.plot}
+        if curve is not None:
+            risk = fitted.annual_rate(curve)
+            found["risk"], figures["risk"] = risk.to_dict(years), risk.plot
+            text.append(risk.summary(years))
+        if standing is not None:
+            survived = fitted.survival(standing, curve, limit_state=fitted.curves[-1].limit_state)
+            found["survival"], figures["survival"] = survived.to_dict(), survived.plot
+            text.append(survived.summary())
         if folder is not None:
             for form in ("continuous", "discrete"):
                 fitted.to_nrml(folder / f"fragility-{form}.xml", taxonomy=taxonomy, format=form)
             fitted.to_csv(folder / "fragility.csv")
-            fitted.outcomes_to_csv(folder / "outcomes.csv")
-            figures = {"fragility": fitted.plot()} | ({} if risk is None else {"risk": risk.plot()})
-            batch.write(folder, figures=figures, result=found)
-        batch.show(found, text, as_json=output.as_json, folder=folder)
+            if fitted.outcomes is not None:
+                together = fitted if read is None else batch.with_records(fitted, read)
+                together.outcomes_to_csv(folder / "outcomes.csv")
+            batch.write(folder, figures={name: draw() for name, draw in figures.items()}, result=found)
+        batch.show(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
+
+
+def _refuse_beside_outcomes(
+    names: Sequence[str],
+    block: EnsembleOptions,
+    motion: MotionOptions,
+    measure: MeasureOptions,
+    limits: str,
+    polarity: Polarity,
+) -> None:
+    """Refuse what observed outcomes leave no room for."""
+    given = {
+        "records": names,
+        "--pulse": motion.pulse,
+        "--levels": measure.levels,
+        "--ensemble": block.ensemble,
+        "--limits": limits if limits != "overturning" else None,
+        "--polarity": polarity if polarity != "+" else None,
+        **block.given(),
+    }
+    found = [option for option, value in given.items() if value]
+    if found:
+        raise InvalidOption(f"--outcomes are observed, of a block and under motions of their own: leave {found[0]} out")
 
 
 def _limits(text: str) -> dict[str, float]:

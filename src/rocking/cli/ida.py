@@ -17,7 +17,7 @@ from rocking.cli.options import (
     ModelOptions,
     Names,
     OutputOptions,
-    RecordOptions,
+    UnscaledOptions,
 )
 
 
@@ -26,7 +26,7 @@ def ida(
     tolerance: float = 1e-6,
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
-    motion: Annotated[RecordOptions, RECORDS] = RecordOptions(),
+    motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
@@ -44,6 +44,7 @@ def ida(
     """
     body = block.block()
     with output.folder() as folder:
-        motions = list(motion.read_all(names).values())
+        read = motion.read_all(names)
+        motions = [*read.motions.values()]
         found = incremental_dynamic_analysis(body, motions, **measure.chosen(), model=model.model, tolerance=tolerance)
-        batch.deliver(found, "ida", folder=folder, as_json=output.as_json)
+        batch.deliver(found, "ida", read, folder=folder, as_json=output.as_json)

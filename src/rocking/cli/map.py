@@ -65,4 +65,4 @@ def map(
             tolerance=tolerance,
             **{name: value for name, value in given.items() if value is not None},
         )
-        batch.deliver(found, "map", folder=folder, as_json=output.as_json)
+        batch.deliver(found, "map", None, folder=folder, as_json=output.as_json)

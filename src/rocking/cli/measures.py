@@ -11,11 +11,11 @@ from rocking.cli.options import (
     MODEL,
     OUTPUT,
     RECORDS,
-    BlockOptions,
+    EnsembleOptions,
     ModelOptions,
     Names,
     OutputOptions,
-    RecordOptions,
+    UnscaledOptions,
 )
 from rocking.quantities import values
 
@@ -24,16 +24,16 @@ def measures(
     *names: Names,
     periods: str = "0.5,1,2",
     damping: float = 0.05,
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
-    motion: Annotated[RecordOptions, RECORDS] = RecordOptions(),
+    block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
+    motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
     """Compare intensity measures: how widely motions scatter, by each, at which they first overturn a block.
 
-    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Every
-    motion is scaled up until it overturns the block. --out holds measures.png, .pdf, .nc, measures.csv,
-    intensities.csv (at which each motion overturns) and result.json.
+    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha), or the
+    ensemble of a calibration stands for it (--ensemble). Every motion is scaled up until it overturns the block. --out
+    holds measures.png, .pdf, .nc, measures.csv, intensities.csv (at which each motion overturns) and result.json.
 
     Parameters
     ----------
@@ -42,13 +42,13 @@ def measures(
     damping
         Their fraction of critical damping.
     """
-    body = block.block()
+    bodies = block.blocks(model)
     with output.folder() as folder:
+        read = motion.read_all(names)
         found = compare_measures(
-            body,
-            list(motion.read_all(names).values()),
+            motions=[*read.motions.values()],
             periods=values(periods, "--periods"),
             damping=damping,
-            model=model.model,
+            **bodies,
         )
-        batch.deliver(found, "measures", folder=folder, as_json=output.as_json)
+        batch.deliver(found, "measures", read, folder=folder, as_json=output.as_json)

@@ -4,29 +4,38 @@ from __future__ import annotations
 
 import contextlib
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple
 
 from cyclopts import Group, Parameter
 
+from rocking import checks
 from rocking.analysis.intensity import MeasureName
+from rocking.cli.wording import with_options
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.named_pulses import named_pulse
-from rocking.plausibility import block_notes, level_notes, motion_notes
+from rocking.plausibility import block_notes, level_notes, motion_notes, vertical_notes
 from rocking.progress import Progress, note
-from rocking.quantities import Quantity, acceleration, number, sides, tilt, values, velocity
+from rocking.quantities import Quantity, acceleration, length, number, sides, tilt, values, velocity
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     from rocking.block import Block
 
-#: Options that say what a rectangular block is.
+#: Options that say what a block is, together, and what may go with them.
+#: What a message about a record file may name.
+_OF_FILES: Final = frozenset({"--channel", "--dt", "--units"})
+
 _SIZES: Final = ("--width", "--height")
 _HALVES: Final = ("--half-width", "--half-height")
+_PARAMETERS: Final = ("--p", "--alpha")
+_PIVOTS: Final = ("--pivots", "--height-of-mass", "--gyration")
+_Descriptions = Mapping[tuple[str, ...], tuple[str, ...]]
+_DESCRIPTIONS: Final[_Descriptions] = {_SIZES: ("--offset",), _HALVES: ("--offset",), _PARAMETERS: (), _PIVOTS: ()}
 
 #: What goes with a slenderness that is all that is known of a block.
 _FREQUENCY_PARAMETER: Final = (
@@ -67,75 +76,112 @@ def _flag(name: str, text: str) -> Parameter:
 
 
 @dataclass(frozen=True)
-class SlendernessOptions:
-    """A block by its sizes, or by its slenderness alone."""
+class BlockOptions:
+    """A block by its sizes, by its parameters, or by its pivots."""
 
     half_width: Annotated[float | None, _help("Half the width of a rectangular block, m.")] = None
     half_height: Annotated[float | None, _help("Half its height, m.")] = None
     width: Annotated[float | None, _help("Width of a rectangular block, m; with --height.")] = None
     height: Annotated[float | None, _help("Its height, m.")] = None
+    offset: Annotated[
+        float | None,
+        _help("How far its centre of mass is off the middle of the width, m; positive to side + (the right)."),
+    ] = None
+    p: Annotated[str | None, _written("Frequency parameter, rad/s; one number or two; with --alpha.")] = None
     alpha: Annotated[
         str | None, _written("Slenderness, 12deg or 0.2 (rad); two with a comma between are side + and side -.")
     ] = None
+    pivots: Annotated[
+        str | None,
+        _written(
+            "Distances of the pivots of side + and side - from the centre of mass, m, as 0.2,0.15; with "
+            "--height-of-mass and --gyration."
+        ),
+    ] = None
+    height_of_mass: Annotated[str | None, _written("Height of the centre of mass above the pivots, m.")] = None
+    gyration: Annotated[str | None, _written("Radius of gyration about the centre of mass, m.")] = None
     restitution: Annotated[
-        str | None, _written("Factor on the angular speed at an impact, in (0, 1]; one or two; Housner's by default.")
+        str | None,
+        _written(
+            "Factor on the angular speed at an impact, in (0, 1]; one or two; by default from angular momentum "
+            "(Housner's where both sides are equal)."
+        ),
     ] = None
 
-    #: Options that say what the block is without its sizes.
-    _PARAMETERS: ClassVar[tuple[str, ...]] = ("--alpha",)
+    #: Descriptions of a block that the command takes.
+    _TAKEN: ClassVar[_Descriptions] = _DESCRIPTIONS
 
     def block(self) -> Block:
-        """Return the block, with notes on what looks like a mistake; of its slenderness alone, with p = 1."""
-        from rocking.block import Block
-
+        """Return the block, with notes on what looks like a mistake."""
         e = None if self.restitution is None else sides(self.restitution, "--restitution")
-        given = tuple(option for option, value in self._options().items() if value is not None)
-        if given == _SIZES:
-            block = Block(width=self.width, height=self.height, restitution=e)
-        elif given == _HALVES:
-            block = Block(self.half_width, self.half_height, restitution=e)
-        elif given == self._PARAMETERS and self.alpha is not None:
-            block = Block.from_parameters(self._p(), sides(self.alpha, "--alpha", tilt), e)
-        else:
-            raise InvalidBlock(_which_block(given, (_SIZES, _HALVES, self._PARAMETERS)))
+        block = self._block(e)
         for sentence in block_notes(block):
             note(sentence)
         return block
 
-    def _options(self) -> dict[str, Any]:
-        """Return what is given of the block, by option."""
-        halves = {"--half-width": self.half_width, "--half-height": self.half_height}
-        return {"--width": self.width, "--height": self.height, **halves, "--alpha": self.alpha}
+    def _block(self, e: float | list[float] | None) -> Block:
+        from rocking.block import Block
 
-    def _p(self) -> float | list[float]:
-        return 1.0
-
-
-@dataclass(frozen=True)
-class BlockOptions(SlendernessOptions):
-    """A block by its sizes or by its parameters."""
-
-    p: Annotated[str | None, _written("Frequency parameter, rad/s; one number or two; with --alpha.")] = None
-
-    _PARAMETERS: ClassVar[tuple[str, ...]] = ("--p", "--alpha")
-
-    def _options(self) -> dict[str, Any]:
-        return {"--p": self.p, **super()._options()}
+        given = self.given()
+        described = next(
+            (all_ for all_, more in self._TAKEN.items() if {*all_} <= given.keys() <= {*all_, *more}), None
+        )
+        if described is None:
+            raise InvalidBlock(_which_block(tuple(given), self._TAKEN))
+        if described in (_SIZES, _HALVES):
+            return Block(
+                half_width=self.half_width,
+                half_height=self.half_height,
+                width=self.width,
+                height=self.height,
+                offset=self.offset or 0.0,
+                restitution=e,
+            )
+        if described == _PIVOTS:
+            distances = sides(given["--pivots"], "--pivots", length)
+            height, gyration = (length(given[option], option) for option in _PIVOTS[1:])
+            pair = [distances] * 2 if isinstance(distances, float) else distances
+            return Block.from_pivots(pair, height, gyration, restitution=e)
+        return Block.from_parameters(self._p(), sides(given["--alpha"], "--alpha", tilt), e)
 
     def _p(self) -> float | list[float]:
         assert self.p is not None
         return sides(self.p, "--p")
 
+    def given(self) -> dict[str, Any]:
+        """Return what is given of the block, by option, in the order of the descriptions."""
+        options = dict.fromkeys(option for each in _DESCRIPTIONS.items() for options in each for option in options)
+        values = {option: getattr(self, option.removeprefix("--").replace("-", "_")) for option in options}
+        return {option: value for option, value in values.items() if value is not None}
 
-def _which_block(given: Sequence[str], descriptions: Sequence[Sequence[str]]) -> str:
+
+@dataclass(frozen=True)
+class SlendernessOptions(BlockOptions):
+    """A block, of which the slenderness alone may be given: p is then 1."""
+
+    _TAKEN: ClassVar[_Descriptions] = {
+        ("--alpha",) if options == _PARAMETERS else options: ("--p",) if options == _PARAMETERS else more
+        for options, more in _DESCRIPTIONS.items()
+    }
+
+    def _p(self) -> float | list[float]:
+        if self.p is not None:
+            return super()._p()
+        if self.restitution is None and isinstance(sides(self.alpha or "", "--alpha", tilt), list):
+            raise InvalidBlock("the restitution of two different sides follows from p and alpha of both: give p, too")
+        return 1.0
+
+
+def _which_block(given: Sequence[str], descriptions: _Descriptions) -> str:
     """Say what is missing of a block, or which of the options that are given belong to different descriptions of it."""
-    begun = [options for options in descriptions if set(options) & set(given)]
-    if len(begun) > 1:
-        return f"{' and '.join(given)} belong to different descriptions of a block; give one: {_choices(begun)}"
+    having = {options: {*options, *more} for options, more in descriptions.items() if {*options, *more} & {*given}}
+    begun = [options for options in having if {*options} & {*given}] or [*having]
+    if any(not {*given} <= having[options] for options in begun):
+        return f"{' and '.join(given)} belong to different descriptions of a block; give one: {_choices([*having])}"
     if begun:
         hint = "" if given != ("--alpha",) or "--p" not in begun[0] else f"; {_FREQUENCY_PARAMETER}"
         return f"a block needs more than {' and '.join(given)}: give {_choices(begun)}{hint}"
-    return f"a block is needed: give {_choices(descriptions)}"
+    return f"a block is needed: give {_choices([*descriptions])}"
 
 
 def _choices(descriptions: Sequence[Sequence[str]]) -> str:
@@ -143,10 +189,37 @@ def _choices(descriptions: Sequence[Sequence[str]]) -> str:
 
 
 @dataclass(frozen=True)
+class EnsembleOptions(BlockOptions):
+    """A block by its sizes or by its parameters, or the ensemble of a calibration."""
+
+    ensemble: Annotated[
+        Path | None,
+        _help("In place of a block the ensemble.csv that rocking calibrate writes, with its weights and its model."),
+    ] = None
+
+    def blocks(self, model: ModelOptions) -> dict[str, Any]:
+        """Return blocks, weights and equation of motion as arguments."""
+        if self.ensemble is None:
+            return {"blocks": self.block(), "model": model.model}
+        given = self.given()
+        if given:
+            raise InvalidBlock(f"--ensemble has blocks of its own: leave {' and '.join(given)} out")
+        return ensemble_of(self.ensemble, model)
+
+
+def ensemble_of(file: Path, model: ModelOptions) -> dict[str, Any]:
+    """Return blocks, weights and equation of motion of an ensemble as arguments."""
+    from rocking.analysis.calibration.tables import read_ensemble
+
+    found = read_ensemble(file)
+    return {"blocks": found.blocks, "weights": found.weights, "model": model.equation or found.model}
+
+
+@dataclass(frozen=True)
 class FileOptions:
     """What a record file does not say."""
 
-    channel: Annotated[str | None, _help("Channel of a record, by number or name, where there are several.")] = None
+    channel: Annotated[str | None, _help("Channel, by number or name, of files that hold several.")] = None
     dt: Annotated[float | None, _help("Sampling step, s, of files that do not say theirs.")] = None
     units: Annotated[str | None, _help("Units of files that do not say theirs: g, m/s2, cm/s2, gal, mm/s2, mg.")] = None
 
@@ -160,6 +233,12 @@ class FileOptions:
         for sentence in motion_notes(motion):
             note(f"{name}: {sentence}")
         return motion
+
+
+def refusal(name: str, error: Exception) -> str:
+    """Return why a record cannot be read, with its name, in the words of the command line."""
+    sentence = str(error) if name in str(error) else f"{name}: {error}"
+    return with_options(sentence, _OF_FILES, _OF_FILES)
 
 
 def _acceleration(text: str, option: str) -> float:
@@ -184,8 +263,30 @@ def _ratio(text: str, option: str) -> float:
 
 
 @dataclass(frozen=True)
-class ScaledOptions(FileOptions):
-    """What a record file does not say, and how its motion is scaled; at most one way."""
+class VerticalOptions(FileOptions):
+    """What a record file does not say, and the vertical motion that comes with it."""
+
+    vertical: Annotated[
+        str | None,
+        _help("Vertical motion, scaled alike: a channel of the same file, or another file or shipped record."),
+    ] = None
+
+    def finished(self, name: str, motion: Motion) -> Motion:
+        """Return a motion with its vertical component, if one is asked for, with notes on that as well."""
+        noted = super().finished(name, motion)
+        if self.vertical is None:
+            return noted
+        noted = noted.with_vertical(
+            named_vertical(self.vertical, name, channel=self.channel, dt=self.dt, units=self.units)
+        )
+        for sentence in vertical_notes(noted):
+            note(f"{name}: {sentence}")
+        return noted
+
+
+@dataclass(frozen=True)
+class ScaledOptions(VerticalOptions):
+    """What a record file does not say, its vertical motion, and how they are scaled; at most one way."""
 
     scale: Annotated[float | None, _help("Factor on the motion; negative: reversed.")] = None
     pga: Annotated[str | None, _written("Scale to this peak ground acceleration: 0.5g, 4.9m/s2 or 4.9 (m/s^2).")] = None
@@ -193,10 +294,6 @@ class ScaledOptions(FileOptions):
     sa: Annotated[
         str | None,
         _written("Scale to this spectral acceleration (5 % damping) at a period: 0.4g@1.0 is 0.4 g at 1.0 s."),
-    ] = None
-    vertical: Annotated[
-        str | None,
-        _help("Vertical motion, scaled alike: a channel of the same file, or another file or shipped record."),
     ] = None
 
     def read(self, name: str, *, several: bool = False) -> Motion:
@@ -208,13 +305,11 @@ class ScaledOptions(FileOptions):
         """Return a motion with its vertical component, if one is asked for, scaled; with notes on that as well."""
         target = self._target
         noted = super().finished(name, motion)
-        if self.vertical is not None:
-            noted = noted.with_vertical(named_vertical(self.vertical, name, dt=self.dt, units=self.units))
         if not target:
             return noted
         scaled = noted.scaled(**target)
         for sentence in motion_notes(scaled):
-            if sentence not in motion_notes(motion):
+            if sentence not in motion_notes(noted):
                 note(f"{name}, scaled: {sentence}")
         return scaled
 
@@ -224,6 +319,8 @@ class ScaledOptions(FileOptions):
         chosen = [option for option, value in given.items() if value is not None]
         if len(chosen) > 1:
             raise InvalidOption(f"{' and '.join(chosen)} scale the same motion; give one of them")
+        if self.scale is not None:
+            checks.finite(self.scale, "--scale", InvalidOption)
         if self.pga is not None:
             return {"pga": _acceleration(self.pga, "--pga")}
         if self.sa is not None:
@@ -254,13 +351,35 @@ class PulseOptions(FileOptions):
         return {text: self.finished(text, named_pulse(text)) for text in self.pulse}
 
 
+class Records(NamedTuple):
+    """Records that were read, and pulses.
+
+    Attributes
+    ----------
+    motions : dict of str to Motion
+        Motions by the names that were asked for.
+    skipped : dict of str to str
+        Why records could not be read.
+    """
+
+    motions: dict[str, Motion]
+    skipped: dict[str, str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return for machines what stands for each record in other tables, and what was skipped."""
+        from rocking.analysis.survey import record_columns
+
+        listed = record_columns([*self.motions], [*self.motions.values()])
+        return {"records": listed, "skipped": self.skipped}
+
+
 @dataclass(frozen=True)
 class RecordOptions(PulseOptions):
     """Several records, and pulses."""
 
     keep_going: Annotated[bool, _flag("--keep-going", "Skip records that cannot be read, and list them.")] = False
 
-    def read_all(self, names: Sequence[str]) -> dict[str, Motion]:
+    def read_all(self, names: Sequence[str]) -> Records:
         """Return the motions of records, folders of them and patterns, and the pulses, by the name of each.
 
         Raises
@@ -275,7 +394,7 @@ class RecordOptions(PulseOptions):
             )
         pulses = self.pulses()
         motions: dict[str, Motion] = {}
-        skipped: list[str] = []
+        skipped: dict[str, str] = {}
         with Progress("reading records", total=len(records)) as progress:
             for name in records:
                 try:
@@ -283,13 +402,20 @@ class RecordOptions(PulseOptions):
                 except (UnreadableRecord, InvalidMotion) as error:
                     if not self.keep_going:
                         raise
-                    skipped.append(str(error) if name in str(error) else f"{name}: {error}")
+                    skipped[name] = refusal(name, error)
                 progress.advance()
         if records and not motions:
-            raise UnreadableRecord(f"none of {len(records)} records could be read; the first: {skipped[0]}")
-        for reason in skipped:
+            raise UnreadableRecord(
+                f"none of {len(records)} records could be read; the first: {next(iter(skipped.values()))}"
+            )
+        for reason in skipped.values():
             note(f"skipped: {reason}")
-        return motions | pulses
+        return Records(motions | pulses, skipped)
+
+
+@dataclass(frozen=True)
+class UnscaledOptions(RecordOptions, VerticalOptions):
+    """Several records, and pulses, with their vertical motions, that an analysis scales itself."""
 
 
 @dataclass(frozen=True)
@@ -337,7 +463,19 @@ class MeasureOptions:
 class ModelOptions:
     """The equation of motion."""
 
-    model: Annotated[Model, _help("Equation of motion: exact, or linearised for slender blocks.")] = "nonlinear"
+    equation: Annotated[
+        Model | None,
+        Parameter(
+            name="--model",
+            help="Equation of motion: exact (nonlinear, the default), or linearised for slender blocks; an ensemble "
+            "has its own.",
+        ),
+    ] = None
+
+    @property
+    def model(self) -> Model:
+        """Equation of motion, nonlinear unless it is said."""
+        return self.equation or "nonlinear"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,6 +21,7 @@ from rocking.cli.options import (
     OutputOptions,
     TreatmentOptions,
 )
+from rocking.contact import friction_coefficient
 from rocking.errors import InvalidOption
 from rocking.quantities import tilt
 from rocking.response import Response
@@ -55,8 +56,9 @@ def simulate(
 ) -> None:
     """Simulate one block under a record and say what happens to it; under several, with one line for each.
 
-    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Of one
-    record --out holds response.png, .pdf, .csv, .nc, events.csv, impacts.csv and result.json; of several, summary.csv,
+    The block is a rectangle (--width, --height, or half of each; --offset where its centre of mass is off the middle),
+    or given by its parameters (--p, --alpha) or by its pivots (--pivots, --height-of-mass, --gyration). Of one record
+    --out holds response.png, .pdf, .csv, .nc, events.csv, impacts.csv and result.json; of several, summary.csv,
     summary.json and (if openpyxl is installed) summary.xlsx.
 
     Parameters
@@ -64,6 +66,8 @@ def simulate(
     each
         Of several records: write the files of each into a folder of its own below --out, too.
     """
+    if start.friction is not None:
+        friction_coefficient(start.friction)  # before the work
     body = block.block()
     options: dict[str, Any] = {
         **model.chosen(),
@@ -74,18 +78,17 @@ def simulate(
     if each and output.out is None:
         raise InvalidOption("--each writes files; name the folder for them with --out")
     with output.folder() as folder:
-        motions = motion.read_all(names)
+        motions, skipped = motion.read_all(names)
         if batch.is_single((*names, *motion.pulse), motions):
-            (shaking,) = motions.values()
-            _deliver(run(body, shaking, **options), folder, friction=start.friction, as_json=output.as_json)
+            ((record, shaking),) = motions.items()
+            _deliver(run(body, shaking, **options), record, folder, friction=start.friction, as_json=output.as_json)
         else:
-            _deliver_all(
-                survey(body, motions, friction=start.friction, **options), folder, each=each, as_json=output.as_json
-            )
+            found = survey(body, motions, friction=start.friction, **options)
+            _deliver_all(replace(found, skipped=skipped), folder, each=each, as_json=output.as_json)
 
 
-def _deliver(response: Response, folder: Path | None, *, friction: float | None, as_json: bool) -> None:
-    result = response.to_dict(friction)
+def _deliver(response: Response, record: str, folder: Path | None, *, friction: float | None, as_json: bool) -> None:
+    result = _result(response, record, friction)
     if folder is not None:
         _write(response, result, folder)
     batch.show(result, response.summary(friction), as_json=as_json, folder=folder)
@@ -95,16 +98,22 @@ def _deliver_all(found: Survey, folder: Path | None, *, each: bool, as_json: boo
     if folder is not None:
         found.write(folder)
     if folder is not None and each:
-        for name, response in zip(found.folders(), found.responses, strict=True):
+        for name, record, response in zip(found.folders(), found.records, found.responses, strict=True):
             (folder / name).mkdir(exist_ok=True)
-            _write(response, response.to_dict(), folder / name)
+            _write(response, _result(response, record, found.friction), folder / name)
     batch.show(found.to_dict(), found.summary(), as_json=as_json, folder=folder)
+
+
+def _result(response: Response, record: str, friction: float | None) -> dict[str, Any]:
+    """Return the result, whose motion is named by the record that was read, too, as in tables of many."""
+    result = response.to_dict(friction)
+    return result | {"motion": {"record": record, **result["motion"]}}
 
 
 def _write(response: Response, result: dict[str, Any], folder: Path) -> None:
     """Write figure, histories, events and result into a folder."""
-    batch.write(folder, figures={"response": response.plot()}, result=result)
     response.to_csv(folder / "response.csv")
     response.to_csv(folder / "events.csv", "events")
     response.to_csv(folder / "impacts.csv", "impacts")
     response.to_netcdf(folder / "response.nc")
+    batch.write(folder, figures={"response": response.plot()}, result=result)

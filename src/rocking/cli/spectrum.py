@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
 from rocking.cli import batch
-from rocking.cli.options import MODEL, OUTPUT, RECORDS, MotionOptions, Names, OutputOptions, TreatmentOptions
+from rocking.cli.options import (
+    MODEL,
+    OUTPUT,
+    RECORDS,
+    MotionOptions,
+    Names,
+    OutputOptions,
+    TreatmentOptions,
+    ensemble_of,
+)
+from rocking.errors import InvalidOption
 from rocking.quantities import tilt, values
 
 
 def spectrum(
     *names: Names,
-    alpha: str,
+    alpha: str | None = None,
     p: str | None = None,
     size: str | None = None,
     restitution: str | None = None,
+    ensemble: Path | None = None,
     fractiles: str = "0.16,0.5,0.84",
     against: Abscissa = "p",
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
@@ -31,26 +43,32 @@ def spectrum(
     Parameters
     ----------
     alpha
-        Slendernesses, as 10deg,15deg or 0.1:0.3:5 (rad).
+        Slendernesses, as 10deg,15deg or 0.1:0.3:5 (rad); or give --ensemble.
     p
         Frequency parameters, rad/s; or give --size.
     size
         Half diagonals of rectangular blocks, m; or give --p.
     restitution
         Restitutions; Housner's by default.
+    ensemble
+        The ensemble.csv that rocking calibrate writes, in place of slendernesses and restitutions: its blocks are made
+        larger or smaller together, so that their median p is each of --p (by default half to twice their own).
     fractiles
         Shares of the motions that stay below the fractile curves.
     against
         Abscissa of the figure.
     """
+    if alpha is None and ensemble is None:
+        raise InvalidOption("a spectrum needs --alpha, or the --ensemble of a calibration")
     with output.folder() as folder:
         axes: dict[str, Any] = {
-            "alpha": values(alpha, "--alpha", tilt),
+            "alpha": None if alpha is None else values(alpha, "--alpha", tilt),
             "p": None if p is None else values(p, "--p"),
             "size": None if size is None else values(size, "--size"),
             "restitution": None if restitution is None else values(restitution, "--restitution"),
         }
         shares = values(fractiles, "--fractiles").tolist()
-        motions = list(motion.read_all(names).values())
-        found = rocking_spectrum(motions, **axes, fractiles=shares, **model.chosen())
-        batch.deliver(found, "spectrum", folder=folder, as_json=output.as_json, against=against)
+        how = model.chosen() | ({} if ensemble is None else ensemble_of(ensemble, model))
+        read = motion.read_all(names)
+        found = rocking_spectrum([*read.motions.values()], **axes, fractiles=shares, **how)
+        batch.deliver(found, "spectrum", read, folder=folder, as_json=output.as_json, against=against)

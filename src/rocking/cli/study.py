@@ -21,7 +21,7 @@ from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.place import place_of
 from rocking.studies.refine import Verdict
 from rocking.studies.study import Study, study_of
-from rocking.tables import to_json, write_text
+from rocking.tables import counted, to_json, write_text
 
 study = App(name="study", help="Run a study too long for one sitting: created once, resumed after anything.")
 
@@ -91,7 +91,7 @@ def run(
     print(f"{report}\n{found.place}: {found.status}")
     if report.failed:
         raise StudyError(
-            f"{len(report.failed)} units failed, as runs.jsonl says; run the study again to try them again"
+            f"{counted(len(report.failed), 'unit')} failed, as runs.jsonl says; run the study again to try again"
         )
     if report.stopped:
         raise KeyboardInterrupt
@@ -117,7 +117,7 @@ def status(folder: str, *, as_json: Annotated[bool, Parameter(name="--json", neg
 
 @study.command
 def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter(negative="")] = False) -> None:
-    """Read every unit and check it; compute some again and compare all bits.
+    """Read every unit and all that describes the study, and check it; compute some units again and compare all bits.
 
     Parameters
     ----------
@@ -126,15 +126,15 @@ def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter
     recompute
         How many units, drawn at random, to compute again.
     repair
-        Compute damaged units again and store them.
+        Compute damaged units again and store them, and write what else is damaged anew.
     """
     found = rocking.study(folder)
     faults = found.verify(recompute, repair=repair)
     for fault in faults:
         print(fault)
     if faults and not repair:
-        raise StudyError(f"{len(faults)} units are damaged or differ; --repair computes them again")
-    print(_sound(found, len(faults)))
+        raise StudyError(f"{counted(len(faults), 'fault')} found; --repair mends what can be computed or written again")
+    print(_sound(found, folder, len(faults)))
 
 
 @study.command
@@ -200,7 +200,7 @@ def _created(file: Path, folder: str, unit_blocks: int | None) -> Study:
     for sentence in described.skipped:
         note(f"left out: {sentence}")
     wanted = described.report, described.refine, described.outcomes
-    return study_of(place_of(folder), described.product, unit_blocks, *wanted)
+    return study_of(place_of(folder), described.product, unit_blocks, *wanted, described.records)
 
 
 def _executor(workers: int | None, scheduler: str | None) -> contextlib.AbstractContextManager[Executor | None]:
@@ -211,5 +211,14 @@ def _executor(workers: int | None, scheduler: str | None) -> contextlib.Abstract
     return contextlib.nullcontext()
 
 
-def _sound(found: Study, repaired: int) -> str:
-    return f"{found.status.done} units are sound" + (f", {repaired} of them repaired" if repaired else "")
+def _sound(found: Study, folder: str, repaired: int) -> str:
+    """Say how much is sound, how much was repaired, and what is not there."""
+    state = found.status
+    missing = state.units - state.done
+    sound = f"{counted(state.done, 'unit')} {'is' if state.done == 1 else 'are'} sound"
+    sound += f"; {counted(repaired, 'fault')} repaired" if repaired else ""
+    if missing:
+        return (
+            f"{sound}; {missing} of {state.units} {'is' if missing == 1 else 'are'} missing: rocking study run {folder}"
+        )
+    return sound if state.complete else f"{sound}; the refinement is not complete: rocking study run {folder}"

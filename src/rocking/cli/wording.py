@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from inspect import Parameter
 from typing import Final
 
 from cyclopts import App, Argument, CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError
 
-from rocking.errors import InvalidOption
+from rocking.errors import DamagedStudy, InvalidOption
 
 #: How alike two names must be for the one to be a slip of the other: a letter or two in a word of six.
 _ALIKE: Final = 0.8
@@ -36,12 +36,14 @@ def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
         return f"{_misread(error.argument, error.token.value, error.target_type)}; see {command} --help"
     if isinstance(error, CycloptsError):
         return f"{sentence}; see {command} --help"
+    if isinstance(error, DamagedStudy):
+        return f"{error.fault}: rocking study verify FOLDER --repair computes it again"
     return in_options(sentence, app, arguments)
 
 
 def in_options(sentence: str, app: App, arguments: Sequence[str]) -> str:
     """Return a sentence with options in place of the arguments that they stand for."""
-    return _with_options(sentence, _options(app, arguments), _keywords(app, arguments))
+    return with_options(sentence, _options(app, arguments), _keywords(app, arguments))
 
 
 def refuse_unknown_options(app: App, arguments: Sequence[str]) -> None:
@@ -133,11 +135,12 @@ def _names(collection: Iterable[Argument]) -> set[str]:
     return {name for argument in collection for name in argument.names if name.startswith("-")}
 
 
-def _with_options(sentence: str, options: set[str], keywords: set[str]) -> str:
-    """Name options where a message names the arguments that they stand for."""
+def with_options(sentence: str, options: Set[str], keywords: Set[str]) -> str:
+    """Name options where a message names the arguments that they stand for; `keywords` are no positional ones."""
     for option in sorted(options, key=len, reverse=True):
         name = option.removeprefix("--").replace("-", "_")
         if len(name) > 1 or name == "p":
+            sentence = re.sub(rf"(?<![\w./\\'\"-]){name} ?= ?(['\"])(\w+)\1", rf"{option} \2", sentence)
             sentence = re.sub(rf"(?<![\w./\\'\"-]){name} ?= ?(?=\s|[\w'\"]|$)", f"{option} ", sentence)
             sentence = re.sub(rf"\bleave {name} out\b", f"leave {option} out", sentence)
         if option in keywords:

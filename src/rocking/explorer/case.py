@@ -23,7 +23,7 @@ from rocking.explorer.pulses import is_pulse, pulse_as_python, pulse_as_text, pu
 from rocking.explorer.shelf import Shelf
 from rocking.motion import records
 from rocking.motion.motion import Motion
-from rocking.quantities import acceleration, angle, number, sides
+from rocking.quantities import acceleration, angle, length, number, sides
 from rocking.response import Response
 from rocking.simulation import simulate
 from rocking.treatment import Treatment, treatment
@@ -36,10 +36,20 @@ DEFAULT: Final[Texts] = {"width": "0.24", "height": "1.1", "motion": "ridgecrest
 
 #: Names of the texts of a case.
 NAMES: Final = (
-    "width", "height", "p", "alpha", "restitution", "gravity",
+    "width", "height", "offset", "p", "alpha", "pivots", "height_of_mass", "gyration", "restitution", "gravity",
     "motion", "channel", "vertical", "dt", "units", "scale", "pga", "pgv", "sa",
     "model", "chattering", "duration", "initial_rotation", "initial_velocity",
 )  # fmt: skip
+
+#: Texts that say what a block is, together, and what may go with them.
+_BLOCKS: Final[Mapping[tuple[str, ...], tuple[str, ...]]] = {
+    ("width", "height"): ("offset",),
+    ("p", "alpha"): (),
+    ("pivots", "height_of_mass", "gyration"): (),
+}
+
+#: Those of a block but its gravity.
+BLOCK_NAMES: Final = frozenset({"restitution", *(name for each in _BLOCKS.items() for names in each for name in names)})
 
 #: Product of both restitutions up to which a page waits for the block to come to rest.
 _LIVELIEST: Final = 0.998
@@ -217,9 +227,12 @@ def _texts_of_block(block: Block) -> dict[str, str]:
     if block.half_width is None or block.half_height is None:
         return texts
     del texts["p"], texts["alpha"]
-    if block.sides == Block(block.half_width, block.half_height, gravity=block.gravity).sides:
+    sizes = {"width": 2.0 * block.half_width, "height": 2.0 * block.half_height}
+    if block.offset:
+        sizes["offset"] = block.offset
+    if block.sides == Block(**sizes, gravity=block.gravity).sides:
         del texts["restitution"]
-    return {"width": repr(2.0 * block.half_width), "height": repr(2.0 * block.half_height)} | texts
+    return {name: repr(size) for name, size in sizes.items()} | texts
 
 
 def _given(texts: Texts) -> dict[str, str]:
@@ -235,29 +248,46 @@ def _given(texts: Texts) -> dict[str, str]:
 def _block(given: Texts) -> Block:
     restitution = None if "restitution" not in given else sides(given["restitution"], "restitution")
     gravity = number(given["gravity"], "gravity") if "gravity" in given else STANDARD_GRAVITY
-    sized, told = {"width", "height"}, {"width", "height", "p", "alpha"} & given.keys()
-    if told not in (sized, {"p", "alpha"}):
-        raise InvalidBlock("a block has either width and height (m), or p (rad/s) and alpha")
-    if told == sized:
-        width, height = (number(given[name], name) for name in ("width", "height"))
-        return Block(width=width, height=height, restitution=restitution, gravity=gravity)
+    told = given.keys() & BLOCK_NAMES - {"restitution"}
+    if not any({*all_} <= told <= {*all_, *more} for all_, more in _BLOCKS.items()):
+        raise InvalidBlock(
+            "a block has either width and height (m) and perhaps offset, or p (rad/s) and alpha, or pivots, "
+            "height_of_mass and gyration (m)"
+        )
+    if "width" in told:
+        sizes = {name: number(given[name], name) for name in ("width", "height", "offset") if name in told}
+        return Block(**sizes, restitution=restitution, gravity=gravity)
+    if "pivots" in told:
+        return Block.from_pivots(**_on_pivots(given), restitution=restitution, gravity=gravity)
     return Block.from_parameters(
         sides(given["p"], "p"), sides(given["alpha"], "alpha", angle), restitution, gravity=gravity
     )
 
 
+def _on_pivots(given: Texts) -> dict[str, Any]:
+    """Return what `Block.from_pivots` takes."""
+    distances = sides(given["pivots"], "pivots", length)
+    return {
+        "distances": tuple(distances) if isinstance(distances, list) else (distances, distances),
+        "height": length(given["height_of_mass"], "height_of_mass"),
+        "radius_of_gyration": length(given["gyration"], "gyration"),
+    }
+
+
 def block_as_python(given: Texts) -> str:
     """Write the call of `rocking` that makes the block."""
     quantities: dict[str, Callable[[str, str], float]] = {"alpha": angle}
-    arguments = {
+    shape = _on_pivots(given) if "pivots" in given else {}
+    arguments = shape | {
         name: sides(given[name], name, quantities.get(name, number))
-        for name in ("width", "height", "p", "alpha", "restitution", "gravity")
+        for name in ("width", "height", "offset", "p", "alpha", "restitution", "gravity")
         if name in given
     }
     written = ", ".join(
         f"{name}={tuple(value) if isinstance(value, list) else value!r}" for name, value in arguments.items()
     )
-    return f"Block({written})" if "width" in given else f"Block.from_parameters({written})"
+    maker = "Block" if "width" in given else "Block.from_pivots" if shape else "Block.from_parameters"
+    return f"{maker}({written})"
 
 
 class _Found(NamedTuple):

@@ -20,7 +20,7 @@ from rocking.block import Block
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.schemes import compare_schemes
 from rocking.errors import InvalidOption
-from rocking.explorer.case import Case, Texts, as_command, as_python, read_case
+from rocking.explorer.case import BLOCK_NAMES, Case, Texts, as_command, as_python, read_case
 from rocking.explorer.shelf import Shelf
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
@@ -62,7 +62,7 @@ EXPORTS: Final[Mapping[str, str]] = {
 
 #: Texts that say one thing together.
 _GROUPS: Final = (
-    {"width", "height", "p", "alpha", "restitution"},
+    BLOCK_NAMES,
     {"motion", "channel", "vertical", "dt", "units", "scale", "pga", "pgv", "sa"},
 )
 
@@ -352,7 +352,8 @@ def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Flo
     motion, gravity = case.motion, case.block.gravity
     if motion is None:
         return {"ground_time": np.empty(0), "ground_g": np.empty(0)}
-    corners = motion.drawing_times(start, min(end, max(start, motion.duration)))
+    last = motion.duration if motion.vertical is None else max(motion.duration, motion.vertical.duration)
+    corners = motion.drawing_times(start, min(end, max(start, last)))
     acceleration = motion.acceleration(corners) / gravity
     if motion.vertical is None:
         corners, acceleration = thinned(corners, acceleration, points)
@@ -428,7 +429,7 @@ def _facts(shown: Shown) -> dict[str, Any]:
         "overturn_time": _plain(response.overturn_time),
         "tipping_time": _plain(response.tipping_time),
         "peak_rotation": response.peak_rotation,
-        "peak_over_slenderness": response.peak_over_slenderness,
+        "peak_over_slenderness": _plain(response.peak_over_slenderness),
         "peak_time": response.peak_time,
         "impacts": len(response.impacts),
         "rests": int(np.sum(response.events["kind"] == "rest")),

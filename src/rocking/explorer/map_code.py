@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import shlex
 from typing import Any, Final
 
 from rocking.constants import STANDARD_GRAVITY
-from rocking.explorer.case import block_as_python
+from rocking.explorer.case import BLOCK_NAMES, NAMES, block_as_python
 from rocking.explorer.maps import QUANTITIES, Axis, Grid
 from rocking.explorer.pulses import arguments_of, is_pulse, pulse_call
 from rocking.named_pulses import pulse_values
@@ -94,15 +95,14 @@ def as_command(grid: Grid) -> str | None:
     if not _is_overturning_map(grid) or "gravity" in texts:
         return None
     name, written, _ = _pulse(grid)
-    options = {
+    options: dict[str, str] = {
         "amplitudes": _range(grid.y),
         "frequencies": _range(grid.x),
         **{each: value for each, value in written.items() if each not in ("amplitude", "frequency")},
-        **{each: texts[each] for each in ("width", "height", "alpha", "restitution", "model") if each in texts},
+        **{each: texts[each] for each in NAMES if each in {*BLOCK_NAMES, "model"} and each in texts},
     }
-    return shlex.join(
-        ["rocking", "map", name, *(word for each in options.items() for word in (f"--{each[0]}", each[1]))]
-    )
+    words = ((f"--{each.replace('_', '-')}", value) for each, value in options.items())
+    return shlex.join(["rocking", "map", name, *itertools.chain.from_iterable(words)])
 
 
 def described(grid: Grid) -> dict[str, Any]:

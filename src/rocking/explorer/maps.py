@@ -15,12 +15,12 @@ from rocking.analysis.overturning import modes_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Blocks
 from rocking.block.single import housner_restitution
-from rocking.chattering.maps import Outcome, outcomes_of
+from rocking.chattering.maps import Outcome, hardly_lifts, outcomes_of
 from rocking.chattering.theory.amplitude import critical_amplitude
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import Setup, Task, simulate_tasks
 from rocking.errors import InvalidOption, OutsideFit
-from rocking.explorer.case import Case, Texts
+from rocking.explorer.case import BLOCK_NAMES, Case, Texts
 from rocking.explorer.pulses import arguments_of, is_pulse, pulse_of
 from rocking.motion.exceedance import exceedances
 from rocking.motion.motion import Motion
@@ -117,7 +117,19 @@ def axes_of(case: Case) -> list[str]:
         return []
     pulse = is_pulse(case.texts.get("motion", ""))
     frequency = pulse and "frequency" in arguments_of(case.texts["motion"])
-    return [name for name in AXES if name != "omega" or frequency]
+    unusable = set() if frequency else {"omega"}
+    if not _has_one_slenderness(case):
+        unusable.add("alpha")
+    return [name for name in AXES if name not in unusable]
+
+
+def _has_one_slenderness(case: Case) -> bool:
+    """Whether blocks of another slenderness, the same on both sides, follow from this one.
+
+    Their restitution is Housner's where none is given; two p, pivots and eccentric sizes belong to another.
+    """
+    plus, minus = case.block.sides
+    return "restitution" in case.texts or (plus.p == minus.p and not {"pivots", "offset"} & case.texts.keys())
 
 
 def grid_of(case: Case, texts: Texts) -> Grid:
@@ -162,10 +174,11 @@ def parts(grid: Grid, threads: int | None = None) -> Iterator[Part]:
         assert isinstance(chosen, np.ndarray)
         values = np.empty((len(QUANTITIES), len(chosen)), np.float32)
         alpha = blocks.alpha[chosen]
-        thresholds = _thresholds(alpha, grid) / task.factor
+        thresholds = _thresholds(alpha, grid)
         for pair in np.unique(thresholds, axis=0):
             here = (thresholds == pair).all(axis=1)
-            values[0, here] = outcomes_of(ends[here], later.of(float(pair[0]), float(pair[1])))
+            times = later.of((float(pair[0]), float(pair[1])), task.factor)
+            values[0, here] = Outcome.NO_UPLIFT if times is None else outcomes_of(ends[here], times)
         rested = ends["rests"] > 0
         values[1] = np.where(rested, (ends["first_rest"] - ends["first_uplift"]) * scale[chosen], np.nan)
         values[2] = np.where(ends["overturned"], np.inf, ends["peak_rotation"] / alpha.min(axis=1))
@@ -175,17 +188,25 @@ def parts(grid: Grid, threads: int | None = None) -> Iterator[Part]:
 
 
 class _Later:
-    """When the motion passes thresholds again, for each pair that was asked for."""
+    """When the scaled motion passes thresholds again, for each pair and factor that was asked for."""
 
     def __init__(self, grid: Grid) -> None:
         self._motion, self._gravity = grid.motion, grid.case.block.gravity
-        self._known: dict[tuple[float, float], Floats] = {}
+        self._known: dict[tuple[float, float, float], Floats | None] = {}
 
-    def of(self, plus: float, minus: float) -> Floats:
-        """Return the times, s, at which it passes the thresholds (m/s^2) after the first."""
-        if (plus, minus) not in self._known:
-            self._known[plus, minus] = exceedances(self._motion, (plus, minus), self._gravity)[1:, 0]
-        return self._known[plus, minus]
+    def of(self, thresholds: tuple[float, float], factor: float) -> Floats | None:
+        """Return the times, s, at which the motion times a factor passes the thresholds (m/s^2) after the first.
+
+        None if it hardly passes one. The motion as it is passes those divided by the factor at the same times, if
+        gravity is divided, too: a vertical component changes it.
+        """
+        plus, minus = (each / factor for each in thresholds)
+        gravity = self._gravity / factor if self._motion.vertical else self._gravity
+        if (plus, minus, gravity) not in self._known:
+            none = hardly_lifts(self._motion, (plus, minus), gravity)
+            found = exceedances(self._motion, (plus, minus), gravity)[1:, 0]
+            self._known[plus, minus, gravity] = None if none else found
+        return self._known[plus, minus, gravity]
 
 
 def curves(grid: Grid) -> dict[str, Floats]:
@@ -220,7 +241,7 @@ def texts_at(grid: Grid, x: float, y: float) -> dict[str, str]:
     texts = dict(grid.case.texts)
     for name, value in ((grid.x.name, x), (grid.y.name, y)):
         if name in ("p", "alpha", "restitution"):
-            _change_block(texts, grid.case, name, value)
+            _change_block(texts, grid, name, value)
     for name, value in ((grid.x.name, x), (grid.y.name, y)):
         if name == "omega":
             p = min(side.p for side in grid.case.block.sides)
@@ -322,11 +343,14 @@ def _tasks(grid: Grid, factors: Floats) -> Iterator[Task]:
                 yield Task(index[factors[index] == factor], grid.motion, float(factor), (stride, row))
 
 
-def _change_block(texts: dict[str, str], case: Case, name: str, value: float) -> None:
-    sides = case.block.sides
-    if "width" in texts:
-        del texts["width"], texts["height"]
-        texts["p"], texts["alpha"] = repr(sides[0].p), repr(sides[0].alpha)
+def _change_block(texts: dict[str, str], grid: Grid, name: str, value: float) -> None:
+    sides = grid.case.block.sides
+    if "alpha" not in (grid.x.name, grid.y.name) and (not grid.case.block.is_symmetric or "pivots" in texts):
+        texts.setdefault("restitution", _both([side.restitution for side in sides]))
+    if "p" not in texts:
+        texts["p"], texts["alpha"] = (_both([getattr(side, each) for side in sides]) for each in ("p", "alpha"))
+        for each in BLOCK_NAMES - {"p", "alpha", "restitution"}:
+            texts.pop(each, None)
     if name == "p":
         slowest = min(side.p for side in sides)
         texts["p"] = _both([side.p * value / slowest for side in sides])

@@ -46,6 +46,23 @@ BLOCK: Final = (
     Number("width", "Width", "m", 0.02, 5.0, 0.24, logarithmic=True, words="Full width 2b of a rectangular block."),
     Number("height", "Height", "m", 0.1, 20.0, 1.1, logarithmic=True, words="Full height 2h of a rectangular block."),
     Number(
+        "offset", "Offset of the centre of mass", "m", -0.25, 0.25, 0.0,
+        words="How far the centre of mass is off the middle of the width, to the right (side +); a quarter of the "
+        "width at most. The two sides then differ.",
+    ),
+    Number(
+        "pivots", "Distance of the pivot", "m", 0.01, 2.5, 0.15, logarithmic=True,
+        words="Horizontal distance of the corner from the centre of mass.",
+    ),
+    Number(
+        "height_of_mass", "Height of the centre of mass", "m", 0.05, 10.0, 0.55, logarithmic=True,
+        words="Above the corners.",
+    ),
+    Number(
+        "gyration", "Radius of gyration", "m", 0.02, 8.0, 0.33, logarithmic=True,
+        words="About the centre of mass: the square root of the moment of inertia over the mass.",
+    ),
+    Number(
         "p", "Frequency parameter p", "rad/s", 0.3, 12.0, 3.61, logarithmic=True,
         words="How fast the block tips: p² = 3g/4R for a rectangle with half diagonal R. Large blocks have a small p. "
         "It is not a frequency of vibration: a rocking block has none.",
@@ -58,7 +75,7 @@ BLOCK: Final = (
     Number(
         "restitution", "Restitution η", "", 0.5, 0.99, 0.93,
         words="Angular speed just after an impact over the speed just before. Housner's value, 1 − 1.5 sin² α, keeps "
-        "the angular momentum about the new corner.",
+        "the angular momentum about the new corner; that of two different sides follows from both p and α.",
     ),
 )  # fmt: skip
 

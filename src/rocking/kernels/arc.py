@@ -24,8 +24,19 @@ from rocking.kernels.state import ORDER, Record
 #: over a step that is short beside 1/p they vanish beside u long before the velocity has converged.)
 NEGLIGIBLE = 2.0**-56
 
-#: Largest of what `is_carried_on` tests over the first two terms: a sixtieth of it is below the last place.
-_CARRIED = 2.0**-46
+#: Bound on all that is left out of a velocity, as a fraction of its largest term: a quarter of the last place.
+_LEFT_OUT = 2.0**-54
+
+#: Nine times the largest bound on all that nine terms leave out of a nonlinear velocity, over the sum of their sizes.
+#: The bound is a few times what they leave out. It holds where two sums are below a quarter.
+_LEFT_OUT_OF_NINE = 9.0 * 2.0**-48
+_QUARTER = 0.25
+
+#: Of the velocity's terms: none that is smaller counts.
+_SMALLEST = 1e-290
+
+#: Steps are shortened so often at most; each time by a tenth at least.
+_SHORTENINGS = 200
 
 #: First step from an impact, over the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
@@ -36,6 +47,10 @@ _INVERSE = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
 
 #: A quantity that changes evenly: its value, and its slope or its change over a step.
 Line = tuple[float, float]
+
+#: Sizes of nine terms of the velocity, and of the seven terms after the first of sin and cos(alpha - u).
+Nine = tuple[float, float, float, float, float, float, float, float, float]
+Seven = tuple[float, float, float, float, float, float, float]
 
 
 @inlined
@@ -72,16 +87,6 @@ def borne(weight: Line | None, this: float, before: float) -> float:
     return this if weight is None else weight[0] * this + weight[1] * before
 
 
-@inlined
-def is_carried_on(change: float, seventh: float, first: tuple[float, float]) -> bool:
-    """Whether a changing weight makes more than nothing of a seventh term of the rate beyond the ninth.
-
-    ``change`` is lam h^2 times the change of the weight over a step of length h, and time is counted in steps. What it
-    makes in all is less than a sixtieth of its product with the term; ``first`` are the first two terms.
-    """
-    return not abs(change * seventh) <= _CARRIED * (abs(first[0]) + abs(first[1]))
-
-
 @shared
 def expand(
     ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float
@@ -100,14 +105,16 @@ def expand(
         order, h = expand_nonlinear(block, state, scratch, (degree, changes), h)
         return order, h, degree
     if has_vertical(ground):
-        expand_linear_weighted(block, state, scratch, degree)
-        return ORDER, shortened(scratch.rotation, h), degree
+        order, h = expand_linear_weighted(block, state, scratch, degree, h)
+        return order, h, degree
     if degree <= 1:
         order = linear_order(block.stiffness[state.side], h)
         expand_linear(block, state, scratch, degree, order)
         return order, h, degree
     expand_linear(block, state, scratch, degree, ORDER)
-    order, h = converged(scratch.rotation, degree, h)
+    order = converged(scratch.rotation, degree, h)
+    if order > ORDER:
+        return ORDER, shortened_linear(scratch, block.stiffness[state.side], 0, h), degree
     return order, h, degree
 
 
@@ -158,8 +165,8 @@ def linear_order(lam: float, h: float) -> int:
 
 
 @inlined
-def converged(c: Floats, degree: int, h: float) -> tuple[int, float]:
-    """Order at which a full series has converged over h, or else a step over which it has; returns (order, h').
+def converged(c: Floats, degree: int, h: float) -> int:
+    """Order at which a full series under a constant weight has converged over h; above `ORDER` where it has not.
 
     Past the motion's degree a coefficient follows from the one two before: two that do not count end the series.
     """
@@ -170,9 +177,9 @@ def converged(c: Floats, degree: int, h: float) -> tuple[int, float]:
         term = k * abs(c[k]) * power
         largest = max(largest, term)
         if k > degree + 3 and term + previous <= NEGLIGIBLE * largest:
-            return k, h
+            return k
         power *= h
-    return ORDER, shortened(c, h)
+    return ORDER + 1
 
 
 @inlined
@@ -190,17 +197,31 @@ def expand_linear(block: Record, state: Record, scratch: Record, degree: int, or
 
 
 @shared
-def expand_linear_weighted(block: Record, state: Record, scratch: Record, degree: int) -> None:
-    """Full series of a linear arc while the weight changes; the motion's polynomials are of one degree."""
+def expand_linear_weighted(block: Record, state: Record, scratch: Record, degree: int, h: float) -> tuple[int, float]:
+    """Series of a linear arc while the weight changes; the motion's polynomials are of one degree.
+
+    Returns (order, h'). The series ends where what it leaves out is proven not to count.
+    """
     c, A, W, side = scratch.rotation, scratch.ground, scratch.weight, state.side
     lam, gain, threshold = block.stiffness[side], block.gain[side], block.threshold[side]
     c[0] = state.u
     c[1] = state.v
+    power = h * h
+    largest = term = abs(state.v) * h
     for k in range(ORDER - 1):
         value = -gain * (threshold * W[k] + A[k]) if k <= degree else 0.0
         for j in range(min(k, degree) + 1):
             value += lam * W[j] * c[k - j]
         c[k + 2] = value * _WEIGHT[k]
+        previous = term
+        term = (k + 2) * abs(c[k + 2]) * power
+        largest = max(largest, term)
+        power *= h
+        if k > degree and term + previous <= NEGLIGIBLE * largest:
+            beyond, _ = left_out_linear(scratch, lam, degree, k + 2, h)
+            if beyond <= _LEFT_OUT * largest:
+                return k + 2, h
+    return ORDER, shortened_linear(scratch, lam, degree, h)
 
 
 @shared
@@ -209,10 +230,7 @@ def expand_nonlinear(
 ) -> tuple[int, float]:
     """Series of a nonlinear arc, and of sin and cos(alpha - u), for a motion and a weight of these degrees.
 
-    Returns (order, h').
-
-    Coefficients may vanish one after another (a release from rest where sin and cos balance), so that small terms alone
-    do not end the series: a majorant of the velocity's, |u''| h^2 times those of an exponential, must be small as well.
+    Returns (order, h'). The series ends where what it leaves out is proven not to count.
     """
     c, A, W, S, C = scratch.rotation, scratch.ground, scratch.weight, scratch.sine, scratch.cosine
     lam, psi = block.stiffness[state.side], block.slenderness[state.side] - state.u
@@ -222,9 +240,6 @@ def expand_nonlinear(
     S[0] = math.sin(psi)
     C[0] = math.cos(psi)
     power = h * h
-    stiff = lam * math.hypot(W[0], A[0])
-    rate = (math.sqrt(stiff) + abs(state.v) + stiff * h) * h
-    majorant = stiff * power
     largest = term = abs(state.v) * h
     for k in range(ORDER - 1):
         value = W[0] * S[k]
@@ -237,8 +252,10 @@ def expand_nonlinear(
         previous = term
         term = (k + 2) * abs(value) * power
         largest = max(largest, term)
-        if k > degree and majorant <= NEGLIGIBLE * largest and term + previous <= NEGLIGIBLE * largest:
-            return k + 2, h
+        if k > degree and term + previous <= NEGLIGIBLE * largest:
+            beyond, _ = left_out_nonlinear(scratch, lam, degrees, k + 2, h)
+            if beyond <= _LEFT_OUT * largest:
+                return k + 2, h
         sine = 0.0
         cosine = 0.0
         for j in range(k + 1):
@@ -248,30 +265,150 @@ def expand_nonlinear(
         S[k + 1] = sine * _INVERSE[k + 1]
         C[k + 1] = cosine * _INVERSE[k + 1]
         power *= h
-        majorant *= rate * _INVERSE[k + 2]
-    return ORDER, shortened(c, h)
+    for _ in range(_SHORTENINGS):
+        beyond, largest = left_out_nonlinear(scratch, lam, degrees, ORDER, h)
+        excess = beyond / max(_LEFT_OUT * largest, _SMALLEST)
+        if excess <= 1.0:
+            break
+        h *= shortening(excess)
+    return ORDER, h
 
 
 @shared
-def shortened(c: Floats, h: float) -> float:
-    """Step, not longer than h, at which the last terms of a full series no longer count.
+def shortened_linear(scratch: Record, lam: float, changes: int, h: float) -> float:
+    """Step, not longer than h, over which a full linear series leaves out nothing that counts.
 
-    The last four, since three may vanish (a release from rest where sin and cos balance has every fourth power only).
+    ``changes`` is the degree of the weight.
     """
-    excess = np.inf
-    while excess > 1.0:
-        largest = last = 0.0
-        power = 1.0
-        for k in range(ORDER + 1):
-            term = k * abs(c[k]) * power
-            largest = max(largest, term)
-            if k > ORDER - 4:
-                last += term
-            power *= h
-        excess = last / (NEGLIGIBLE * largest)
-        if excess > 1.0:
-            h *= 0.9 * excess ** (-1.0 / ORDER)
+    for _ in range(_SHORTENINGS):
+        beyond, largest = left_out_linear(scratch, lam, changes, ORDER, h)
+        excess = beyond / max(_LEFT_OUT * largest, _SMALLEST)
+        if excess <= 1.0:
+            break
+        h *= shortening(excess)
     return h
+
+
+@inlined
+def shortening(excess: float) -> float:
+    """Factor on a step whose series leaves out so many times what it may."""
+    return max(0.5, 0.9 * excess ** (-1.0 / ORDER))
+
+
+@shared
+def left_out_linear(scratch: Record, lam: float, changes: int, order: int, h: float) -> tuple[float, float]:
+    """Bound on all terms that a linear series leaves out of the velocity over h, and its largest term; times h.
+
+    With u_k = |c_k| h^k and w_j = |W_j| h^j the products w_j u_k with j + k >= order - 1 are left out of u'' h^2, and
+    what they make feeds on itself: see "Where a series may end" in the documentation. The motion's degree is below
+    order - 1.
+    """
+    c, W, d = scratch.rotation, scratch.weight, scratch.spare
+    power = 1.0
+    largest = 0.0
+    for k in range(order + 1):
+        d[k] = abs(c[k]) * power
+        largest = max(largest, k * d[k])
+        power *= h
+    for k in range(order - 1, order - 2 - changes, -1):  # from here on: sums of all later terms
+        d[k] += d[k + 1]
+    heaviest = fed = 0.0
+    power = 1.0
+    for j in range(changes + 1):
+        heaviest += abs(W[j]) * power
+        fed += abs(W[j]) * power * d[order - 1 - j]
+        power *= h
+    stiff = abs(lam) * h * h
+    back = stiff * heaviest / (order * (order + 1))
+    return (stiff * fed / (order * (1.0 - back)) if back < 1.0 else np.inf), largest
+
+
+@shared
+def left_out_nonlinear(
+    scratch: Record, lam: float, degrees: tuple[int, int], order: int, h: float
+) -> tuple[float, float]:
+    """Bound on all terms that a nonlinear series leaves out of the velocity over h, and its largest term; times h.
+
+    With r the velocity's terms, z those of sin and cos(alpha - u), b those of motion and weight, the products r z from
+    order - 2 on are left out of z', and b z from order - 1 on of u''; what they make feeds on itself and on the terms
+    that are there. See "Where a series may end" in the documentation. inf: h is too long for a bound.
+    """
+    c, A, W = scratch.rotation, scratch.ground, scratch.weight
+    S, C, d = scratch.sine, scratch.cosine, scratch.spare
+    last = order - 2
+    largest = 0.0
+    power = h
+    for k in range(order):
+        d[k] = (k + 1) * abs(c[k + 1]) * power
+        largest = max(largest, d[k])
+        power *= h
+    for k in range(order - 2, -1, -1):  # from here on: sums of all later terms
+        d[k] += d[k + 1]
+    turned = d[last]
+    angles = 1.0
+    power = h
+    for k in range(1, last + 1):
+        term = (abs(S[k]) + abs(C[k])) * power
+        angles += term
+        turned += term * d[last - k]
+        power *= h
+    turning = d[0]
+    d[0] = 1.0
+    power = h
+    for k in range(1, last + 1):
+        d[k] = (abs(S[k]) + abs(C[k])) * power
+        power *= h
+    for k in range(last - 1, -1, -1):
+        d[k] += d[k + 1]
+    degree, changes = degrees
+    strongest = pushed = 0.0
+    power = 1.0
+    for j in range(max(degree, changes) + 1):
+        push = ((abs(A[j]) if j <= degree else 0.0) + (abs(W[j]) if j <= changes else 0.0)) * power
+        strongest += push
+        if j > 0:
+            pushed += push * d[max(0, last + 1 - j)]
+        power *= h
+    # What is left out of z is at most (turned + turning z + (what is left out of u') (angles + z))/(order - 1), with
+    # z below 1; what is left out of u' at most stiff (pushed + strongest z)/order.
+    stiff = abs(lam) * h * h
+    back = (turning + stiff * strongest * (angles + 1.0) / order) / (order - 1)
+    if not back < 0.5:
+        return np.inf, largest
+    z = (turned + stiff * pushed * (angles + 1.0) / order) / ((order - 1) * (1.0 - back))
+    return (stiff * (pushed + strongest * z) / order if z < 1.0 else np.inf), largest
+
+
+@inlined
+def strength_of(weight: Line | None, push: Line, t: float) -> Line:
+    """Sum of the sizes of weight and push within t, and of what they change; given are their values and slopes."""
+    if weight is None:
+        return 1.0 + abs(push[0]) + abs(push[1]) * t, abs(push[1]) * t
+    change = (abs(push[1]) + abs(weight[1])) * t
+    return abs(weight[0]) + abs(push[0]) + change, change
+
+
+@inlined
+def is_left_out_nothing(r: Nine, z: Seven, stiff: float, strength: Line) -> tuple[bool, float]:
+    """Whether nine terms leave out next to nothing (2^-48); and the size of all that the first leaves out of u''.
+
+    `left_out_nonlinear` for a motion and a weight that change evenly, with time, as in u'', counted in steps of length
+    h; ``stiff`` is lam h^2.
+    """
+    t8 = r[7] + r[8]  # sums of all later terms from here on
+    t7 = r[6] + t8
+    t6 = r[5] + t7
+    t5 = r[4] + t6
+    t4 = r[3] + t5
+    t3 = r[2] + t4
+    t2 = r[1] + t3
+    turning = r[0] + t2
+    turned = (t8 + z[0] * t7) + (z[1] * t6 + z[2] * t5) + ((z[3] * t4 + z[4] * t3) + (z[5] * t2 + z[6] * turning))
+    most, change = stiff * strength[0], stiff * strength[1]
+    # Where all terms of the velocity, and stiff times the strength, are below a quarter, what feeds back adds so much.
+    beyond = 1.01 * change * z[6] + 0.131 * (most * turned)
+    nothing = (beyond <= _LEFT_OUT_OF_NINE * turning) & (turning <= _QUARTER) & (most <= _QUARTER)
+    return nothing, (t3 + t3) + ((t4 + t5) + (t6 + t7) + (t8 + r[8]))
 
 
 @inlined

@@ -193,6 +193,8 @@ def side_here(block: Record, rules: Record, j: int, scratch: Record, seen: Seen)
     sign, gain, threshold, lam = sign_of(j), block.gain[j], block.threshold[j], block.stiffness[j]
     horizontal, vertical = seen.motion
     error = seen.error + beyond_parabola(A, seen)
+    # Where next to nothing presses the block down, weight and push cancel, and the rounding of both stays.
+    error += ROUNDING * (threshold * (1.0 + largest(vertical)) + largest(horizontal))
     weighs = vertical.high > vertical.low
     lift = seen.error + beyond_parabola(W, seen) if weighs else 0.0
     sway = vertical.slope * seen.window + 2.0 * seen.error if weighs else 0.0

@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 
-from rocking.kernels.arc import expand
+from rocking.kernels.arc import evaluate, expand, restoring
 from rocking.kernels.certificate import unproven
-from rocking.kernels.compiled import inlined, kernel
+from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import Ground, has_vertical, is_straight, last_piece, length_of, start_of
 from rocking.kernels.impact import Arrival, advance, strike
 from rocking.kernels.proven import pass_proven_impacts
 from rocking.kernels.rest import ULP, Rest, note_impact, note_proof, proven_bounds, rest_after_impact, time_of
+from rocking.kernels.root import first_root
 from rocking.kernels.short_arc import short_step
 from rocking.kernels.state import AT_REST, Record, Records
 from rocking.kernels.status import (
@@ -35,6 +36,12 @@ from rocking.kernels.uplift import next_uplift
 # Further outcomes of an arc, besides STEP, IMPACT and OVERTURN.
 _STOPPED = 3
 _STUCK = 4
+
+#: Depth of a dip below zero rotation that is lost in rounding, over the highest rotation so far.
+_TOUCH = 2.0**-46
+
+#: Distance from zero rotation at which that may be decided by the rounding of what was given.
+_NEAR_TIE = 2.0**-36
 
 
 @kernel
@@ -86,7 +93,7 @@ def lift_off(ground: Ground, block: Record, rules: Record, table: Records, scrat
     found = next_uplift(ground, block, scratch, state.piece, state.offset, rules.stop)
     if found.side == AT_REST or start_of(ground, found.piece) + found.offset >= rules.stop:
         over = start_of(ground, last_piece(ground))
-        state.end = max(time_of(ground, state), over) if rules.endless else rules.stop
+        state.end = max(state.rested, over) if rules.endless else rules.stop
         state.resting += state.end - state.rested
         return DONE
     state.piece = found.piece
@@ -100,6 +107,9 @@ def lift_off(ground: Ground, block: Record, rules: Record, table: Records, scrat
     if state.uplifts == 0:
         state.first_uplift = state.uplifted
     state.uplifts += 1
+    if has_vertical(ground) and state.rests > 0 and state.uplifted - state.rested <= _NEAR_TIE * state.uplifted:
+        # The last of its impacts may have come too late.
+        state.near_ties += is_weightless(ground, block, state, state.offset)
     write_event(rules, table, state, state.uplifted, UPLIFT)
     return GOING
 
@@ -115,6 +125,8 @@ def follow_arc(ground: Ground, block: Record, rules: Record, scratch: Record, st
         arrival = short_step(ground, block, rules, state, left)
     if arrival.outcome == UNDECIDED:
         arrival = long_step(ground, block, rules, scratch, state, left)
+    if has_vertical(ground) and arrival.outcome == STEP and state.v < 0.0 <= arrival.v:
+        state.near_ties += nearly_touches(ground, block, rules, scratch, state, arrival.time)
     return arrive(ground, rules, state, arrival, left)
 
 
@@ -152,6 +164,13 @@ def arrive(ground: Ground, rules: Record, state: Record, arrival: Arrival, left:
 def pass_impact(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
     """Pass an impact, and come to rest where it is so decided; DONE when the march ends there."""
     settle(ground, state)
+    if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
+        pushed = abs(restoring(ground, block, state.side, state.piece, state.offset))
+        depth = 0.5 * state.v * state.v / pushed  # of the dip below zero rotation, if there were no ground
+        state.near_ties += depth <= _NEAR_TIE * state.peak
+        if depth <= _TOUCH * state.peak:  # no impact, which would leave the block on the other side
+            state.v = 0.0
+            return GOING
     time = time_of(ground, state)
     speed = strike(block, state)
     write_impact(rules, table, state, time, speed)
@@ -165,6 +184,29 @@ def pass_impact(ground: Ground, block: Record, rules: Record, table: Records, sc
     if math.isnan(rest.time):
         return GOING
     return come_to_rest(ground, rules, table, state, rest)
+
+
+@inlined
+def is_weightless(ground: Ground, block: Record, state: Record, offset: float) -> bool:
+    """Whether a block at zero rotation is pushed off to both sides at an offset of its piece."""
+    here = restoring(ground, block, state.side, state.piece, offset)
+    other = restoring(ground, block, block.entered[state.side], state.piece, offset)
+    return bool(here < 0.0 and other < 0.0)
+
+
+@shared
+def nearly_touches(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, h: float) -> bool:
+    """Whether the arc from a state turns within h so near to the ground that rounding may hide an impact.
+
+    Where weight presses the block down it goes on alike with the impact and without.
+    """
+    order, _, _ = expand(ground, block, rules, scratch, state, h)
+    c, d = scratch.rotation, scratch.spare
+    for k in range(order):
+        d[k] = -(k + 1) * c[k + 1]
+    turn = first_root(d, 0, order - 1, h)
+    lowest, _, _ = evaluate(c, order, turn)
+    return bool(lowest <= _NEAR_TIE * state.peak and is_weightless(ground, block, state, state.offset + turn))
 
 
 @inlined

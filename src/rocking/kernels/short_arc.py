@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from rocking.kernels.arc import Line, borne, is_carried_on, sign_of, weight_at
+from rocking.kernels.arc import Line, Seven, borne, is_left_out_nothing, sign_of, strength_of, weight_at
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import Ground, acceleration, coefficient, has_vertical, is_straight, vertical_of
 from rocking.kernels.impact import Arrival
@@ -19,12 +19,17 @@ from rocking.kernels.status import IMPACT, STEP, UNDECIDED
 Series = tuple[float, float, float, float, float, float, float, float, float, float]
 
 #: Largest lam t^2 of a linear step, lam |W| t^2 of one while the weight W changes, and (lam (|W| + |a|/g) + v^2) t^2 of
-#: a nonlinear one. Two powers on, terms are then smaller by a factor of 20,000 or more: what follows the last two is
-#: nothing where they are as small as this, beside the first two of the velocity.
+#: a nonlinear one.
 SHORT_LINEAR = 4e-3
 SHORT_WEIGHTED = 2e-3
 SHORT_NONLINEAR = 1.2e-3
+
+#: Largest sum of the last two terms of a linear velocity, over the first two: as lam t^2 is small, what follows is
+#: smaller by a factor of 20,000 or more.
 _LAST_TERMS = 2.0**-40
+
+#: Largest of what `is_complete_weighted` tests over the first two: what is left out is a sixtieth of it.
+_CARRIED = 2.0**-46
 
 _NEWTON_STEPS = 8
 _SETTLED = 1e-8
@@ -38,30 +43,58 @@ def short_step(ground: Ground, block: Record, rules: Record, state: Record, left
     if has_vertical(ground):
         return short_weighted_step(ground, block, rules, state, left)
     if rules.nonlinear:
-        t, c = reach_nonlinear(ground, block, state, left, None), nonlinear_series(ground, block, state, None)
-    else:
-        t, c = reach_linear(block, state, left), linear_series(ground, block, state)
-    return look(c, t, state, block.fallen)
+        return short_nonlinear_step(ground, block, state, left, None)
+    c = linear_series(ground, block, state)
+    arrival = look(c, reach_linear(block, state, left), state, block.fallen)
+    return arrival if is_complete(c, arrival.time) else undecided()
 
 
 @shared
 def short_weighted_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> Arrival:
     """Step in the same way while the weight changes."""
-    weight = weight_line(ground, state)
+    weight, lam = weight_line(ground, state), block.stiffness[state.side]
     if rules.nonlinear:
-        t, c = reach_nonlinear(ground, block, state, left, weight), nonlinear_series(ground, block, state, weight)
-    else:
-        t, c = reach_weighted(block.stiffness[state.side], weight, left), weighted_series(ground, block, state, weight)
-    arrival = look(c, t, state, block.fallen)
-    return undecided() if goes_on(c, block.stiffness[state.side], weight, arrival.time) else arrival
+        return short_nonlinear_step(ground, block, state, left, weight)
+    c = weighted_series(ground, block, state, weight)
+    arrival = look(c, reach_weighted(lam, weight, left), state, block.fallen)
+    return arrival if is_complete_weighted(c, lam, weight, arrival.time) else undecided()
 
 
 @inlined
-def goes_on(c: Series, lam: float, weight: Line, t: float) -> bool:
-    """Whether the change of the weight carries terms on beyond the last within t."""
+def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> Arrival:
+    """Step in the same way in the nonlinear model."""
+    c, angles = nonlinear_series(ground, block, state, weight)
+    arrival = look(c, reach_nonlinear(ground, block, state, left, weight), state, block.fallen)
+    push = (acceleration(ground, state.piece, state.offset), coefficient(ground, state.piece, 1))
+    complete = is_complete_nonlinear(c, angles, block.stiffness[state.side], (push, weight), arrival.time)
+    return arrival if complete else undecided()
+
+
+@inlined
+def is_complete_weighted(c: Series, lam: float, weight: Line, t: float) -> bool:
+    """Whether nine terms of a linear series are enough at t while the weight changes.
+
+    Each coefficient is made of the one two before and, as the weight changes, of the one three before. So the last
+    three make all that follows, a power of lam (|W| + |W'| t) t^2 after the other, which is at most 0.006.
+    """
+    t2, change = t * t, abs(weight[1]) * t
+    t6 = t2 * t2 * t2
+    eighth, ninth = 8.0 * abs(c[8]) * t2, 9.0 * abs(c[9]) * (t2 * t)
+    made = (abs(weight[0]) + change) * (eighth + ninth) + change * (7.0 * abs(c[7]) * t)
+    return abs(lam) * t2 * (made * t6) <= _CARRIED * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
+
+
+@inlined
+def is_complete_nonlinear(c: Series, z: Seven, lam: float, pulls: tuple[Line, Line | None], t: float) -> bool:
+    """Whether nine terms of a nonlinear series are enough at t; ``pulls`` are push and weight."""
     t2 = t * t
-    seventh = 7.0 * c[7] * (t2 * t2 * t2) * t
-    return is_carried_on(lam * t2 * (weight[1] * t), seventh, (c[1] * t, 2.0 * c[2] * t2))
+    t3, t4 = t2 * t, t2 * t2
+    t5, t6, t7 = t2 * t3, t3 * t3, t3 * t4
+    low = (abs(c[1]) * t, 2.0 * abs(c[2]) * t2, 3.0 * abs(c[3]) * t3, 4.0 * abs(c[4]) * t4, 5.0 * abs(c[5]) * t5)
+    sizes = (*low, 6.0 * abs(c[6]) * t6, 7.0 * abs(c[7]) * t7, 8.0 * abs(c[8]) * (t4 * t4), 9.0 * abs(c[9]) * (t4 * t5))
+    angles = (z[0] * t, z[1] * t2, z[2] * t3, z[3] * t4, z[4] * t5, z[5] * t6, z[6] * t7)
+    nothing, _ = is_left_out_nothing(sizes, angles, lam * t2, strength_of(pulls[1], pulls[0], t))
+    return nothing
 
 
 @inlined
@@ -143,10 +176,11 @@ def linear_tail(u: float, v: float, c2: float, c3: float, lam: float) -> Series:
 
 
 @inlined
-def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line | None) -> Series:
+def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line | None) -> tuple[Series, Seven]:
     """Series of a nonlinear arc under a ground acceleration that changes evenly, by the recurrence of `arc`.
 
-    The weight may change evenly, too, or not at all (None).
+    The weight may change evenly, too, or not at all (None). The second
+    tuple has the sums of the sizes of the coefficients of sin and cos, from the first power to the seventh.
     """
     side, u, v = state.side, state.u, state.v
     l2 = -0.5 * block.stiffness[side]
@@ -181,7 +215,9 @@ def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line 
     s7 = -(1.0 / 7.0) * ((v * c6 + r2 * c5) + (r3 * c4 + r4 * c3) + ((r5 * c2 + r6 * c1) + r7 * c0))
     c7 = (1.0 / 7.0) * ((v * s6 + r2 * s5) + (r3 * s4 + r4 * s3) + ((r5 * s2 + r6 * s1) + r7 * s0))
     u9 = l2 * (borne(weight, s7, s6) + (a * c7 + b * c6)) * (1.0 / 36.0)
-    return u, v, u2, u3, u4, u5, u6, u7, u8, u9
+    low = (abs(v), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
+    angles = (*low, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
+    return (u, v, u2, u3, u4, u5, u6, u7, u8, u9), angles
 
 
 @inlined
@@ -203,7 +239,7 @@ def look(c: Series, t: float, state: Record, fallen: float) -> Arrival:
         if not min(c[0], end) > 0.125 * t * t * max(most, 0.0):
             falls = most < 0.0 or c[1] + max(most, 0.0) * t < 0.0
             t, outcome = impact_from_above(c, t) if end < 0.0 and falls else np.nan, IMPACT
-    if math.isnan(t) or not is_complete(c, t):
+    if math.isnan(t):
         return undecided()
     end, speed = (rotation(c, t) if outcome == STEP else 0.0), velocity(c, t)
     top, height = t, end
@@ -230,7 +266,7 @@ def later_curvature(c: Series, t: float) -> float:
 
 @inlined
 def is_complete(c: Series, t: float) -> bool:
-    """Whether nine terms are enough at t, for the velocity to its last place."""
+    """Whether nine terms of a linear series are enough at t, for the velocity to its last place."""
     t2 = t * t
     t4 = t2 * t2
     return 9.0 * (abs(c[8]) + abs(c[9]) * t) * (t4 * t4) <= _LAST_TERMS * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)

@@ -48,12 +48,13 @@ RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endles
 #: Where a march stands. ``until`` is the first piece that is not marched through and ``budget`` the number of turns
 #: left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a jump;
 #: ``worth`` is the speed below which a proof is worth trying; ``stalled`` counts the rests brought about only because
-#: time hardly advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times.
+#: time hardly advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties``
+#: counts what was decided in the last digits: whether a block that nothing weighs down touches the ground.
 STATE = _record(
     piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
     run="i8", worth="f8", struck="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8", run_start="f8",
     uplifted="f8", rested="f8", first_uplift="f8", first_rest="f8", resting="f8", end="f8",
-    nodes="i8", events="i8", sequences="i8", uplifts="i8", rests="i8", stalled="i8",
+    nodes="i8", events="i8", sequences="i8", uplifts="i8", rests="i8", stalled="i8", near_ties="i8",
 )  # fmt: skip
 
 #: A step of a response: the state at its start, as `expand` takes it. Elsewhere a side is +1 or -1, and 0 at rest.

@@ -59,28 +59,27 @@ def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offs
             to_plus, jump_plus = first_excess(A, degree, left, plus, -1.0, d)
             degree = push_series(ground, piece, offset, minus, 1.0, A, d)
             to_minus, jump_minus = first_excess(A, degree, left, minus, 1.0, d)
-            if to_plus == to_minus < np.inf:  # where nothing weighs the block down, both may be passed at once
-                if pushes_to_minus(ground, piece, offset + to_plus, A):
-                    to_plus = np.inf
-                else:
-                    to_minus = np.inf
+            passed = min(to_plus, to_minus)
             # A passing that rounding puts at the end of the piece is left to the next one, which may turn back.
-            if to_plus < to_minus and offset + to_plus < length:
-                return Uplift(piece, offset + to_plus, 0, jump_plus)
-            if to_minus < to_plus and offset + to_minus < length:
-                return Uplift(piece, offset + to_minus, 1, jump_minus)
+            if offset + passed < length:
+                side = 0
+                if block.entered[0] != 0:  # there is another side
+                    side = pushed_side(ground, piece, offset + passed, length - offset - passed, A)
+                return Uplift(piece, offset + passed, side, jump_minus if side == 1 else jump_plus)
         piece += 1
         offset = 0.0
 
 
 @inlined
-def pushes_to_minus(ground: Ground, piece: int, offset: float, A: Floats) -> bool:
-    """Whether the horizontal motion pushes a block to side - from here on; ``A`` is scratch space."""
+def pushed_side(ground: Ground, piece: int, offset: float, h: float, A: Floats) -> int:
+    """Side to which the horizontal motion pushes a block within h from here, + without a push; ``A`` is scratch space.
+
+    Where a threshold is passed that is the side: with weight on the block it is the threshold's, and where nothing
+    weighs the block down both are passed at once, at instants that only rounding tells apart.
+    """
     degree = local_series(ground, piece, offset, 1.0, A)
-    lead = 0
-    while lead < degree and A[lead] == 0.0:
-        lead += 1
-    return bool(A[lead] > 0.0)
+    lead = leading_power(A, degree, h, rounding_of(A, degree, h))
+    return 1 if lead <= degree and A[lead] > 0.0 else 0
 
 
 @inlined
@@ -126,9 +125,7 @@ def first_passing(d: Floats, degree: int, h: float) -> float:
 
     From a root that is but a touch the search goes on with what is left once the root is divided out. Changes ``d``.
     """
-    rounding = 0.0
-    for k in range(degree, -1, -1):
-        rounding = rounding * h + _ROUNDING * abs(d[k])
+    rounding = rounding_of(d, degree, h)
     start = 0.0
     for _ in range(degree + 1):
         lead = leading_power(d, degree, h - start, rounding)
@@ -147,6 +144,15 @@ def first_passing(d: Floats, degree: int, h: float) -> float:
             start += across
         d[0] = 0.0
     return np.inf
+
+
+@inlined
+def rounding_of(d: Floats, degree: int, h: float) -> float:
+    """Return the rounding of a polynomial within h."""
+    rounding = 0.0
+    for k in range(degree, -1, -1):
+        rounding = rounding * h + _ROUNDING * abs(d[k])
+    return rounding
 
 
 @inlined

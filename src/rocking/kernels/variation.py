@@ -58,7 +58,7 @@ def vary(
                 at_peak, _, _ = evaluate(work[2], order, peak_time - node.time)
             t = elapsed(trail, node, following)
             du, dv, _ = evaluate(work[2], order, t)
-            if following.u == 0.0:
+            if following.u == 0.0 and (following.side != node.side or following.v > 0.0):  # no touch
                 _, speed, _ = evaluate(scratch.rotation, order, t)
                 shift = du / -speed
                 du, dv = saltation(trail, node, following, what, shift, (dv, -speed))

@@ -34,7 +34,7 @@ _LONGEST: Final = 1e15
 _OF_SAMPLES: Final = ": of samples make a motion with Motion.from_samples(acceleration, dt)"
 
 #: Far below any ground motion; pieces may be shorter, but must not change faster than over this time.
-_SHORTEST: Final = 1e-9
+SHORTEST: Final = 1e-9
 
 
 def pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
@@ -53,15 +53,15 @@ def pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Flo
             f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}: "
             "split them into shorter ones of a lower degree"
         )
-    if not _SHORTEST <= ends[-1] <= _LONGEST:
+    if not SHORTEST <= ends[-1] <= _LONGEST:
         raise InvalidMotion(
-            f"a motion must last from {_SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
+            f"a motion must last from {SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
         )
     if not _stays_below(STRONGEST, rows, np.diff(ends)):
         raise InvalidMotion(f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale")
-    if not _stays_below(STRONGEST, rows, np.maximum(np.diff(ends), _SHORTEST)):
+    if not _stays_below(STRONGEST, rows, np.maximum(np.diff(ends), SHORTEST)):
         raise InvalidMotion(
-            f"a piece of a motion is too steep: shorter than {_SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "
+            f"a piece of a motion is too steep: shorter than {SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "
             "within that time: check units and times"
         )
     for array in (ends, rows):
@@ -101,7 +101,7 @@ def step(dt: float) -> float:
     if np.ndim(dt) != 0:
         raise InvalidMotion("dt must be one number; for uneven times use Motion.from_points(times, acceleration)")
     positive = checks.positive(dt, "sampling step dt", InvalidMotion, "s")
-    return checks.within(positive, "sampling step dt", InvalidMotion, _SHORTEST, 1.0 / _SHORTEST, "s: check its units")
+    return checks.within(positive, "sampling step dt", InvalidMotion, SHORTEST, 1.0 / SHORTEST, "s: check its units")
 
 
 def instants(times: ArrayLike, count: int) -> Floats:

@@ -10,7 +10,7 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.motion import formats, records
 from rocking.motion.formats.request import Request
 from rocking.motion.motion import Motion
-from rocking.tables import named, text_table
+from rocking.tables import decimal, named, text_table
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,9 @@ class Contents:
     def summary(self) -> str:
         """Return the table for people."""
         columns = list(self.entries[0])
-        table = text_table(columns, [[entry[column] for column in columns] for entry in self.entries])
+        # What has no value is the step of samples that are not evenly spaced.
+        rows = [["uneven" if entry[column] is None else entry[column] for column in columns] for entry in self.entries]
+        table = text_table(columns, rows)
         return f"{self.title}\n\n{table}" if self.title else table
 
     def __repr__(self) -> str:
@@ -92,7 +94,8 @@ def contents(
     UnreadableRecord, InvalidMotion
         As for `rocking.read`.
     """
-    identification, channels = formats.content_as(file, channel, Request.checked(dt, units, several=several))
+    request = Request.checked(dt, units, several=several)
+    identification, channels = formats.content_as(file, channel, request, optional=several)
     motions = tuple(each.motion() for each in channels)
     name = "standard input" if hasattr(file, "read") else os.fsdecode(file)
     facts = {"file": name, "format": identification.format, "reason": identification.reason}
@@ -114,6 +117,6 @@ def _measures(motion: Motion) -> dict[str, Any]:
     return {
         named("step", "s"): motion.step,
         named("duration", "s"): motion.duration,
-        named("pga", "g"): motion.pga / STANDARD_GRAVITY,
+        named("pga", "g"): decimal(motion.pga / STANDARD_GRAVITY),
         named("pgv", "m/s"): motion.pgv,
     }

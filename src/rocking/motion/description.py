@@ -77,12 +77,17 @@ class Description:
         return replace(self, family=family)
 
 
-def labelled(name: str, history: Sequence[str]) -> str:
+def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
     """Return the name of a motion with what was done to it, in a few words: without what it was scaled to.
+
+    A vertical component is named, too.
 
     Examples
     --------
     >>> labelled("pulse", ["scaled by 2 to a peak ground acceleration of 2 m/s^2 (0.2039 g)", "trimmed to 2-20 s"])
     'pulse, scaled by 2, trimmed to 2-20 s'
+    >>> labelled("tower-090", ["scaled by 2"], "tower-up")
+    'tower-090 with vertical tower-up, scaled by 2'
     """
-    return ", ".join((name, *(_SCALED.sub(r"\1", done) for done in history)))
+    both = f"{name} with vertical {vertical}" if vertical else name
+    return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
@@ -46,6 +46,55 @@ def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float 
     middle = 0.5 * (cuts[:-1] + cuts[1:])
     beyond = (towards_minus.acceleration(middle) > minus) | (towards_plus.acceleration(middle) < -plus)
     return cuts[np.flatnonzero(np.diff(beyond, prepend=False, append=False))].reshape(-1, 2)
+
+
+def lifting_factors(motion: Motion, thresholds: ArrayLike, gravity: float = STANDARD_GRAVITY) -> Floats:
+    """Lowest factors on a motion, both components, from which on it lifts blocks from rest.
+
+    Parameters
+    ----------
+    motion : Motion
+        Ground motion; a vertical component takes part, since it changes the weight.
+    thresholds : array_like, shape (n, 2)
+        Pairs of accelerations, m/s^2, as `exceedances` takes one.
+    gravity : float
+        Gravity under which they hold, m/s^2.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Infinite where no factor does.
+
+    Examples
+    --------
+    A vertical acceleration of -g/2 at the moment of the horizontal peak halves the factor that lifts this block:
+
+    >>> from rocking import Motion
+    >>> push = Motion.from_samples([0.0, 2.0, 0.0], 0.1)
+    >>> pull = Motion.from_samples([0.0, -9.80665 / 2.0, 0.0], 0.1)
+    >>> lifting_factors(push, [(4.0, 4.0)]), lifting_factors(push.with_vertical(pull), [(4.0, 4.0)])
+    (array([2.]), array([1.]))
+    """
+    pairs = np.asarray(thresholds, dtype=np.float64)
+    if motion.vertical is None:
+        widths = np.diff(motion.breakpoints)
+        reached = np.array([[piecewise.highest(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
+    else:
+        breakpoints, (push, lift) = piecewise.together(motion, motion.vertical)
+        widths = np.diff(breakpoints)
+        reached = np.array(
+            [
+                [
+                    piecewise.highest(widths, sign * push - threshold / gravity * lift)
+                    for sign, threshold in zip((-1.0, 1.0), pair, strict=True)
+                ]
+                for pair in pairs
+            ]
+        )
+    with np.errstate(divide="ignore"):
+        factors = np.where(reached > 0.0, pairs / np.maximum(reached, 0.0), np.inf)
+    lowest: Floats = factors.min(axis=1)
+    return lowest
 
 
 def _push(motion: Motion, threshold_over_g: float) -> Motion:

@@ -67,10 +67,16 @@ def significant_duration(motion: Piecewise, start: float, end: float) -> float:
     start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
     if not 0.0 <= start < end <= 1.0:
         raise InvalidMotion(f"a significant duration needs 0 <= start < end <= 1, not {start:g} and {end:g}")
+    first, last = significant_span(motion, start, end)
+    return last - first
+
+
+def significant_span(motion: Piecewise, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
+    """Return the times, s, at which the Arias intensity reaches two fractions of itself; NaN if it is zero."""
     cumulated = np.append(0.0, np.cumsum(_energies(motion)))
     if cumulated[-1] == 0.0:
-        return math.nan
-    return _time_at(motion, cumulated, end) - _time_at(motion, cumulated, start)
+        return math.nan, math.nan
+    return _time_at(motion, cumulated, start), _time_at(motion, cumulated, end)
 
 
 def spectral_acceleration(

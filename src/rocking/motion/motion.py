@@ -207,8 +207,20 @@ class Motion:
         return float(self.breakpoints[-1])
 
     @property
+    def end(self) -> float:
+        """Time from which the ground no longer moves, s: that of the last breakpoint of both components.
+
+        Examples
+        --------
+        >>> horizontal, vertical = Motion([0.0, 1.0], [[1.0]]), Motion([0.0, 3.0], [[1.0]])
+        >>> horizontal.with_vertical(vertical).duration, horizontal.with_vertical(vertical).end
+        (1.0, 3.0)
+        """
+        return max(self.duration, 0.0 if self.vertical is None else self.vertical.duration)
+
+    @property
     def label(self) -> str:
-        """Name, with what was done to the motion in a few words, for titles.
+        """Name, with what was done to the motion in a few words and its vertical component, for titles.
 
         Examples
         --------
@@ -216,7 +228,7 @@ class Motion:
         >>> motion.label, motion.scaled(pga=2.0).label, (-motion).delayed(1.0).label
         ('step', 'step, scaled by 2', 'step, polarity reversed, delayed by 1 s')
         """
-        return labelled(self.name, self.history)
+        return labelled(self.name, self.history, "" if self.vertical is None else self.vertical.name)
 
     @property
     def samples(self) -> tuple[Floats, Floats]:
@@ -232,6 +244,18 @@ class Motion:
     def pga(self) -> float:
         """Peak ground acceleration, m/s^2: the exact extremum of the pieces."""
         return measures.peak_acceleration(self)
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """Lowest and highest acceleration, m/s^2, with their signs: the exact extrema of the pieces.
+
+        Examples
+        --------
+        >>> Motion.from_samples([0.0, 1.0, -2.0, 0.0], 0.02).extremes
+        (-2.0, 1.0)
+        """
+        widths = np.diff(self.breakpoints)
+        return -piecewise.highest(widths, -self.coefficients), piecewise.highest(widths, self.coefficients)
 
     @property
     def pgv(self) -> float:
@@ -449,7 +473,8 @@ class Motion:
         Parameters
         ----------
         trim : (start, end)
-            Part to keep, s; its start becomes time 0. For even samples the ends move to the nearest sample.
+            Part to keep, s; its start becomes time 0. For even samples the ends move to the nearest sample. A vertical
+            component is cut at the same instants, whatever its own step.
         baseline : int
             Degree of the polynomial in time that is fitted to the samples by least squares and subtracted.
         band_pass : (low, high)
@@ -477,9 +502,7 @@ class Motion:
         ('trimmed to 0.5-2 s', 'baseline of degree 0 removed')
         """
         steps: list[Callable[[piecewise.Piecewise], processing.Processed]] = []
-        if trim is not None:
-            start, end = processing.pair(trim, "trim=(start, end)")
-            steps.append(lambda motion: processing.trim(motion, start, end))
+        kept = None if trim is None else processing.ends(self, *processing.pair(trim, "trim=(start, end)"))
         if baseline is not None:
             steps.append(lambda motion: processing.baseline(motion, baseline))
         if band_pass is not None:
@@ -489,23 +512,32 @@ class Motion:
             raise InvalidMotion("order= belongs to band_pass=; give that as well, or neither")
         if resample is not None:
             steps.append(lambda motion: processing.resample(motion, resample))
-        if not steps:
+        if kept is None and not steps:
             raise InvalidMotion("name what to do: trim, baseline, band_pass or resample")
         vertical = self.vertical
-        if vertical is not None and (trim is None or trim[0] < vertical.duration):
-            kept = None if trim is None else (trim[0], min(trim[1], vertical.duration))
-            vertical = vertical.processed(
-                trim=kept, baseline=baseline, band_pass=band_pass, order=order, resample=resample
-            )
-        elif vertical is not None:  # it is over by then
-            vertical = None
+        if vertical is not None and kept is not None and kept[0] > vertical.duration - arguments.SHORTEST:
+            vertical = None  # it is over by then
+        if vertical is not None:
+            vertical = vertical._processed(kept, steps, self.step)
+        return replace(self._processed(kept, steps), vertical=vertical)
+
+    def _processed(
+        self,
+        kept: tuple[float, float] | None,
+        steps: list[Callable[[piecewise.Piecewise], processing.Processed]],
+        grid: float | None = None,
+    ) -> Motion:
+        """Return the part between two times (s; even samples stay even on a finer `grid`), after these steps."""
         motion: piecewise.Piecewise = self
         history = self.history
+        if kept is not None:
+            start, end = kept[0], min(kept[1], self.duration)
+            steps = [lambda motion: processing.cut(motion, start, end, grid), *steps]
         for step in steps:
             motion = done = step(motion)
             history = (*history, done.done)
         # What is made of samples is the motion from then on: the lines between them are exact.
-        cut_only = baseline is None and band_pass is None and resample is None
+        cut_only = len(steps) == (kept is not None)
         return replace(
             self,
             breakpoints=motion.breakpoints,
@@ -513,16 +545,15 @@ class Motion:
             description=self.description.changed("processed"),
             history=history,
             error=self.error if cut_only else 0.0,
-            vertical=vertical,
         )
 
     def plot(self, ax: Axes | None = None, *, figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the ground acceleration in g over time.
+        """Draw the ground acceleration in g over time, and below it the vertical one.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
+            Where to draw the horizontal acceleration alone; by default in a new figure.
         figsize : (float, float), optional
             Width and height of a new figure, inches.
 
@@ -539,16 +570,27 @@ class Motion:
         """
         from rocking.plot import motion_figure
 
-        times = self.drawing_times(0.0, self.duration)
-        ground = self.acceleration(times) / STANDARD_GRAVITY
-        return motion_figure(time=times, acceleration_g=ground, title=self.name, ax=ax, figsize=figsize)
+        end = self.duration if self.vertical is None else max(self.duration, self.vertical.duration)
+        times = self.drawing_times(0.0, end)
+        return motion_figure(
+            time=times,
+            acceleration_g=self.acceleration(times) / STANDARD_GRAVITY,
+            vertical_g=None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY,
+            title=self.label,
+            ax=ax,
+            figsize=figsize,
+        )
 
     def drawing_times(self, start: float, end: float) -> Floats:
-        """Return the ends of a stretch of time, breakpoints in it, and times between them where pieces are curved."""
+        """Return the ends of a stretch of time, breakpoints in it, and times between them where pieces are curved.
+
+        The breakpoints are those of both components.
+        """
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:
             corners = (corners[:-1, None] + np.linspace(0.0, 1.0, _DRAWN) * np.diff(corners)[:, None]).ravel()
-        return np.union1d([start, end], corners[(corners > start) & (corners < end)])
+        times = np.union1d([start, end], corners[(corners > start) & (corners < end)])
+        return times if self.vertical is None else np.union1d(times, self.vertical.drawing_times(start, end))
 
     def __repr__(self) -> str:
         return f"<Motion: {self}>"

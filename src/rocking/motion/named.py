@@ -37,7 +37,8 @@ def named_motion(
     scale : float
         Factor on the motion.
     several : bool
-        Whether `dt` and `units` are for several files, of which those that say theirs keep them.
+        Whether `dt`, `units` and `channel` are for several files, of which those that say their step and units keep
+        them, and those that hold one channel are taken whatever its name.
 
     Raises
     ------
@@ -50,11 +51,13 @@ def named_motion(
         motion = records.load(name)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
-        motion = formats.read_as(file, channel, Request.checked(dt, units, several=several))
+        motion = formats.read_as(file, channel, Request.checked(dt, units, several=several), optional=several)
     return motion if scale == 1.0 else motion.scaled(scale)
 
 
-def named_vertical(name: str, record: str, *, dt: float | None = None, units: str | None = None) -> Motion:
+def named_vertical(
+    name: str, record: str, *, channel: str | None = None, dt: float | None = None, units: str | None = None
+) -> Motion:
     """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal one's file.
 
     There are two motions then, so `dt` and `units` are for the one that does not say its own.
@@ -65,6 +68,8 @@ def named_vertical(name: str, record: str, *, dt: float | None = None, units: st
         Path of a file, name of a shipped record, or a channel by number or name.
     record : str
         Path of the file with the horizontal motion.
+    channel
+        The channel that is the horizontal motion, where that file has several.
     dt, units
         As for `rocking.read`.
 
@@ -77,9 +82,11 @@ def named_vertical(name: str, record: str, *, dt: float | None = None, units: st
         return named_motion(name, dt=dt, units=units, several=True)
     if record == STANDARD_INPUT or not Path(record).exists():
         raise UnreadableRecord(
-            f"{name}: there is no such file or shipped record for the vertical motion, and {record} has no channels"
+            f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels; check "
+            "the name"
         )
-    return formats.read_as(record, name, Request.checked(dt, units, several=True))
+    request = Request.checked(dt, units, several=True)
+    return formats.read_vertical(record, name, channel, request)
 
 
 def refuse_what_is_known(name: str, **said: object) -> None:

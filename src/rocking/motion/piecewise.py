@@ -213,6 +213,19 @@ def bounds(widths: Floats, coefficients: Floats) -> Floats:
     return result
 
 
+def highest(widths: Floats, coefficients: Floats) -> float:
+    """Highest value over all pieces, at their ends or at their interior extrema."""
+    best = max(float(np.max(coefficients[:, 0])), float(np.max(value(coefficients, widths))))
+    if coefficients.shape[1] <= 2:
+        return best
+    may_exceed = np.max(_control_points(widths, coefficients), axis=1) > best
+    if not np.any(may_exceed):
+        return best
+    pieces, spans = coefficients[may_exceed], widths[may_exceed]
+    extrema = root_candidates(spans, derivative(pieces))
+    return max(best, float(np.max(value(pieces[:, np.newaxis, :], extrema))))
+
+
 def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
     """Largest absolute value over all pieces, at their ends or at their interior extrema."""
     best = max(float(np.max(np.abs(coefficients[:, 0]))), float(np.max(np.abs(value(coefficients, widths)))))

@@ -17,6 +17,9 @@ T = TypeVar("T")
 
 _MOST_SAMPLES: Final = 50_000_000
 
+#: Ratios of times and steps are off a whole number by no more than this, through rounding.
+_ROUNDING: Final = 1e-8
+
 
 class Processed(NamedTuple):
     """Pieces after one step of processing, and what was done, for the motion's history."""
@@ -35,8 +38,14 @@ def pair(values: tuple[T, T], what: str) -> tuple[T, T]:
     return first, second
 
 
-def trim(motion: Piecewise, start: float, end: float) -> Processed:
-    """Keep the part from `start` to `end` (s); even samples are cut at the nearest sample."""
+def ends(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
+    """Return the ends (s) of the part to keep; those of even samples are moved to the nearest sample.
+
+    Raises
+    ------
+    InvalidMotion
+        If they are no part of the motion, or no two samples lie between them.
+    """
     first = checks.finite(start, "start of the part to keep", InvalidMotion)
     last = checks.finite(end, "end of the part to keep", InvalidMotion)
     duration = float(motion.breakpoints[-1])
@@ -45,20 +54,38 @@ def trim(motion: Piecewise, start: float, end: float) -> Processed:
             f"trim needs 0 <= start < end <= {duration:.6g} s, the motion's duration, not {first:.6g} and {last:.6g}"
         )
     step = piecewise.even_step(motion)
-    if step is not None:
-        return _trimmed_samples(motion, step, round(first / step), round(last / step))
-    breakpoints = motion.breakpoints
-    inside = breakpoints[(breakpoints > first) & (breakpoints < last)]
-    kept = np.concatenate([[first], inside, [min(last, duration)]])
-    coefficients = piecewise.refined(breakpoints, motion.coefficients, kept, motion.coefficients.shape[1])
-    return Processed(kept - first, coefficients, f"trimmed to {first:.6g}-{last:.6g} s")
-
-
-def _trimmed_samples(motion: Piecewise, step: float, first: int, last: int) -> Processed:
-    if last <= first:
+    if step is None:
+        return first, min(last, duration)
+    if round(last / step) <= round(first / step):
         raise InvalidMotion(f"trim must keep at least two samples, {step:.6g} s apart")
-    times = piecewise.even_times(last - first + 1, step)
-    return Processed(times, motion.coefficients[first:last], f"trimmed to {first * step:.6g}-{last * step:.6g} s")
+    return round(first / step) * step, round(last / step) * step
+
+
+def cut(motion: Piecewise, start: float, end: float, grid: float | None = None) -> Processed:
+    """Keep the part from `start` to `end` (s), exactly; it starts at 0 then.
+
+    Even samples stay even where both ends are samples, or where they are multiples of a step `grid` (s) that divides
+    the samples' own: the part has that step then.
+    """
+    done = f"trimmed to {start:.6g}-{end:.6g} s"
+    step = piecewise.even_step(motion)
+    if step is not None:
+        for finer in (step, grid or step):
+            first, last, parts = (_whole(value / finer) for value in (start, end, step))
+            if first is not None and last is not None and parts:
+                sample, part = np.divmod(np.arange(first, last), parts)
+                coefficients = piecewise.moved(motion.coefficients[sample], part * finer)
+                return Processed(piecewise.even_times(last - first + 1, finer), coefficients, done)
+    breakpoints = motion.breakpoints
+    inside = breakpoints[(breakpoints > start) & (breakpoints < end)]
+    kept = np.concatenate([[start], inside, [end]])
+    coefficients = piecewise.refined(breakpoints, motion.coefficients, kept, motion.coefficients.shape[1])
+    return Processed(kept - start, coefficients, done)
+
+
+def _whole(ratio: float) -> int | None:
+    """Return the whole number that a ratio is up to rounding, or None."""
+    return round(ratio) if abs(ratio - round(ratio)) <= _ROUNDING else None
 
 
 def baseline(motion: Piecewise, degree: int) -> Processed:

@@ -13,7 +13,7 @@ from rocking.plot.maps import outcome_figure
 from rocking.plot.motion import motion_figure
 from rocking.plot.regions import regions_figure
 from rocking.plot.response import DrawnSequence, RotationUnits, response_figure
-from rocking.plot.risk import RiskLine, risk_figure
+from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
 from rocking.plot.sequences import Ratios, chattering_figure, ratio_figure
 from rocking.plot.sketch import block_figure
 from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
@@ -24,6 +24,7 @@ __all__ = [
     "DrawnSequence",
     "Flowchart",
     "FragilityLine",
+    "HazardLine",
     "Mark",
     "Parameter",
     "Ratios",
@@ -55,4 +56,5 @@ __all__ = [
     "risk_figure",
     "spectrum_figure",
     "surface_figure",
+    "survival_figure",
 ]

@@ -25,11 +25,13 @@ class Parameter(NamedTuple):
     """One parameter of the blocks that explain the outcomes: values (blocks, sides), and what is known of each side.
 
     estimates (sides, 3) : median, lower and upper end of its interval
+    bounds : lowest and highest value that was thinkable
     """
 
     label: str
     values: Floats
     estimates: Floats
+    bounds: tuple[float, float]
 
 
 def outcomes_figure(
@@ -66,7 +68,7 @@ def outcomes_figure(
     >>> import numpy as np
     >>> figure = outcomes_figure(
     ...     probabilities=np.array([0.1, 0.9]), overturned=np.array([False, True]), weights=np.array([0.5, 0.5]),
-    ...     parameters=[Parameter("p (rad/s)", np.array([[2.0], [3.0]]), np.array([[2.4, 2.0, 3.0]]))])
+    ...     parameters=[Parameter("p (rad/s)", np.array([[2.0], [3.0]]), np.array([[2.4, 2.0, 3.0]]), (1.0, 9.0))])
     >>> [axes.get_xlabel() for axes in figure.axes]
     ['test, by its probability', 'p (rad/s)']
     """
@@ -153,9 +155,11 @@ def _draw_tests(axes: Axes, probabilities: Floats, overturned: Flags) -> None:
 def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
     """Draw how the blocks are distributed, and above that the median of the population's centre and its interval."""
     sides = parameter.values.shape[1]
-    names = ("side +", "side -") if sides > 1 else ("blocks",)
+    drawn = {"side +": CURVES[3], "side -": CURVES[1]} if sides > 1 else {"both sides": CURVES[2] | {"linestyle": "-"}}
     edges = np.histogram_bin_edges(parameter.values, _BINS)
-    for k, (name, style) in enumerate(zip(names, CURVES, strict=False)):
+    for bound in parameter.bounds:
+        axes.axvline(bound, color=GROUND, linewidth=1.0, linestyle=(0, (3, 2)), label="bound")
+    for k, (name, style) in enumerate(drawn.items()):
         shares = np.histogram(parameter.values[:, k], edges, weights=weights)[0]
         axes.stairs(shares, edges, linewidth=1.1, label=name, **style)
         median, low, high = parameter.estimates[k]

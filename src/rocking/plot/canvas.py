@@ -12,7 +12,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.plot.style import STYLE
 
@@ -37,6 +40,10 @@ _LETTER: Final = 0.52
 _X_LINE: Final = 1.0
 _Y_LINE: Final = 0.85
 _FEWEST_LETTERS: Final = 12
+
+#: What is written of each decade of an axis, where there is less than one, and where there are more.
+_DIGITS: Final = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+_FEW_DIGITS: Final = (1.0, 2.0, 5.0)
 
 #: Where titles begin, in widths of the figure.
 _TITLE_AT: Final = 0.02
@@ -113,6 +120,17 @@ def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
     for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
         letter = _LETTER * axes.figure.dpi * float(axis.label.get_fontsize()) / 72.0
         axis.set_label_text(_in_lines(label, max(_FEWEST_LETTERS, int(length / letter))))
+
+
+def scale_by_ratio(axes: Axes, x: Floats) -> None:
+    """Scale an axis that these numbers go along logarithmically, with as many numbers as there is room for."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    decades = float(np.log10(x[-1] / x[0])) if x.size > 1 else 0.0
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=_DIGITS if decades < 1.0 else _FEW_DIGITS))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> None:

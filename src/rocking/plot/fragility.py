@@ -38,6 +38,7 @@ def fragility_figure(
     lines: Sequence[FragilityLine],
     intensity_label: str,
     band_label: str,
+    probability_label: str = "probability",
     title: str = "",
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
@@ -48,8 +49,8 @@ def fragility_figure(
     ----------
     lines : sequence of FragilityLine
         One for every limit state.
-    intensity_label, band_label : str
-        Texts; `band_label` says what the bands are.
+    intensity_label, band_label, probability_label : str
+        Texts; `band_label` says what the bands are, or why there is none, `probability_label` what is probable.
     title : str
         Title of the figure.
     ax : matplotlib.axes.Axes, optional
@@ -84,11 +85,14 @@ def fragility_figure(
                 markerfacecolor="none",
                 clip_on=False,
             )
-        axes.fill_between([], [], [], color=GROUND, alpha=0.4, linewidth=0.0, label=band_label)
+        if any(np.any(line.lower < line.upper) for line in lines):
+            axes.fill_between([], [], [], color=GROUND, alpha=0.4, linewidth=0.0, label=band_label)
+        else:
+            axes.plot([], [], linestyle="none", label=band_label)
         axes.plot([], [], "o", color=GROUND, markersize=4.0, markerfacecolor="none", label=_dots(lines))
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid()
-        add_labels(axes, intensity_label, "probability")
+        add_labels(axes, intensity_label, probability_label)
         add_title(figure, ax, title)
         add_legend(figure, ax, labelled(axes))
     return figure
@@ -97,6 +101,6 @@ def fragility_figure(
 def _dots(lines: Sequence[FragilityLine]) -> str:
     """Say what one dot pools."""
     held = np.concatenate([line.outcomes for line in lines])
-    fewest, most = int(held.min()), int(held.max())
+    fewest, most = round(float(held.min())), round(float(held.max()))
     count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-    return f"dot: share of {count} outcomes at about its intensity"
+    return f"dot: share of {count} outcome{'' if most == 1 else 's'} at about its intensity"

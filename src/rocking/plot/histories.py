@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_title, figure_for, magnified
-from rocking.plot.style import ABOVE, GROUND, INK
+from rocking.plot.canvas import add_legend, add_title, figure_for, labelled, magnified
+from rocking.plot.style import ABOVE, GROUND, INK, REST
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,13 +26,8 @@ _SCHEMES: Final[tuple[dict[str, Any], ...]] = (
 _MARK: Final[dict[str, Any]] = {"color": ABOVE, "markersize": 4.5, "markeredgewidth": 0.0, "zorder": 4}
 
 
-#: Where the inset lies, in fractions of the axes, and what room the axes leave above the rotations for it.
-_INSET: Final = (0.3, 0.66, 0.62, 0.32)
-_ROOM: Final = 0.85
-
-
 class Detail(NamedTuple):
-    """What an inset magnifies: limits of time and rotation."""
+    """What is magnified: limits of time and rotation."""
 
     time: tuple[float, float]
     rotation: tuple[float, float]
@@ -105,7 +100,7 @@ def history_figure(
     marks: tuple[Mark, ...],
     title: str,
 ) -> Figure:
-    """Draw responses by one or several schemes, an inset on what matters, and the excitation below.
+    """Draw responses by one or several schemes, the excitation below, and a detail of what matters below that.
 
     Parameters
     ----------
@@ -116,7 +111,7 @@ def history_figure(
     acceleration : ndarray, shape (n,)
         Ground acceleration over g alpha.
     detail : Detail
-        What the inset shows.
+        What the last panel shows; its time is shaded in the first.
     marks : tuple of Mark
         Instants to mark.
     title : str
@@ -126,42 +121,38 @@ def history_figure(
     -------
     matplotlib.figure.Figure
     """
-    from matplotlib.ticker import MaxNLocator
-
-    with figure_for(None, (7.0, 4.9)) as figure:
-        response, excitation = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+    with figure_for(None, (7.0, 5.6)) as figure:
+        response, excitation, close = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 1.2))
+        response.axvspan(*detail.time, color=REST, label="the time of (c)")
         low = min(float(rotation.min()) for rotation in rotations.values())
         high = max(float(rotation.max()) for rotation in rotations.values())
-        scale, power = magnified(max(high, -low))
-        scaled = {name: scale * rotation for name, rotation in rotations.items()}
-        _draw_responses(response, time, scaled)
-        response.set_xlim(time[0], time[-1])
-        response.set_ylim(scale * (low - 0.07 * (high - low)), scale * (high + _ROOM * (high - low)))
-        response.set_ylabel(rf"rotation, {power}$\theta/\alpha$")
-        add_title(figure, None, title)
-        response.set_yticks([tick for tick in response.get_yticks() if scale * low <= tick <= scale * high])
+        margin = 0.07 * (high - low)
+        _draw_responses(response, time, rotations, (low - margin, high + margin))
         response.plot([mark.time for mark in marks], [0.0] * len(marks), "^", **_MARK)
-        inset = response.inset_axes(_INSET)
-        _draw_responses(inset, time, scaled)
-        inset.set_xlim(*detail.time)
-        inset.set_ylim(*(scale * limit for limit in detail.rotation))
-        inset.tick_params(labelsize=7)
-        inset.yaxis.tick_right()
-        inset.xaxis.set_major_locator(MaxNLocator(6))
-        for spine in inset.spines.values():
-            spine.set_visible(True)
-        response.indicate_inset_zoom(inset, edgecolor=INK, linewidth=0.6, zorder=0.5)
         _draw_excitation(excitation, time, acceleration)
         _mark_initiations(excitation, marks, float(acceleration.max()))
+        for axes in (response, excitation):
+            axes.set_xlim(time[0], time[-1])
+        response.tick_params(labelbottom=False)
         excitation.set_xlabel("time over period, $t/T$")
-        figure.legend(*response.get_legend_handles_labels(), loc="outside lower center", ncols=len(rotations))
+        _draw_responses(close, time, rotations, detail.rotation)
+        close.set_xlim(*detail.time)
+        close.set_xlabel("time over period, $t/T$")
+        for letter, axes in zip("abc", (response, excitation, close), strict=True):
+            axes.set_title(f"({letter})", loc="left", pad=3.0)
+        add_title(figure, None, title)
+        add_legend(figure, None, labelled(response, excitation))
     return figure
 
 
-def _draw_responses(axes: Axes, time: Floats, rotations: Mapping[str, Floats]) -> None:
+def _draw_responses(axes: Axes, time: Floats, rotations: Mapping[str, Floats], limits: tuple[float, float]) -> None:
+    """Draw rotations between limits, all magnified by as much as these ask for."""
+    scale, power = magnified(max(abs(limit) for limit in limits))
     axes.axhline(0.0, color=INK, linewidth=0.4)
     for (name, rotation), style in zip(rotations.items(), _SCHEMES, strict=False):
-        axes.plot(time, rotation, label=name, **style)
+        axes.plot(time, scale * rotation, label=name, **style)
+    axes.set_ylim(*(scale * limit for limit in limits))
+    axes.set_ylabel(rf"rotation, {power}$\theta/\alpha$")
 
 
 def _draw_excitation(axes: Axes, time: Floats, acceleration: Floats) -> None:
@@ -185,9 +176,8 @@ def _mark_initiations(axes: Axes, marks: tuple[Mark, ...], peak: float) -> None:
         axes.annotate(
             mark.text,
             (mark.time, height),
-            xytext=(0, 4),
+            xytext=(-4, 4),
             textcoords="offset points",
-            ha="center",
             color=ABOVE,
             fontsize=7.5,
         )

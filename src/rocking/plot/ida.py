@@ -31,6 +31,8 @@ _HEADROOM: Final = 1.5
 
 _OWN: Final[dict[str, Any]] = {"linewidth": 1.1, "markersize": 5.0}
 _ALIKE: Final[dict[str, Any]] = {"linewidth": 0.6, "markersize": 3.0}
+#: Between what stands and what overturns: the way off the frame, and back.
+_AWAY: Final[dict[str, Any]] = {"linestyle": (0, (1, 2)), "linewidth": 0.5}
 _STRIP: Final[dict[str, Any]] = {"linewidth": 5.0, "solid_capstyle": "butt"}
 
 #: Ends of strips: lines, so that the thinnest strip is seen, and an arrow where one leaves the frame.
@@ -86,7 +88,7 @@ def ida_figure(
     >>> [axes.get_xlabel() for axes in figure.axes]
     ['peak rotation / slenderness', 'overturns']
     >>> [text.get_text() for text in figure.legends[0].get_texts()][-2:]
-    ['kink: another swing is the largest', 'strip: levels that overturn (arrow: and above)']
+    ['kink: from there on, another swing is the largest', 'strip: levels that overturn (arrow: and above)']
     """
     few = len(motions) <= _FEW
     styles = [*CURVES[: len(motions)]] if few else [{"color": GROUND, "linestyle": "-"}] * len(motions)
@@ -96,7 +98,9 @@ def ida_figure(
             _draw_motion(curves, motion, style | (_OWN if few else _ALIKE))
         if not few:
             _draw_fractiles(curves, motions)
-        curves.set_xlim(left=0.0)
+        curves.set_xlim(left=0.0, right=curves.get_xlim()[1])
+        for motion, style in zip(motions, styles, strict=True):
+            _draw_ways(curves, motion, style["color"])
         curves.set_ylim(0.0, _highest_shown(motions))
         curves.grid()
         add_labels(curves, "peak rotation / slenderness", level_label)
@@ -137,6 +141,19 @@ def _draw_motion(axes: Axes, motion: ScaledMotion, style: dict[str, Any]) -> Non
         label=motion.label,
         **style,
     )
+
+
+def _draw_ways(axes: Axes, motion: ScaledMotion, color: str) -> None:
+    """Draw how the curve leaves the frame where a band begins, and comes back where it ends."""
+    edge = axes.get_xlim()[1]
+    stands = np.isfinite(motion.peak)
+    level, peak = motion.levels[stands], motion.peak[stands]
+    for low, high in motion.bands:
+        below, above = np.flatnonzero(level <= low), np.flatnonzero(level >= high)
+        if below.size and low > motion.levels[0]:
+            axes.plot([peak[below[-1]], edge], [level[below[-1]], low], color=color, **_AWAY)
+        if above.size:
+            axes.plot([edge, peak[above[0]]], [high, level[above[0]]], color=color, **_AWAY)
 
 
 def _draw_fractiles(axes: Axes, motions: Sequence[ScaledMotion]) -> None:
@@ -223,14 +240,15 @@ def _handles(named: Sequence[ScaledMotion], *, with_strips: bool, with_arrows: b
     ]
     alone: dict[str, Any] = {"color": INK, "linestyle": ""}
     handles += [
-        Line2D([], [], marker=".", markersize=5.0, label="dot: a level; none where it overturns", **alone),
+        Line2D([], [], marker=".", markersize=5.0, label="dot: a level at which it stands", **alone),
+        Line2D([], [], color=GROUND, label="dotted: off to overturning, and back", **_AWAY | {"linewidth": 1.0}),
         Line2D(
             [],
             [],
             marker=_KINK,
             markersize=8.0,
             markerfacecolor="none",
-            label="kink: another swing is the largest",
+            label="kink: from there on, another swing is the largest",
             **alone,
         ),
     ]

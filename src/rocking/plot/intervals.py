@@ -19,6 +19,9 @@ _DOTS: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "m
 #: Up to so many intervals are joined by a line, which shows how they take turns.
 _JOINED: Final = 100
 
+#: Room beside the first and the last impact, over their number.
+_MARGIN: Final = 0.03
+
 
 def intervals_figure(
     *,
@@ -54,9 +57,12 @@ def intervals_figure(
     >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
     ['interval before the impact, p t', 'interval over that two impacts before']
     """
+    from matplotlib.ticker import MaxNLocator
+
     with figure_for(ax, (7.0, 3.2), figsize) as figure:
         panels = _panels(figure) if ax is None else [ax]
         number = np.arange(1, intervals.size + 1)
+        margin = max(0.5, _MARGIN * intervals.size)
         _draw(panels[0], number, intervals)
         add_labels(panels[0], "impact", "interval before the impact, p t")
         if intervals.size:
@@ -67,6 +73,9 @@ def intervals_figure(
             add_labels(panel, "impact", "interval over that two impacts before")
         for panel in panels:
             panel.grid()
+            if intervals.size:
+                panel.set_xlim(1.0 - margin, intervals.size + margin)
+                panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         add_title(figure, ax, title)
         add_legend(figure, ax, labelled(*panels))
     return figure

@@ -17,6 +17,7 @@ def motion_figure(
     *,
     time: Floats,
     acceleration_g: Floats,
+    vertical_g: Floats | None = None,
     title: str = "",
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
@@ -27,12 +28,14 @@ def motion_figure(
     ----------
     time, acceleration_g : ndarray, shape (n,)
         Times (s) and ground acceleration (g), joined by straight lines.
+    vertical_g : ndarray, shape (n,), optional
+        Vertical ground acceleration (g), which has a panel of its own.
     title : str
         Title of the axes.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; by default in a new figure.
+        Where to draw the horizontal acceleration alone; by default in a new figure.
     figsize : (float, float), optional
-        Width and height of a new figure, inches; by default 7 by 2.4.
+        Width and height of a new figure, inches; by default 7 by 2.4, or 4.2 with a vertical acceleration.
 
     Returns
     -------
@@ -45,11 +48,15 @@ def motion_figure(
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_xlim()
     ('time (s)', (np.float64(0.0), np.float64(1.0)))
     """
-    with figure_for(ax, (7.0, 2.4), figsize) as figure:
-        axes = ax or figure.add_subplot()
-        axes.axhline(0.0, color=INK, linewidth=0.4)
-        axes.plot(time, acceleration_g, color=GROUND, linewidth=0.8)
-        axes.set_xlim(time[0], time[-1])
-        add_labels(axes, "time (s)", "ground acceleration (g)")
+    traces = {"ground acceleration (g)": acceleration_g}
+    if vertical_g is not None and ax is None:
+        traces["vertical acceleration (g)"] = vertical_g
+    with figure_for(ax, (7.0, 0.6 + 1.8 * len(traces)), figsize) as figure:
+        panels = [ax] if ax else figure.subplots(len(traces), 1, sharex=True, squeeze=False)[:, 0].tolist()
+        for axes, (label, trace) in zip(panels, traces.items(), strict=True):
+            axes.axhline(0.0, color=INK, linewidth=0.4)
+            axes.plot(time, trace, color=GROUND, linewidth=0.8)
+            axes.set_xlim(time[0], time[-1])
+            add_labels(axes, "time (s)" if axes is panels[-1] else "", label)
         add_title(figure, ax, title)
     return figure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,9 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-#: Colour and hatch of regions in which the block stays, from lightest to darkest, and of those in which it overturns
-#: after 0, 1, ... impacts, from darkest to lightest: hatched, so that none is taken for one of the others in grey.
-_STAYS: Final = (("#ffffff", ""), ("#dde7f0", ""), ("#a9bfd6", ""))
+#: Colour and hatch of regions in which the block stays, and of those in which it overturns after 0, 1, ... impacts,
+#: from darkest to lightest: hatched, so that none is taken for one of the others in grey. The second one of those in
+#: which it stays is the darkest, as it is often a strip and must be seen between the others.
+_STAYS: Final = (("#ffffff", ""), ("#5d7da6", ""), ("#dde7f0", ""))
 _OVERTURNS: Final = (
     ("#7d2706", ""),
     ("#d9692a", "////"),
@@ -30,6 +32,11 @@ _OVERTURNS: Final = (
 
 #: Share of the frame below which nobody sees a region.
 _LEAST_SEEN: Final = 1e-3
+
+#: Shares of the frame's height: a region lower than the first, about half a point, is no more than a speck, and one
+#: lower than the second would vanish between the lines on both sides of it.
+_SPECK: Final = 2e-3
+_STRIP: Final = 1e-2
 
 
 def regions_figure(
@@ -70,7 +77,8 @@ def regions_figure(
     Notes
     -----
     A region that one abscissa has and the next one lacks ends in a tip half way between them: see
-    `rocking.plot.boundaries`.
+    `rocking.plot.boundaries`. A strip has no lines around it, which would hide it, and a region too low to be seen
+    none that would make it seen.
 
     Examples
     --------
@@ -86,14 +94,22 @@ def regions_figure(
     low, high = y_range
     stacks = [Stack(np.array([low, *edge, high]), tuple(at)) for edge, at in zip(edges, regions, strict=True)]
     polygons: dict[int, list[Floats]] = {}
+    specks: dict[int, list[Floats]] = {}
+    tallest: dict[int, float] = {}
     lines: list[Floats] = []
     for abscissae, levels, inside in runs(x, stacks):
         curves = [np.column_stack([abscissae, level]) for level in levels]
-        for region, below, above in zip(inside, curves, curves[1:], strict=False):
-            polygons.setdefault(region, []).append(np.concatenate([below, above[::-1]]))
-        lines += curves[1:-1]
+        heights = np.diff(levels, axis=0).max(axis=1) / (high - low)
+        for region, height, below, above in zip(inside, heights, curves, curves[1:], strict=False):
+            among = polygons if height > _SPECK else specks
+            among.setdefault(region, []).append(np.concatenate([below, above[::-1]]))
+            tallest[region] = max(height, tallest.get(region, 0.0))
+        seen = np.flatnonzero(heights > _SPECK)
+        lines += [curves[j + 1] for j, k in pairwise(seen) if min(heights[j], heights[k]) > _STRIP]
     with figure_for(ax, (5.6, 4.6), figsize) as figure:
         axes = ax or figure.add_subplot()
+        for region, corners in specks.items():
+            axes.add_collection(PolyCollection(corners, facecolors=_look(region)[0], linewidths=0.0))
         for region, corners in polygons.items():
             colour, hatch = _look(region)
             # An edge of the same colour closes the seams between polygons; a hatch takes the colour of its edge.
@@ -105,7 +121,8 @@ def regions_figure(
         axes.set(xlim=(x[0], x[-1]), ylim=y_range)
         add_labels(axes, x_label, y_label)
         add_title(figure, ax, title)
-        add_legend(figure, ax, _patches(polygons, names, (x[-1] - x[0]) * (high - low)))
+        strips = {region: f"{name} (a strip)" for region, name in names.items() if tallest.get(region, 1.0) < _STRIP}
+        add_legend(figure, ax, _patches(polygons, {**names, **strips}, (x[-1] - x[0]) * (high - low)))
     return figure
 
 

@@ -59,7 +59,8 @@ def response_figure(
     overturn_time: float | None,
     motion_time: Floats,
     motion_acceleration_g: Floats,
-    thresholds_g: tuple[float, float],
+    thresholds_g: tuple[Floats | float, Floats | float],
+    vertical_acceleration_g: Floats | None = None,
     duration: float | None = None,
     chattering: DrawnSequence | None = None,
     units: RotationUnits = "slenderness",
@@ -84,9 +85,12 @@ def response_figure(
         Time at which the block has fallen, s.
     motion_time, motion_acceleration_g : ndarray, shape (m,)
         Times (s) and ground acceleration (g) of the stretch; both empty for free rocking, which has no panel of it.
-    thresholds_g : (float, float)
+    thresholds_g : (float, float), or a pair of ndarray, shape (m,)
         Acceleration (g, a magnitude) that uplifts the block to side + and to side -; an acceleration
-        of the opposite sign is needed, so the first is drawn below zero and the second above.
+        of the opposite sign is needed, so the first is drawn below zero and the second above. Under a vertical motion
+        they change with the weight: one for each of the motion's times.
+    vertical_acceleration_g : ndarray, shape (m,), optional
+        Vertical ground acceleration (g), which has a panel of its own.
     duration : float, optional
         How long the whole response is, s; where the stretch is only a part of it, the figure says so.
     chattering : DrawnSequence, optional
@@ -94,13 +98,13 @@ def response_figure(
         logarithmic. There is none where the time of rest is not bracketed (NaN) or the sequence has a single impact.
     units : {"slenderness", "rad", "deg"}
         What rotations are drawn in: over the slenderness of their side, or as they are. Beside the first two stands an
-        axis in degrees.
+        axis in degrees. Where the sides differ they are named, with what 1 is on each.
     title : str
         Title of the figure.
     ax : matplotlib.axes.Axes, optional
         Draw the rotation here, without the other panels.
     figsize : (float, float), optional
-        Width and height of a new figure, inches; by default 7 by 4.4.
+        Width and height of a new figure, inches; by default 7 by 4.4, or 5.4 with a vertical motion.
 
     Returns
     -------
@@ -122,41 +126,49 @@ def response_figure(
     scale = _scale(units, slenderness)
     drawn = scale.of(rotation)
     zoom = chattering if ax is None and chattering and _can_be_zoomed(chattering) else None
-    with figure_for(ax, (7.0, 4.4), figsize) as figure:
-        main, motion, sequence = _panels(figure, ax, shaken=motion_time.size > 0, zoomed=zoom is not None)
+    histories = 1 if not motion_time.size else 2 if vertical_acceleration_g is None else 3
+    with figure_for(ax, (7.0, 4.4 if histories < 3 else 5.4), figsize) as figure:
+        (main, *grounds), sequence = _panels(figure, ax, histories, zoomed=zoom is not None)
         _shade_rest(main, np.clip(rest_intervals, *shown))
         _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])))
         _add_degrees(main, scale, units)
+        if slenderness[0] != slenderness[1]:
+            _tell_sides(main, grounds[0] if grounds else None, thresholds_g, scale)
         _mark_impacts(main, _within(impact_times, shown), _within(uplift_times, shown))
         if overturn_time is not None:
             _mark_overturning(main, drawn, overturn_time)
         main.set_xlim(*shown)
-        if motion is not None:
-            _draw_motion(motion, motion_time, motion_acceleration_g, thresholds_g)
-            main.tick_params(labelbottom=False)
-            add_labels(motion, _time_label(shown, duration), "ground acceleration (g)")
-        add_labels(main, "" if motion else _time_label(shown, duration), _Y_LABELS[units])
+        if grounds:
+            _draw_motion(grounds[0], motion_time, motion_acceleration_g, thresholds_g)
+        if vertical_acceleration_g is not None and len(grounds) > 1:
+            _draw_vertical(grounds[1], motion_time, vertical_acceleration_g)
+        histories_shown = main, *grounds
+        labels = _Y_LABELS[units], "ground acceleration (g)", "vertical (g)"
+        for axes, label in zip(histories_shown, labels, strict=False):
+            is_last = axes is histories_shown[-1]
+            axes.tick_params(labelbottom=is_last)
+            add_labels(axes, _time_label(shown, duration) if is_last else "", label)
         if zoom and sequence is not None:
             _mark_sequence(main, zoom)
             _draw_sequence(sequence, zoom)
         add_title(figure, ax, title)
-        add_legend(figure, ax, labelled(main, *([motion] if motion else [])))
+        add_legend(figure, ax, labelled(main, *grounds))
     return figure
 
 
-def _panels(figure: Figure, ax: Axes | None, *, shaken: bool, zoomed: bool) -> tuple[Axes, Axes | None, Axes | None]:
-    """Panels of the rotation, of the motion, and of the chattering sequence: beside the others, or below them."""
+def _panels(figure: Figure, ax: Axes | None, histories: int, *, zoomed: bool) -> tuple[list[Axes], Axes | None]:
+    """Panels of the rotation and of the motion, and of the chattering sequence: beside the others, or below them."""
     if ax is not None:
-        return ax, None, None
-    histories = 2 if shaken else 1
+        return [ax], None
     beside = zoomed and figure.get_figwidth() >= _WIDE
     below = zoomed and not beside
-    heights, widths = (1.3, 1.0, 1.0)[: histories + below], (3.0, 1.0)[: 1 + beside]
+    heights = (1.3, 1.0, 0.7)[:histories] + (1.0,) * below
+    widths = (3.0, 1.0)[: 1 + beside]
     grid = figure.add_gridspec(len(heights), len(widths), height_ratios=heights, width_ratios=widths)
     rotation = figure.add_subplot(grid[0, 0])
-    motion = figure.add_subplot(grid[1, 0], sharex=rotation) if shaken else None
+    grounds = [figure.add_subplot(grid[k, 0], sharex=rotation) for k in range(1, histories)]
     sequence = figure.add_subplot(grid[:, 1] if beside else grid[-1, 0]) if zoomed else None
-    return rotation, motion, sequence
+    return [rotation, *grounds], sequence
 
 
 def _can_be_zoomed(sequence: DrawnSequence) -> bool:
@@ -202,6 +214,31 @@ def _add_degrees(axes: Axes, scale: _Scale, units: RotationUnits) -> None:
         axes.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
 
 
+def _tell_sides(
+    rotation: Axes, motion: Axes | None, thresholds: tuple[Floats | float, Floats | float], scale: _Scale
+) -> None:
+    """Name the sides: where rotations are theirs, with what 1 is on each, and to which one a threshold lifts."""
+    plus, minus = (float(np.ravel(threshold)[0]) for threshold in thresholds)
+    names = ["side +", "side −"]
+    if scale.plus != scale.minus:
+        names = [f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°" for name, factor in zip(names, scale, strict=True)]
+    places = [(rotation, 0.0, names[0], "bottom"), (rotation, 0.0, names[1], "top")]
+    if motion is not None:
+        places += [(motion, minus, "lifts to side −", "top"), (motion, -plus, "lifts to side +", "bottom")]
+    for axes, level, words, place in places:
+        axes.annotate(
+            words,
+            (0.0, level),
+            xycoords=axes.get_yaxis_transform(),
+            xytext=(3, 2 if place == "bottom" else -2),
+            textcoords="offset points",
+            va=place,
+            color=INK,
+            fontsize="small",
+            zorder=5,
+        )
+
+
 def _mark_impacts(axes: Axes, impact_times: Floats, uplift_times: Floats) -> None:
     rug = axes.get_xaxis_transform()
     if impact_times.size:
@@ -244,8 +281,10 @@ def _mark_overturning(axes: Axes, drawn: Floats, overturn_time: float) -> None:
     )
 
 
-def _draw_motion(axes: Axes, time: Floats, acceleration: Floats, thresholds: tuple[float, float]) -> None:
-    plus, minus = thresholds
+def _draw_motion(
+    axes: Axes, time: Floats, acceleration: Floats, thresholds: tuple[Floats | float, Floats | float]
+) -> None:
+    plus, minus = (np.broadcast_to(threshold, time.shape) for threshold in thresholds)
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, acceleration, color=GROUND, linewidth=0.6, label="_ground acceleration")
     above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
@@ -254,8 +293,19 @@ def _draw_motion(axes: Axes, time: Floats, acceleration: Floats, thresholds: tup
         if np.any(beyond):
             axes.fill_between(time, acceleration, threshold, where=beyond, label=label, **above)
             label = ""
-    axes.axhline(minus, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
-    axes.axhline(-plus, color=INK, linewidth=0.8, linestyle=(0, (5, 2)))
+    moves = bool(np.ptp(plus) or np.ptp(minus))
+    label = "uplift thresholds" + (", which change with the weight" if moves else "")
+    for threshold in (minus, -plus):
+        if moves:
+            axes.plot(time, threshold, color=INK, linewidth=0.5, label=label)
+        else:
+            axes.axhline(float(threshold[0]), color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label=label)
+        label = ""
+
+
+def _draw_vertical(axes: Axes, time: Floats, acceleration: Floats) -> None:
+    axes.axhline(0.0, color=INK, linewidth=0.4)
+    axes.plot(time, acceleration, color=GROUND, linewidth=0.6, label="_vertical acceleration")
 
 
 def _time_label(shown: tuple[float, float], duration: float | None) -> str:

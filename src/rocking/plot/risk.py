@@ -8,68 +8,163 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled
-from rocking.plot.style import CURVES, GROUND
+from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled, scale_by_ratio
+from rocking.plot.style import ABOVE, CURVES, GROUND
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Rates are drawn down to this part of the highest contribution.
+#: Shares of a rate are shown from this part of the highest one on.
 _LEAST = 1e-3
+
+#: Rates are shown from this part of the lowest of the hazard curve to so many times its highest.
+_MARGIN = 10.0
+
+
+class HazardLine(NamedTuple):
+    """Annual rates at which intensities are exceeded, and the ends of the curve, beyond which it is extended."""
+
+    rate: Floats
+    known: tuple[float, float]
 
 
 class RiskLine(NamedTuple):
-    """What the intensities contribute to a limit state's rate, for each factor of e in intensity (1/year)."""
+    """Which share of a limit state's rate comes from about each intensity, for each factor of e in intensity."""
 
     label: str
-    contribution: Floats
+    share: Floats
 
 
 def risk_figure(
     *,
     intensity: Floats,
-    rate: Floats,
-    known: tuple[float, float],
+    hazard: HazardLine,
     lines: Sequence[RiskLine],
     intensity_label: str,
     title: str = "",
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw a hazard curve, dotted where it is extended, and the contributions to each limit state's rate below it.
+    """Draw a hazard curve, dotted where it is extended, and below it where each limit state's rate comes from.
 
     Parameters
     ----------
-    intensity, rate : ndarray, shape (n,)
-        Annual rates at which intensities are exceeded.
-    known : (float, float)
-        First and last intensity of the hazard curve.
+    intensity : ndarray, shape (n,)
+        Intensities of all lines.
+    hazard : HazardLine
+        Annual rates at these intensities.
     lines : sequence of RiskLine
         One for every limit state.
+    intensity_label, title : str
+        Texts.
+    ax : matplotlib.axes.Axes, optional
+        Draw the shares of the rates here, without the hazard curve.
+    figsize : (float, float), optional
+        Width and height of a new figure, inches.
+
+    Examples
+    --------
+    >>> x = np.array([1.0, 2.0, 4.0])
+    >>> figure = risk_figure(
+    ...     intensity=x, hazard=HazardLine(1e-2 / x, (1.0, 2.0)), lines=[RiskLine("overturning", x / 7.0)],
+    ...     intensity_label="PGA (g)")
+    >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
+    ['exceeded, times a year', 'share of the rate (per unit of ln)']
+    """
+    with figure_for(ax, (5.6, 5.2), figsize) as figure:
+        panels = figure.subplots(2, 1, sharex=True).tolist() if ax is None else [ax]
+        *curves, shares = panels
+        for axes in curves:
+            _draw_hazard(axes, intensity, hazard)
+        for k, line in enumerate(lines):
+            style = CURVES[k % len(CURVES)]
+            shares.plot(intensity, line.share, linewidth=1.5, label=line.label, **style)
+            shares.fill_between(intensity, 0.0, line.share, color=style["color"], alpha=0.12, linewidth=0.0)
+        shown = _inside(intensity, hazard.known)
+        for line in lines:
+            shown |= line.share > _LEAST * line.share.max()
+        for axes in curves:
+            axes.set_ylim(0.5 * float(hazard.rate[shown].min()), 2.0 * float(hazard.rate[shown].max()))
+        scale_by_ratio(shares, intensity[shown])
+        shares.set(xlim=(float(intensity[shown][0]), float(intensity[shown][-1])))
+        shares.set_ylim(bottom=0.0)
+        shares.grid()
+        add_labels(shares, intensity_label, "share of the rate (per unit of ln)")
+        add_title(figure, ax, title)
+        add_legend(figure, ax, labelled(*panels))
+    return figure
+
+
+def survival_figure(
+    *,
+    intensity: Floats,
+    largest: Floats,
+    largest_label: str,
+    hazard: HazardLine | None,
+    intensity_label: str,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw the largest annual rates of motions that fit with a block that still stands, and a hazard curve beside it.
+
+    Parameters
+    ----------
+    intensity, largest : ndarray, shape (n,)
+        Intensities, and the largest rate of motions of that intensity or more.
+    largest_label : str
+        What the rates say.
+    hazard : HazardLine or None
+        Annual rates of a hazard curve at these intensities.
     intensity_label, title : str
         Texts.
     ax : matplotlib.axes.Axes, optional
         Where to draw.
     figsize : (float, float), optional
         Width and height of a new figure, inches.
+
+    Examples
+    --------
+    >>> x = np.array([1.0, 2.0, 4.0])
+    >>> figure = survival_figure(
+    ...     intensity=x, largest=1e-2 / x, largest_label="at most", hazard=None, intensity_label="PGA (g)")
+    >>> [text.get_text() for text in figure.legends[0].get_texts()]
+    ['at most']
     """
-    with figure_for(ax, (5.6, 4.2), figsize) as figure:
+    with figure_for(ax, (5.6, 3.6), figsize) as figure:
         axes = ax or figure.add_subplot()
-        inside = (intensity >= known[0]) & (intensity <= known[1])
-        axes.plot(intensity, rate, color=GROUND, linewidth=1.0, linestyle=":")
-        axes.plot(intensity[inside], rate[inside], color=GROUND, linewidth=2.0, label="hazard: intensity exceeded")
-        for k, line in enumerate(lines):
-            style = CURVES[k % len(CURVES)]
-            axes.plot(intensity, line.contribution, linewidth=1.5, label=line.label, **style)
-            axes.fill_between(intensity, 0.0, line.contribution, color=style["color"], alpha=0.12, linewidth=0.0)
-        highest = max(float(line.contribution.max()) for line in lines)
-        shown = np.any([line.contribution > _LEAST * highest for line in lines], axis=0) | inside
-        axes.set_xscale("log")
+        scale_by_ratio(axes, intensity)
+        if hazard is not None:
+            _draw_hazard(axes, intensity, hazard)
+            above = hazard.rate > largest
+            axes.fill_between(
+                intensity, largest, hazard.rate, where=above.tolist(), color=ABOVE, alpha=0.2, linewidth=0.0,
+                label="more often than the block allows" if above.any() else "",
+            )  # fmt: skip
+        axes.plot(intensity, largest, label=largest_label, linewidth=1.5, **CURVES[1])
         axes.set_yscale("log")
-        axes.set(xlim=(float(intensity[shown][0]), float(intensity[shown][-1])), ylim=(_LEAST * highest, None))
+        lowest, highest = float(largest.min()), float(largest[largest < np.inf].max())
+        if hazard is not None:
+            lowest, highest = min(lowest, float(hazard.rate.min())), float(hazard.rate.max())
+        axes.set(xlim=(float(intensity[0]), float(intensity[-1])), ylim=(0.5 * lowest, min(_MARGIN * highest, 10.0)))
         axes.grid()
-        add_labels(axes, intensity_label, "annual rate (contributions: per unit of ln)")
+        add_labels(axes, intensity_label, "exceeded, times a year")
         add_title(figure, ax, title)
         add_legend(figure, ax, labelled(axes))
     return figure
+
+
+def _inside(intensity: Floats, known: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return np.asarray((intensity >= known[0]) & (intensity <= known[1]))
+
+
+def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
+    """Draw a hazard curve, dotted where it is extended."""
+    inside = _inside(intensity, hazard.known)
+    label = "hazard curve (dotted: extended)" if not inside.all() else "hazard curve"
+    axes.plot(intensity, hazard.rate, color=GROUND, linewidth=1.0, linestyle=":")
+    axes.plot(intensity[inside], hazard.rate[inside], color=GROUND, linewidth=2.0, label=label)
+    axes.set_yscale("log")
+    axes.grid()
+    add_labels(axes, "", "exceeded, times a year")

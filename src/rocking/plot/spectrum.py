@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
-from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for
+from rocking.arrays import Flags, Floats
+from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, scale_by_ratio
 from rocking.plot.style import CURVES, GROUND, INK
 
 if TYPE_CHECKING:
@@ -27,14 +27,14 @@ _WIDTHS: Final = (1.6, 0.7)
 _MIDDLE: Final = 1.8
 _OTHER: Final = 0.9
 
-#: What is written of each decade of sizes, where there is less than one, and where there are more.
-_DIGITS: Final = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
-_FEW_DIGITS: Final = (1.0, 2.0, 5.0)
+#: What marks an end of a line beyond which blocks overturn.
+_END: Final[dict[str, Any]] = {"marker": "x", "linestyle": "none", "markersize": 4.0, "markeredgewidth": 1.0}
 
 
 class SpectrumCurves(NamedTuple):
     """Curves of one slenderness and restitution over the spectrum's abscissa; infinite where the block overturns.
 
+    label : what the legend says of them; none if empty
     singles (motions, points) : peak rotation over slenderness of every motion
     fractiles (fractiles, points) : their fractiles, the middle one drawn thickest
     overturned (points,) : share of the motions that overturn the block
@@ -64,18 +64,23 @@ def spectrum_figure(
     x : ndarray, shape (points,)
         Abscissa, drawn on a logarithmic axis.
     curves : sequence of SpectrumCurves
-        At most four.
+        At most four; one alone needs no label.
     fractiles : sequence of float
         What the fractiles are, in (0, 1). None of two motions or fewer is drawn, and only the middle one of three
         curves or four.
     motions : sequence of str
-        Names of the motions; two or fewer are told apart and named, more are counted.
+        Names of the motions; two are told apart and named, more are counted.
     x_label, title : str
         Texts.
     ax : matplotlib.axes.Axes, optional
         Draw the peak rotations here, without the shares.
     figsize : (float, float), optional
         Width and height of a new figure, inches; by default 5.6 by 4.8.
+
+    Notes
+    -----
+    A line of a named motion, and a fractile, ends in a cross where the block of the next point overturns; of a fractile
+    that means that so many motions overturn it that there is none.
 
     Examples
     --------
@@ -104,20 +109,20 @@ def spectrum_figure(
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
         for panel in panels:
             panel.grid(which="both")
-        _scale_sizes(panels[-1], x)
+        scale_by_ratio(panels[-1], x)
         peaks.set_ylim(bottom=0.0)
         add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
         for panel in shares:
             panel.set_ylim(-0.03, 1.03)
             add_labels(panel, x_label, "share overturned")
         add_title(figure, ax, title)
-        add_legend(figure, ax, _handles(curves, motions, chosen))
+        add_legend(figure, ax, [*_handles(curves, motions, chosen), *_ends_handle(peaks)])
     return figure
 
 
 def _draw_named(axes: Axes, x: Floats, curve: SpectrumCurves, style: dict[str, Any]) -> None:
     for width, single in zip(_WIDTHS, curve.singles, strict=False):
-        axes.plot(x, _cut(single), linewidth=width, **style)
+        _draw(axes, x, single, {**style, "linewidth": width})
 
 
 def _draw_family(
@@ -127,7 +132,23 @@ def _draw_family(
     for single in curve.singles:
         axes.plot(x, _cut(single), color=style["color"], linewidth=0.5, alpha=0.35)
     for share, row in fractiles.items():
-        axes.plot(x, _cut(curve.fractiles[row]), linewidth=_MIDDLE if share == _middle(fractiles) else _OTHER, **style)
+        width = _MIDDLE if share == _middle(fractiles) else _OTHER
+        _draw(axes, x, curve.fractiles[row], {**style, "linewidth": width})
+
+
+def _draw(axes: Axes, x: Floats, values: Floats, style: dict[str, Any]) -> None:
+    """Draw a line with gaps where its values are infinite, and mark its ends there."""
+    axes.plot(x, _cut(values), **style)
+    ends = _ends(np.isfinite(values))
+    if ends.any():
+        axes.plot(x[ends], values[ends], color=style["color"], **_END)
+
+
+def _ends(finite: Flags) -> Flags:
+    """Points with a value beside which there is one without."""
+    before, after = np.append(True, finite[:-1]), np.append(finite[1:], True)
+    ends: Flags = finite & ~(before & after)
+    return ends
 
 
 def _middle(fractiles: Iterable[float]) -> float:
@@ -139,23 +160,16 @@ def _cut(values: Floats) -> Floats:
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _scale_sizes(axes: Axes, x: Floats) -> None:
-    """Scale an axis logarithmically, with as many numbers as there is room for."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    decades = float(np.log10(x[-1] / x[0])) if x.size > 1 else 0.0
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=_DIGITS if decades < 1.0 else _FEW_DIGITS))
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter(NullFormatter())
-
-
 def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles: Iterable[float]) -> list[Line2D]:
     from matplotlib.lines import Line2D
 
     each = [
-        Line2D([], [], linewidth=1.4, label=curve.label, **style) for curve, style in zip(curves, CURVES, strict=False)
+        Line2D([], [], linewidth=1.4, label=curve.label, **style)
+        for curve, style in zip(curves, CURVES, strict=False)
+        if curve.label
     ]
+    if len(motions) == 1:
+        return each
     if len(motions) <= _FEW:
         named = zip(motions, _WIDTHS, strict=False)
         return each + [Line2D([], [], color=INK, linewidth=width, label=name) for name, width in named]
@@ -166,6 +180,14 @@ def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles
     if others:
         each.append(Line2D([], [], color=INK, linewidth=_OTHER, label=_named(others)))
     return each
+
+
+def _ends_handle(axes: Axes) -> list[Line2D]:
+    """Make the handle of the crosses, if there are any."""
+    from matplotlib.lines import Line2D
+
+    crosses = any(line.get_marker() == _END["marker"] for line in axes.lines)
+    return [Line2D([], [], color=INK, label="beyond: overturns", **_END)] if crosses else []
 
 
 def _named(percent: str) -> str:

@@ -123,6 +123,7 @@ def _attributes(response: Response) -> dict[str, Any]:
         "restitution": [side.restitution for side in sides],
         named("gravity", "m/s^2"): response.block.gravity,
         "motion": "none" if motion is None else motion.name,
+        "vertical_motion": "none" if motion is None or motion.vertical is None else motion.vertical.name,
         "motion_history": "" if motion is None else "; ".join(motion.history),
         "model": response.model,
         "chattering_treatment": repr(response.treatment),

@@ -12,14 +12,16 @@ if TYPE_CHECKING:
 #: usual record formats print: digits of times and of the peak that it would change are not shown.
 KNOWN: Final = 1e-6
 
-_MOST_DECIMALS, _MOST_DIGITS = 9, 6
+#: Decimals of a time, and digits of a peak, at most.
+MOST_DECIMALS: Final = 9
+_MOST_DIGITS: Final = 6
 
 #: Decimals of a time in a table, and of one beside others in a summary.
 _BRIEF: Final = 2
 _SHORT: Final = 4
 
 #: From so much on, s, the unknown part of a time is told with it.
-_TOLD: Final = 1e-3
+TOLD: Final = 1e-3
 
 
 def time_text(time: float, change: float) -> str:
@@ -37,7 +39,7 @@ def time_text(time: float, change: float) -> str:
     """
     unknown = KNOWN * change
     text = f"{time:.{decimals(unknown)}f}"
-    if unknown < _TOLD:
+    if unknown < TOLD:
         return f"{text} s"
     return f"{text} +- {unknown:.1g} s" if unknown < 0.5 * time else f"about {text} s"
 
@@ -95,14 +97,14 @@ def decimals(unknown: float) -> int:
     if not math.isfinite(unknown):
         return 0
     if unknown <= 0.0:
-        return _MOST_DECIMALS
+        return MOST_DECIMALS
     known = -math.log10(unknown)
-    return min(max(math.ceil(known) if unknown >= _TOLD else math.floor(known), 0), _MOST_DECIMALS)
+    return min(max(math.ceil(known) if unknown >= TOLD else math.floor(known), 0), MOST_DECIMALS)
 
 
 def _short_text(time: float, unknown: float) -> str:
     """Time to four decimals at most, of which so much is unknown, s."""
-    about = "" if unknown < _TOLD else "about "
+    about = "" if unknown < TOLD else "about "
     return f"{about}{time:.{min(decimals(unknown), _SHORT)}f} s"
 
 

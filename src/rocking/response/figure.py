@@ -38,7 +38,9 @@ def figure(
     times = drawing_times(response, start, end)
     motion, gravity = response.motion, response.block.gravity
     corners = np.empty(0) if motion is None else motion.drawing_times(start, end)
-    plus, minus = (threshold / gravity for threshold in response.block.uplift_thresholds(response.model))
+    lift = None if motion is None or motion.vertical is None else motion.vertical.acceleration(corners) / gravity
+    weight = 1.0 if lift is None else 1.0 + lift
+    plus, minus = (weight * threshold / gravity for threshold in response.block.uplift_thresholds(response.model))
     alpha_plus, alpha_minus = (side.alpha for side in response.block.sides)
     sequence = _longest_sequence(response, start, end) if chattering else None
     return response_figure(
@@ -52,6 +54,7 @@ def figure(
         motion_time=corners,
         motion_acceleration_g=corners if motion is None else motion.acceleration(corners) / gravity,
         thresholds_g=(plus, minus),
+        vertical_acceleration_g=lift,
         duration=response.duration,
         chattering=None if sequence is None else DrawnSequence(*sequence),
         units=units,

@@ -15,8 +15,10 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Block
 from rocking.contact import contact_forces
 from rocking.errors import InvalidOption
-from rocking.kernels import state
+from rocking.kernels import state, status
 from rocking.kernels.ground import components
+from rocking.kernels.march import march
+from rocking.kernels.trace import Trail
 from rocking.motion import piecewise
 from rocking.response.history import History, bisected
 
@@ -25,8 +27,46 @@ _SAMPLES: Final = 9
 _REFINEMENTS: Final = 10
 _MOST_REFINED: Final = 64
 
+#: Impacts beyond the last resolved one are followed down to this speed, over p and in rad: what the motion changes and
+#: what their speed adds are then nothing. And so many of a sequence at most: all, up to a restitution of 0.998.
+_SLOWEST: Final = 1e-10
+_MOST_IMPACTS: Final = 10_000
+
 #: What is asked of the horizontal and the vertical force over the weight.
 Measure = Callable[[Floats, Floats], Floats]
+
+
+def with_all_impacts(trail: Trail, block: Block, *, cut: bool) -> Trail:
+    """Return the trail with the impacts between the last resolved one of each chattering sequence and its rest.
+
+    ``cut``: whether the response ends within a sequence that is closed already. A sequence is closed where its end is
+    proven, while its impacts still push and pull. They are followed here as far as that counts.
+    """
+    nodes = trail.nodes
+    # A duration that ends within a sequence that is closed leaves no rest behind its last impact.
+    rests = np.append(nodes["side"][1:] == state.AT_REST, cut)
+    closing = np.flatnonzero(rests & (nodes["side"] != state.AT_REST) & (nodes["u"] == 0.0))
+    slowest = np.array([_SLOWEST * side.p for side in block.sides])
+    closing = closing[nodes["v"][closing] > slowest[nodes["side"][closing]]]
+    if not len(closing):
+        return trail
+    body, rules, scratch = trail.block.copy(), trail.rules.copy(), state.new_scratch()
+    body["limit"] = slowest
+    rules["treatment"], rules["endless"], rules["record"] = status.VELOCITY, False, True
+    table = state.new_table(1024)
+    parts, done = [], 0
+    for row in closing:
+        start = state.new_states(1, _MOST_IMPACTS)[0]
+        for name in ("piece", "offset", "side", "u", "v"):
+            start[name] = nodes[name][row]
+        start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
+        rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
+        while march(trail.ground, body, rules, table, scratch, start) == status.FULL:
+            table = state.grown(table)
+        found = table["node"][1 : start["nodes"]]
+        parts += [nodes[done : row + 1], found[(found["side"] != state.AT_REST) & (found["time"] < rules["stop"])]]
+        done = row + 1
+    return trail._replace(nodes=state.attributed(np.concatenate([*parts, nodes[done:]])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +170,8 @@ class Contact:
         corners = corners[nodes["side"][self.history.rows(corners)] == state.AT_REST]
         starts = np.unique(np.concatenate([nodes["time"], corners]))
         starts = starts[(starts < self.until) | (starts == starts[0])]
+        if nodes["side"][self.history.rows(np.array([self.until]))[0]] == state.AT_REST:
+            starts = np.union1d(starts, [self.until])  # what the motion is after a jump at the end
         ends = np.append(starts[1:], max(self.until, starts[-1]))
         rows = self.history.rows(starts)
         fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES))

@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking import checks, svg
+from rocking import svg
 from rocking.arrays import Floats, as_asked
 from rocking.block import Block
-from rocking.contact import friction_demand
-from rocking.errors import InvalidOption
+from rocking.contact import friction_coefficient, friction_demand
 from rocking.kernels import state, status
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
 from rocking.plot import RotationUnits
 from rocking.response import data, figure, summary
-from rocking.response.forces import Contact
+from rocking.response.forces import Contact, with_all_impacts
 from rocking.response.history import History
 from rocking.response.sensitivity import Sensitivity
 from rocking.treatment import Treatment
@@ -72,6 +71,8 @@ class Response:
         resolved since the start.
     stalled : int
         Sequences that ended because time no longer advanced between impacts, without proof.
+    near_ties : int
+        Times that the last digits decided whether a block that nothing weighs down touches the ground.
     """
 
     block: Block
@@ -88,6 +89,7 @@ class Response:
     impacts: NDArray[np.void]
     chattering: NDArray[np.void]
     stalled: int
+    near_ties: int
     trail: Trail = field(repr=False)
 
     @classmethod
@@ -119,6 +121,7 @@ class Response:
             impacts=_public(table["impact"][: end["impacts"]], IMPACT),
             chattering=_public(table["sequence"][: end["sequences"]], CHATTERING),
             stalled=int(end["stalled"]),
+            near_ties=int(end["near_ties"]),
             trail=trail._replace(nodes=state.attributed(np.array(table["node"][: end["nodes"]]))),
         )
 
@@ -138,7 +141,9 @@ class Response:
 
     @property
     def peak_over_slenderness(self) -> float:
-        """Peak rotation over the slenderness of the side where it is reached."""
+        """Peak rotation over the slenderness of the side where it is reached; infinite where the block overturns."""
+        if self.overturned:
+            return math.inf
         if self.peak_rotation == 0.0:
             return 0.0
         leaning = float(self.rotation(self.peak_time))
@@ -155,7 +160,7 @@ class Response:
 
         What became of the block is then not known, and `overturned` says no more than "not by then".
         """
-        over = self.motion is None or self.duration >= self.motion.duration
+        over = self.motion is None or self.duration >= self.motion.end
         return not (self.overturned or self.unfinished) and (self.moves_at_end or not over)
 
     @property
@@ -182,12 +187,14 @@ class Response:
 
     @property
     def ambiguities(self) -> tuple[str, ...]:
-        """What makes the response ambiguous: "peak", "events" (a time of one, or of an impact), both or neither.
+        """What makes the response ambiguous: "peak", "events" (a time of one, or of an impact) and "touch".
+
+        The last is that of a block that nothing weighs down, which may just reach the ground, or just not.
 
         An ambiguous response is one of those that are possible. Scale the motion, or the initial state, by 1 plus some
         millionths, simulate each, and take the spread of the results for the answer.
         """
-        return self.sensitivity.ambiguities(self.peak_rotation)
+        return self.sensitivity.ambiguities(self.peak_rotation, self.near_ties)
 
     @property
     def time_at_rest(self) -> float:
@@ -258,12 +265,12 @@ class Response:
         Parameters
         ----------
         friction : float
-            Coefficient of friction between block and ground, positive.
+            Coefficient of friction between block and ground, positive and at most 3.
 
         Raises
         ------
         InvalidOption
-            If the coefficient is not positive.
+            If it is no such number.
 
         Notes
         -----
@@ -273,11 +280,12 @@ class Response:
         Examples
         --------
         >>> import rocking
-        >>> response = rocking.simulate(rocking.Block(0.12, 0.55), rocking.records.load("ridgecrest-clc-090"))
+        >>> block = rocking.Block(width=0.24, height=1.1)
+        >>> response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090"))
         >>> f"{response.required_friction:.4f}, {response.sliding_time(0.24):.4f} s, {response.sliding_time(0.3)}"
         '0.2489, 234.3559 s, nan'
         """
-        level = checks.positive(friction, "friction", InvalidOption)
+        level = friction_coefficient(friction)
         return self._contact.first(friction_demand, lambda demand: demand > level)
 
     @cached_property
@@ -288,9 +296,15 @@ class Response:
         """
         return self._contact.first(_pull, lambda pull: pull >= 0.0)
 
-    @property
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is kept of the response: the impacts that its forces need are followed again."""
+        return {name: value for name, value in self.__dict__.items() if name != "_contact"}
+
+    @cached_property
     def _contact(self) -> Contact:
-        return Contact(self._history, self.block, self._end_of_contact)
+        cut = bool(len(self.chattering)) and bool(self.chattering["end"][-1] >= self.duration) and self.moves_at_end
+        history = History(with_all_impacts(self.trail, self.block, cut=cut), self.duration)
+        return Contact(history, self.block, self._end_of_contact)
 
     @property
     def _end_of_contact(self) -> float:
@@ -315,7 +329,7 @@ class Response:
         Examples
         --------
         >>> import rocking
-        >>> block = rocking.Block(0.12, 0.55)
+        >>> block = rocking.Block(width=0.24, height=1.1)
         >>> print(rocking.simulate(block, rocking.pulses.one_sine(3.0, 1.0)).summary())
         block               rectangular block, 0.24 m x 1.1 m
         parameters          p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184
@@ -324,7 +338,7 @@ class Response:
         uplift              0.126380 s, to side -
         overturn            1.532021 s
         impacts resolved    1
-        peak rotation       1.5708 rad at 1.5320 s, 7.312 of the slenderness
+        peak rotation       1.5708 rad at 1.5320 s, where the block has fallen
         friction needed     0.2372, until it tips at 0.9319 s
         least normal force  0.8919 of the weight, until it tips at 0.9319 s
         verdict             overturns at 1.532021 s
@@ -344,7 +358,7 @@ class Response:
         Examples
         --------
         >>> import rocking
-        >>> response = rocking.simulate(rocking.Block(0.12, 0.55), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
         >>> result = response.to_dict()
         >>> result["overturned"], result["lift_off_time_s"], result["events"][0]["kind"]
         (True, None, 'uplift')
@@ -393,7 +407,7 @@ class Response:
         Examples
         --------
         >>> import rocking
-        >>> response = rocking.simulate(rocking.Block(0.12, 0.55), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
         >>> list(response.to_dataframe(dt=0.01).columns)
         ['rotation_rad', 'angular_velocity_rad_s', 'ground_acceleration_m_s2']
         >>> list(response.to_dataframe("impacts").columns)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rocking.arrays import Floats
 from rocking.kernels import state, variation
 from rocking.kernels.trace import Trail
+from rocking.tables import counted
 
 #: A response is ambiguous when changes of the motion, the initial state and the block by one unit in the last place
 #: move its peak by more than this fraction, or one of its events or impacts by more than this many seconds.
@@ -60,15 +61,17 @@ class Sensitivity:
         event = np.max(np.abs(self.events["motion"]), initial=0.0)
         return (
             f"<Sensitivity: 0.1 % more of the motion changes the peak by {1e-3 * self.peak['motion'][0]:.2g} rad and "
-            f"the times of {len(self.events)} events by up to {1e-3 * event:.2g} s; {len(self.impacts)} impacts>"
+            f"the times of {counted(len(self.events), 'event')} by up to {1e-3 * event:.2g} s; "
+            f"{counted(len(self.impacts), 'impact')}>"
         )
 
-    def ambiguities(self, peak_rotation: float) -> tuple[str, ...]:
-        """Which of "peak" and "events" one unit in the last place of everything changes visibly."""
+    def ambiguities(self, peak_rotation: float, near_ties: int) -> tuple[str, ...]:
+        """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly."""
         peak, *times = (_ULP * _total(values, QUANTITIES) for values in (self.peak, self.events, self.impacts))
         known = {
             "peak": bool(np.all(peak <= AMBIGUITY * max(peak_rotation, 1e-300))),
             "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
+            "touch": near_ties == 0,
         }
         return tuple(name for name, is_known in known.items() if not is_known)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rocking.response import data, digits
 from rocking.response.verdict import in_words
-from rocking.tables import named, plain
+from rocking.tables import counted, named, plain
 
 if TYPE_CHECKING:
     from rocking.response.response import Response
@@ -21,20 +21,20 @@ _LISTED: Final = 12
 
 def text(response: Response, friction: float | None) -> str:
     """Return what happened, line by line; with a coefficient of friction, whether it is enough."""
-    known, gravity = response.sensitivity, response.block.gravity
-    plus, minus = (threshold / gravity for threshold in response.block.uplift_thresholds(response.model))
+    known = response.sensitivity
+    sliding = math.nan if friction is None else response.sliding_time(friction)
     lines = [
         ("block", response.block.description),
         ("parameters", _parameters(response)),
         ("motion", _motion_text(response)),
-        ("uplift above", f"{plus:.4f} g" if plus == minus else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"),
+        ("uplift above", _thresholds_text(response)),
         *_event_lines(response, known),
         ("impacts resolved", f"{len(response.impacts)}"),
         ("peak rotation", _peak_text(response)),
         ("friction needed", f"{response.required_friction:.4f}{_before_tipping(response)}"),
         ("least normal force", f"{response.minimum_normal_force:.4f} of the weight{_before_tipping(response)}"),
-        *_contact_lines(response, friction),
-        ("verdict", _verdict(response, known)),
+        *_contact_lines(response, friction, sliding),
+        ("verdict", _verdict(response, known) + ("" if math.isnan(sliding) else " (as if it did not slide)")),
     ]
     if any(" +- " in entry for _, entry in lines):
         lines.append(("+-", "what a millionth more or less of what drives the block changes"))
@@ -47,7 +47,8 @@ def line(response: Response) -> str:
     peak = "" if response.overturned else f", peak {response.peak_over_slenderness:.4g} of the slenderness"
     return (
         f"{response.block.description} under {shaken}: {in_words(response, f'{response.overturn_time:.4f} s')}{peak}; "
-        f"{len(response.events)} events, {len(response.impacts)} impacts resolved, {response.duration:.5g} s"
+        f"{counted(len(response.events), 'event')}, {counted(len(response.impacts), 'impact')} resolved, "
+        f"{response.duration:.5g} s"
     )
 
 
@@ -115,46 +116,74 @@ def _motion_text(response: Response) -> str:
     return "; ".join(parts)
 
 
+def _thresholds_text(response: Response) -> str:
+    """Say what lifts the block; under a vertical motion it changes with the weight."""
+    gravity, motion = response.block.gravity, response.motion
+    plus, minus = (threshold / gravity for threshold in response.block.uplift_thresholds(response.model))
+    text = f"{plus:.4f} g" if plus == minus else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"
+    if motion is None or motion.vertical is None:
+        return text
+    low, high = (1.0 + lift / gravity for lift in motion.vertical.extremes)
+    return f"{text}, times the weight over that at rest, {low:.4f} to {high:.4f}"
+
+
 def _event_lines(response: Response, known: Sensitivity) -> list[tuple[str, str]]:
     sequences = {float(row["end"]): row for row in response.chattering}
     changes = known.driving()[1]
     lines = []
     for event, change in zip(response.events[:_LISTED], changes, strict=False):
-        entry = digits.time_text(float(event["time"]), float(change))
+        time = float(event["time"])
+        entry = digits.time_text(time, float(change))
+        sequence = sequences.get(time)
         if event["kind"] == "uplift":
             entry += f", to side {'+' if event['side'] > 0 else '-'}"
-        sequence = sequences.get(float(event["time"]))
-        if event["kind"] == "rest" and sequence is not None:
-            entry += _bracket_text(sequence, min(digits.decimals(digits.KNOWN * change), 4))
+        elif event["kind"] == "rest" and sequence is not None:
+            entry = _rest_text(response, time, float(change), sequence)
         lines.append((str(event["kind"]), entry))
     if len(response.events) > _LISTED:
         lines.append(("...", f"{len(response.events) - _LISTED} more events"))
     return lines or [("uplift", "none")]
 
 
-def _bracket_text(sequence: np.void, decimals: int) -> str:
-    width = sequence["upper"] - sequence["lower"]
-    if not width >= 0.0:
-        return ", by the treatment, not proven"
-    return f", complete chattering proven from {sequence['start']:.{decimals}f} s on, bracket {width:.1e} s wide"
+def _rest_text(response: Response, time: float, change: float, sequence: np.void) -> str:
+    """Say when the block comes to rest, and how that is known: no more of it than the record's digits tell."""
+    unknown, width = digits.KNOWN * change, sequence["upper"] - sequence["lower"]
+    decimals = digits.decimals(unknown)
+    if unknown < digits.TOLD:
+        text = digits.time_text(time, change)
+        if not width >= 0.0:
+            return f"{text}, by the treatment, not proven"
+        start = f"{sequence['start']:.{min(decimals, 4)}f}"
+        # The bracket is for the motion to the last place: beside a time with fewer digits it would say too much.
+        bracket = f", bracket {width:.1e} s wide" if decimals >= digits.MOST_DECIMALS else ""
+        return f"{text}, complete chattering proven from {start} s on{bracket}"
+    driver = "the initial state" if response.motion is None else "the motion"
+    off = f"+- {unknown:.1g} s" if unknown < 0.5 * time else "far from it"
+    known = "rest proven" if width >= 0.0 else "by the treatment, not proven"
+    return f"at about {time:.{decimals}f} s ({off} if {driver} is off by a millionth); {known}"
 
 
 def _peak_text(response: Response) -> str:
-    ratio = digits.ratio_text(response)
-    return f"{digits.peak_text(response)} at {digits.peak_time_text(response)}, {ratio} of the slenderness"
+    reached = f"{digits.peak_text(response)} at {digits.peak_time_text(response)}"
+    if response.overturned:
+        return f"{reached}, where the block has fallen"
+    return f"{reached}, {digits.ratio_text(response)} of the slenderness"
 
 
 def _before_tipping(response: Response) -> str:
     return "" if math.isnan(response.tipping_time) else f", until it tips at {digits.tipping_text(response)}"
 
 
-def _contact_lines(response: Response, friction: float | None) -> list[tuple[str, str]]:
+def _contact_lines(response: Response, friction: float | None, sliding: float) -> list[tuple[str, str]]:
     """Say whether the block slides at a coefficient of friction, and when its base leaves the ground if it does."""
     lines = []
     if friction is not None:
-        sliding = response.sliding_time(friction)
-        slides = "no" if math.isnan(sliding) else f"yes, first at {sliding:.4f} s; what follows is not this response"
-        lines.append((f"slides at {friction:g}", slides))
+        text = (
+            "is enough: the block does not slide"
+            if math.isnan(sliding)
+            else f"is not enough: the block slides, first at {sliding:.4f} s; what follows is not this response"
+        )
+        lines.append((f"friction {friction:g}", text))
     if not math.isnan(response.lift_off_time):
         lines.append(("base lifts off", f"at {response.lift_off_time:.4f} s; what follows is not this response"))
     return lines
@@ -169,10 +198,14 @@ def _sliding(response: Response, friction: float | None) -> dict[str, Any]:
 def _verdict(response: Response, known: Sensitivity) -> str:
     verdict = in_words(response, digits.overturn_text(response) if response.overturned else "")
     if response.stalled:
-        verdict += f"; {response.stalled} rest(s) not proven"
-    ambiguities = known.ambiguities(response.peak_rotation)
+        verdict += f"; {counted(response.stalled, 'rest')} not proven"
+    ambiguities = known.ambiguities(response.peak_rotation, response.near_ties)
     if ambiguities:
-        affected = {"peak": "the peak rotation", "events": "times of events or impacts"}
+        affected = {
+            "peak": "the peak rotation",
+            "events": "times of events or impacts",
+            "touch": "whether a block without weight touches the ground",
+        }
         verdict += (
             f"; AMBIGUOUS: one unit in the last place of the input changes "
             f"{' and '.join(affected[name] for name in ambiguities)}: scale the motion (or the initial state) "

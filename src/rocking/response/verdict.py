@@ -49,9 +49,9 @@ def _when_stopped(response: Response) -> str:
 
 def _still_to_come(response: Response) -> str:
     motion = response.motion
-    if motion is None or not response.duration < motion.duration:
+    if motion is None or not response.duration < motion.end:
         return ""
-    return f"; the motion goes on to {motion.duration:.6g} s"
+    return f"; the motion goes on to {motion.end:.6g} s"
 
 
 def _has_moved(response: Response) -> bool:

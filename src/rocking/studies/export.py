@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from rocking.errors import InvalidOption, OutputError
-from rocking.tables import data_frame, plain
+from rocking.errors import InvalidOption
+from rocking.tables import data_frame, plain, whole_file, write_netcdf
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,19 +43,18 @@ def export(dataset: xr.Dataset, target: Path, along: str, step: int) -> None:
     """
     if target.suffix not in {".nc", *_WRITERS}:
         raise InvalidOption(f"a study is exported to .nc, {', '.join(_WRITERS)}, not to {target.name}")
+    if target.suffix == ".nc":
+        write_netcdf(target, dataset)
+        return
+    table = _named(dataset)
+    parts = (slice(start, start + step) for start in range(0, max(1, table.sizes[along]), step))
+    frames = (data_frame(table.isel({along: part}).load()) for part in parts)
     try:
-        if target.suffix == ".nc":
-            dataset.to_netcdf(target, engine="h5netcdf")
-        else:
-            table = _named(dataset)
-            parts = (slice(start, start + step) for start in range(0, max(1, table.sizes[along]), step))
-            frames = (data_frame(table.isel({along: part}).load()) for part in parts)
-            _WRITERS[target.suffix](frames, table, target)
+        with whole_file(target) as beside:
+            _WRITERS[target.suffix](frames, table, beside)
     except ImportError:
         extra = {".parquet": "parquet", ".xlsx": "excel"}[target.suffix]
         raise InvalidOption(f"{target.suffix} needs more: install rocking[{extra}], or export to .csv or .nc") from None
-    except OSError as error:
-        raise OutputError(f"{target} cannot be written: {error.strerror or error}; choose another place") from error
 
 
 def _named(dataset: xr.Dataset) -> xr.Dataset:
@@ -107,7 +107,9 @@ def _write_workbook(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target:
             sheet.append([*frame.columns])
         for row in frame.to_dict("records"):
             sheet.append([*plain(row).values()])
-    book.save(target)
+    content = io.BytesIO()  # what it writes itself must not fail
+    book.save(content)
+    target.write_bytes(content.getvalue())
 
 
 _WRITERS: Final[Mapping[str, Callable[[Iterator[pd.DataFrame], xr.Dataset, Path], None]]] = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import itertools
 import re
 import tomllib
@@ -16,16 +15,19 @@ import numpy as np
 
 from rocking import checks, quantities
 from rocking.arrays import Floats
-from rocking.block import Blocks
+from rocking.block import Block, Blocks
 from rocking.errors import InvalidMotion, RockingError, StudyError, UnreadableRecord
 from rocking.motion.formats.request import Request
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.named_pulses import pulse_family
+from rocking.plausibility import vertical_notes
 from rocking.product import Product, Scales
+from rocking.progress import note
 from rocking.studies.outcomes import OUTCOMES, chosen_outcomes
 from rocking.studies.refine import Tolerances, tolerances_of
 from rocking.studies.report import FragilityPlan, ReportPlan, SpectrumPlan
+from rocking.tables import csv_rows
 from rocking.treatment import treatment
 
 TEMPLATE: Final = """\
@@ -35,7 +37,13 @@ TEMPLATE: Final = """\
 [blocks]                        # the full grid of these; or: csv = "blocks.csv" with these columns
 p = "1.5:6:20"                  # frequency parameter, rad/s
 alpha = "5deg:20deg:16"         # slenderness
-restitution = 0.9               # leave out for Housner's
+restitution = 0.9               # leave out for that of angular momentum (Housner's)
+# width = [0.3, 0.6]            # instead of p and alpha: rectangles, m,
+# height = "1:2:5"
+# offset = 0.02                 # with the centre of mass off the middle, positive to side +
+# pivots = [[0.2, 0.15]]        # or bodies: distances of the pivots of side + and side - from the centre of mass, m,
+# height_of_mass = 0.6          # its height, and the radius of gyration
+# gyration = 0.4
 
 [motions]
 records = ["ridgecrest-clc-090", "el-centro-meloland-270"]   # files, folders, patterns, shipped records
@@ -82,7 +90,9 @@ def _is_list_of_texts(value: Any) -> bool:
 
 #: Keys of every table.
 _KEYS: Final[Mapping[str, frozenset[str]]] = {
-    "blocks": frozenset({"p", "alpha", "restitution", "csv"}),
+    "blocks": frozenset(
+        {"p", "alpha", "restitution", "csv", "width", "height", "offset", "pivots", "height_of_mass", "gyration"}
+    ),
     "motions": frozenset({"records", "channel", "vertical", "units", "dt", "skip_unreadable", "pulses"}),
     "scales": frozenset({"factor", "pga", "pgv", "sa", "period", "damping", "polarity", "refine"}),
     "simulation": frozenset({"model", "chattering", "duration", "outcomes"}),
@@ -100,9 +110,22 @@ _KINDS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
 
 _QUANTITIES: Final[Mapping[str, Callable[[str, str], float]]] = {
     "alpha": quantities.tilt,
+    **dict.fromkeys(("width", "height", "pivots", "height_of_mass", "gyration"), quantities.length),
     "pga": quantities.acceleration,
     "sa": quantities.acceleration,
 }
+
+
+#: What says together what a block is, and what may go with it.
+_BODIES: Final[Mapping[tuple[str, ...], tuple[str, ...]]] = {
+    ("p", "alpha"): ("restitution",),
+    ("width", "height"): ("offset", "restitution"),
+    ("pivots", "height_of_mass", "gyration"): ("restitution",),
+}
+
+#: What both sides of a block may have of their own, in columns of a table that end so.
+_SIDED: Final = ("p", "alpha", "pivots", "restitution")
+_SIDES: Final = ("_plus", "_minus")
 
 
 @dataclass(frozen=True)
@@ -121,6 +144,8 @@ class StudyFile:
         Tolerances to which scales are refined, by verdict.
     outcomes : tuple of str
         What is kept of each simulation.
+    records : tuple of str
+        Name of the record of each motion, relative to the file; empty of a pulse.
     """
 
     product: Product
@@ -128,6 +153,7 @@ class StudyFile:
     report: ReportPlan | None
     refine: Tolerances | None = None
     outcomes: tuple[str, ...] = OUTCOMES
+    records: tuple[str, ...] = ()
 
 
 def read_study(path: str | Path) -> StudyFile:
@@ -169,7 +195,7 @@ class _Reader:
     def study(self) -> StudyFile:
         self._check_keys()
         blocks, scales = self._blocks(), self._scales()
-        motions, skipped = self._motions(scales)
+        motions, names, skipped = self._motions(scales)
         rules = self.tables.get("simulation", {})
         with self._line_told("simulation", "chattering"):
             chattering = treatment(rules.get("chattering", "certified"))
@@ -186,7 +212,7 @@ class _Reader:
             )
         with self._line_told("simulation", "outcomes"):
             kept = chosen_outcomes(rules.get("outcomes"))
-        return StudyFile(product, tuple(skipped), self._report(kept), self._refine(product, kept), kept)
+        return StudyFile(product, tuple(skipped), self._report(kept), self._refine(product, kept), kept, tuple(names))
 
     def _scales(self) -> Scales:
         given = {
@@ -242,51 +268,97 @@ class _Reader:
         given = self.tables["blocks"]
         if "csv" in given:
             if len(given) > 1:
-                raise self._wrong("blocks", "csv", "csv goes without p, alpha and restitution")
+                raise self._wrong("blocks", "csv", "csv goes without other keys")
             return self._blocks_of_csv(self.file.parent / given["csv"])
-        missing = [name for name in ("p", "alpha") if name not in given]
-        if missing:
-            raise self._wrong("blocks", None, f"[blocks] needs {' and '.join(missing)}, or csv")
-        axes: dict[str, Any] = {name: self._numbers("blocks", name, value) for name, value in given.items()}
+        self._check_description(given)
+        axes: dict[str, Any] = {
+            name: self._pivots(value) if name == "pivots" else self._numbers("blocks", name, value)
+            for name, value in given.items()
+        }
         with self._lines_told("blocks"):
-            return Blocks.grid(**axes)
+            if "p" in axes:
+                return Blocks.grid(**axes)
+            checks.grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
+            return Blocks.of(
+                [_body(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())],
+            )
+
+    def _check_description(self, given: Mapping[str, Any]) -> None:
+        """Check that these keys say what a block is."""
+        if not any({*all_} <= given.keys() <= {*all_, *more} for all_, more in _BODIES.items()):
+            choices = ", or ".join(_listed(all_) for all_ in _BODIES)
+            having = f"; it has {_listed([*given])}" if given else ""
+            raise self._wrong("blocks", None, f"[blocks] needs {choices}, or csv{having}")
+
+    def _pivots(self, value: Any) -> list[Floats]:
+        """Pairs of distances: one, or several."""
+        with self._line_told("blocks", "pivots"):
+            pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+            found = [_read("pivots", pair, quantities.length) for pair in pairs]
+            if any(len(pair) != 2 for pair in found):
+                raise StudyError("pivots must be a pair, [0.2, 0.15] (side +, side -), or a list of pairs")
+            return found
 
     def _blocks_of_csv(self, table: Path) -> Blocks:
         try:
-            with table.open(encoding="utf-8-sig", newline="") as file:
-                rows = list(csv.DictReader(file))
+            rows = csv_rows(table.read_text("utf-8-sig"))
         except OSError as error:
             raise self._wrong("blocks", "csv", f"{table} cannot be read: {error.strerror}") from None
+        except UnicodeDecodeError:
+            raise self._wrong("blocks", "csv", f"{table} is no text table in UTF-8; save it as CSV") from None
         columns: dict[str, Any] = {}
-        for name in ("p", "alpha", "restitution"):
-            if rows and name in rows[0]:
-                cells = enumerate((row[name] or "" for row in rows), start=2)
-                columns[name] = np.array([_cell(table, line, name, text) for line, text in cells])
-        if not {"p", "alpha"} <= columns.keys():
-            raise self._wrong("blocks", "csv", f"{table} needs columns p (rad/s) and alpha (rad, or 12deg), and rows")
-        try:
-            return Blocks(**columns)
-        except RockingError as error:
-            raise self._wrong("blocks", "csv", f"{table}, whose block 0 is in line 2: {error}") from None
+        headings, given = (rows[0][1], rows[1:]) if len(rows) > 1 else ([], [])
+        for name in sorted(_KEYS["blocks"] - {"csv"}):
+            ends = _SIDES if name in _SIDED and f"{name}{_SIDES[0]}" in headings else ("",)
+            if all(name + end in headings for end in ends):
+                places = [headings.index(name + end) for end in ends]
+                cells = [
+                    [_cell(table, line, name, row[place] if place < len(row) else "") for place in places]
+                    for line, row in given
+                ]
+                columns[name] = np.squeeze(cells, axis=1) if len(ends) == 1 else np.array(cells)
+        if not any({*all_} <= columns.keys() for all_ in _BODIES):
+            raise self._wrong(
+                "blocks",
+                "csv",
+                f"{table} needs columns p (rad/s) and alpha (rad, or 12deg), or width and height (m), or pivots_plus, "
+                "pivots_minus, height_of_mass and gyration (m), and rows",
+            )
+        if {"p", "alpha"} <= columns.keys():
+            try:
+                return Blocks(**{name: columns[name] for name in ("p", "alpha", "restitution") if name in columns})
+            except RockingError as error:
+                raise self._wrong(
+                    "blocks", "csv", f"{table}, whose block 0 is in line {given[0][0]}: {error}"
+                ) from None
+        bodies = []
+        for (line, _), row in zip(given, zip(*columns.values(), strict=True), strict=True):
+            try:
+                bodies.append(_body(dict(zip(columns, row, strict=True))))
+            except RockingError as error:
+                raise StudyError(f"{table}, line {line}: {error}") from None
+        return Blocks.of(bodies)
 
-    def _motions(self, scales: Scales) -> tuple[list[Motion], list[str]]:
-        """Motions that can be read and scaled, and a sentence for each that cannot, where the file says to go on."""
+    def _motions(self, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
+        """Motions that can be read and scaled, their records, and a sentence for each that cannot, if it may be so."""
         given = self.tables["motions"]
-        motions, skipped = [], []
+        motions, names, skipped = [], [], []
         records = self._records()
         for path, name in records.items():
             try:
                 with self._record_told(name):
                     motions.append(_scalable(self._record(path, several=len(records) > 1), scales))
+                names.append(self._as_written(path))
             except (UnreadableRecord, InvalidMotion) as error:
                 if not given.get("skip_unreadable", False):
                     raise
                 skipped.append(str(error))
         for k in range(len(given.get("pulses", []))):
             motions += self._pulses(k)
+        names += [""] * (len(motions) - len(names))
         if not motions:
             raise self._wrong("motions", None, "[motions] holds no motion that can be read: name records or pulses")
-        return motions, skipped
+        return motions, names, skipped
 
     def _records(self) -> dict[str, str]:
         """Paths (relative to the study's own file) or names of all records, and what stands for each in the file."""
@@ -305,12 +377,20 @@ class _Reader:
         motion = named_motion(path, channel=channel, several=several, **about)
         if "vertical" not in given:
             return motion
-        return motion.with_vertical(named_vertical(self._beside(given["vertical"]), path, **about))
+        both = motion.with_vertical(named_vertical(self._beside(given["vertical"]), path, channel=channel, **about))
+        for sentence in vertical_notes(both):
+            note(f"{path}: {sentence}")
+        return both
 
     def _beside(self, name: str) -> str:
         """Path of a file that lies beside the study's own, or the name of anything else."""
         path = str(self.file.parent / name)
         return path if Path(path).exists() or any(mark in name for mark in "*?[") else name
+
+    def _as_written(self, path: str) -> str:
+        """Return the path of a record relative to the file, as it names those beside it."""
+        beside = Path(path).is_relative_to(self.file.parent) and Path(path).exists()
+        return str(Path(path).relative_to(self.file.parent)) if beside else path
 
     def _pulses(self, k: int) -> list[Motion]:
         pulse = dict(self.tables["motions"]["pulses"][k])
@@ -394,9 +474,22 @@ def _read(key: str, value: Any, quantity: quantities.Quantity) -> Floats:
     return np.array([quantity(one if isinstance(one, str) else repr(one), key) for one in each])
 
 
+def _body(given: Mapping[str, Any]) -> Block:
+    """Rectangle or body on pivots from one value of each."""
+    if "width" in given:
+        return Block(**given)
+    return Block.from_pivots(
+        given["pivots"], given["height_of_mass"], given["gyration"], restitution=given.get("restitution")
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
 def _cell(table: Path, line: int, name: str, text: str) -> float:
     try:
-        return (quantities.tilt if name == "alpha" else quantities.number)(text, name)
+        return _QUANTITIES.get(name, quantities.number)(text, name)
     except RockingError as error:
         raise StudyError(f"{table}, line {line}: {error}") from None
 

@@ -9,12 +9,12 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rocking.analysis.fragility.curve import Fragility, FragilityCurve
-from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility, passed
+from rocking.analysis.fragility.fit import OVERTURNING, Bands, fit_fragility, fitted_curve, passed
 from rocking.analysis.intensity import Measure
-from rocking.analysis.levels import described, several_motions
+from rocking.analysis.levels import mean_one, only_block, pooled, several_motions
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
@@ -23,6 +23,7 @@ from rocking.progress import Progress
 from rocking.result import Result, table_of_some
 from rocking.studies.ratios import peak_ratios, require_limits
 from rocking.studies.store import Store
+from rocking.tables import counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,31 +43,43 @@ _KEPT: Final[Mapping[str, str]] = {
 
 
 def pooled_fragility(
-    store: Store, measure: Measure, limits: Mapping[str, float] = OVERTURNING, confidence: float = 0.9
+    store: Store,
+    measure: Measure,
+    limits: Mapping[str, float] = OVERTURNING,
+    confidence: float = 0.9,
+    weights: ArrayLike | None = None,
 ) -> Fragility:
-    """Fit one curve to the outcomes of all blocks."""
+    """Fit one curve to the outcomes of all blocks, each of which may have a weight."""
     require_limits(store.grid.outcomes, limits)
     product = store.product
+    shares, bands = mean_one(weights, len(product.blocks)), Bands(confidence)
     units, which = np.unique(measure.unit_of(product.blocks, product.model), return_inverse=True)
     motions, scales, _, _ = product.shape
     counts = {name: np.zeros((motions, scales, len(units))) for name in limits}
     trials = np.zeros((motions, scales, len(units)))
     for blocks, ratios in peak_ratios(store):
-        belongs = which[blocks][:, None] == np.arange(len(units))
+        belongs = np.where(which[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
         trials += ratios.shape[2] * belongs.sum(axis=0)
         for name, limit in limits.items():
             counts[name] += passed(ratios, limit, name).sum(axis=2) @ belongs
     x = _intensities(product, measure)[:, :, None] / units
     found = trials.ravel() > 0
-    return fit_fragility(
-        x.ravel()[found],
-        {name: count.ravel()[found] for name, count in counts.items()},
-        trials=trials.ravel()[found],
-        clusters=np.broadcast_to(np.arange(motions)[:, None, None], x.shape).ravel()[found],
-        **_words(measure),
-        confidence=confidence,
-        block=product.blocks[0] if len(product.blocks) == 1 else None,
-        description=f"{described(product.blocks)}, {motions} motions, {scales} scales",
+    clusters = np.broadcast_to(np.arange(motions)[:, None, None], x.shape).ravel()[found]
+    curves = [
+        fitted_curve(
+            name, x.ravel()[found], count.ravel()[found], trials.ravel()[found], clusters, bands, measure, limits[name]
+        )
+        for name, count in counts.items()
+    ]
+    text = f"{pooled(product.blocks, weights)}, {counted(motions, 'motion')}, {counted(scales, 'scale')}"
+    return Fragility(
+        curves=tuple(curves),
+        measure=measure,
+        description=f"{text}, {product.model} model",
+        block=only_block(product.blocks),
+        model=product.model,
+        outcomes=None,
+        one_way=product.polarity != "both" and not product.blocks.is_symmetric,
     )
 
 
@@ -152,9 +165,10 @@ class BlockFragilities(Result):
             )
         without = int(np.count_nonzero(data.fault.values != ""))
         text = (
-            f"fragility of {data.sizes['block']} blocks, {data.outcomes} outcomes each; intensity: {self.measure.label}"
+            f"fragility of {counted(data.sizes['block'], 'block')}, {counted(int(data.outcomes), 'outcome')} each; "
+            f"intensity: {self.measure.label}"
         )
-        text += f"; {without} curves cannot be fitted (fault says why)" if without else ""
+        text += f"; {counted(without, 'curve')} cannot be fitted (fault says why)" if without else ""
         return f"{text}\n\n{table_of_some(header, rows)}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -185,7 +199,9 @@ class BlockFragilities(Result):
             panels=dict(zip(names, medians, strict=True)),
             value_label=f"median {self.measure.label}",
             missing_label="no curve fits",
-            title=title or f"fragility of {self.data.sizes['block']} blocks, {self.data.outcomes} outcomes each",
+            title=title
+            or f"fragility of {counted(self.data.sizes['block'], 'block')}, "
+            f"{counted(int(self.data.outcomes), 'outcome')} each",
             ax=ax,
             figsize=figsize,
         )

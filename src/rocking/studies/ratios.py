@@ -73,7 +73,7 @@ def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     grid = store.grid
     missing = len(grid) - len(store.done())
     if missing:
-        raise StudyError(f"{missing} of {len(grid)} units are missing: run the study to its end first")
+        raise StudyError(f"units are missing, {missing} of {len(grid)}: run the study to its end first")
     motions, scales, polarities = grid.shape[:3]
     shape = motions, scales, 1 if store.product.blocks.is_symmetric else polarities
     width = max(1, _HELD // int(np.prod(shape)))

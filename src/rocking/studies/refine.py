@@ -28,6 +28,7 @@ from rocking.studies import inputs
 from rocking.studies.outcomes import require
 from rocking.studies.store import Store, readable, sealed, unsealed
 from rocking.studies.units import Key, Line, PointsWork, name_of
+from rocking.tables import counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -165,10 +166,15 @@ class Round:
         """Write the round without its units; what describes it last."""
         place, archive = self.store.place, self.brackets.to_bytes()
         place.put(f"{self.name}/brackets.npz", archive)
-        if len(self.chosen):
-            place.put(f"{self.name}/zarr.json", self.grid.metadata().encode())
+        for name, data in self.metadata.items():
+            place.put(name, data)
         about = {"round": self.number, "brackets": hashlib.sha256(archive).hexdigest(), "points": len(self.chosen)}
         place.put(f"{self.name}/round.json", sealed(about))
+
+    @property
+    def metadata(self) -> dict[str, bytes]:
+        """What any reader of Zarr knows the array by; a round without points has none."""
+        return {f"{self.name}/zarr.json": self.grid.metadata().encode()} if len(self.chosen) else {}
 
     @property
     def name(self) -> str:
@@ -280,10 +286,10 @@ class Refinement:
     def __str__(self) -> str:
         """Write it in a few words."""
         if self.complete:
-            return f"refined to {_told(self.tolerances)} in {self.rounds - 1} rounds"
+            return f"refined to {_told(self.tolerances)} in {counted(self.rounds - 1, 'round')}"
         if not self.rounds:
             return f"to be refined to {_told(self.tolerances)}"
-        far = f"round {self.rounds}: {self.done} of {self.simulations} simulations done"
+        far = f"round {self.rounds}: {self.done} of {counted(self.simulations, 'simulation')} done"
         return f"being refined to {_told(self.tolerances)}, {far}"
 
 
@@ -410,7 +416,7 @@ def found_brackets(store: Store, verdict: Verdict) -> Brackets:
     """
     missing = len(store.grid) - len(store.done())
     if missing:
-        raise StudyError(f"{missing} of {len(store.grid)} units are missing: run the study to its end first")
+        raise StudyError(f"units are missing, {missing} of {len(store.grid)}: run the study to its end first")
     tolerances = kept_plan(store)
     if tolerances is None or verdict not in tolerances:
         return grid_brackets(store, [verdict])

@@ -132,6 +132,11 @@ def keep(store: Store, plan: ReportPlan) -> None:
         store.place.put(_NAME, data)
 
 
+def is_kept(store: Store) -> bool:
+    """Whether anything is wanted of the results."""
+    return store.place.get(_NAME) is not None
+
+
 def kept(store: Store) -> ReportPlan:
     """Read what is wanted.
 

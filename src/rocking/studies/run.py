@@ -17,6 +17,7 @@ from rocking.compiling import SIMULATIONS, announce
 from rocking.progress import Progress
 from rocking.studies.units import Grid, Key, Line, PointsWork, Work
 from rocking.studies.workers import LOST, Workers, sentence, workers_of
+from rocking.tables import counted
 
 #: Units that are handed out for each worker: one that it computes, and the next.
 _AHEAD: Final = 2
@@ -89,9 +90,10 @@ class RunReport:
     def __str__(self) -> str:
         """Write it in one line."""
         rate = self.simulations / self.seconds if self.seconds > 0.0 else 0.0
-        text = f"{self.units} units, {self.simulations} simulations in {self.seconds:.1f} s ({rate:.3g} a second)"
+        done = f"{counted(self.units, 'unit')}, {counted(self.simulations, 'simulation')}"
+        text = f"{done} in {self.seconds:.1f} s ({rate:.3g} a second)"
         if self.failed:
-            text += f"; {len(self.failed)} units failed, the first: {next(iter(self.failed.values()))}"
+            text += f"; {counted(len(self.failed), 'unit')} failed, the first: {next(iter(self.failed.values()))}"
         return text + ("; stopped, go on with another run" if self.stopped else "")
 
 
@@ -168,7 +170,7 @@ def run(
             else:
                 failed[job.label(key)] = outcome
                 failing(job.label(key), outcome)
-                bar.note(f"{len(failed)} units failed")
+                bar.note(f"{counted(len(failed), 'unit')} failed")
     stopped = stop.asked and units + len(failed) < len(missing)
     return RunReport(units, simulations, time.monotonic() - start, failed, stopped)
 

@@ -18,6 +18,7 @@ from rocking.result import Result, table_of_some
 from rocking.studies.fragility import plane_of
 from rocking.studies.ratios import peak_ratios, require_ratios
 from rocking.studies.store import Store
+from rocking.tables import counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,7 +90,7 @@ class StudySpectrum(Result):
             for j in range(data.sizes["block"])
         ]
         what = f"{100 * float(one.fractile):g} % fractile of peak rotation over slenderness"
-        return f"{what}, {data.motions} motion(s), {data.model} model\n\n{table_of_some(header, rows)}"
+        return f"{what}; {self._about()}\n\n{table_of_some(header, rows)}"
 
     def to_dict(self) -> dict[str, Any]:
         """Axes, fractiles and shares by name."""
@@ -121,7 +122,7 @@ class StudySpectrum(Result):
         fractile : float
             Which one; the nearest there is.
         title : str
-            Title; by default the number of motions and the model.
+            Title; by default the number of motions, the model, and how many scales are shown.
         figsize : (float, float), optional
             Width and height of a new figure, inches.
 
@@ -137,8 +138,8 @@ class StudySpectrum(Result):
             *plane_of(self.data),
             panels={self._scale_name(i): one.values[i] for i in self._some_scales()},
             value_label=f"{100 * float(one.fractile):g} % fractile of peak rotation over slenderness",
-            missing_label="overturns",
-            title=title or f"{self.data.motions} motion(s), {self.data.model} model",
+            missing_label="so many motions overturn the block that there is none",
+            title=title or self._about(),
             ax=ax,
             figsize=figsize,
         )
@@ -148,6 +149,12 @@ class StudySpectrum(Result):
         nearest = int(np.argmin(np.abs(self.data.fractile.values - wanted)))
         found: xr.DataArray = self.data.fractile_over_alpha.isel(fractile=nearest)
         return found
+
+    def _about(self) -> str:
+        """Say what the figure and the table are about, and of which scales."""
+        motions, scales, shown = int(self.data.motions), self.data.sizes["scale"], len(self._some_scales())
+        left_out = f"; {shown} of {scales} scales are shown" if shown < scales else ""
+        return f"{counted(motions, 'motion')}, {self.data.model} model{left_out}"
 
     def _some_scales(self) -> list[int]:
         count = self.data.sizes["scale"]

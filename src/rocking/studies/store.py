@@ -5,26 +5,30 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from rocking.arrays import Floats
 from rocking.constants import VERSION
-from rocking.errors import StudyError
+from rocking.errors import DamagedStudy, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.product import Product
 from rocking.studies import inputs
 from rocking.studies.outcomes import OUTCOMES, told
 from rocking.studies.place import Place
 from rocking.studies.units import Axes, DamagedUnit, Grid, Key, Line, Work, decoded, key_of, name_of
+from rocking.tables import counted
 
 #: Format of a store, and of one of chosen outcomes, which a program that knows none would take for damage.
 FORMAT: Final = 2
 _CHOSEN: Final = 3
 
 _ARRAY: Final = "result"
+
+#: How the file that a study was made from names its records; no result depends on it.
+_RECORDS: Final = "records.json"
 
 #: What is in the place of a study whose creation was cut off; that of an object store keeps a clock as well.
 _ITS_OWN: Final = frozenset({_ARRAY, "inputs.npz", "zarr.json", "lock", "clock", "runs.jsonl"})
@@ -70,8 +74,9 @@ class Store:
         grid = Grid(product.shape, unit, outcomes)
         archive = inputs.to_bytes(product)
         place.put("inputs.npz", archive)
-        place.put("zarr.json", _GROUP.encode())
-        place.put(f"{_ARRAY}/zarr.json", grid.metadata().encode())
+        made = cls(place, product, grid)
+        for name, data in made.metadata.items():
+            place.put(name, data)
         about: dict[str, Any] = {
             "format": FORMAT,
             "version": VERSION,
@@ -84,7 +89,7 @@ class Store:
         if outcomes != OUTCOMES:
             about |= {"format": _CHOSEN, "outcomes": list(outcomes)}
         place.put("study.json", sealed(about))
-        return cls(place, product, grid)
+        return made
 
     @classmethod
     def open(cls, place: Place) -> Store:
@@ -103,10 +108,12 @@ class Store:
             )
         product = inputs.from_bytes(archive)
         grid = Grid(product.shape, tuple(about["unit"]), tuple(about.get("outcomes", OUTCOMES)))
-        for name, text in (("zarr.json", _GROUP), (f"{_ARRAY}/zarr.json", grid.metadata())):
-            if place.get(name) != text.encode():
-                place.put(name, text.encode())
         return cls(place, product, grid)
+
+    @property
+    def metadata(self) -> dict[str, bytes]:
+        """Objects by which any reader of Zarr knows the array."""
+        return {"zarr.json": _GROUP.encode(), f"{_ARRAY}/zarr.json": self.grid.metadata().encode()}
 
     def check_program(self) -> None:
         """Check that this program computes what the store holds, to the last bit.
@@ -137,8 +144,30 @@ class Store:
         if changed:
             raise StudyError(
                 f"{self.place} holds a study of other inputs ({', '.join(changed)} changed), {len(self.done())} of "
-                f"{len(self.grid)} units done: create this one elsewhere, or remove that one"
+                f"{counted(len(self.grid), 'unit')} done: create this one elsewhere, or remove that one"
             )
+
+    def name_records(self, records: Sequence[str]) -> None:
+        """Keep the name of the record of each motion, in place of those that were; no number depends on them."""
+        data = sealed({"records": list(records)})
+        if self.place.get(_RECORDS) != data:
+            self.place.put(_RECORDS, data)
+
+    def records(self) -> tuple[str, ...]:
+        """Name of the record of each motion, empty of a pulse; none at all where they are not known.
+
+        Raises
+        ------
+        StudyError
+            If they are damaged.
+        """
+        data = self.place.get(_RECORDS)
+        about = {"records": ()} if data is None else unsealed(data)
+        if about is None or (data is not None and len(about["records"]) != len(self.product.motions)):
+            raise StudyError(
+                f"{_RECORDS} in {self.place} is damaged: create the study again from its file, in its place"
+            )
+        return tuple(about["records"])
 
     def done(self) -> set[Key]:
         """Keys of the units that are done."""
@@ -195,13 +224,13 @@ def readable(data: bytes, grid: Grid | Line, counts: tuple[int, ...], label: str
 
     Raises
     ------
-    StudyError
+    DamagedStudy
         If they are damaged; the message names the unit.
     """
     try:
         return decoded(data, grid.outcomes, counts, grid.unit)
     except DamagedUnit as error:
-        raise StudyError(f"unit {label} is damaged, {error}: verify(repair=True) computes it again") from None
+        raise DamagedStudy(f"unit {label} is damaged, {error}") from None
 
 
 def exists(place: Place) -> bool:

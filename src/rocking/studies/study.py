@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from datetime import datetime
@@ -21,10 +22,10 @@ from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.intensity import Measure, MeasureName
 from rocking.block import Block, Blocks
 from rocking.compiling import SIMULATIONS, announce
-from rocking.errors import InvalidOption, StudyError
+from rocking.errors import DamagedStudy, InvalidOption, StudyError
 from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
-from rocking.product import Polarity, Product, Scales
+from rocking.product import Polarity, Product, Scales, names_of
 from rocking.studies import store as stores
 from rocking.studies.export import export
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
@@ -42,7 +43,7 @@ from rocking.studies.refine import (
     rounds,
     tolerances_of,
 )
-from rocking.studies.report import Made, ReportPlan, keep, kept, report
+from rocking.studies.report import Made, ReportPlan, is_kept, keep, kept, report
 from rocking.studies.run import RunReport, Stop, run
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.store import Store
@@ -61,6 +62,9 @@ _GROUP: Final = 512
 _UNIT: Final = 5.0
 _FEWEST: Final = 32
 _LARGEST: Final = 1 << 18
+
+#: What happened in every run; no result depends on it.
+_RUNS: Final = "runs.jsonl"
 
 #: Rows of a table that are held in memory at a time.
 _ROWS: Final = 1 << 16
@@ -128,7 +132,8 @@ class Status:
     def __str__(self) -> str:
         """Write it in one line."""
         share = 100.0 * self.done / self.units
-        text = f"{self.done} of {self.units} units done ({share:.1f} %), {self.simulations} simulations in all"
+        done = f"{self.done} of {counted(self.units, 'unit')} done ({share:.1f} %)"
+        text = f"{done}, {counted(self.simulations, 'simulation')} in all"
         text += f"; {self.refinement}" if self.refinement else ""
         text += f"; {len(self.failed)} failed in the last run" if self.failed else ""
         return text + (f"; {self.running}" if self.running else "")
@@ -192,7 +197,8 @@ class Study:
             except BaseException as error:
                 self._log({"event": "end", "error": str(error) or type(error).__name__})
                 raise
-            self._log({"event": "end", "units": report.units, "seconds": report.seconds, "stopped": report.stopped})
+            about = {"units": report.units, "seconds": report.seconds, "stopped": report.stopped}
+            self._log({"event": "end", **about, "done": self._simulations()})
         return report
 
     def _compute(self, **options: Any) -> RunReport:
@@ -263,34 +269,57 @@ class Study:
         outcomes: dict[str, Any] = {name: lazy(self.store, name, complete) for name in self.store.grid.outcomes}
         if not complete:
             outcomes["done"] = self._done_mask(done)
-        return self.product.dataset(outcomes)
+        return self._with_records(self.product.dataset(outcomes))
+
+    def _with_records(self, found: xr.Dataset) -> xr.Dataset:
+        """Name each motion by its record, too, where the study knows that."""
+        records = dict(zip(names_of(self.product.motions), self.store.records(), strict=False))
+        if not records:
+            return found
+        return found.assign_coords(record=(found.motion.dims, [records[name] for name in found.motion.values.tolist()]))
 
     def verify(self, recompute: int = 0, *, repair: bool = False, seed: int = 0) -> list[str]:
-        """Read every unit and check it; compute some again and compare all their bits.
+        """Read every unit and all that describes the study, and check it; compute some units again, to the last bit.
 
         Parameters
         ----------
         recompute : int
             How many units, drawn at random, to compute again.
         repair : bool
-            Whether to compute damaged units again and store them.
+            Whether to compute damaged units again and store them, and to write what else is damaged anew.
         seed : int
             Seed of the draw.
 
         Returns
         -------
         list of str
-            A sentence for each unit that is damaged or differs; empty if all is well.
+            A sentence for each unit or file that is damaged or differs; empty if all is well.
 
         Raises
         ------
         StudyError
-            If units are to be computed again and the study was made by another version.
+            If units are to be computed again and the study was made by another version, or what says what is computed
+            is damaged.
+
+        Notes
+        -----
+        The log of the runs, ``runs.jsonl``, is not needed for any result. That it is cut is seen within a line, where
+        it has no run of units that are done, and after the end of a run; a log that ends within a run looks as after a
+        kill. What is lost of it stays lost: a repair keeps the lines that can be read, and says so in it.
         """
         if recompute or repair:
             self.store.check_program()
             announce(SIMULATIONS)
-        done = [(part, key) for part in self._parts() for key in sorted(part.done())]
+        parts = self._parts()
+        described = {name: data for part in parts for name, data in part.metadata.items()}
+        wrong = [name for name, data in described.items() if self.place.get(name) != data]
+        told = [f"{name} is damaged or missing: other programs that read Zarr need it" for name in wrong]
+        told += [
+            *self._faults(kept if is_kept(self.store) else None),
+            *self._faults(Store.records),
+            *(log := self._log_faults()),
+        ]
+        done = [(part, key) for part in parts for key in sorted(part.done())]
         faults = {unit: fault for unit in done if (fault := _fault(*unit))}
         sound = [unit for unit in done if unit not in faults]
         rng = np.random.default_rng(seed)
@@ -299,9 +328,37 @@ class Study:
                 faults[part, key] = f"unit {part.label(key)} is not what this program computes"
         if repair:
             with self.place.locked():
+                for name in wrong:
+                    self.place.put(name, described[name])
                 for part, key in faults:
                     part.put(key, compute(part.work(key)))
-        return list(faults.values())
+                if log:
+                    self.place.put(_RUNS, b"".join(json.dumps(entry).encode() + b"\n" for entry in self._runs()))
+                    self._log({"event": "repaired", "why": log[0]})
+        return [*told, *faults.values()]
+
+    def _faults(self, read: Callable[[Store], object] | None) -> list[str]:
+        """Say whether what is kept beside the inputs cannot be read; nothing if it can, or nothing is kept."""
+        try:
+            if read is not None:
+                read(self.store)
+        except StudyError as error:
+            return [str(error)]
+        return []
+
+    def _log_faults(self) -> list[str]:
+        """Say what is wrong with the log; nothing if it may be whole."""
+        data, entries = self.place.get(_RUNS) or b"", [*self._runs()]
+        lines, done = len(data.splitlines()), self._simulations()
+        is_told = any(entry.get("event") in ("start", "repaired") for entry in entries)
+        if len(entries) < lines or (data and not data.endswith(b"\n")):
+            return [f"{_RUNS} is damaged: {counted(lines - len(entries) or 1, 'line')} of it cannot be read whole"]
+        if done and not is_told:
+            return [f"{_RUNS} is damaged or missing: it has no run of the units that are done"]
+        last = entries[-1] if entries else {}
+        if last.get("event") == "end" and last.get("done", done) < done:
+            return [f"{_RUNS} is damaged: it ends before the last run"]
+        return []
 
     def critical_scales(self, verdict: Verdict = "overturning") -> xr.Dataset:
         """Scales between which the verdict on a block changes.
@@ -329,7 +386,7 @@ class Study:
         InvalidOption
             If there is no such verdict, the study does not keep its outcomes, or has no two scales in increasing order.
         """
-        return critical_scales(self.store, verdict)
+        return self._with_records(critical_scales(self.store, verdict))
 
     def fragility(
         self,
@@ -339,12 +396,13 @@ class Study:
         damping: float = 0.05,
         limits: Mapping[str, float] = OVERTURNING,
         confidence: float = 0.9,
+        weights: ArrayLike | None = None,
     ) -> Fragility:
         """Fit the probability that a limit is exceeded to the outcomes of all blocks, as `rocking.fragility` does.
 
         Parameters
         ----------
-        measure, period, damping, limits, confidence
+        measure, period, damping, limits, confidence, weights
             As for `rocking.fragility`. What a motion measures at a scale is its intensity.
 
         Raises
@@ -354,7 +412,7 @@ class Study:
         InvalidOption
             If an argument is out of its range, the study does not keep what a limit needs, or no lognormal fits.
         """
-        return pooled_fragility(self.store, Measure(measure, period, damping), limits, confidence)
+        return pooled_fragility(self.store, Measure(measure, period, damping), limits, confidence, weights)
 
     def block_fragilities(
         self,
@@ -460,23 +518,23 @@ class Study:
 
     def _log(self, entry: dict[str, Any]) -> None:
         who = {"time": datetime.now().astimezone().isoformat(timespec="seconds"), "by": this_process()}
-        self.place.append("runs.jsonl", json.dumps(who | entry))
+        self.place.append(_RUNS, json.dumps(who | entry))
 
     def _runs(self) -> Iterator[dict[str, Any]]:
         """Entries of the log; a line that was cut off by a crash is passed over."""
-        for line in (self.place.get("runs.jsonl") or b"").splitlines():
-            try:
-                yield json.loads(line)
-            except ValueError:
-                continue
+        for line in (self.place.get(_RUNS) or b"").splitlines():
+            with contextlib.suppress(ValueError):
+                entry = json.loads(line)
+                if isinstance(entry, dict):
+                    yield entry
 
 
 def _fault(part: Store | Round, key: Key) -> str:
     """Say what is wrong with a unit; nothing if it is sound."""
     try:
         part.outcomes(key)
-    except StudyError as error:
-        return str(error)
+    except DamagedStudy as error:
+        return error.fault
     return ""
 
 
@@ -586,6 +644,7 @@ def study_of(
     plan: ReportPlan | None = None,
     refine: float | Mapping[str, float] | None = None,
     outcomes: tuple[str, ...] = OUTCOMES,
+    records: Sequence[str] = (),
 ) -> Study:
     """Create the study of a product in a place, or open the one that is there and check its inputs.
 
@@ -603,6 +662,8 @@ def study_of(
         Tolerance of the scales, or one for each verdict; may be given later.
     outcomes : tuple of str
         What is kept of each simulation, from `chosen_outcomes`.
+    records : sequence of str
+        Name of the record of each motion, which results then have as well; takes the place of what was.
 
     Raises
     ------
@@ -618,6 +679,8 @@ def study_of(
     else:
         unit = _pilot(product) if unit_blocks is None else (1, 1, 1, _checked_width(unit_blocks))
         found = Store.create(place, product, unit, outcomes)
+    if any(records):
+        found.name_records(records)
     if plan is not None:
         keep(found, plan)
     if tolerances is not None:

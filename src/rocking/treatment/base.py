@@ -89,7 +89,8 @@ def treatment(chattering: str | Treatment) -> Treatment:
         return chattering
     name, given, value = chattering.partition("=") if isinstance(chattering, str) else ("", "", "")
     if name not in _BY_NAME:
-        raise InvalidOption(f"chattering must be one of {', '.join(_BY_NAME)} or a treatment, not {chattering!r}")
+        kinds = "" if isinstance(chattering, str) else " or a treatment"
+        raise InvalidOption(f"chattering must be one of {', '.join(_BY_NAME)}{kinds}, not {chattering!r}")
     if not given:
         return _BY_NAME[name]()
     try:

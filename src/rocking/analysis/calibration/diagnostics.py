@@ -13,11 +13,12 @@ from rocking.analysis.calibration import population
 from rocking.analysis.calibration.search import AGREEMENT, RUNS, Search
 from rocking.analysis.calibration.space import HIGHEST, Space, unit_of
 from rocking.arrays import Floats
+from rocking.tables import counted
 
-#: A posterior leans on a bound if more than this share of it lies within the outermost part of the range, in the
-#: logarithm; an even one would have that part there.
+#: A posterior leans on a bound if more than this share of it, what lies beyond one end of an estimate's interval, is
+#: within the outermost part of the range, in the logarithm: then the interval ends where the bound is.
 _OUTERMOST: Final = 0.05
-_LEANING: Final = 0.15
+_LEANING: Final = 0.05
 
 #: Fewer effective candidates than these do not tell what a population does.
 _FEW: Final = 20.0
@@ -53,7 +54,8 @@ class Leaning:
         bound = f"{self.bound:g}" + ("" if unit == "1" else f" {unit}")
         return (
             f"{self.name} leans on its {self.end} bound of {bound}: {100 * self.share:.0f} % of the posterior lies in "
-            f"the outermost {100 * _OUTERMOST:.0f} % of the range; unless you know that bound, "
+            f"the outermost {100 * _OUTERMOST:.0f} % of the range, so that the bound sets the {self.end} end of the "
+            "interval; unless you know that bound, "
             f"set that of {self.name.partition('_')[0]} to {self.wider:g}"
         )
 
@@ -87,7 +89,7 @@ class Diagnostics:
             len(found.evidence.candidates.points),
             float(np.median(found.evidence.effective(posterior))),
             found.agreement,
-            _leaning(space, population.unpacked(posterior)[0]),
+            leaning(space, population.unpacked(posterior)[0]),
         )
 
     @property
@@ -99,14 +101,14 @@ class Diagnostics:
             held = "the estimates weigh what both found; double the candidates, or narrow the bounds to what you know"
             notes.append(f"independent runs disagree (R-hat) on {', '.join(apart)}: {held}")
         if self.effective < _FEW:
-            few = f"only {self.effective:.0f} candidates tell what a typical population does"
+            few = f"only {counted(round(self.effective), 'candidate')} can tell what a typical population does"
             notes.append(f"{few}: double the candidates, or narrow the bounds to what you know")
         return tuple(notes)
 
     def __str__(self) -> str:
         """Say how the search went, then the notes."""
         search = (
-            f"{self.candidates} candidates, {self.effective:.0f} effective for a typical population; {RUNS} "
+            f"{counted(self.candidates, 'candidate')}, {self.effective:.0f} effective for a typical population; {RUNS} "
             f"independent runs, R-hat at most {max(self.agreement.values()):.2f}"
         )
         return "\n".join([search, *(f"note: {sentence}" for sentence in self.notes)])
@@ -122,7 +124,8 @@ class Diagnostics:
         }
 
 
-def _leaning(space: Space, centres: Floats) -> tuple[Leaning, ...]:
+def leaning(space: Space, centres: Floats) -> tuple[Leaning, ...]:
+    """Estimates whose interval ends where a bound is, from draws of the population's centre."""
     found = []
     for name, values in space.named(centres).items():
         parameter = name.partition("_")[0]

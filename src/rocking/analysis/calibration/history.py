@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.calibration.space import HIGHEST, PARAMETERS, Range, unit_of, value_range
+from rocking.analysis.calibration.space import (
+    EVERYTHING_IS_KNOWN,
+    HIGHEST,
+    PARAMETERS,
+    Range,
+    is_known,
+    unit_of,
+    value_range,
+)
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.errors import InvalidOption
@@ -19,7 +27,7 @@ from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.response.figure import drawing_times
 from rocking.simulation import simulate
-from rocking.tables import text_table
+from rocking.tables import counted, text_table
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
@@ -171,7 +179,7 @@ class HistoryCalibration:
         return f"<HistoryCalibration: {self._estimates_text()}; {self._misfit_text()}>"
 
     def _misfit_text(self) -> str:
-        return f"misfit {self.misfit:.3g} rad (root mean square) over {len(self.residuals)} samples"
+        return f"misfit {self.misfit:.3g} rad (root mean square) over {counted(len(self.residuals), 'sample')}"
 
 
 def calibrate_history(
@@ -247,9 +255,11 @@ def calibrate_history(
     else:
         unknowns.append(_released_from(history))
     if not unknowns:
-        raise InvalidOption("everything is known: give a pair (lowest, highest) for what is to be found")
+        raise InvalidOption(EVERYTHING_IS_KNOWN)
     if len(history.times) < 2 * len(unknowns):
-        raise InvalidOption(f"{len(history.times)} samples cannot determine {len(unknowns)} parameters: give more")
+        raise InvalidOption(
+            f"{counted(len(history.times), 'sample')} cannot determine {counted(len(unknowns), 'parameter')}: give more"
+        )
     problem = _HistoryProblem(history, settled, tuple(unknowns))
     return _result(problem, _best(problem, np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))))
 
@@ -339,8 +349,8 @@ def _split(given: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[st
     """Tell what is known of a block from what is to be found."""
     settled, unknowns = {}, []
     for name, value in given.items():
-        if not isinstance(value, (tuple, list, np.ndarray)) or np.ndim(value) == 0:
-            settled[name] = checks.positive(value, name, InvalidOption)
+        if is_known(value):
+            settled[name] = checks.positive(np.ravel(value)[0], name, InvalidOption)
             continue
         low, high = value_range(value, name, HIGHEST[name])
         sides = ("_plus", "_minus") if two_sided else ("",)

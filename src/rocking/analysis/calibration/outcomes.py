@@ -18,13 +18,17 @@ from rocking.analysis.calibration.posterior import posterior, systematic
 from rocking.analysis.calibration.scores import Scores
 from rocking.analysis.calibration.search import Problem, search
 from rocking.analysis.calibration.space import SIDED, Knowledge, Space, unit_of
+from rocking.analysis.fragility.curve import Fragility
+from rocking.analysis.fragility.fit import OVERTURNING, fragility
+from rocking.analysis.intensity import MeasureName
+from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.tables import named, text_table, write_text
+from rocking.tables import counted, named, text_table, write_text
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
@@ -81,7 +85,7 @@ class Validation:
     def __repr__(self) -> str:
         repeats, tests = self.probabilities.shape
         times = "once" if repeats == 1 else f"{repeats} times"
-        return f"<Validation: {tests} tests, each left out {times}: {self.scores}>"
+        return f"<Validation: {counted(tests, 'test')}, each left out {times}: {self.scores}>"
 
     @property
     def scores(self) -> Scores:
@@ -211,18 +215,102 @@ class Calibration:
                 row[left_out] = wanted.probabilities(drawn).mean(axis=0)
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
+    def fragility(
+        self,
+        motions: Motion | Sequence[Motion],
+        *,
+        measure: MeasureName = "pga",
+        period: float | None = None,
+        damping: float = 0.05,
+        levels: ArrayLike | None = None,
+        limits: Mapping[str, float] = OVERTURNING,
+        model: Model | None = None,
+        **options: Any,
+    ) -> Fragility:
+        """Fit the specimen's fragility: the ensemble with its weights, in the equation of motion of the calibration.
+
+        Parameters
+        ----------
+        motions, measure, period, damping, levels, limits
+            As for `rocking.fragility`.
+        model : {"linear", "nonlinear"}, optional
+            Equation of motion, if not that of the calibration.
+        **options
+            Further arguments of `rocking.fragility`: polarity, confidence, band, ...
+
+        Returns
+        -------
+        Fragility
+            What is not known of the block, and how it differs from test to test, widens the curve; its band is that of
+            the motions. The lapse of `predict`, chance that a test is not that of a rocking block at all, is not in it:
+            a weak motion does not overturn what it cannot lift.
+
+        Raises
+        ------
+        InvalidOption, InvalidMotion
+            As `rocking.fragility`.
+        """
+        return fragility(
+            self.blocks,
+            motions,
+            weights=self.weights,
+            model=self.model if model is None else model,
+            measure=measure,
+            period=period,
+            damping=damping,
+            levels=levels,
+            limits=limits,
+            **options,
+        )
+
+    def spectrum(
+        self,
+        motions: Motion | Sequence[Motion],
+        *,
+        p: ArrayLike | None = None,
+        model: Model | None = None,
+        **options: Any,
+    ) -> RockingSpectrum:
+        """Peak rotation of the specimen, and of larger and smaller ones of its shape, with the ensemble's weights.
+
+        Parameters
+        ----------
+        motions : Motion or sequence of Motion
+            m motions.
+        p : array_like, optional
+            Frequency parameters, rad/s, that the ensemble's median is moved to; by default half to twice its own.
+        model : {"linear", "nonlinear"}, optional
+            Equation of motion, if not that of the calibration.
+        **options
+            Further arguments of `rocking.rocking_spectrum`: size (in place of p), fractiles, ...
+
+        Raises
+        ------
+        InvalidOption, InvalidMotion
+            As `rocking.rocking_spectrum`.
+        """
+        return rocking_spectrum(
+            motions,
+            blocks=self.blocks,
+            weights=self.weights,
+            p=p,
+            model=self.model if model is None else model,
+            **options,
+        )
+
     def summary(self) -> str:
         """Return the estimates and scores as a table for people."""
         rows = [
             [name, one.median, one.lower, one.upper, f"{100 * one.dispersion:.0f} %", unit_of(name)]
             for name, one in self.estimates.items()
         ]
+        motions, alike = counted(len(self.observed), "motion"), 1.0 / float((self.weights**2).sum())
         lines = [
-            f"{len(self.observed)} motions, {int(self.observed.sum())} overturned the specimen; {self.model} model",
+            f"{motions}, {int(self.observed.sum())} overturned the specimen; {self.model} model",
             "",
             text_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows),
             "",
-            f"ensemble of {len(self.blocks)} blocks, equivalent to {1 / (self.weights**2).sum():.0f} of equal weight",
+            f"ensemble of {counted(len(self.blocks), 'block')}, equivalent to {alike:.0f} of equal weight",
             f"fitted motions: {self.scores}",
             str(self.diagnostics),
         ]
@@ -241,7 +329,9 @@ class Calibration:
         }
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the ensemble: parameters of both sides and weight, one row for each block.
+        """Write the ensemble, one row for each block: parameters of both sides, weight, and the equation of motion.
+
+        `rocking fragility --ensemble` and its like read it.
 
         Raises
         ------
@@ -252,8 +342,8 @@ class Calibration:
         units = ["rad/s", "rad/s", "rad", "rad", "1", "1"]
         columns = [named(name, unit) for name, unit in zip(names, units, strict=True)]
         table = np.hstack([self.blocks.p, self.blocks.alpha, self.blocks.restitution, self.weights[:, None]])
-        rows = [",".join(f"{value:.10g}" for value in row) for row in table]
-        write_text(path, "\n".join([",".join([*columns, "weight"]), *rows]) + "\n")
+        rows = [",".join([*(f"{value:.10g}" for value in row), self.model]) for row in table]
+        write_text(path, "\n".join([",".join([*columns, "weight", "model"]), *rows]) + "\n")
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw what happened against the fitted probability of every test, and the ensemble of blocks.
@@ -286,7 +376,9 @@ class Calibration:
         estimates = [one for key, one in self.estimates.items() if key.partition("_")[0] == name]
         values = getattr(self.blocks, name)[:, : len(estimates)]
         ends = np.array([(one.median, one.lower, one.upper) for one in estimates])
-        return Parameter({"p": "p (rad/s)", "alpha": "alpha (rad)"}.get(name, name), values, ends)
+        space = self._evidence.candidates.space
+        low, high = (float(np.exp(end[space.unknown.index(name)])) for end in (space.lower, space.upper))
+        return Parameter({"p": "p (rad/s)", "alpha": "alpha (rad)"}.get(name, name), values, ends, (low, high))
 
     def __repr__(self) -> str:
         return f"<Calibration: {self.summary().splitlines()[0]}; fitted: {self.scores}>"
@@ -321,10 +413,11 @@ def calibrate(
     model : {"linear", "nonlinear"}
         Equation of motion; the linear one is faster and serves slender specimens.
     p, alpha, restitution : float or pair of float
-        A number is known and kept, on both sides and in every test; a pair is the lowest and highest value that is
-        thinkable on either side (rad/s; rad; -), with a prior that is even in the logarithm. A body of known size has
-        p = ``Block(width=..., height=...).p``. The restitution may be "housner": it then follows from each side's
-        slenderness as 1 - 1.5 sin(alpha)^2 (Housner 1963).
+        A number, or a pair of equal ones, is known and kept, on both sides and in every test; a pair is the lowest and
+        highest value that is thinkable on either side (rad/s; rad; -), with a prior that is even in the logarithm. A
+        body of known size has p = ``Block(width=..., height=...).p``. The restitution may be "housner": it then
+        follows from the slenderness as 1 - 1.5 sin(alpha)^2 (Housner 1963), and of two sides from those of a rectangle
+        whose centre of mass is off the middle, whose p is that of the rectangle.
     two_sided : bool
         Whether the slendernesses of the two sides may differ, by a factor of 3 at most. p and restitution of a rigid
         body's sides differ by terms of second order in the slenderness only.
@@ -346,8 +439,8 @@ def calibrate(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, the numbers of motions and outcomes differ, or all outcomes are the same
-        (they bound the block from one side only).
+        If an argument is out of its range, everything is known, the numbers of motions and outcomes differ, or all
+        outcomes are the same (they bound the block from one side only).
 
     Notes
     -----

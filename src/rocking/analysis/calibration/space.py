@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.block.body import eccentric_rectangles
 from rocking.block.single import housner_restitution
 from rocking.errors import InvalidOption
 
@@ -33,12 +34,19 @@ LARGEST_RATIO: Final = 3.0
 #: Median of the prior of the dispersion from test to test, of each coordinate.
 _DISPERSION: Final = 0.10
 
-#: Restitution that follows from the slenderness (Housner 1963), where it is positive.
+#: Restitution that follows from the slenderness (Housner 1963), where it is positive; of two sides, from those of a
+#: rectangle whose centre of mass is off the middle. Then p is that of the rectangle, and the sides' own differ from it.
 HOUSNER: Final = "housner"
 _HOUSNER_ENDS: Final = math.asin(math.sqrt(2.0 / 3.0))
 
 #: Points that measure the space's volume: its share of the box to about 0.1 %.
 _VOLUME_POINTS: Final = 20_000
+
+#: What to say where nothing is left to be found.
+EVERYTHING_IS_KNOWN: Final = (
+    "everything is known of the block, so that nothing is to be found: give a pair (lowest, highest) for what is not "
+    "known, or ask what the known block does by simulate, and how probably it overturns by fragility"
+)
 
 Range = tuple[float, float]
 
@@ -83,12 +91,12 @@ class Space:
         for name, given in zip(PARAMETERS, (p, alpha, restitution), strict=True):
             if isinstance(given, str):
                 _check_housner(name, given)
-            elif np.ndim(given):
-                bounds[name] = value_range(given, name, HIGHEST[name])
+            elif is_known(given):
+                known[name] = known_value(np.ravel(given)[0], name)
             else:
-                known[name] = known_value(given, name)
+                bounds[name] = value_range(given, name, HIGHEST[name])
         if not bounds:
-            raise InvalidOption("everything is known: give a pair (lowest, highest) for what is to be found")
+            raise InvalidOption(EVERYTHING_IS_KNOWN)
         steepest = bounds.get("alpha", (0.0, known.get("alpha", 0.0)))[1]
         if "restitution" not in {*bounds, *known} and steepest >= _HOUSNER_ENDS:
             raise InvalidOption(f"Housner's restitution is positive for alpha below {_HOUSNER_ENDS:.4f} rad only")
@@ -147,16 +155,19 @@ class Space:
         """Values of p, alpha and restitution on each side, shape (n, 2, 3)."""
         found = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
         values = found | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
-        if "restitution" not in values:
+        if "restitution" not in values and self.two_sided:
+            factors, values["restitution"] = eccentric_rectangles(values["alpha"])
+            values["p"] = values["p"] * factors
+        elif "restitution" not in values:
             values["restitution"] = np.vectorize(housner_restitution)(values["alpha"])
         return np.stack([values[name] for name in PARAMETERS], axis=2)
 
     def named(self, points: Floats) -> dict[str, Floats]:
         """Values of the unknown parameters by name, of each side where they differ; shape (n,) each."""
-        values = self.sides(points)
+        values = np.exp(self._log_sides(points))
         return {
-            name + side: values[:, i, PARAMETERS.index(name)]
-            for name in self.unknown
+            name + side: values[:, i, k]
+            for k, name in enumerate(self.unknown)
             for i, side in enumerate(("_plus", "_minus") if self.two_sided and name == SIDED else ("",))
         }
 
@@ -178,6 +189,11 @@ class Space:
 def unit_of(estimate: str) -> str:
     """Return the unit of an estimate: of a parameter, of either side, or of the initial rotation."""
     return _UNITS[estimate.partition("_")[0]]
+
+
+def is_known(given: Any) -> bool:
+    """Whether a parameter has a value: a number, or a pair of equal ones."""
+    return np.ndim(given) == 0 or (np.shape(given) == (2,) and given[0] == given[1])
 
 
 def known_value(value: object, name: str) -> float:

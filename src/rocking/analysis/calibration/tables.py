@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,12 +11,12 @@ from typing import Any, Final
 import numpy as np
 
 from rocking.arrays import Floats
+from rocking.block import Blocks
 from rocking.errors import RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
-
-#: The decimal comma of a number.
-_DECIMAL_COMMA: Final = re.compile(r"(?<=\d),(?=\d+(?:[eE][+-]?\d+)?$)")
+from rocking.tables import counted, csv_rows, named
+from rocking.treatment.base import Model
 
 _FOLDER: Final = re.compile(r"[\w-][\w. -]*(?<![. ])")
 
@@ -41,17 +40,44 @@ class History:
     rotation: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Blocks that stand for one that is not quite known, their weights, and the equation of motion they are for."""
+
+    blocks: Blocks
+    weights: Floats
+    model: Model
+
+
 @dataclass(frozen=True)
-class _Table:
+class Table:
+    """Cells of a table by the names of its columns.
+
+    Attributes
+    ----------
+    path : Path
+        File.
+    columns : tuple of str
+        Names of the columns.
+    rows : tuple of (int, dict)
+        Line number and cells of each row.
+    """
+
     path: Path
     columns: tuple[str, ...]
-    #: Line number and cells of each row.
     rows: tuple[tuple[int, dict[str, str]], ...]
 
     def numbers(self, column: str) -> Floats:
+        """Return the numbers of a column."""
         return np.array([self.convert(line, row[column], float, "a number") for line, row in self.rows])
 
+    def answers(self, column: str) -> tuple[bool, ...]:
+        """Return the truth values of a column: 1 or 0, yes or no, true or false."""
+        what = "0 or 1, no or yes, false or true"
+        return tuple(self.convert(line, row[column].lower(), _ANSWERS.__getitem__, what) for line, row in self.rows)
+
     def convert(self, line: int, text: str, how: Callable[[str], Any], what: str) -> Any:
+        """Return a cell read in some way; an error says the line and what it should be."""
         try:
             return how(text)
         except (ValueError, KeyError):
@@ -72,12 +98,12 @@ def read(
     UnreadableRecord
         If it is no such table, or a cell or a record cannot be read; the message has the line.
     """
-    table = _table(path)
+    table = read_table(path)
     if {"motion", "overturned"} <= set(table.columns):
         about = {"channel": channel, "dt": dt, "units": units}
         if "specimen" not in table.columns:
-            return _outcomes(table, **about)
-        return {name: _outcomes(each, **about) for name, each in _by_specimen(table).items()}
+            return outcomes_of(table, **about)
+        return {name: outcomes_of(each, **about) for name, each in _by_specimen(table).items()}
     for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
         if {"time_s", column} <= set(table.columns):
             return History(table.numbers("time_s"), unit * table.numbers(column))
@@ -88,31 +114,69 @@ def read(
     )
 
 
-def _table(path: Path) -> _Table:
+def read_ensemble(path: Path) -> Ensemble:
+    """Read what `Calibration.to_csv` writes.
+
+    Raises
+    ------
+    UnreadableRecord
+        If it is no such table.
+    InvalidBlock
+        If a row is no block.
+    """
+    table = read_table(path)
+    columns = [
+        [named(f"{name}_{side}", unit) for side in ("plus", "minus")]
+        for name, unit in (("p", "rad/s"), ("alpha", "rad"), ("restitution", "1"))
+    ]
+    missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
+    if missing:
+        raise UnreadableRecord(
+            f"{path}, line 1: no ensemble of a calibration, whose ensemble.csv has {' and '.join(missing)}"
+        )
+    models = {table.convert(line, row["model"], _model, "linear or nonlinear") for line, row in table.rows}
+    if len(models) > 1:
+        raise UnreadableRecord(f"{path}: an ensemble has one model, not both; correct the column model")
+    try:
+        blocks = Blocks(*(np.column_stack([table.numbers(side) for side in sides]) for sides in columns))
+    except RockingError as error:
+        raise type(error)(f"{path}, whose block 0 is in line 2: {error}") from None
+    return Ensemble(blocks, table.numbers("weight"), models.pop())
+
+
+def _model(text: str) -> Model:
+    models: dict[str, Model] = {"linear": "linear", "nonlinear": "nonlinear"}
+    return models[text]
+
+
+def read_table(path: Path) -> Table:
+    """Read a CSV table with a header.
+
+    Raises
+    ------
+    UnreadableRecord
+        If it cannot be read, or a row is not like its header.
+    """
     try:
         text = path.read_text("utf-8-sig")
     except OSError as error:
         raise UnreadableRecord(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise UnreadableRecord(f"{path} is no text table; save it as CSV") from None
-    lines = text.splitlines()
-    # As record tables: semicolons separate where the header has one, and a comma is then the decimal sign.
-    semicolons = bool(lines) and ";" in lines[0]
-    reader = csv.reader(lines, delimiter=";" if semicolons else ",")
-    cells = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(cell.strip() for cell in row)]
+    cells = csv_rows(text)
     if len(cells) < 2:
         raise UnreadableRecord(f"{path} holds no rows below its header")
     (_, columns), *rows = cells
-    if semicolons:
-        rows = [(line, [_DECIMAL_COMMA.sub(".", cell) for cell in row]) for line, row in rows]
     for line, row in rows:
         if len(row) != len(columns):
-            raise UnreadableRecord(f"{path}, line {line}: {len(row)} cells under {len(columns)} columns; correct it")
-    named = tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows)
-    return _Table(path, tuple(columns), named)
+            raise UnreadableRecord(
+                f"{path}, line {line}: {counted(len(row), 'cell')} under {counted(len(columns), 'column')}; correct it"
+            )
+    by_name = tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows)
+    return Table(path, tuple(columns), by_name)
 
 
-def _by_specimen(table: _Table) -> dict[str, _Table]:
+def _by_specimen(table: Table) -> dict[str, Table]:
     """Rows of each specimen, in the order in which the specimens come."""
     rows: dict[str, list[tuple[int, dict[str, str]]]] = {}
     for line, row in table.rows:
@@ -128,21 +192,21 @@ def _folder_name(text: str) -> str:
     return text
 
 
-def _outcomes(table: _Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
-    motions, overturned = [], []
+def outcomes_of(table: Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
+    """Return motions and outcomes of a table with these columns; an error says the line."""
+    motions, overturned = [], table.answers("overturned")
+    several = len({row["motion"] for _, row in table.rows}) > 1
     for line, row in table.rows:
-        overturned.append(
-            table.convert(line, row["overturned"].lower(), _ANSWERS.__getitem__, "0 or 1, no or yes, false or true")
-        )
         scale = table.convert(line, row.get("scale") or "1", float, "a number")
         name = _file_or_name(row["motion"], table.path.parent)
-        wanted = row.get("channel") or channel
+        own = row.get("channel")
+        about = {"channel": own or channel, "dt": dt, "units": units}
         try:
-            motions.append(named_motion(name, channel=wanted, dt=dt, units=units, scale=scale))
+            motions.append(named_motion(name, **about, scale=scale, several=several and not own))
         except RockingError as error:
             raise UnreadableRecord(f"{table.path}, line {line}: {error}") from error
     groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None
-    return Outcomes(tuple(motions), tuple(overturned), groups)
+    return Outcomes(tuple(motions), overturned, groups)
 
 
 def _file_or_name(name: str, folder: Path) -> str:

@@ -25,6 +25,12 @@ _NEWTON: Final = 12
 _FEWEST: Final = 3
 _LEVERAGE: Final = 0.9
 
+#: Level curves at 0 and 1, and steps at intensities below and above all that there are.
+_STEPS_AT: Final = 1000.0 * lognormal.STEEP
+_WHOLE_PLANE: Final = Probit(
+    np.array([-np.inf, np.inf, _STEPS_AT, -_STEPS_AT]), np.array([0.0, 0.0, lognormal.STEEP, lognormal.STEEP])
+)
+
 Quantity = Callable[[Probit], Floats]
 Ends = tuple[Floats, Floats]
 _Data = tuple[Floats, Floats, Floats]
@@ -51,21 +57,25 @@ class LikelyRegion:
     def __repr__(self) -> str:
         return f"<LikelyRegion: {len(self.rim.slope)} fits on its rim>"
 
+    @property
+    def bounded(self) -> bool:
+        """Whether the data bound anything at all."""
+        return bool(np.all(np.isfinite(self.rim.intercept)))
+
     @classmethod
     def of(
-        cls, z: Floats, exceeded: Floats, trials: Floats, clusters: Integers, fitted: Probit, confidence: float
+        cls, z: Floats, exceeded: Floats, trials: Floats, clusters: Integers | None, fitted: Probit, confidence: float
     ) -> LikelyRegion:
-        """Measure the region from the maximum outwards."""
+        """Measure the region from the maximum outwards; without clusters every outcome is on its own."""
         from scipy.special import chdtri, stdtrit
 
         centre, spread = z.mean(), z.std()
         data = (z - centre) / spread, exceeded, trials
         best = Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread)
-        count = int(clusters.max()) + 1
-        if count == len(z):
+        if clusters is None:
             rim = _rim(data, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
-        elif count < _FEWEST:
-            return cls(Probit(np.array([-np.inf, np.inf, 0.0]), np.array([0.0, 0.0, lognormal.STEEP])))
+        elif (count := int(clusters.max()) + 1) < _FEWEST:
+            return cls(_WHOLE_PLANE)
         else:
             rim = _rim(data, best, 0.5 * float(stdtrit(count - 1.0, 0.5 + 0.5 * confidence)) ** 2)
             rim = np.column_stack(best) + (rim - np.column_stack(best)) @ _stretch(data, clusters, best).T

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -21,7 +22,8 @@ from rocking.arrays import Floats, as_asked
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
-from rocking.tables import text_table, write_text
+from rocking.progress import phrased
+from rocking.tables import counted, text_table, write_text
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 
     from rocking.analysis.hazard import HazardCurve
     from rocking.analysis.risk import Risk
+    from rocking.analysis.survival import Survival
 
 #: Points of a curve in a table or a figure.
 _POINTS: Final = 201
@@ -44,8 +47,14 @@ class FragilityCurve:
     ----------
     limit_state : str
         Name of what is exceeded.
+    limit : float or None
+        Peak rotation over slenderness that is exceeded, infinite for overturning; None where outcomes were given.
     intensity, exceeded, trials : ndarray, shape (n,)
-        The data: outcomes that exceeded, of how many, at each intensity.
+        The data: outcomes that exceeded, of how many, at each intensity. Those of blocks with weights count in parts.
+    clusters : int
+        Number of clusters of outcomes that belong together: of motions, where outcomes were simulated.
+    independent : bool
+        Whether every outcome is on its own, so that tests which know of no clusters may be asked.
     fitted : Probit
         Intercept and slope of P = Phi(intercept + slope ln x).
     covariance : ndarray, shape (2, 2)
@@ -59,10 +68,11 @@ class FragilityCurve:
     goodness : Goodness
         Pearson's test between groups of outcomes and the fit: one group for each intensity where each has five outcomes
         or more (stripes), else up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow). It takes all
-        outcomes for independent, which stripes of the same motions are not: there the p-value flatters the fit.
+        outcomes for independent: where several belong to one cluster there is no p-value.
     """
 
     limit_state: str
+    limit: float | None
     intensity: Floats
     exceeded: Floats
     trials: Floats
@@ -70,12 +80,13 @@ class FragilityCurve:
     covariance: Floats
     uncertainty: Confidence
     confidence: float
+    clusters: int
+    independent: bool
     likelihood: lognormal.Likelihood
     goodness: lognormal.Goodness
 
     def __repr__(self) -> str:
-        ends = (self.median_interval, self.dispersion_interval)
-        median, dispersion = ("{:.4g} to {:.4g}".format(*each) for each in ends)
+        median, dispersion = (interval_text(each, 4) for each in (self.median_interval, self.dispersion_interval))
         count = f"{self.exceeded.sum():.0f} of {self.trials.sum():.0f} exceeded"
         return (
             f"<FragilityCurve: {self.limit_state}, {count}; median {self.median:.4g} ({median}) in SI units, "
@@ -99,6 +110,11 @@ class FragilityCurve:
         Separated outcomes make a step, the others a level curve; NaN without a bootstrap.
         """
         return self.uncertainty.degenerate if isinstance(self.uncertainty, Resamples) else math.nan
+
+    @property
+    def bounded(self) -> bool:
+        """Whether intervals and bands bound anything: fewer than three clusters of several outcomes do not."""
+        return isinstance(self.uncertainty, Resamples) or self.uncertainty.bounded
 
     @property
     def median_interval(self) -> tuple[float, float]:
@@ -144,7 +160,8 @@ class FragilityCurve:
 
         share = checks.share(probability, "probability", InvalidOption)
         score = float(ndtri(share))
-        return math.exp((score - float(self.fitted.intercept[0])) / float(self.fitted.slope[0]))
+        with np.errstate(over="ignore", under="ignore"):
+            return float(np.exp((score - float(self.fitted.intercept[0])) / float(self.fitted.slope[0])))
 
     def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.95) -> Floats:
         """Annual rates of motions of an intensity or more that fit with none having exceeded the limit state in a time.
@@ -202,8 +219,9 @@ class FragilityCurve:
             "dispersion": self.dispersion,
             "dispersion_interval": list(self.dispersion_interval),
             "confidence": self.confidence,
-            "outcomes": int(self.trials.sum()),
-            "exceeded": int(self.exceeded.sum()),
+            "outcomes": round(float(self.trials.sum())),
+            "exceeded": round(float(self.exceeded.sum())),
+            "clusters": self.clusters,
             "log_likelihood": self.likelihood.logarithm,
             "likelihood_ratio": self.likelihood.ratio,
             "likelihood_ratio_p_value": self.likelihood.p_value,
@@ -233,7 +251,12 @@ class Fragility:
     outcomes : pandas.DataFrame or None
         What was simulated, one row each, so that the fit can be audited: motion, block (position), polarity, the
         measure with its unit (SI, as pga_m_s2), peak_rotation_rad, peak_over_alpha (infinite where it overturned),
-        overturned, and whether each limit state was exceeded; None where the outcomes were given.
+        overturned, whether each limit state was exceeded, and the weight of the block where it has one; None where the
+        outcomes were given.
+    one_way : bool
+        Whether sides that differ met motions in one polarity only: reversed, they do something else.
+    source : str
+        What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
     """
 
     curves: tuple[FragilityCurve, ...]
@@ -242,26 +265,62 @@ class Fragility:
     block: Block | None
     model: Model
     outcomes: pd.DataFrame | None
+    one_way: bool = False
+    source: str = "motion"
 
     def summary(self) -> str:
         """Median and dispersion of each limit state with their intervals, in a table."""
-        rows = []
-        for curve in self.curves:
-            between = (f"{scale * end:.4g}" for end in curve.median_interval for scale in [self.measure.scale])
-            rows.append(
-                [
-                    curve.limit_state,
-                    f"{curve.exceeded.sum():.0f} of {curve.trials.sum():.0f}",
-                    self.measure.scale * curve.median,
-                    " to ".join(between),
-                    curve.dispersion,
-                    "{:.3g} to {:.3g}".format(*curve.dispersion_interval),
-                    curve.goodness.p_value,
-                ]
-            )
+        scale = self.measure.scale
+        rows = [
+            [
+                curve.limit_state,
+                f"{curve.exceeded.sum():.0f} of {curve.trials.sum():.0f}",
+                scale * curve.median,
+                interval_text([scale * end for end in curve.median_interval], 4),
+                curve.dispersion,
+                interval_text(curve.dispersion_interval, 3),
+                curve.goodness.p_value,
+            ]
+            for curve in self.curves
+        ]
         between_text = f"{100 * self.curves[0].confidence:g} % between"
         header = ["limit state", "exceeded", "median", between_text, "dispersion", between_text, "p of fit"]
-        return f"{self.description}; intensity: {self.measure.label}\n\n{text_table(header, rows)}"
+        table = text_table(header, rows)
+        notes = [f"note: {sentence}" for sentence in self.notes]
+        return "\n".join([f"{self.description}; intensity: {self.measure.label}", "", table, *notes])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be known before the curves are believed, a sentence each."""
+        notes = []
+        if self.one_way:
+            notes.append(
+                "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
+                + phrased('polarity="both" counts both')
+            )
+        if not self.curves[0].bounded:
+            notes.append(f"intervals and bands go from 0 to infinity: {self._too_few()}")
+        independent = self.curves[0].independent
+        wanted = "outcome" if independent else self.source
+        notes += [
+            f"{curve.limit_state}: intervals without an end say that the data allow a curve which does not rise with "
+            f"the intensity; more {wanted}s are needed"
+            for curve in self.curves
+            if curve.bounded and math.isinf(curve.dispersion_interval[1])
+        ]
+        if not independent:
+            notes.append(
+                f"there is no p of fit: the test takes all outcomes for independent, and those of one {self.source} "
+                "belong together"
+            )
+        elif self.curves[0].goodness.freedom < 1:
+            notes.append("there is no p of fit: the test needs three groups of outcomes, of five or so each")
+        return tuple(notes)
+
+    def _too_few(self) -> str:
+        """Why nothing is bounded."""
+        count = counted(self.curves[0].clusters, self.source)
+        return f"{count} cannot tell how far {self.source}s differ; give 3 or more"
 
     def to_dict(self) -> dict[str, Any]:
         """Curves by name; intensities in SI units."""
@@ -272,6 +331,7 @@ class Fragility:
             "model": self.model,
             "band": self.band_kind,
             "curves": [curve.to_dict() for curve in self.curves],
+            "notes": list(self.notes),
             "outcomes": None if self.outcomes is None else self.outcomes.to_dict("records"),
         }
 
@@ -282,7 +342,7 @@ class Fragility:
 
     def __repr__(self) -> str:
         curves = ", ".join(
-            f"{one.limit_state}: median {self._in_units(one.median)}, dispersion {one.dispersion:.3g}"
+            f"{one.limit_state}: median {self.in_units(one.median)}, dispersion {one.dispersion:.3g}"
             for one in self.curves
         )
         return f"<Fragility: {self.description}; {self.measure.label}; {curves}>"
@@ -334,7 +394,53 @@ class Fragility:
 
         return risk(self, hazard)
 
-    def _in_units(self, intensity: float) -> str:
+    def survival(
+        self,
+        years: float,
+        hazard: HazardCurve | None = None,
+        *,
+        confidence: float = 0.95,
+        limit_state: str = "overturning",
+    ) -> Survival:
+        """Say what follows for past shaking where a limit state was not exceeded, as of a rock that still stands.
+
+        Parameters
+        ----------
+        years : float
+            For how long the block has stood, or has not exceeded the limit state.
+        hazard : HazardCurve, optional
+            Annual rates of the intensities: how probable the survival is under them.
+        confidence : float
+            Probability with which the limit would have been exceeded, were shaking any stronger or more frequent.
+        limit_state : str
+            Name of what was not exceeded.
+
+        Returns
+        -------
+        Survival
+            Intensity that was most likely never reached, largest annual rates, and the probability of surviving.
+
+        Raises
+        ------
+        InvalidOption
+            If an argument is out of its range, there is no such limit state, or the hazard curve is of another measure.
+
+        Examples
+        --------
+        >>> from rocking import HazardCurve, fit_fragility
+        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
+        >>> found = fitted.survival(10_000.0, HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
+        >>> found
+        <Survival: overturning: not in 10000 years; most likely never 0.4385 g or more>
+        >>> f"{found.probability:.4f}", found.contradicts
+        ('0.0131', False)
+        """
+        from rocking.analysis.survival import survival
+
+        return survival(self, years, hazard, confidence, limit_state)
+
+    def in_units(self, intensity: float) -> str:
+        """Return an intensity, in SI units, as people write it."""
         return f"{self.measure.scale * intensity:.4g} {self.measure.shown_in}".rstrip()
 
     @property
@@ -413,13 +519,14 @@ class Fragility:
         -----
         Units become OpenQuake's: PGA and SA in g, PGV in cm/s. A measure in a block's own unit becomes PGA or PGV of
         that block. The range of validity is that of the data. A block cannot move below its uplift acceleration, which
-        is written as the limit of no damage of PGA.
+        is written as the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
         """
         chosen = self.block if block is None else block
         lognormals = [nrml.Lognormal(one.limit_state, one.median, one.dispersion) for one in self.curves]
         scale = nrml.scale_of(self.measure, chosen, self.model)
         lifting = None
-        if chosen is not None and scale.imt == "PGA":
+        is_horizontal = self.outcomes is None or "vertical" not in self.outcomes
+        if chosen is not None and scale.imt == "PGA" and is_horizontal:
             lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
         function = nrml.fragility_function(lognormals, scale, self.range, lifting, taxonomy, format)
         states = [curve.limit_state for curve in self.curves]
@@ -439,21 +546,46 @@ class Fragility:
         """
         from rocking.plot import FragilityLine, fragility_figure
 
+        first = self.curves[0]
+        band_text = f"band: {100 * first.confidence:g} % confidence ({self.band_kind})"
+        if not first.bounded:
+            band_text = f"no band: {self._too_few()}"
+
         intensity, scale = np.linspace(0.0, self.range[1], _POINTS), self.measure.scale
         lines = []
         for curve in self.curves:
             at, seen, outcomes = _shares_seen(curve)
-            text = f"{curve.limit_state}: median {self._in_units(curve.median)}, dispersion {curve.dispersion:.3g}"
-            chance, band = curve.probability(intensity), curve.band(intensity)
+            limit = f" (rotation of {curve.limit:g} of the slenderness)" if _is_rotation(curve.limit) else ""
+            at_half = f"median {self.in_units(curve.median)}, dispersion {curve.dispersion:.3g}"
+            text = f"{curve.limit_state}{limit}: {at_half}"
+            chance = curve.probability(intensity)
+            band = curve.band(intensity) if curve.bounded else (chance, chance)
             lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, outcomes))
         return fragility_figure(
             lines=lines,
             intensity_label=self.measure.label,
-            band_label=f"band: {100 * self.curves[0].confidence:g} % confidence ({self.band_kind})",
+            band_label=band_text,
+            probability_label=_probability_of([curve.limit_state for curve in self.curves]),
             title=title or self.description,
             ax=ax,
             figsize=figsize,
         )
+
+
+def interval_text(ends: Sequence[float], digits: int) -> str:
+    """Write the ends of an interval, to some digits."""
+    return " to ".join("infinity" if math.isinf(end) else f"{end:.{digits}g}" for end in ends)
+
+
+def _is_rotation(limit: float | None) -> bool:
+    return limit is not None and math.isfinite(limit)
+
+
+def _probability_of(limit_states: Sequence[str]) -> str:
+    """Say what a probability is of."""
+    if [*limit_states] == ["overturning"]:
+        return "probability of overturning"
+    return f"probability of exceeding {limit_states[0] if len(limit_states) == 1 else 'the limit state'}"
 
 
 def _shares_seen(curve: FragilityCurve) -> tuple[Floats, Floats, Floats]:

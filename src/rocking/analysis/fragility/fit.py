@@ -15,7 +15,7 @@ from rocking.analysis.fragility import lognormal
 from rocking.analysis.fragility.confidence import Confidence, LikelyRegion, Resamples
 from rocking.analysis.fragility.curve import Fragility, FragilityCurve
 from rocking.analysis.intensity import Measure, MeasureName
-from rocking.analysis.levels import described, only_block, several_motions, simulate_levels
+from rocking.analysis.levels import mean_one, only_block, pooled, several_motions, simulate_levels
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import require_finished
@@ -23,6 +23,7 @@ from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.product import Polarity
+from rocking.tables import counted
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
 
@@ -37,6 +38,8 @@ _INTENSITIES: Final = (1e-50, 1e50)
 _MOST_TRIALS: Final = 2.0**53
 #: Logarithm of how far beyond the data a median is still believed.
 _BEYOND: Final = math.log(1000.0)
+
+_IN_BOTH: Final = ", one polarity, since a symmetric block does the same in both"
 
 #: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
 OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
@@ -54,6 +57,7 @@ def fragility(
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",
     polarity: Polarity = "+",
+    weights: ArrayLike | None = None,
     confidence: float = 0.9,
     band: Band = "likelihood",
     samples: int = 1000,
@@ -66,7 +70,8 @@ def fragility(
     Parameters
     ----------
     blocks : Blocks, Block or sequence of Block
-        One block; or several whose outcomes are pooled, which makes sense against a measure in their own units.
+        One block; or several whose outcomes are pooled: against a measure in their own units, or of an ensemble that
+        stands for one block that is not quite known, with `weights` (`Calibration.fragility` does so).
     motions : Motion or sequence of Motion
         m motions.
     measure : {"pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
@@ -82,6 +87,8 @@ def fragility(
     model, chattering, polarity, threads, progress
         As for `simulate_many`. With both polarities each motion counts twice, unless all blocks are symmetric: they do
         the same under a motion and its mirror image, which is no second outcome.
+    weights : array_like, optional
+        How much the outcomes of each block count, one number for each; by default all alike.
     confidence, band, samples, seed
         As for `fit_fragility`, whose clusters are the motions, each with all its outcomes.
 
@@ -108,8 +115,9 @@ def fragility(
     median 1.443, dispersion 0.524
     """
     many, how = Blocks.of(blocks), Measure(measure, period, damping)
+    shares = mean_one(weights, len(many))
     mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
-    bands = _Bands(confidence, band, samples, seed)
+    bands = Bands(confidence, band, samples, seed)
     states = _limit_states(limits, "limits")
     shaken, values = several_motions(motions, how)
     options: dict[str, Any] = {
@@ -132,14 +140,25 @@ def fragility(
     ratio = table.peak_rotation.values / many.alpha.min(axis=1)[:, None]
     ratio[table.overturned.values] = np.inf
     clusters = np.broadcast_to(np.arange(len(shaken))[None, :, None, None], ratio.shape)
-    x = np.broadcast_to(intensity, ratio.shape).ravel()
+    x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
     curves = [
-        _curve(name, x, passed(ratio, limit, name).ravel(), np.ones(x.size), clusters.ravel(), bands, how)
+        fitted_curve(name, x, trials * passed(ratio, limit, name).ravel(), trials, clusters.ravel(), bands, how, limit)
         for name, limit in states.items()
     ]
-    text = _described(described(blocks), len(shaken), None if levels is None else len(intensity), mirrored=mirrored)
+    kind = "cloud" if levels is None else counted(len(intensity), "stripe")
+    text = f"{pooled(blocks, weights)}, {counted(len(shaken), 'motion')}, {kind}, {model} model"
     outcomes = _outcomes(table, how, x, ratio, states)
-    return Fragility(tuple(curves), how, text, only_block(blocks), model, outcomes)
+    if weights is not None:
+        outcomes["weight"] = trials
+    return Fragility(
+        curves=tuple(curves),
+        measure=how,
+        description=f"{text}{_IN_BOTH if mirrored else ''}",
+        block=only_block(blocks),
+        model=model,
+        outcomes=outcomes,
+        one_way=polarity != "both" and not many.is_symmetric,
+    )
 
 
 def _outcomes(
@@ -153,6 +172,7 @@ def _outcomes(
     return pd.DataFrame(
         {
             "motion": motion,
+            **_verticals(table, ratio.shape),
             "block": block,
             "polarity": polarity,
             measure.column: intensity,
@@ -162,6 +182,13 @@ def _outcomes(
             **exceeded,
         }
     )
+
+
+def _verticals(table: xr.Dataset, shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:
+    """Names of the vertical components, if there are any."""
+    if "vertical" not in table.coords:
+        return {}
+    return {"vertical": np.broadcast_to(table.vertical.values[:, None, None], shape).ravel()}
 
 
 def _axes(table: xr.Dataset) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
@@ -250,23 +277,23 @@ def fit_fragility(
         raise InvalidOption("intensity must be from {:g} to {:g}: check its units".format(*_INTENSITIES))
     count = _whole(trials, "trials", x.size, 1.0, _MOST_TRIALS)
     outcomes = _limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
-    groups = np.arange(x.size) if clusters is None else _clusters(clusters, x.size)
-    bands = _Bands(confidence, band, samples, seed)
+    groups = None if clusters is None else _clusters(clusters, x.size)
+    bands = Bands(confidence, band, samples, seed)
     curves = [
-        _curve(name, x, _whole(values, "exceeded", x.size, 0.0, count), count, groups, bands, how)
+        fitted_curve(name, x, _whole(values, "exceeded", x.size, 0.0, count), count, groups, bands, how)
         for name, values in outcomes.items()
     ]
-    return Fragility(tuple(curves), how, description, block, "nonlinear", None)
+    return Fragility(tuple(curves), how, description, block, "nonlinear", None, source="cluster")
 
 
 @dataclass(frozen=True)
-class _Bands:
+class Bands:
     """How intervals and bands are made."""
 
     confidence: float
-    kind: Band
-    samples: int
-    seed: int
+    kind: Band = "likelihood"
+    samples: int = 1
+    seed: int = 0
 
     def __post_init__(self) -> None:
         checks.share(self.confidence, "confidence", InvalidOption)
@@ -275,9 +302,20 @@ class _Bands:
         checks.whole(self.seed, "seed", InvalidOption, 0)
 
 
-def _curve(
-    name: str, intensity: Floats, exceeded: Floats, trials: Floats, clusters: Integers, bands: _Bands, measure: Measure
+def fitted_curve(
+    name: str,
+    intensity: Floats,
+    exceeded: Floats,
+    trials: Floats,
+    clusters: Integers | None,
+    bands: Bands,
+    measure: Measure,
+    limit: float | None = None,
 ) -> FragilityCurve:
+    """Curve of a limit state; outcomes may count in parts, as those of blocks with weights do.
+
+    Without clusters every trial is on its own, also where several are at one intensity.
+    """
     z = np.log(intensity)
     fault = lognormal.unidentified(z, exceeded, trials, measure.shown)
     if fault is not None:
@@ -290,14 +328,18 @@ def _curve(
             f"{'above' if middle > z.max() else 'below'} all intensities by a factor of more than 1000: motions nearer "
             "to it, or another measure, are needed"
         )
+    groups = np.arange(z.size) if clusters is None else clusters
+    count = int(groups.max()) + 1
+    independent = clusters is None or (count == z.size and bool(np.all(trials <= 1.0)))
     uncertainty: Confidence
     if bands.kind == "bootstrap":
-        uncertainty = Resamples.of(z, exceeded, trials, fitted, clusters, bands.samples, bands.seed)
+        uncertainty = Resamples.of(z, exceeded, trials, fitted, groups, bands.samples, bands.seed)
     else:
-        uncertainty = LikelyRegion.of(z, exceeded, trials, clusters, fitted, bands.confidence)
-    gained = lognormal.gain(z, exceeded, trials, fitted)
+        together = None if independent else groups
+        uncertainty = LikelyRegion.of(z, exceeded, trials, together, fitted, bands.confidence)
     return FragilityCurve(
         limit_state=name,
+        limit=limit,
         intensity=intensity,
         exceeded=exceeded,
         trials=trials,
@@ -305,8 +347,10 @@ def _curve(
         covariance=lognormal.covariance(z, trials, fitted),
         uncertainty=uncertainty,
         confidence=bands.confidence,
-        likelihood=gained,
-        goodness=lognormal.goodness(z, exceeded, trials, fitted),
+        clusters=count,
+        independent=independent,
+        likelihood=lognormal.gain(z, exceeded, trials, fitted, independent=independent),
+        goodness=lognormal.goodness(z, exceeded, trials, fitted, independent=independent),
     )
 
 
@@ -351,9 +395,3 @@ def _clusters(clusters: ArrayLike, size: int) -> Integers:
     if labels.shape != (size,):
         raise InvalidOption(f"clusters must hold one label for each of the {size} intensities")
     return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
-
-
-def _described(blocks: str, motions: int, stripes: int | None, *, mirrored: bool) -> str:
-    how = "cloud" if stripes is None else f"{stripes} stripes"
-    text = f"{blocks}, {motions} motion{'s' if motions > 1 else ''}, {how}"
-    return f"{text}, one polarity, since a symmetric block does the same in both" if mirrored else text

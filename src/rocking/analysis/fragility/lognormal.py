@@ -68,7 +68,8 @@ class Likelihood:
     ratio : float
         Twice its gain over one probability for all intensities.
     p_value : float
-        Probability of a larger gain if the intensity did not matter (chi-squared, one degree of freedom).
+        Probability of a larger gain if the intensity did not matter (chi-squared, one degree of freedom); NaN where
+        outcomes belong together, of which the test knows nothing.
     """
 
     logarithm: float
@@ -87,7 +88,8 @@ class Goodness:
     freedom : int
         Groups less two.
     p_value : float
-        Probability of a larger statistic if the lognormal is right; NaN with fewer than three groups.
+        Probability of a larger statistic if the lognormal is right; NaN with fewer than three groups, and where
+        outcomes belong together, of which the test knows nothing.
     """
 
     statistic: float
@@ -107,11 +109,13 @@ def unidentified(z: Floats, exceeded: Floats, trials: Floats, shown: Callable[[f
     shown : callable
         Writes an intensity with its unit.
     """
-    yes, no = z[exceeded > 0], z[exceeded < trials]
+    yes, no, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
     if not yes.size:
-        return f"none of the {_count(trials)} outcomes exceeds the limit: stronger motions are needed"
+        which = "the only outcome does not exceed" if count == 1 else f"none of the {count} outcomes exceeds"
+        return f"{which} the limit: stronger motions are needed"
     if not no.size:
-        return f"all of the {_count(trials)} outcomes exceed the limit: weaker motions are needed"
+        which = "the only outcome exceeds" if count == 1 else f"all of the {count} outcomes exceed"
+        return f"{which} the limit: weaker motions are needed"
     if z.min() == z.max():
         return f"all outcomes are at one intensity, {shown(math.exp(z[0]))}: others are needed"
     if no.max() <= yes.min() + _overlap(z):
@@ -183,7 +187,7 @@ def covariance(z: Floats, trials: Floats, fitted: Probit) -> Floats:
     return np.asarray(np.linalg.inv(information), dtype=np.float64)
 
 
-def gain(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit) -> Likelihood:
+def gain(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit, *, independent: bool) -> Likelihood:
     """Likelihood of one fit, and its gain over one probability for all intensities."""
     from scipy.special import gammaincc, xlogy
 
@@ -191,7 +195,7 @@ def gain(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit) -> Likelih
     yes, total = exceeded.sum(), trials.sum()
     without = xlogy(yes, yes / total) + xlogy(total - yes, 1.0 - yes / total)
     ratio = max(0.0, 2.0 * float(here[0] - without))
-    return Likelihood(float(here[0]), ratio, float(gammaincc(0.5, 0.5 * ratio)))
+    return Likelihood(float(here[0]), ratio, float(gammaincc(0.5, 0.5 * ratio)) if independent else math.nan)
 
 
 def groups(z: Floats, trials: Floats) -> Integers:
@@ -206,7 +210,7 @@ def groups(z: Floats, trials: Floats) -> Integers:
     return np.asarray(group[level], dtype=np.int64)
 
 
-def goodness(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit) -> Goodness:
+def goodness(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit, *, independent: bool) -> Goodness:
     """Test the fit in its `groups`."""
     from scipy.special import gammaincc
 
@@ -220,7 +224,8 @@ def goodness(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit) -> Goo
     # A group whose variance vanishes is one that the fit is certain of, and right about.
     with np.errstate(over="ignore"):
         statistic = float(np.sum((seen - expected) ** 2 / np.maximum(variance, np.finfo(float).tiny)))
-    return Goodness(statistic, freedom, float(gammaincc(0.5 * freedom, 0.5 * statistic)))
+    chance_of_more = float(gammaincc(0.5 * freedom, 0.5 * statistic)) if independent else math.nan
+    return Goodness(statistic, freedom, chance_of_more)
 
 
 def limits(z: Floats, exceeded: Floats, trials: Floats) -> tuple[Probit, NDArray[np.bool_]]:
@@ -284,7 +289,3 @@ def _uphill(
         step[falling] *= 0.5
         then[falling] = likelihood(z, exceeded[falling], trials[falling], (beta + step)[falling])
     return step, then
-
-
-def _count(trials: Floats) -> int:
-    return int(trials.sum())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -11,6 +11,7 @@ from typing import Any, Final
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.rules.criteria import rate
+from rocking.analysis.survey import block_columns, motion_of, record_columns
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
@@ -19,7 +20,7 @@ from rocking.progress import Progress
 from rocking.response import Response
 from rocking.response.verdict import in_brief
 from rocking.simulation import simulate
-from rocking.tables import named, text_table, write_text
+from rocking.tables import decimal, frame_of, named, text_table, write_text
 from rocking.treatment.base import Model
 
 #: Names of the rules for people.
@@ -35,6 +36,9 @@ TITLES: Final = MappingProxyType(
 
 #: Width, relative to it, of the level that overturns first: a margin is read to three digits.
 _TOLERANCE: Final = 1e-4
+
+#: From so much on, a factor below 1 is told to four digits.
+_NEAR: Final = 0.985
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +56,10 @@ class Check:
     ratios : tuple of mapping of str to float
         For each motion, demand over capacity by each rule.
     margins : tuple of float
-        For each motion, one over the lowest factor on it at which the block is found to overturn: what the ratio of a
-        perfect rule is. NaN if it overturns at none.
+        For each motion, one over the lowest factor on it at which the block is found to overturn. NaN if it overturns
+        at none. Above 1 the block need not overturn under the motion as it is: see `falls_under_less`.
+    skipped : mapping of str to str
+        Records that could not be read, and why.
     """
 
     block: Block
@@ -61,22 +67,37 @@ class Check:
     responses: tuple[Response, ...]
     ratios: tuple[Mapping[str, float], ...]
     margins: tuple[float, ...]
+    skipped: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def falls_under_less(self) -> tuple[bool, ...]:
+        """Whether the block stands under each motion as it is, and falls under the same motion times less than 1.
+
+        A stronger motion need not overturn what a weaker one does: no single number can be right there.
+        """
+        each = zip(self.responses, self.margins, strict=True)
+        return tuple(margin > 1.0 and not (one.overturned or one.unfinished) for one, margin in each)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return demand, ratios and the exact answer for each record; units are in the names."""
+        labels = record_columns(self.records, [motion_of(response) for response in self.responses])
+        block = block_columns(self.block)
         return [
             {
-                "record": name,
-                named("pga", "g"): _motion(response).pga / STANDARD_GRAVITY,
-                named("pgv", "m/s"): _motion(response).pgv,
+                **label,
+                **block,
+                named("pga", "g"): decimal(motion_of(response).pga / STANDARD_GRAVITY),
+                named("pgv", "m/s"): motion_of(response).pgv,
                 **ratios,
                 "exact": margin,
+                "lowest_factor": 1.0 / margin,
                 "peak_over_slenderness": response.peak_over_slenderness,
                 "overturned": response.overturned,
-                "verdict": in_brief(response),
+                "falls_under_less": less,
+                "verdict": _verdict(response, margin, falls_under_less=less),
             }
-            for name, response, ratios, margin in zip(
-                self.records, self.responses, self.ratios, self.margins, strict=True
+            for label, response, ratios, margin, less in zip(
+                labels, self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
             )
         ]
 
@@ -97,7 +118,8 @@ class Check:
         return "\n".join(
             [
                 str(self.block),
-                "demand over capacity by each rule, and exactly: from 1 on the block overturns",
+                "demand over capacity: from 1 on a rule says that the block overturns; exact: one over the lowest "
+                "factor on the motion that overturns it",
                 "",
                 table,
                 *(["", *self._disagreements(rules)] if rules else []),
@@ -111,20 +133,29 @@ class Check:
         return f"<Check: {self.block.description}: {count}, overturned by {overturned}; by {rules}>"
 
     def _disagreements(self, rules: list[str]) -> list[str]:
-        """Say of each rule how often it is wrong, and how."""
+        """Say of each rule how often it is wrong, and how; where no number can be right, none is counted."""
         lines = []
+        less = self.falls_under_less
         for rule in rules:
-            said = [ratios[rule] >= 1.0 for ratios in self.ratios]
-            fell = [response.overturned for response in self.responses]
-            unsafe = sum(not yes and real for yes, real in zip(said, fell, strict=True))
-            wary = sum(yes and not real for yes, real in zip(said, fell, strict=True))
+            said = [
+                (ratios[rule] >= 1.0, response.overturned)
+                for ratios, response, is_left_out in zip(self.ratios, self.responses, less, strict=True)
+                if not is_left_out
+            ]
+            unsafe = sum(not yes and real for yes, real in said)
+            wary = sum(yes and not real for yes, real in said)
             right = len(said) - unsafe - wary
             lines.append(f"{TITLES[rule]}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(said)}")
+        if any(less):
+            lines.append(
+                f"not counted: {sum(less)} of {len(less)}, where the block stands under the motion as it is, but falls "
+                "under the same motion scaled down"
+            )
         return lines
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for machines."""
-        return {"block": str(self.block), "records": self.rows()}
+        return {"block": str(self.block), "records": self.rows(), "skipped": dict(self.skipped)}
 
     def to_csv(self, path: str | Path) -> None:
         """Write the table as text columns with a header.
@@ -134,9 +165,8 @@ class Check:
         OutputError
             If the file cannot be written.
         """
-        import pandas
-
-        write_text(path, pandas.DataFrame(self.rows()).to_csv(index=False, lineterminator="\n"))
+        frame = frame_of(self.rows(), self.skipped)
+        write_text(path, frame.to_csv(index=False, float_format="%.15g", lineterminator="\n"))
 
 
 def check(
@@ -212,9 +242,12 @@ def _margin(response: Response, block: Block, motion: Motion, model: Model, thre
     return float(max(margin, 1.0)) if response.overturned else margin
 
 
-def _motion(response: Response) -> Motion:
-    assert response.motion is not None
-    return response.motion
+def _verdict(response: Response, margin: float, *, falls_under_less: bool) -> str:
+    if not falls_under_less:
+        return in_brief(response)
+    factor = 1.0 / margin
+    text = f"{factor:.2f}" if factor < _NEAR else f"{factor:.4f}"
+    return f"stands here, falls at x {text}" + (", AMBIGUOUS" if response.ambiguous else "")
 
 
 def _short(entry: Any) -> Any:

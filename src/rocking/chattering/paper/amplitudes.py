@@ -74,11 +74,12 @@ def figure_6() -> PaperFigure:
         Statement(
             f"spread of a_cr over omega for eta > {_PRACTICAL:g}, %", '"independent"', float(practical.max()), digits=3
         ),
-        Statement("largest error of Eq. 76, %", "none given", 100.0 * float(error[worst]), digits=3),
+        Statement("largest error of Eq. 76, %", None, 100.0 * float(error[worst]), digits=3),
         Statement(
-            f"Eq. 76 there, at omega = {_FREQUENCIES[worst[0]]:g}, eta = {_RESTITUTIONS[worst[1]]:g}",
+            f"a_cr there, at omega = {_FREQUENCIES[worst[0]]:g}, eta = {_RESTITUTIONS[worst[1]]:g}",
             float(fitted[worst]),
             float(exact[worst]),
+            formula="Eq. 76",
         ),
     )
     grid = np.meshgrid(_FREQUENCIES, _RESTITUTIONS, indexing="ij")
@@ -103,11 +104,11 @@ def figure_7(*, eta: float = ETA) -> PaperFigure:
     exact = critical["exact"]
     spread = float(_spread(exact[:, np.newaxis])[0])
     statements = (
-        Statement("spread of a_cr from omega = 0.5 to 8, %", 0.5 if eta == ETA else "not given", spread, digits=3),
-        Statement("a_cr at omega = 0.5 (paper: Eq. 76)", float(critical["eq76"][0]), float(exact[0])),
-        Statement("a_cr at omega = 8 (paper: Eq. 76)", float(critical["eq76"][-1]), float(exact[-1])),
+        Statement("spread of a_cr from omega = 0.5 to 8, %", 0.5 if eta == ETA else None, spread, digits=3),
+        Statement("a_cr at omega = 0.5", float(critical["eq76"][0]), float(exact[0]), formula="Eq. 76"),
+        Statement("a_cr at omega = 8", float(critical["eq76"][-1]), float(exact[-1]), formula="Eq. 76"),
         Statement(
-            "a_cr at omega = 2 (paper: Eq. 77)", float(critical["eq77"][0]), float(critical_amplitude(OMEGA, eta))
+            "a_cr at omega = 2", float(critical["eq77"][0]), float(critical_amplitude(OMEGA, eta)), formula="Eq. 77"
         ),
     )
     return PaperFigure(
@@ -139,7 +140,7 @@ def _duration_statements(case: Case) -> tuple[Statement, ...]:
     starts, ends = 1.0 + excess * _NEAR, critical - excess * _NEAR
     papers = (case.omega, case.eta) == (OMEGA, ETA)
     return (
-        Statement("critical amplitude a_cr", 1.038 if papers else "not given", critical),
+        Statement("critical amplitude a_cr", 1.038 if papers else None, critical),
         Statement(
             "vertical asymptote at a = 1: tau_ch goes like a - 1 to the power",
             "below 1",
@@ -159,17 +160,17 @@ def _duration_statements(case: Case) -> tuple[Statement, ...]:
         ),
         Statement(
             "largest error of Eq. 65 up to 90 % of the way to a_cr, %",
-            '"almost perfectly"' if papers else "not given",
+            '"almost perfectly"' if papers else None,
             asymptotic,
             digits=3,
         ),
         Statement(
             f"the same of Eq. 75 with {resolved_by_default(np.array(case.eta))} impacts resolved, %",
-            '"remarkable agreement"' if papers else "not given",
+            '"remarkable agreement"' if papers else None,
             semianalytical,
             digits=2,
         ),
-        Statement("Eq. 65 exceeds the exact time up to a =", "not mentioned", _crossing(case), digits=5),
+        Statement("Eq. 65 exceeds the exact time up to a =", None, _crossing(case), digits=5),
         _by_frequency(case.eta),
     )
 

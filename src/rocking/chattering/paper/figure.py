@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.errors import InvalidOption, OutputError
+from rocking.errors import InvalidOption
+from rocking.tables import whole_file, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,35 +31,42 @@ class Statement:
     ----------
     claim : str
         What is stated.
-    paper : float or str
-        The paper's number or words.
+    paper : float, str or None
+        The paper's number or words, or what its formula gives for these parameters; None where it says nothing of them.
     here : float or str
         Ours.
     digits : int
         Significant digits worth writing.
+    formula : str
+        The formula of the paper that gives its number or words, "Eq. 76"; empty where they stand in the paper.
     """
 
     claim: str
-    paper: float | str
+    paper: float | str | None
     here: float | str
     digits: int = 7
+    formula: str = ""
 
     @property
     def difference(self) -> float | None:
-        """Ours minus the paper's; None where one of them is in words."""
-        if isinstance(self.paper, str) or isinstance(self.here, str):
-            return None
-        return self.here - self.paper
+        """Ours minus the paper's; None where one of them is in words or the paper has none."""
+        if isinstance(self.paper, float | int) and isinstance(self.here, float | int):
+            return self.here - self.paper
+        return None
 
     def shown(self) -> str:
-        """One line: paper, here, difference."""
-        paper, here, difference = self.cells()
-        return f"{paper} in the paper, {here} here{difference and f', {difference}'}"
+        """One line: paper, here, difference; ours alone where the paper says nothing."""
+        _, here, difference = self.cells()
+        if self.paper is None:
+            return here
+        source = f"by {self.formula}" if self.formula else "in the paper"
+        return f"{self._written(self.paper)} {source}, {here} here{difference and f', {difference}'}"
 
     def cells(self) -> tuple[str, str, str]:
-        """Paper, here and difference as texts."""
+        """Paper, here and difference as texts; the first is empty where the paper says nothing."""
+        paper = "" if self.paper is None else self._written(self.paper)
         difference = "" if self.difference is None else f"{self.difference:+.2g}"
-        return self._written(self.paper), self._written(self.here), difference
+        return f"{paper}, {self.formula}" if self.formula else paper, self._written(self.here), difference
 
     def _written(self, value: float | str) -> str:
         return value if isinstance(value, str) else f"{value:.{self.digits}g}"
@@ -134,13 +142,10 @@ class PaperFigure:
         target = Path(folder)
         tables = {target / f"{self._stem}-{name}.csv": table for name, table in self.tables.items()}
         paths: list[Path] = []
-        try:
-            for k, name in enumerate(self.drawings):
-                paths += self._write_drawing(target, f"{self._stem}-{name}" if k else self._stem, self.draw(name))
-            for path, table in tables.items():
-                _write_table(path, table)
-        except OSError as error:
-            raise OutputError(f"{target} cannot be written to: {error.strerror}; choose another folder") from error
+        for k, name in enumerate(self.drawings):
+            paths += self._write_drawing(target, f"{self._stem}-{name}" if k else self._stem, self.draw(name))
+        for path, table in tables.items():
+            _write_table(path, table)
         return (*paths, *tables)
 
     @property
@@ -150,13 +155,13 @@ class PaperFigure:
     def _write_drawing(self, folder: Path, stem: str, drawing: Figure) -> tuple[Path, Path]:
         pdf, png = folder / f"{stem}.pdf", folder / f"{stem}.png"
         # Without a date the files of two runs are the same.
-        drawing.savefig(pdf, metadata={"CreationDate": None})
-        drawing.savefig(png, dpi=_DOTS_PER_INCH)
+        write_figure(pdf, drawing, metadata={"CreationDate": None})
+        write_figure(png, drawing, dpi=_DOTS_PER_INCH)
         return pdf, png
 
 
 def _write_table(path: Path, table: Table) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with whole_file(path) as beside, beside.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(table)
         writer.writerows(zip(*([_cell(value) for value in column] for column in table.values()), strict=True))

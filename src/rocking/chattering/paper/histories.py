@@ -23,7 +23,7 @@ _INCOMPLETE: Final = 1.05
 #: Arcs of less than this share of the period are not drawn point by point.
 _SHORTEST: Final = 1e-4
 
-#: What the insets show: from and to, counted from uplift, over the chattering time (half a period where incomplete).
+#: What the details show: from and to, counted from uplift, over the chattering time (half a period where incomplete).
 _DETAILS: Final = {9: (0.64, 1.09), 10: (0.955, 1.015), 11: (0.38, 1.2)}
 
 _SINE: Final = ("a", "omega", "eta")
@@ -52,9 +52,10 @@ def figure_4(*, a: float = A, omega: float = OMEGA, eta: float = ETA) -> PaperFi
     time = np.linspace(0.0, CYCLES, 1001)
     marks = _initiations(case, {"certified": response})
     half_periods = _none(float(np.diff([mark.time for mark in marks])[0]) * 2.0 if len(marks) > 1 else math.nan)
+    complete = not math.isnan(case.rest)
     statements = (
-        Statement("from the 1st to the 2nd initiation, over T/2", 1.0, half_periods),
-        Statement("chattering time over T/2", "below 1", _none(2.0 * case.rest)),
+        Statement("from the 1st to the 2nd initiation, over T/2", 1.0 if complete else None, half_periods),
+        Statement("chattering time over T/2", "below 1" if complete else None, _none(2.0 * case.rest)),
     )
     acceleration = _acceleration(case, time)
     return PaperFigure(
@@ -83,15 +84,20 @@ def figure_9(
     case = Case(a, omega, eta, p, alpha)
     responses = _responses(case, ("certified", "chattering_threshold"))
     scheme, certified = responses["chattering_threshold"], responses["certified"]
-    stated = [Statement("a_cr (paper: by Eq. 76 or Eq. 77, rounded)", 1.038, case.critical)]
+    stated = [Statement("a_cr", 1.038, case.critical)]
     statements = (
         *(stated if (omega, eta) == (OMEGA, ETA) else []),
-        Statement("a_cr (paper: Eq. 76)", float(critical_amplitude(omega, eta, method="eq76")), case.critical),
-        Statement("a_cr (paper: Eq. 77)", float(critical_amplitude(omega, eta, method="eq77")), case.critical),
+        *(
+            Statement(
+                "a_cr", float(critical_amplitude(omega, eta, method=f"eq{fit}")), case.critical, formula=f"Eq. {fit}"
+            )
+            for fit in (76, 77)
+        ),
         Statement(
-            "time from uplift to rest, p t (paper: Eq. 65)",
+            "time from uplift to rest, p t",
             float(chattering_time(a, omega, eta, method="asymptotic")),
             _none(float(chattering_time(a, omega, eta))),
+            formula="Eq. 65",
         ),
         Statement(
             "rest of the scheme, p t, at its first impact past Eq. 65",
@@ -114,9 +120,10 @@ def figure_10(
     fitted = float(critical_amplitude(omega, eta, method="eq76"))
     statements = [
         Statement(
-            "complete chattering (paper: where a is below a_cr of Eq. 76)",
+            "complete chattering, a below a_cr",
             "yes" if a < fitted else "no",
             "no" if math.isnan(case.rest) else "yes",
+            formula="Eq. 76",
         )
     ]
     for name in names:
@@ -127,12 +134,7 @@ def figure_10(
                 _shown(case, A),
                 float(_rests(response)),
             ),
-            Statement(
-                f"{_words(name)}: first rest, after certified, s",
-                '"properly"' if _is_papers(case, A) else "not given",
-                _none(_first(response) - _first(certified)),
-                digits=3,
-            ),
+            _first_rest(name, response, certified, '"properly"' if _is_papers(case, A) else None),
         ]
     return _history(10, "response by both schemes", case, responses, tuple(statements))
 
@@ -145,7 +147,7 @@ def figure_11(
     responses = _responses(case, tuple(_SCHEMES))
     coarse, certified = responses["veltol_5e-2"], responses["certified"]
     papers = _is_papers(case, _INCOMPLETE)
-    none = 0.0 if papers else "not given"
+    none = 0.0 if papers else None
     statements = (
         Statement(
             "rests in 2.5 T, as a is above a_cr: incomplete chattering" if papers else "rests in 2.5 T",
@@ -168,7 +170,7 @@ def figure_11(
         ),
         Statement(
             f"{_words('veltol_5e-2')}: peak rotation over the certified one",
-            '"completely different"' if papers else "not given",
+            '"completely different"' if papers else None,
             coarse.peak_rotation / certified.peak_rotation,
             digits=4,
         ),
@@ -214,7 +216,7 @@ def _history(
 
 
 def _detail(case: Case, shares: tuple[float, float], time: Floats, rotations: list[Floats]) -> Detail:
-    """Return what an inset shows: all rotations within its limits of time, up to the end of chattering."""
+    """Return what a detail shows: all rotations within its limits of time, up to the end of chattering."""
     uplift, length = _uplift(case), 0.5 if math.isnan(case.rest) else case.rest
     start, end = (uplift + share * length for share in shares)
     inside = (time >= start) & (time <= min(end, uplift + length))
@@ -231,10 +233,15 @@ def _events(case: Case, responses: dict[str, Response]) -> Table:
 
 
 def _initiations(case: Case, responses: dict[str, Response]) -> tuple[Mark, ...]:
-    """First two uplifts from rest, of the scheme that rests most often; only one where none comes to rest."""
-    most = max(responses.values(), key=_rests)
-    times = most.events["time"][most.events["kind"] == "uplift"][:2] / case.period
-    texts = ("1st initiation", "2nd initiation")
+    """First two uplifts from rest, of the scheme that rests most often; only one where none comes to rest.
+
+    The first response is the certified one: what it has not got is another scheme's.
+    """
+    most = max(responses, key=lambda name: _rests(responses[name]))
+    first, times = (_uplifts(response) for response in (next(iter(responses.values())), responses[most]))
+    times = times[:2] / case.period
+    whose = "" if len(first) >= len(times) else f", by {_SCHEMES[most].label} alone"
+    texts = ("1st initiation", f"2nd initiation{whose}")
     return tuple(Mark(float(time), text) for time, text in zip(times, texts, strict=False))
 
 
@@ -254,6 +261,11 @@ def _first(response: Response) -> float:
     return float(rests[0] - events["time"][0]) if rests.size else math.nan
 
 
+def _uplifts(response: Response) -> Floats:
+    times: Floats = response.events["time"][response.events["kind"] == "uplift"]
+    return times
+
+
 def _rests(response: Response) -> int:
     return int(np.sum(response.events["kind"] == "rest"))
 
@@ -263,8 +275,19 @@ def _is_papers(case: Case, a: float) -> bool:
     return case == Case(a)
 
 
-def _shown(case: Case, a: float) -> str:
-    return "shown" if _is_papers(case, a) else "not given"
+def _shown(case: Case, a: float) -> str | None:
+    return "shown" if _is_papers(case, a) else None
+
+
+def _first_rest(name: str, response: Response, certified: Response, paper: str | None) -> Statement:
+    """Say how long before or after the certified response a scheme comes to rest for the first time."""
+    late = _first(response) - _first(certified)
+    if math.isnan(late):
+        rest = f"only {_words(name)} rests" if _rests(response) else "only certified rests"
+        here = rest if _rests(response) or _rests(certified) else "neither rests"
+        return Statement(f"{_words(name)}: first rest, beside that of certified", paper, here)
+    side = "before" if late < 0.0 else "after"
+    return Statement(f"{_words(name)}: first rest, s {side} that of certified", paper, abs(late), digits=3)
 
 
 def _none(value: float) -> float | str:

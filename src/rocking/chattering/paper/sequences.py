@@ -43,15 +43,24 @@ def figure_2(
     statements = (
         Statement("complete chattering: at rest in finite time", "yes", _yes(chattering.complete)),
         Statement("chattering time", '"finite"', chattering.time, digits=13),
-        Statement("bracket on it narrower than 2e-12", "none given", _yes(chattering.upper - chattering.lower < 2e-12)),
+        Statement("bracket on it narrower than 2e-12", None, _yes(chattering.upper - chattering.lower < 2e-12)),
         Statement(
-            "first interval (paper: Eq. 32 as printed)", _eq32_as_printed(a - 1.0, omega), float(first["interval"])
+            "first interval, p t",
+            _eq32_as_printed(a - 1.0, omega),
+            float(first["interval"]),
+            formula="Eq. 32 as printed",
         ),
-        Statement("the same (paper: Eq. 32 mended)", float(first_interval(a, omega)), float(first["interval"])),
         Statement(
-            "speed at the first impact (paper: Eq. 34)",
+            "first interval, p t",
+            float(first_interval(a, omega)),
+            float(first["interval"]),
+            formula="Eq. 32 with its slip corrected",
+        ),
+        Statement(
+            "speed at the first impact",
             float(first_impact_speed(a, omega)),
             float(first["speed_before"]),
+            formula="Eq. 34",
         ),
     )
     return PaperFigure(
@@ -122,7 +131,7 @@ def _ratio_statements(case: Case, ratios: Floats, words: str) -> list[Statement]
     known = np.flatnonzero(np.isfinite(ratios))
     last = int(known[-1])
     statements = [
-        Statement(f"{words}: ratio at n = {last} (paper: its limit, eta^2, Eq. 73)", limit, float(ratios[last]))
+        Statement(f"{words}: ratio at n = {last}, and its limit", limit, float(ratios[last]), formula="Eq. 73, eta^2")
     ]
     late = ratios[known[known >= _LATE]]
     if late.size:

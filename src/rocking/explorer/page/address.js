@@ -4,10 +4,10 @@
 /** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts}} State */
 
 export const NAMES = [
-  "width", "height", "p", "alpha", "restitution", "gravity", "motion", "channel", "vertical", "dt", "units",
+  "width", "height", "offset", "p", "alpha", "pivots", "height_of_mass", "gyration", "restitution", "gravity", "motion", "channel", "vertical", "dt", "units",
   "scale", "pga", "pgv", "sa", "model", "chattering", "duration", "initial_rotation", "initial_velocity",
 ];
-export const BLOCK = ["width", "height", "p", "alpha", "restitution", "gravity"];
+export const BLOCK = ["width", "height", "offset", "p", "alpha", "pivots", "height_of_mass", "gyration", "restitution", "gravity"];
 export const MOTION = ["motion", "channel", "vertical", "dt", "units", "scale", "pga", "pgv", "sa", "initial_rotation", "initial_velocity"];
 const VIEWS = ["response", "block", "map", "compare"];
 const MAP = [

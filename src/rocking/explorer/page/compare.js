@@ -46,9 +46,11 @@ export class View {
 
   /** The same shape, half as large again. @param {Record<string, string>} texts */
   larger(texts) {
-    if (texts.width) return {width: String(1.5 * Number(texts.width)), height: String(1.5 * Number(texts.height))};
-    const kept = Object.fromEntries(["p", "alpha", "restitution"].flatMap((name) => (texts[name] ? [[name, texts[name]]] : [])));
-    return {...kept, p: (kept.p ?? "3").split(",").map((each) => String(Number((0.8 * Number(each)).toPrecision(4)))).join(",")};
+    const resized = (/** @type {string} */ text, /** @type {number} */ factor) =>
+      text.split(",").map((each) => String(Number((factor * parseFloat(each)).toPrecision(12))) + each.replace(/^[\s\d.eE+-]+/, "")).join(",");
+    const LENGTHS = ["width", "height", "offset", "pivots", "height_of_mass", "gyration"];
+    const kept = [...LENGTHS, "p", "alpha", "restitution"].filter((name) => texts[name]);
+    return Object.fromEntries(kept.map((name) => [name, LENGTHS.includes(name) ? resized(texts[name], 1.5) : name === "p" ? resized(texts[name], 0.8) : texts[name]]));
   }
 
   update() {

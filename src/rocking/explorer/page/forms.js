@@ -38,16 +38,18 @@ export class BlockForm {
       const label = side < 0 ? spec.label : `${spec.label}, ${side ? "left (side −)" : "right (side +)"}`;
       return new NumberControl({...spec, label, words: side > 0 ? "" : spec.words}, () => this.tell(), `${prefix}${side < 0 ? "" : side}`);
     };
-    this.shape = choice(`${prefix}shape`, "Given by", [["sizes", "width and height"], ["parameters", "p and α"]], () => this.reshape());
-    this.sizes = ["width", "height"].map((name) => control(name, -1));
+    this.shape = choice(`${prefix}shape`, "Given by", [["sizes", "width and height"], ["parameters", "p and α"], ["pivots", "pivots and radius of gyration"]], () => this.reshape());
+    this.sizes = ["width", "height", "offset"].map((name) => control(name, -1));
     this.plain = ["p", "alpha"].map((name) => control(name, -1));
     this.pairs = ["p", "alpha", "restitution"].map((name) => [control(name, 0), control(name, 1)]);
+    this.pivots = [control("pivots", 0), control("pivots", 1), control("height_of_mass", -1), control("gyration", -1)];
     this.two = check(`${prefix}two`, "Two different sides", () => this.part());
-    this.housner = check(`${prefix}housner`, "Restitution by Housner", () => this.tell());
+    this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => this.tell());
     this.restitution = control("restitution", -1);
     element.replaceChildren(
       this.shape.element, ...this.sizes.map((each) => each.element), this.two.element, ...this.plain.map((each) => each.element),
-      ...this.pairs.flat().map((each) => each.element), this.housner.element, this.restitution.element,
+      ...this.pairs.slice(0, 2).flat().map((each) => each.element), ...this.pivots.map((each) => each.element), this.housner.element,
+      this.restitution.element, ...this.pairs[2].map((each) => each.element),
     );
   }
 
@@ -55,13 +57,13 @@ export class BlockForm {
   show(texts, known) {
     this.texts = texts;
     this.known = known ?? this.known;
-    const sized = "width" in texts;
-    const two = !sized && ["p", "alpha", "restitution"].some((name) => (texts[name] ?? "").includes(","));
-    this.shape.select.value = sized ? "sizes" : "parameters";
-    this.two.box.checked = two;
+    const shape = "width" in texts ? "sizes" : "pivots" in texts ? "pivots" : "parameters";
+    this.shape.select.value = shape;
+    this.two.box.checked = shape === "parameters" && ["p", "alpha", "restitution"].some((name) => (texts[name] ?? "").includes(","));
     this.housner.box.checked = !("restitution" in texts);
-    for (const each of [...this.sizes, ...this.plain]) if (texts[each.spec.name]) each.show(sides(texts[each.spec.name])[0]);
+    for (const each of [...this.sizes, ...this.plain]) each.show(texts[each.spec.name] ? sides(texts[each.spec.name])[0] : each.spec.name === "offset" ? "0" : each.text);
     for (const pair of this.pairs) pair.forEach((each, k) => { if (texts[each.spec.name]) each.show(sides(texts[each.spec.name])[k]); });
+    this.pivots.forEach((each, k) => { if (texts[each.spec.name]) each.show(sides(texts[each.spec.name])[k === 1 ? 1 : 0]); });
     if (this.known) {
       if (!texts.restitution) this.restitution.show(sent(this.known[0].restitution));
       this.pairs[2].forEach((each, k) => { if (!texts.restitution) each.show(sent(/** @type {any[]} */ (this.known)[k].restitution)); });
@@ -70,26 +72,52 @@ export class BlockForm {
     this.reveal();
   }
 
-  reveal() {
-    const sized = this.shape.select.value === "sizes", two = !sized && this.two.box.checked;
-    this.sizes.forEach((each) => { each.element.hidden = !sized; });
-    this.plain.forEach((each) => { each.element.hidden = sized || two; });
-    this.pairs.flat().forEach((each) => { each.element.hidden = !two; });
-    this.two.element.hidden = sized;
-    this.housner.element.hidden = two;
-    this.restitution.element.hidden = two || this.housner.box.checked;
+  /** Whether each side has a restitution of its own. */
+  sided() {
+    const shape = this.shape.select.value;
+    if (shape === "parameters") return this.two.box.checked;
+    return (this.texts.restitution ?? "").includes(",") || (this.known && this.known[0].restitution !== this.known[1].restitution);
   }
 
-  /** From sizes to parameters keeps the block; back, its sizes. */
+  reveal() {
+    const shape = this.shape.select.value, two = shape === "parameters" && this.two.box.checked, given = !this.housner.box.checked;
+    this.sizes.forEach((each) => { each.element.hidden = shape !== "sizes"; });
+    this.plain.forEach((each) => { each.element.hidden = shape !== "parameters" || two; });
+    this.pairs.slice(0, 2).flat().forEach((each) => { each.element.hidden = !two; });
+    this.pivots.forEach((each) => { each.element.hidden = shape !== "pivots"; });
+    this.two.element.hidden = shape !== "parameters";
+    this.restitution.element.hidden = this.sided() || !given;
+    this.pairs[2].forEach((each) => { each.element.hidden = !this.sided() || !given; });
+  }
+
+  /** From one description to another; the block stays as far as that can describe it. */
   reshape() {
-    if (this.shape.select.value === "parameters" && this.known) {
-      const [{p, alpha}] = this.known;
-      this.plain[0].show(sent(p));
-      this.plain[1].show(`${sent((alpha * 180) / Math.PI)}deg`);
-    } else if (this.known) {
-      const [{radius, alpha}] = this.known;
-      this.sizes[0].show(sent(2 * radius * Math.sin(alpha)));
-      this.sizes[1].show(sent(2 * radius * Math.cos(alpha)));
+    const shape = this.shape.select.value;
+    if (this.known) {
+      const [right, left] = this.known;
+      const distances = this.known.map((/** @type {any} */ side) => side.radius * Math.sin(side.alpha));
+      const height = right.radius * Math.cos(right.alpha);
+      if (shape === "parameters") {
+        this.plain[0].show(sent(right.p));
+        this.plain[1].show(`${sent((right.alpha * 180) / Math.PI)}deg`);
+        this.two.box.checked = right.p !== left.p || right.alpha !== left.alpha;
+        this.known.forEach((/** @type {any} */ side, /** @type {number} */ k) => {
+          this.pairs[0][k].show(sent(side.p));
+          this.pairs[1][k].show(`${sent((side.alpha * 180) / Math.PI)}deg`);
+          this.pairs[2][k].show(sent(side.restitution));
+        });
+        // Rounded p and alpha need not be those of a body.
+        if (this.two.box.checked) this.housner.box.checked = false;
+      } else if (shape === "sizes") {
+        this.sizes[0].show(sent(distances[0] + distances[1]));
+        this.sizes[1].show(sent(2 * height));
+        this.sizes[2].show(sent(0.5 * (distances[1] - distances[0])));
+      } else {
+        const gravity = Number(this.texts.gravity ?? 9.80665);
+        distances.forEach((/** @type {number} */ each, /** @type {number} */ k) => this.pivots[k].show(sent(each)));
+        this.pivots[2].show(sent(height));
+        this.pivots[3].show(sent(Math.sqrt(Math.max((gravity * right.radius) / right.p ** 2 - right.radius ** 2, 0))));
+      }
     }
     this.tell();
   }
@@ -99,6 +127,7 @@ export class BlockForm {
     if (this.two.box.checked) {
       this.plain.forEach((each, k) => this.pairs[k].forEach((side) => side.show(each.text)));
       this.pairs[2].forEach((side) => side.show(this.restitution.text));
+      this.housner.box.checked = false;
     } else {
       this.plain.forEach((each, k) => each.show(this.pairs[k][0].text));
       this.restitution.show(this.pairs[2][0].text);
@@ -107,14 +136,21 @@ export class BlockForm {
   }
 
   tell() {
-    this.reveal();
-    const sized = this.shape.select.value === "sizes", two = !sized && this.two.box.checked;
+    const shape = this.shape.select.value, two = shape === "parameters" && this.two.box.checked;
     /** @type {Texts} */
     const texts = {};
-    for (const each of sized ? this.sizes : two ? [] : this.plain) texts[each.spec.name] = each.text;
-    if (two) for (const [plus, minus] of this.pairs) texts[plus.spec.name] = `${plus.text},${minus.text}`;
-    else if (!this.housner.box.checked) texts.restitution = this.restitution.text;
-    this.changed(texts, ["width", "height", "p", "alpha", "restitution"]);
+    if (shape === "sizes") {
+      for (const each of this.sizes) texts[each.spec.name] = each.text;
+      if (Number(texts.offset) === 0) delete texts.offset;
+    } else if (shape === "pivots") {
+      texts.pivots = `${this.pivots[0].text},${this.pivots[1].text}`;
+      texts.height_of_mass = this.pivots[2].text;
+      texts.gyration = this.pivots[3].text;
+    } else if (two) for (const [plus, minus] of this.pairs.slice(0, 2)) texts[plus.spec.name] = `${plus.text},${minus.text}`;
+    else for (const each of this.plain) texts[each.spec.name] = each.text;
+    if (!this.housner.box.checked) texts.restitution = this.sided() ? `${this.pairs[2][0].text},${this.pairs[2][1].text}` : this.restitution.text;
+    this.reveal();
+    this.changed(texts, ["width", "height", "offset", "p", "alpha", "pivots", "height_of_mass", "gyration", "restitution"]);
   }
 }
 

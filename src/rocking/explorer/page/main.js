@@ -15,7 +15,7 @@ import {make, one, say, short} from "./words.js";
 const offers = await json("/api/start", {});
 const state = address.read(offers.opening);
 if (!Object.keys(state.texts).length) state.texts = {...offers.default};
-else if (!("width" in state.texts) && !("p" in state.texts)) state.texts = {width: offers.default.width, height: offers.default.height, ...state.texts};
+else if (!["width", "p", "pivots"].some((name) => name in state.texts)) state.texts = {width: offers.default.width, height: offers.default.height, ...state.texts};
 
 /** What the views share.
  * @type {{offers: any, state: address.State, shown: import("./api.js").Payload | null, change: typeof change, go: typeof go, problem: typeof problem, restate: typeof restate, remember: () => void}} */
@@ -145,8 +145,9 @@ function draw() {
   showFigures(header);
   showNotes(header);
   const [plus, minus] = header.block.thresholds_g;
-  one("derived").textContent = `p = ${short(header.block.sides[0].p)} rad/s, α = ${short((header.block.sides[0].alpha * 180) / Math.PI)}°, `
-    + `η = ${short(header.block.sides[0].restitution)}; lifts above ${plus === minus ? short(plus) : `${short(plus)} and ${short(minus)}`} g.`;
+  const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
+    `p = ${short(side.p)} rad/s, α = ${short((side.alpha * 180) / Math.PI)}°, η = ${short(side.restitution)}; lifts above ${short([plus, minus][k])} g`);
+  one("derived").textContent = right === left ? `${right}.` : `To the right ${right}. To the left ${left}.`;
   if (state.view === "response" || state.view === "block") histories_draw();
   views[state.view]?.draw?.();
 }

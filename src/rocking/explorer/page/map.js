@@ -1,5 +1,6 @@
 // A map of the case over two of its parameters, coarse to fine; or of a study.
 
+import {BLOCK} from "./address.js";
 import {Latest, frames, json, payload} from "./api.js";
 import {bokeh, colour, figure, themed} from "./theme.js";
 import {showMapTaking, withLegend} from "./taking.js";
@@ -466,8 +467,8 @@ export class View {
     const {shown} = this.page;
     const [threshold] = shown?.header.block.thresholds_g ?? [0.2];
     const p = shown?.header.block.sides[0].p ?? 3.6;
-    const {width, height, alpha, restitution, p: given, model} = this.page.state.texts;
-    const block = Object.fromEntries(Object.entries({width, height, alpha, restitution, p: given, model}).filter(([, value]) => value));
+    const {texts} = this.page.state;
+    const block = Object.fromEntries([...BLOCK, "model"].filter((name) => texts[name] && name !== "gravity").map((name) => [name, texts[name]]));
     const motion = `sine:amplitude=${(1.03 * threshold).toPrecision(6)}g,frequency=${(p / Math.PI).toPrecision(6)},cycles=2.5`;
     this.page.state.map = {};
     this.page.restate({...block, motion});

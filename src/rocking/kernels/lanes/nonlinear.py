@@ -4,16 +4,12 @@ Time is counted in steps, so that coefficients are terms: u is their sum. The si
 along, turned by the addition theorem. Under a vertical ground acceleration the weight changes evenly, too.
 """
 
-from rocking.kernels.arc import Line, borne, is_carried_on
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.arc import Line, borne, is_left_out_nothing, strength_of
+from rocking.kernels.compiled import shared
 from rocking.kernels.lanes.crew import WIDTH
 from rocking.kernels.lanes.events import is_quiet
 from rocking.kernels.lanes.substeps import begin, commit, over_substep
 from rocking.kernels.state import Record
-
-#: Largest of the last two terms of the rate, over the first two, that is good to the last place: over a substep that is
-#: no longer than `LONGEST_SUBSTEP` terms fall by a factor of 20,000 or more from one to the next but one.
-_TAIL = 2.0**-38
 
 
 @shared
@@ -67,12 +63,13 @@ def substep(group: Record, push: Line, weight: Line | None, stretch: float, fall
         moved = r1 + (0.5 * r2 + ((1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + last)))))
         u1 = u + moved
         v1 = r1 + (r2 + (r3 + (r4 + (r5 + (r6 + (r7 + (r8 + r9)))))))
-        rest = 2.0 * abs(r3) + (3.0 * abs(r4) + (4.0 * abs(r5) + (5.0 * abs(r6) + 6.0 * abs(r7))))
-        rest += 7.0 * abs(r8) + 8.0 * abs(r9)
+        sizes = (abs(r1), abs(r2), abs(r3), abs(r4), abs(r5), abs(r6), abs(r7), abs(r8), abs(r9))
+        low = (abs(r1), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
+        angles = (*low, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
+        converged, rest = is_left_out_nothing(sizes, angles, -2.0 * l2, strength_of(weight, (a, b), 1.0))
         least, most = min(r2 - rest, 0.0), max(r2 + rest, 0.0)
         quiet = is_quiet((u, u1), r1, 0.125 * most, -0.125 * least, (least, most), group.peak[lane], fallen)
-        quiet &= abs(r8) + abs(r9) <= _TAIL * (abs(r1) + abs(r2))
-        quiet &= not goes_on(weight, l2, r7, (r1, r2))
+        quiet &= converged
         group.event[lane] |= not quiet
         # sin and 1 - cos of the rotation moved through
         square = moved * moved
@@ -84,9 +81,3 @@ def substep(group: Record, push: Line, weight: Line | None, stretch: float, fall
         group.next_v[lane] = v1
         group.next_sine[lane] = s0 - (s0 * versine + c0 * sine)
         group.next_cosine[lane] = c0 - (c0 * versine - s0 * sine)
-
-
-@inlined
-def goes_on(weight: Line | None, l2: float, seventh: float, first: tuple[float, float]) -> bool:
-    """Whether the change of the weight carries terms on beyond the last."""
-    return False if weight is None else is_carried_on(2.0 * l2 * weight[1], seventh, first)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import os
+from collections.abc import Sequence
 from typing import BinaryIO, Protocol
 
 from rocking.errors import UnreadableRecord
@@ -63,8 +64,9 @@ def read(
     dt : float, optional
         Sampling step, s; needed only for one column of accelerations. Elsewhere it must agree with the file.
     units : {"g", "m/s2", "cm/s2", "gal", "mm/s2", "mg"}, optional
-        Units of the numbers; needed only where the file does not say: ObsPy's formats, and text tables without a
-        heading such as "acceleration (cm/s2)" or "a_g". They overrule a heading.
+        Units of the accelerations; needed only where the file does not say: ObsPy's formats, and text tables without
+        a heading such as "acceleration (cm/s2)" or "a_g". They overrule a heading. Times in a text table are in the
+        unit that their heading names, "time (ms)", or else in seconds.
 
     Returns
     -------
@@ -93,11 +95,43 @@ def read(
     return read_as(path, channel, Request.checked(dt, units))
 
 
-def read_as(path: str | os.PathLike[str] | BinaryIO, channel: int | str | None, request: Request) -> Motion:
-    """Read one channel of a record file as a motion, as `read` does, with arguments that are checked already."""
+def read_as(
+    path: str | os.PathLike[str] | BinaryIO,
+    channel: int | str | None,
+    request: Request,
+    *,
+    optional: bool = False,
+) -> Motion:
+    """Read one channel of a record file as a motion, as `read` does, with arguments that are checked already.
+
+    An `optional` channel is for files that have several: the only one of a file is taken whatever its name.
+    """
     source = open_source(path)
     reader = _recognise(source)[0]
-    return _choose(source, reader.read(source, request), channel).motion()
+    found = reader.read(source, request)
+    return _choose(source, found, None if optional and len(found) == 1 else channel).motion()
+
+
+def read_vertical(path: str | os.PathLike[str], name: str, horizontal: int | str | None, request: Request) -> Motion:
+    """Read the channel of a record file that is the vertical motion beside another one, the `horizontal`.
+
+    Raises
+    ------
+    UnreadableRecord, InvalidMotion
+        As for `read`; the message offers the channels beside the horizontal one.
+    """
+    source = open_source(path)
+    found = _recognise(source)[0].read(source, request)
+    if _matching(found, name):
+        return _choose(source, found, name).motion()
+    taken = {one.number for one in (found if len(found) == 1 or horizontal is None else _matching(found, horizontal))}
+    beside = [one for one in found if one.number not in taken]
+    unknown = f"there is no channel, file or shipped record {name!r}"
+    if not beside:
+        raise source.error(
+            f"{unknown}, and this file holds the horizontal motion alone; give the path of the file of the vertical one"
+        )
+    raise source.error(f"{unknown}; {_hint(beside, name)}give one of {_listed(beside)}")
 
 
 def content(
@@ -123,13 +157,15 @@ def content(
 
 
 def content_as(
-    path: str | os.PathLike[str] | BinaryIO, channel: int | str | None, request: Request
+    path: str | os.PathLike[str] | BinaryIO, channel: int | str | None, request: Request, *, optional: bool = False
 ) -> tuple[Identification, tuple[Channel, ...]]:
-    """Return format and channels as `content` does, with arguments that are checked already."""
+    """Return format and channels as `content` does, with arguments that are checked already, as for `read_as`."""
     source = open_source(path)
     reader, identification = _recognise(source)
     found = reader.read(source, request)
-    return identification, tuple(found if channel is None else [_choose(source, found, channel)])
+    if channel is None or (optional and len(found) == 1):
+        return identification, tuple(found)
+    return identification, (_choose(source, found, channel),)
 
 
 def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: str | None = None) -> tuple[Channel, ...]:
@@ -185,13 +221,9 @@ def _unknown(source: Source) -> UnreadableRecord:
     line = source.first_line()
     if line is not None and "RESPONSE AND FOURIER" in line.text.upper():
         return source.error("this is a V3 file of spectra; give the V1 or V2 file of the acceleration", line.start)
-    wide = table.columns(source)
-    if wide is not None:
-        decimal = "" if wide != 4 or b"." in source.raw else "; decimal commas need semicolons or tabs between columns"
-        return source.error(
-            f"each line holds {wide} numbers, but a text table has one (acceleration) or two (time, acceleration); "
-            f"keep only these, or name all {wide} columns in a heading line{decimal}"
-        )
+    refused = table.refusal(source)
+    if refused is not None:
+        return refused
     foreign = next((what for mark, what in _FOREIGN.items() if source.raw.startswith(mark)), None)
     if foreign is not None:
         return source.error(f"this is {foreign}")
@@ -210,8 +242,13 @@ def _unknown(source: Source) -> UnreadableRecord:
     )
 
 
+def _listed(found: Sequence[Channel]) -> str:
+    more = len(found) - _LISTED
+    return ", ".join(channel.label for channel in found[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
 def _choose(source: Source, found: list[Channel], wanted: int | str | None) -> Channel:
-    listed = ", ".join(channel.label for channel in found[:_LISTED]) + (", ..." if len(found) > _LISTED else "")
+    listed = _listed(found)
     if wanted is None and len(found) > 1:
         raise source.error(f"the file holds {len(found)} channels; give channel= as one of {listed}")
     matching = found if wanted is None else _matching(found, wanted)

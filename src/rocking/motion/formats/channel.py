@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -11,11 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidMotion
+from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion.description import Description
 from rocking.motion.formats.source import Source
 from rocking.motion.formats.units import Unit
 from rocking.motion.motion import Motion
+
+#: Numbers that files have where a value is missing: nines before and after the point, and the lowest of 16 bits.
+_MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(3, 9) for decimals in range(5)] + [32768.0]
+#: No acceleration is so large, in any unit.
+_LARGEST = 1e9
+#: A number stands for a missing value where those beside it are smaller than this share of it.
+_FAR_SMALLER = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,20 +118,57 @@ class Channel:
         return ", ".join(f"{key} {value}" for key, value in {**self.metadata, **facts}.items() if value)
 
 
-def to_acceleration(source: Source, at: int | None, values: NDArray[np.float64], unit: Unit) -> NDArray[np.float64]:
+def to_acceleration(
+    source: Source,
+    at: int | None,
+    values: NDArray[np.float64],
+    unit: Unit,
+    *,
+    row_at: Callable[[int], int] | None = None,
+) -> NDArray[np.float64]:
     """Return numbers in `unit`, which stand at the offset `at` of the file, in m/s^2.
+
+    Where each has a row of its own, `row_at` gives its offset.
 
     Raises
     ------
     UnreadableRecord
-        If there are fewer than two, or one is too large.
+        If there are fewer than two, one is too large, or one stands for a missing value.
     """
     if len(values) < 2:
         raise source.error(f"{len(values)} values are too few for a record; get the whole file", at)
     acceleration = unit.to_si(values)
     if not np.isfinite(acceleration).all():
         raise source.error("some values are too large for an acceleration; check the file and its units", at)
+    gap = gap_at(values)
+    if gap is not None:
+        raise missing_value(source, values[gap], at if row_at is None else row_at(gap))
     return acceleration
+
+
+def gap_at(values: NDArray[np.float64]) -> int | None:
+    """Return the index of the first number that stands for a missing value, or None.
+
+    Such numbers (-999, 9999.0, 99999.99, -32768, 1e20, ...) are values as well: they stand for missing ones where what
+    is beside them is far smaller.
+    """
+    sizes = np.abs(values)
+    marked = np.isin(sizes, _MARKS) | (sizes >= _LARGEST)
+    if not marked.any():
+        return None
+    edges = np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    padded = np.concatenate([[0.0], sizes, [0.0]])
+    alone = np.maximum(padded[starts], padded[ends + 1]) < _FAR_SMALLER * sizes[starts]
+    return int(starts[alone][0]) if alone.any() else None
+
+
+def missing_value(source: Source, value: float, at: int | None) -> UnreadableRecord:
+    """Return the error for a number at the offset `at` that stands for a missing value."""
+    return source.error(
+        f"{value:g} seems to stand for a missing value; a record needs a value at every instant: get one without gaps",
+        at,
+    )
 
 
 def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:

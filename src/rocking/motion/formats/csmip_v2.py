@@ -50,11 +50,13 @@ def read(source: Source, request: Request) -> list[Channel]:
         If a channel lacks its acceleration, or has more or fewer values than its header says.
     """
     found: list[Channel] = []
-    title = _TITLE.search(source.data)
-    while title is not None:
-        channel, end = _channel(source, request, title.start(), len(found) + 1)
+    first = source.first_line()
+    start = None if first is None else first.start
+    while start is not None:
+        channel, end = _channel(source, request, start, len(found) + 1)
         found.append(channel)
         title = _TITLE.search(source.data, end)
+        start = None if title is None else title.start()
     return found
 
 

@@ -72,7 +72,7 @@ def read(source: Source, request: Request) -> list[Channel]:
     Raises
     ------
     UnreadableRecord
-        If a header line is missing, or the number of counts is not rate times duration.
+        If a header line is missing, or there are fewer counts than rate times duration, or a second's more.
     """
     entries, start = _entries(source)
     (rate,) = _positive(source, entries, "Sampling Freq", _RATE)
@@ -133,9 +133,10 @@ def _positive(source: Source, entries: dict[str, _KnetEntry], key: str, pattern:
 
 
 def _check_duration(source: Source, entries: dict[str, _KnetEntry], rate: float, count: int) -> None:
+    """Refuse fewer samples than the duration, which is in whole seconds, or a second's more."""
     (seconds,) = _positive(source, entries, "Duration Time", _SECONDS)
     stated = seconds * rate
-    if not abs(count - stated) < rate:
+    if not -0.5 < count - stated < rate:
         raise source.error(
             f"{seconds:g} s at {rate:g} Hz make {stated:g} samples but {count} follow; get the whole file again",
             entries["Duration Time"].at,

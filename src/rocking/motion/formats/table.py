@@ -1,66 +1,66 @@
 """Plain text and CSV: one column of accelerations with dt=, times and accelerations, or as many as a heading names.
 
-Units are those that a heading names, in brackets or after an underscore, or units=. Heading lines and comments (#, %,
-!, //) are passed over. The delimiter is a semicolon (a comma is then the decimal sign), a comma, or blanks; between
-blanks a comma within a number is the decimal sign. Numbers may be quoted, and exponents Fortran's (1.0D-3). Rows such
-as "1,5" in a file without any point may be one number or two: they are refused.
+Columns and their units are what the heading says (`heading`), or units=; times are in seconds where it says nothing.
+Heading lines and comments (#, %, !, //) are passed over, but no line that looks like a spoilt row. The delimiter is a
+semicolon (a comma is then the decimal sign), a comma, or blanks; between blanks a comma within a number is the decimal
+sign. Numbers may be quoted, and exponents Fortran's (1.0D-3). Rows such as "1,5" in a file without any point, and
+without two names above them, may be one number or two: they are refused.
 """
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats.channel import Channel, to_acceleration
+from rocking.motion.formats.channel import Channel, gap_at, missing_value, to_acceleration
+from rocking.motion.formats.heading import RULE, Column, Heading, heading_of, names_columns
 from rocking.motion.formats.identification import Identification
 from rocking.motion.formats.request import Request
 from rocking.motion.formats.source import Line, Source
 from rocking.motion.formats.timing import even_step, first_fault
-from rocking.motion.formats.units import Unit, find_unit
+from rocking.motion.formats.units import CHOICES, Unit
 from rocking.motion.formats.values import convert, not_a_number, parse, rows_of_numbers
 
 NAME = "text table"
 
-_COMMA = "a comma"
+_DELIMITERS = {",": "a comma", ";": "a semicolon", " ": "a blank"}
 
 _HEADING_LINES = 64
 _LINES_AT_ONCE = 50_000
-_LONGEST_HEADING = 10_000
-_BRACKETS = re.compile(r"[(\[]\s*([A-Za-z][\w/^*.·⁻ -]{0,20}?)\s*[)\]]")
-_SUFFIX = re.compile(r"(?<=[A-Za-z0-9])_(?=([A-Za-z]\w{0,12})\b)")
-_COMMENT = re.compile(rb"[ \t]*(#|%|!|//)")
+
+#: What spreadsheets write after a # where they have no number.
+_ERRORS = r"(?:(?:n/?a|nv)(?!\w)|div/0!|value!|ref!|num!|name\?|null!|wert!|zahl!)"
+_COMMENT = re.compile(rf"[ \t]*(?:%|!|//|#(?!{_ERRORS}|#+[ \t]*(?:[,;\t]|$)))".encode(), re.IGNORECASE)
+#: What begins like a number, or stands where one is missing.
+_LIKE_NUMBER = re.compile(
+    rf"[<>~]?[+-]*[.,]?\d.*|[*?-]+|##+|#{_ERRORS}|n/?a|nil|null|none|missing|bad|error|overflow|void", re.IGNORECASE
+)
+#: Letters that are taken for digits.
+_MISTAKEN = str.maketrans("OolI", "0011")
+_DIGIT_OR_POINT = re.compile(r"[\d.]|[Oo]$")
+_DATE = re.compile(r"\d+[-/:]\d+[-/:T]\S*|\d{1,2}\.\d{1,2}\.\d{2}(?:\d\d)?")
 
 #: No row of numbers is longer; what is, is refused before it is split.
 _ROW_LIMIT = 1024
 _WITHOUT_POINT = re.compile(r"[+-]?\d+(?:,\d+)?(?:[EeDd][+-]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[EeDd][+-]?\d+)?")
 
+#: A line before the first row is one itself if its time is one step earlier, up to this share of the step.
+_SAME_STEP = 0.5
+
+#: What a unit of another quantity has.
+_OF_OTHER_QUANTITY = re.compile(r".*[/%].*|m|cm|mm|in|ft|m?v|counts?|rad|deg", re.IGNORECASE)
+
+_LENGTH_OR_SPEED = re.compile(r"(?:[muµ]?m|cm|in|ft)(?:/s(?:ec)?)?", re.IGNORECASE)
+
 #: Titles of other formats' tables, which ObsPy reads.
 _OTHER_TITLES = ("TIMESERIES ",)
-
-
-class _Shape(NamedTuple):
-    """How the rows are written, and where the first one starts."""
-
-    translation: bytes
-    delimiter: str
-    columns: int
-    start: int
-
-    def ambiguous(self, source: Source) -> bool:
-        """Whether the commas may be decimal signs as well as delimiters: rows such as "1,5" and no point anywhere."""
-        # A comma that blanks follow is no decimal sign, and one at the end of a row neither.
-        return (
-            self.delimiter == _COMMA
-            and self.columns <= 2
-            and _DECIMAL_COMMA.fullmatch(source.line(self.start).text.strip().strip('"')) is not None
-            and b"." not in source.data[self.start :]
-        )
 
 
 class _Row(NamedTuple):
@@ -68,32 +68,71 @@ class _Row(NamedTuple):
     at: int
 
 
-class _Column(NamedTuple):
-    """A column of accelerations: its place in a row, its name, and the unit that its heading names."""
+class _Shape(NamedTuple):
+    """How the rows are written, where the first one starts, and what is wrong with it or a row before it."""
 
-    place: int
-    name: str
-    unit: Unit | None
+    translation: bytes
+    delimiter: str
+    columns: int
+    start: int
+    fault: UnreadableRecord | None
+
+    def ambiguous(self, source: Source) -> bool:
+        """Whether the commas may be decimal signs as well as delimiters: rows such as "1,5" and no point anywhere."""
+        # A comma that blanks follow is no decimal sign, and one at the end of a row neither.
+        return (
+            self.delimiter == ","
+            and self.columns <= 2
+            and _DECIMAL_COMMA.fullmatch(source.line(self.start).text.strip().strip('"')) is not None
+            and b"." not in source.data[self.start :]
+            and not (self.columns == 2 and self.heading(source).named)
+        )
+
+    def heading(self, source: Source) -> Heading:
+        """Return what the lines before the first row say."""
+        return heading_of(source, self.start, self.columns, self.delimiter)
+
+    def row_at(self, source: Source, index: int) -> int:
+        """Return the offset of a row."""
+        return next(row.at for k, row in enumerate(_rows(source, self)) if k == index)
 
 
 def recognise(source: Source) -> Identification | None:
     """Return the format if rows of one or two numbers begin after comments and headings, or of more that are named."""
     shape = _shape(source)
-    if shape is None or not _columns(source, shape):
+    if shape is None or (shape.columns > 2 and not shape.heading(source).named):
         return None
     if shape.columns == 1:
         what = "one number"
     elif shape.ambiguous(source):
         what = "one number with a decimal comma, or two numbers"
     else:
-        what = f"{'two' if shape.columns == 2 else shape.columns} numbers, between them {shape.delimiter}"
+        what = f"{'two' if shape.columns == 2 else shape.columns} numbers, between them {_DELIMITERS[shape.delimiter]}"
     return Identification(NAME, f"from line {source.line_number(shape.start)} on each line holds {what}")
 
 
-def columns(source: Source) -> int | None:
-    """Return how many numbers the first row of what looks like a table holds, or None."""
+def refusal(source: Source) -> UnreadableRecord | None:
+    """Return why what looks like a table is not read as one, or None if it does not look so."""
     shape = _shape(source)
-    return None if shape is None else shape.columns
+    if shape is not None:
+        decimal = (
+            ""
+            if shape.columns != 4 or b"." in source.raw
+            else "; decimal commas need semicolons or tabs between columns"
+        )
+        return shape.fault or source.error(
+            f"each line holds {shape.columns} numbers, but a text table has one (acceleration) or two (time, "
+            f"acceleration); keep only these, or name all {shape.columns} columns in a heading line{decimal}",
+            shape.start,
+        )
+    if is_foreign(source) or source.binary_at() is not None:
+        return None
+    rows = [_row(line, _delimiter(line)[0]) for line in _filled(source.lines(0, _HEADING_LINES))]
+    for row, following in itertools.pairwise(rows):
+        spoilt = _spoilt_in(row.tokens)
+        if spoilt and len(row.tokens) == len(following.tokens) and _spoilt_in(following.tokens):
+            return _not_in_row(source, spoilt, row.at)
+    return None
 
 
 def is_foreign(source: Source) -> bool:
@@ -107,90 +146,232 @@ def read(source: Source, request: Request) -> list[Channel]:
     Raises
     ------
     UnreadableRecord
-        If units are not known, or dt is not given for a single column, or a row is not like the first one, or
-        times do not increase, or it cannot be told whether commas are decimal signs.
+        If units are not known, or dt is not given where there are no times, or a row is not like the others, or times
+        do not increase, or a value is missing, or it cannot be told whether commas are decimal signs.
     """
     shape = _shape(source)
     assert shape is not None
+    if shape.fault is not None:
+        raise shape.fault
     if shape.ambiguous(source):
         raise source.error(
             f"{source.line(shape.start).text.strip()!r} may be one number with a decimal comma, or two numbers; write "
             "decimal points, or blanks between two numbers",
             shape.start,
         )
-    if shape.columns == 1 and request.dt is None:
+    heading = shape.heading(source)
+    held = _channels(source, heading)
+    if not heading.places("time") and request.dt is None:
         raise source.error("the file does not say its sampling step; give dt= in seconds", shape.start)
-    held = _columns(source, shape)
-    units = [request.units_by_heading(source, column.unit, shape.start) for column in held]
+    for place in heading.places("time"):
+        _refuse_strange_times(source, heading, place)
+    units = [_unit(source, request, heading, place, shape.start) for place in held]
     values = _values(source, shape)
-    dt, times = request.dt, None
-    if shape.columns > 1:
-        dt, times = _timing(source, request, shape, values[0 :: shape.columns])
+    table = values.reshape(-1, shape.columns)
+    for place in heading.places("count"):
+        _check_count(source, shape, table[:, place])
     channels = []
-    for number, (column, unit) in enumerate(zip(held, units, strict=True), 1):
-        facts = {"format": NAME, "file": source.file}
-        facts |= {"heading units": column.unit.name} if column.unit else {}
-        acceleration = to_acceleration(source, shape.start, values[column.place :: shape.columns], unit)
-        channels.append(Channel(column.name, number, acceleration, dt, times, units=unit.name, metadata=facts))
+    for number, (place, unit) in enumerate(zip(held, units, strict=True), 1):
+        column = heading.columns[place]
+        dt, times = _timing(source, request, shape, heading, table, place)
+        acceleration = to_acceleration(
+            source, shape.start, table[:, place], unit, row_at=lambda index: shape.row_at(source, index)
+        )
+        facts = {"format": NAME, "file": source.file} | _heading_units(column)
+        name = source.stem if shape.columns <= 2 and len(held) == 1 else column.name
+        channels.append(Channel(name, number, acceleration, dt, times, units=unit.name, metadata=facts))
     return channels
 
 
-def _columns(source: Source, shape: _Shape) -> list[_Column]:
-    """Columns of accelerations; of more than two those that a heading names, with a unit of acceleration if any has."""
-    heading = _decoded(source.data[: min(shape.start, _LONGEST_HEADING)])
-    if shape.columns <= 2:
-        return [_Column(shape.columns - 1, source.stem, _unit_in(heading))]
-    lines = [line.strip().lstrip("#%!/").strip() for line in heading.splitlines() if line.strip()]
-    names = _cells(lines[-1], shape.columns) if lines else []
-    found = [_Column(k, _BRACKETS.sub("", name).strip(), _unit_in(name)) for k, name in enumerate(names)][1:]
-    return [column for column in found if column.unit] or found
+def _channels(source: Source, heading: Heading) -> list[int]:
+    """Return the places of the accelerations: with a unit of acceleration if any has one, else without any unit."""
+    if heading.places("spectrum") and not heading.places("time"):
+        name = heading.columns[heading.places("spectrum")[0]].name
+        raise source.error(
+            f"the column {name!r} is that of a spectrum; give a table of accelerations at times", heading.at
+        )
+    channels = heading.places("channel")
+    known = [place for place in channels if heading.columns[place].unit]
+    plain = [place for place in channels if not heading.columns[place].strange]
+    if not channels:
+        raise source.error("the heading names no column of accelerations; name it so", heading.at)
+    return known or plain or channels
 
 
-def _cells(line: str, count: int) -> list[str]:
-    """Return the names in a heading of so many columns, or none where it cannot be split so."""
-    for delimiter in (r";", r",", r"\t+", r"\s{2,}", r"\s+"):
-        cells = [cell.strip().strip('"').strip() for cell in re.split(delimiter, line)]
-        if len(cells) == count and all(cells):
-            return cells
-    return []
+def _unit(source: Source, request: Request, heading: Heading, place: int, at: int) -> Unit:
+    """Return the unit of a column of accelerations."""
+    column = heading.columns[place]
+    if request.unit is None and _LENGTH_OR_SPEED.fullmatch(column.strange):
+        raise source.error(
+            f"the heading says {column.strange!r}, which is no unit of an acceleration; give a table of accelerations",
+            heading.at,
+        )
+    if request.unit is None and column.strange:
+        raise source.error(
+            f"the heading says {column.strange!r}, which is no unit of acceleration that is known here; give units= as "
+            f"one of {', '.join(CHOICES)}",
+            heading.at,
+        )
+    return request.units_by_heading(source, column.unit, at)
 
 
-def _unit_in(heading: str) -> Unit | None:
-    """Return the one unit of acceleration that a heading names in brackets or after an underscore, or None."""
-    words = [*_BRACKETS.findall(heading), *_SUFFIX.findall(heading)]
-    units = {unit for word in words if (unit := find_unit(word)) is not None}
-    return units.pop() if len(units) == 1 else None
+def _heading_units(column: Column) -> dict[str, str]:
+    """Return the unit that a heading names, for notes on what overrules it."""
+    if column.unit is not None:
+        return {"heading units": column.unit.name}
+    return {"heading units": column.strange} if _OF_OTHER_QUANTITY.fullmatch(column.strange) else {}
 
 
-def _decoded(heading: bytes) -> str:
-    try:
-        return heading.decode("utf-8")
-    except UnicodeDecodeError:
-        return heading.decode("latin-1")
+def _refuse_strange_times(source: Source, heading: Heading, place: int) -> None:
+    column = heading.columns[place]
+    if column.unit is None:
+        raise source.error(
+            f"the unit of the times is not clear from {column.strange!r} in the heading; name it in their column, as "
+            "'time (ms)': s, ms, us, ns, min, h or d",
+            heading.at,
+        )
+
+
+def _check_count(source: Source, shape: _Shape, numbers: Floats) -> None:
+    """Refuse rows whose numbers do not follow each other: one is missing."""
+    steps = np.diff(numbers)
+    odd = np.flatnonzero(steps != steps[0]) if len(steps) else steps
+    if len(odd):
+        raise source.error(
+            "the number of this row does not follow that of the row before; get a record without gaps",
+            shape.row_at(source, int(odd[0]) + 1),
+        )
 
 
 def _shape(source: Source) -> _Shape | None:
-    for line in source.lines(0, _HEADING_LINES):
-        text = line.text.encode("latin-1")
+    lines = source.lines(0, _HEADING_LINES)
+    for k, line in enumerate(lines):
         if line.text.startswith(_OTHER_TITLES):
             return None
         translation, delimiter = _delimiter(line)
-        tokens = text.translate(translation).split()
-        if tokens and not _COMMENT.match(text) and all(parse(token) is not None for token in tokens):
-            return _Shape(translation, delimiter, len(tokens), line.start)
+        tokens = _row(line, translation).tokens
+        if tokens and not _is_comment(line) and all(parse(token) is not None for token in tokens):
+            following = _filled(source.lines(line.next, _HEADING_LINES))
+            if delimiter == " " and len(tokens) > 1:
+                translation = _with_decimal_commas(following) or translation
+            rows = [_row(each, translation) for each in (line, *following[:2])]
+            counts = [len(row.tokens) for row in rows]
+            odd = len(counts) == 3 and counts[0] != counts[1] == counts[2]
+            columns = counts[1] if odd else counts[0]
+            shape = _Shape(translation, delimiter, columns, line.start, None)
+            fault = _fault_before(source, lines[:k], rows, shape)
+            if fault is None and odd:
+                fault = source.error(
+                    f"columns in this row: {counts[0]}, in those below: {columns}; make all rows alike", line.start
+                )
+            return shape._replace(fault=fault)
     return None
 
 
+def _is_comment(line: Line) -> bool:
+    return _COMMENT.match(line.text.encode("latin-1")) is not None
+
+
+def _filled(lines: Sequence[Line]) -> list[Line]:
+    """Return the lines that hold more than a comment."""
+    return [line for line in lines if not _is_comment(line) and not RULE.fullmatch(line.text)]
+
+
+def _row(line: Line, translation: bytes) -> _Row:
+    return _Row(line.text.encode("latin-1").translate(translation).split(), line.start)
+
+
+def _with_decimal_commas(lines: Sequence[Line]) -> bytes | None:
+    """Return what turns rows with blanks between numbers into numbers, if commas are their decimal signs."""
+    ways = (_delimiter(line) for line in lines if "," in line.text)
+    return next((translation for translation, delimiter in ways if delimiter == " "), None)
+
+
+def _fault_before(source: Source, before: Sequence[Line], rows: list[_Row], shape: _Shape) -> UnreadableRecord | None:
+    """Return what is wrong with the first of the rows that end where numbers alone begin, or None if there are none."""
+    fault = None
+    for line in reversed(_filled(before)):
+        tokens = _row(line, shape.translation).tokens
+        spoilt = (
+            _spoilt_in(tokens, shape.columns)
+            or _spoilt_before(tokens, rows, shape.columns)
+            or _spoilt_below_names(line, tokens, before, shape)
+        )
+        if not spoilt:
+            break
+        fault = _not_in_row(source, spoilt, line.start)
+    return fault
+
+
+def _spoilt_in(tokens: list[bytes], columns: int = 0) -> bytes:
+    """Return the first piece that is no number, of a line of numbers and what stands in place of some; or nothing."""
+    spoilt = [token for token in tokens if parse(token) is None]
+    numbers = len(tokens) - len(spoilt)
+    fits = numbers > 0 or len(tokens) == columns
+    return spoilt[0] if spoilt and fits and all(map(_like_number, spoilt)) else b""
+
+
+def _like_number(token: bytes) -> bool:
+    text = token.decode("latin-1")
+    mistaken = (
+        _DIGIT_OR_POINT.search(text) is not None and parse(text.translate(_MISTAKEN).encode("latin-1")) is not None
+    )
+    return mistaken or _LIKE_NUMBER.fullmatch(text) is not None
+
+
+def _spoilt_before(tokens: list[bytes], rows: list[_Row], columns: int) -> bytes:
+    """Return the first piece that is no number, of a line whose time is one step before that of the rows below it."""
+    times = [
+        time for each in (tokens, *(row.tokens for row in rows[:2])) if each and (time := parse(each[0])) is not None
+    ]
+    if columns == 1 or len(times) < 3:
+        return b""
+    before, first, second = times
+    follows = second > first and abs((first - before) - (second - first)) <= _SAME_STEP * (second - first)
+    return next((token for token in tokens if parse(token) is None), b"") if follows else b""
+
+
+def _spoilt_below_names(line: Line, tokens: list[bytes], before: Sequence[Line], shape: _Shape) -> bytes:
+    """Return the first piece that is no number, of a line with as many cells as columns, one of them a number.
+
+    It is no heading if one stands above it; without one, if a number has a point and more than blanks are between them.
+    """
+    numbers = [token for token in tokens if parse(token) is not None]
+    cells = len(tokens) if shape.delimiter == " " else line.text.rstrip(shape.delimiter).count(shape.delimiter) + 1
+    if shape.columns == 1 or not numbers or shape.columns not in (len(tokens), cells) or _names_columns(line, shape):
+        return b""
+    above = (each for each in before if each.start < line.start)
+    divided = shape.delimiter != " " and any(b"." in number for number in numbers)
+    if not divided and not any(_names_columns(each, shape) for each in above):
+        return b""
+    return next((token for token in tokens if parse(token) is None), b"")
+
+
+def _names_columns(line: Line, shape: _Shape) -> bool:
+    return names_columns(line.text.encode("latin-1"), shape.columns, shape.delimiter)
+
+
+def _not_in_row(source: Source, token: bytes, at: int) -> UnreadableRecord:
+    shown = token[:40].decode("latin-1")
+    if _DATE.fullmatch(shown):
+        return source.error(f"{shown!r} is not a number; write times in seconds, not as dates or times of day", at)
+    return source.error(
+        f"{shown!r} is not a number, in what looks like a row of them; correct it, or begin the line with # if it is a "
+        "heading",
+        at,
+    )
+
+
 def _delimiter(line: Line) -> tuple[bytes, str]:
-    """Return what turns a row into numbers with points between blanks, and the delimiter's name."""
+    """Return what turns a row into numbers with points between blanks, and the delimiter."""
     if ";" in line.text:
-        return bytes.maketrans(b',;"', b".  "), "a semicolon"
+        return bytes.maketrans(b',;"', b".  "), ";"
     words = line.text.replace('"', " ").split()
     if len(words) > 1 and "," in line.text and all(map(_WITHOUT_POINT.fullmatch, words)):
-        return bytes.maketrans(b',"', b". "), "a blank"
+        return bytes.maketrans(b',"', b". "), " "
     if "," in line.text:
-        return bytes.maketrans(b',"', b"  "), _COMMA
-    return bytes.maketrans(b'"', b" "), "a blank"
+        return bytes.maketrans(b',"', b"  "), ","
+    return bytes.maketrans(b'"', b" "), " "
 
 
 def _values(source: Source, shape: _Shape) -> Floats:
@@ -247,14 +428,28 @@ def _first_bad(source: Source, rows: list[_Row], shape: _Shape) -> UnreadableRec
     raise AssertionError("among rows that do not convert one is bad")
 
 
-def _timing(source: Source, request: Request, shape: _Shape, times: Floats) -> tuple[float | None, Floats | None]:
+def _timing(
+    source: Source, request: Request, shape: _Shape, heading: Heading, table: Floats, place: int
+) -> tuple[float | None, Floats | None]:
+    """Return step or times (s) of a column: those in the nearest column of times before it, or else the first one."""
+    columns = heading.places("time")
+    if not columns:
+        return request.dt, None
+    column = max((each for each in columns if each < place), default=columns[0])
+    unit = heading.columns[column].unit
+    assert unit is not None
+    written = table[:, column]
+    times = unit.to_si(written)
     fault = first_fault(times)
     if fault is not None:
-        at = next(row.at for index, row in enumerate(_rows(source, shape)) if index == fault)
-        raise source.error("the time does not increase from the row before; mend the first column", at)
-    dt = even_step(times) if len(times) > 1 else None
-    if dt is not None:
-        return request.step(source, dt, shape.start), None
+        at = shape.row_at(source, fault)
+        raise source.error("the time does not increase from the row before; mend the column of times", at)
+    step = even_step(written) if len(written) > 1 else None
+    if step is not None:
+        return request.step(source, step * unit.multiplier / unit.divisor, shape.start), None
+    gap = gap_at(written)
+    if gap is not None:
+        raise missing_value(source, written[gap], shape.row_at(source, gap))
     if request.dt is not None:
         raise source.error(f"the times are not evenly {request.dt:g} s apart; leave dt out", shape.start)
     return None, times

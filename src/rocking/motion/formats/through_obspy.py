@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from typing import Any
 
@@ -18,6 +19,7 @@ from rocking.motion.formats.units import Unit
 _REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
 _SUFFIX = " (through ObsPy)"
 _REASON_LENGTH = 200
+_TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
 
 
 def installed() -> bool:
@@ -57,6 +59,7 @@ def read(source: Source, request: Request) -> list[Channel]:
     traces = _traces(source, name)
     if isinstance(traces, str):
         raise source.error(f"ObsPy's {name} reader cannot read this ({traces}); get the record again")
+    _refuse_cut(source, traces)
     return [_channel(source, request, unit, trace, identification.format, n) for n, trace in enumerate(traces, 1)]
 
 
@@ -79,6 +82,20 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, form: str
         station=station,
         metadata={"format": form, "file": source.file},
     )
+
+
+def _refuse_cut(source: Source, traces: Any) -> None:
+    """Refuse a file that lacks its end where ObsPy reads what is left without a word."""
+    titles = list(_TITLE.finditer(source.data))
+    for title, trace in zip(titles, traces if len(titles) == len(traces) else (), strict=False):
+        if int(title[1]) != len(trace.data):
+            raise source.error(
+                f"the header says {int(title[1])} samples but {len(trace.data)} follow; get the whole file again",
+                title.start(),
+            )
+    lengths = {int(trace.stats.mseed.record_length) for trace in traces if "mseed" in trace.stats}
+    if len(lengths) == 1 and len(source.raw) % (length := lengths.pop()):
+        raise source.error(f"the last of its blocks of {length} bytes is not whole; get the whole file again")
 
 
 def _claims(source: Source) -> list[str]:
@@ -106,9 +123,12 @@ def _claimed_by(name: str, source: Source) -> bool:
 def _traces(source: Source, name: str) -> Any:
     """Return ObsPy's traces, or the reason why there are none."""
     import obspy
+    from obspy.io.mseed import InternalMSEEDWarning
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        # What does not pass MiniSEED's own check of its numbers is a warning only.
+        warnings.simplefilter("error", InternalMSEEDWarning)
         try:
             traces = obspy.read(io.BytesIO(source.raw), format=name)
         except Exception as error:

@@ -1,4 +1,4 @@
-"""Units of acceleration, as users name them and as record files spell them."""
+"""Units of acceleration and of time, as users name them and as record files spell them."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ CHOICES = ("g", "m/s2", "cm/s2", "gal", "mm/s2", "mg")
 
 
 class Unit(NamedTuple):
-    """One unit of acceleration: m/s^2 = value * multiplier / divisor, so that decimal units round once."""
+    """One unit: m/s^2, or s, = value * multiplier / divisor, so that decimal units round once."""
 
     name: str
     multiplier: float
     divisor: float
 
     def to_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return `values` of this unit in m/s^2 (infinite where that overflows)."""
+        """Return `values` of this unit in m/s^2 or s (infinite where that overflows)."""
         with np.errstate(over="ignore"):
             return values * self.multiplier / self.divisor
 
@@ -32,11 +32,33 @@ _G_TENTH = Unit("g/10", STANDARD_GRAVITY, 10.0)
 _M = Unit("m/s2", 1.0, 1.0)
 _CM = Unit("cm/s2", 1.0, 100.0)
 _MM = Unit("mm/s2", 1.0, 1000.0)
+_UM = Unit("um/s2", 1.0, 1e6)
+_FT = Unit("ft/s2", 3048.0, 1e4)
+_IN = Unit("in/s2", 254.0, 1e4)
+
+SECOND = Unit("s", 1.0, 1.0)
+
+#: Units of time by their spellings.
+_TIMES = {
+    spelling: unit
+    for unit, spellings in {
+        SECOND: "s sec secs second seconds seg segundos sek sekunden secondes secondi",
+        Unit("ms", 1.0, 1e3): "ms msec msecs millis millisecond milliseconds",
+        Unit("us", 1.0, 1e6): "us µs μs usec microsecond microseconds",
+        Unit("ns", 1.0, 1e9): "ns nsec nanosecond nanoseconds",
+        Unit("min", 60.0, 1.0): "min mins minute minutes",
+        Unit("h", 3600.0, 1.0): "h hr hrs hour hours",
+        Unit("d", 86400.0, 1.0): "d day days",
+    }.items()
+    for spelling in spellings.split()
+}
 
 #: Units by their spelling without signs: "cm/s^2", "cm/sec/sec" and "cm_s2" are "cms2" or "cmss".
 _UNITS = {
     "g": Unit("g", STANDARD_GRAVITY, 1.0),
+    "gs": Unit("g", STANDARD_GRAVITY, 1.0),
     "g10": _G_TENTH,
+    "%g": Unit("%g", STANDARD_GRAVITY, 100.0),
     "mg": Unit("mg", STANDARD_GRAVITY, 1000.0),
     "ms2": _M,
     "mss": _M,
@@ -45,13 +67,26 @@ _UNITS = {
     "gal": _CM,
     "mms2": _MM,
     "mmss": _MM,
+    "ums2": _UM,
+    "µms2": _UM,
+    "μms2": _UM,
+    "nms2": Unit("nm/s2", 1.0, 1e9),
+    "fts2": _FT,
+    "ftss": _FT,
+    "ins2": _IN,
+    "inss": _IN,
 }
 
 
 def find_unit(spelling: str) -> Unit | None:
     """Return the unit that one spells "CM/SEC/SEC", "cm/sec2", "cm/s^2", "cm/s²", "cm_s2", "gal", "G", ..., or None."""
-    plain = spelling.lower().replace("²", "2").replace("s-2", "s2").replace("s⁻2", "s2")
-    return _UNITS.get(re.sub(r"[\s^*._/·]", "", plain).replace("sec", "s"))
+    plain = re.sub(r"[\s^*._/·'’]", "", spelling.lower().replace("²", "2").replace("⁻", "-"))
+    return _UNITS.get(plain.replace("sec", "s").replace("s-2", "s2"))
+
+
+def find_time_unit(spelling: str) -> Unit | None:
+    """Return the unit of time that one spells "ms", "Sec.", "minutes", ..., or None."""
+    return _TIMES.get(spelling.strip().rstrip(".").lower())
 
 
 def choose_unit(units: str) -> Unit:

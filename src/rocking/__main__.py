@@ -1,0 +1,16 @@
+"""The program `rocking`: an interrupt while the command line is being imported ends it as quietly as one later."""
+
+import sys
+
+
+def main() -> None:
+    """Run the command line, as `rocking.cli.main` does."""
+    try:
+        from rocking.cli import main as run
+    except KeyboardInterrupt:
+        sys.exit(130)
+    run()
+
+
+if __name__ == "__main__":
+    main()

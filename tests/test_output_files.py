@@ -1,0 +1,146 @@
+"""What is written to files is whole, or not there; what was there before stays where the new one cannot be written."""
+
+import contextlib
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import rocking
+from rocking.analysis.survey import survey
+from rocking.result import Result
+from rocking.tables import whole_file, write_figure
+
+resource = pytest.importorskip("resource")
+
+RECORD = "el-centro-meloland-270"
+
+
+@contextlib.contextmanager
+def full_disk(left: int) -> Iterator[None]:
+    """Let no file grow beyond so many bytes: the system itself fails the writes, in compiled libraries as well."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (left, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture(scope="module")
+def response() -> rocking.Response:
+    found = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.records.load(RECORD))
+    found.summary(0.5)  # kernels are compiled and kept on the disk while it has room
+    found.to_xarray(dt=1.0)
+    return found
+
+
+@pytest.fixture(scope="module")
+def analysis(response: rocking.Response) -> Result:
+    return rocking.incremental_dynamic_analysis(response.block, response.motion, tolerance=1e-2)
+
+
+WRITERS = {
+    "response.csv": lambda response, _, path: response.to_csv(path),
+    "response.nc": lambda response, _, path: response.to_netcdf(path),
+    "levels.csv": lambda _, analysis, path: analysis.to_csv(path),
+    "levels.nc": lambda _, analysis, path: analysis.to_netcdf(path),
+    "response.png": lambda response, _, path: write_figure(path, response.plot()),
+    "response.pdf": lambda response, _, path: write_figure(path, response.plot()),
+}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_full_disk_leaves_no_part_of_a_file_and_keeps_the_old_one(response, analysis, tmp_path, name):
+    path = tmp_path / name
+    for old in (None, b"old"):
+        if old is not None:
+            path.write_bytes(old)
+        with full_disk(1000), pytest.raises(rocking.OutputError, match=f"{name} cannot be written"):
+            WRITERS[name](response, analysis, path)
+        assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == ([] if old is None else [(name, old)])
+    WRITERS[name](response, analysis, path)
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+    assert path.stat().st_size > 1000
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".parquet", ".nc"])
+def test_an_export_of_a_study_is_whole_or_not_there(tmp_path, suffix):
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    blocks = rocking.Blocks.grid(p=[1.0, 2.0, 3.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+    study = rocking.study(tmp_path / "study", blocks, rocking.pulses.one_sine(4.0, 1.0), factor=[0.4, 1.0])
+    study.run()
+    target = tmp_path / f"results{suffix}"
+    with full_disk(700), pytest.raises(rocking.OutputError, match="cannot be written"):
+        study.export(target)
+    assert {file.name for file in tmp_path.iterdir()} == {"study"}
+    study.export(target)
+    assert {file.name for file in tmp_path.iterdir()} == {"study", target.name}
+
+
+def test_a_table_of_many_records_is_whole_or_not_there(response, tmp_path):
+    found = survey(response.block, {RECORD: response.motion})
+    with full_disk(100), pytest.raises(rocking.OutputError, match="cannot be written"):
+        found.write(tmp_path)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("too_large", ["response.csv", "response.pdf"])
+def test_a_command_that_meets_a_full_disk_leaves_no_result_that_looks_whole(run, tmp_path, too_large):
+    """Smaller files than the one that does not fit may be there; result.json, the last, is not."""
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    command = ["simulate", RECORD, "--width", "0.24", "--height", "1.1", "--out"]
+    assert run(*command, whole)[0] == 0
+    assert json.loads((whole / "result.json").read_text("utf-8"))["overturned"] is True
+    with full_disk((whole / too_large).stat().st_size // 2):
+        code, _, err = run(*command, out)
+    assert code == 2
+    assert err.startswith("rocking: ") and "cannot be written: File too large" in err and len(err.splitlines()) == 1
+    left = {file.name: file.read_bytes() for file in out.iterdir()} if out.exists() else {}
+    assert not {"result.json", too_large} & left.keys()
+    for name, content in left.items():
+        if name.endswith(".csv"):
+            assert content == (whole / name).read_bytes()
+
+
+def test_a_write_that_fails_in_the_middle_leaves_what_was_there(tmp_path, monkeypatch):
+    file = tmp_path / "table.csv"
+    file.write_text("old")
+
+    def fails(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fails)
+    with (
+        pytest.raises(rocking.OutputError, match="No space left on device; nothing of it was kept"),
+        whole_file(file) as beside,
+    ):
+        beside.write_text("new")
+    assert [each.name for each in tmp_path.iterdir()] == ["table.csv"]
+    assert file.read_text() == "old"
+
+
+def test_a_link_is_kept_and_a_file_keeps_its_rights_and_a_device_is_written_to(tmp_path):
+    real, link = tmp_path / "real.csv", tmp_path / "link.csv"
+    real.write_text("old")
+    real.chmod(0o640)
+    link.symlink_to(real)
+    with whole_file(link) as beside:
+        beside.write_text("new")
+    assert link.is_symlink()
+    assert real.read_text() == "new"
+    assert real.stat().st_mode & 0o777 == 0o640
+    with whole_file("/dev/null") as beside:
+        assert beside == Path("/dev/null")
+    umask = os.umask(0o022)
+    try:
+        with whole_file(tmp_path / "fresh.csv") as beside:
+            beside.write_text("new")
+    finally:
+        os.umask(umask)
+    assert (tmp_path / "fresh.csv").stat().st_mode & 0o777 == 0o644
+    with pytest.raises(rocking.OutputError, match="there is no folder"), whole_file(tmp_path / "none" / "a.csv"):
+        pass

@@ -1,0 +1,223 @@
+"""Text tables as spreadsheets, loggers and programs write them: what is read of each, or the line that is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rocking.errors import UnreadableRecord
+from rocking.motion.formats import channels, identify, read
+from rocking.plausibility import reading_notes
+
+G = 9.80665
+FT, IN = 0.3048, 0.0254
+
+#: Samples of every table below, in its own unit.
+SAMPLES = [0.1, -0.4, 0.25, 0.0]
+
+
+def rows(*, step: float = 0.01, sign: str = ",", point: str = ".", start: int = 0, form: str = "{:.3f}") -> str:
+    """Four rows of times and the samples."""
+    pairs = (f"{form.format(step * (start + k))}{sign}{value:g}\n" for k, value in enumerate(SAMPLES))
+    return "".join(pairs).replace(".", point)
+
+
+def wide(*columns: list[float], sign: str = ",", point: str = ".") -> str:
+    """Rows of numbers from their columns."""
+    return "".join(sign.join(f"{value:g}" for value in row) + "\n" for row in zip(*columns, strict=True)).replace(
+        ".", point
+    )
+
+
+TIMES = [0.0, 0.01, 0.02, 0.03]
+OTHER = [1.0, 2.0, 3.0, 4.0]
+COUNT = [1.0, 2.0, 3.0, 4.0]
+
+#: Name, content, step (s), and what the samples are times, in m/s^2.
+READ = [
+    ("spreadsheet", "Time (s),Acceleration (g)\n" + rows(), 0.01, G),
+    ("spreadsheet with marks", "\ufeffTime (s);Acceleration (m/s²)\r\n" + rows(sign=";", point=","), 0.01, 1.0),
+    ("spreadsheet, marked delimiter", "sep=;\nTime (s);a (g)\n" + rows(sign=";", point=","), 0.01, G),
+    ("quoted names", '"Time (s)","Acceleration, NS (m/s^2)"\n' + rows(), 0.01, 1.0),
+    ("quoted names with commas", '"Time, s","Acceleration, cm/s2"\n' + rows(), 0.01, 0.01),
+    ("empty columns and rows at the end", "Time (s),a (g),,\n,,,\n" + rows().replace("\n", ",,\n") + ",,,\n", 0.01, G),
+    ("names after empty lines", "\n\n  \nTime (s)\ta (g)\n\n" + rows(sign="\t"), 0.01, G),
+    ("first row of whole numbers", "Zeit [s]\ta [g]\n" + "0\t0,1\n0,01\t-0,4\n0,02\t0,25\n0,03\t0\n", 0.01, G),
+    ("milliseconds", "time (ms),a (g)\n" + rows(step=10.0), 0.01, G),
+    ("milliseconds after an underscore", "t_ms,a_ms2\n" + rows(step=10.0, form="{:.0f}"), 0.01, 1.0),
+    ("microseconds", "Time [µs]\tAccel [mg]\n" + rows(step=10_000.0, sign="\t"), 0.01, 1e-3 * G),
+    ("nanoseconds since a date", "timestamp_ns,a_g\n" + rows(step=1e7, start=10**11, form="{:.0f}"), 0.01, G),
+    ("minutes", "Time [min];a [g]\n" + rows(step=0.5, sign=";"), 30.0, G),
+    ("hours", "time (hr),a (gal)\n" + rows(step=0.25), 900.0, 0.01),
+    ("days", "days,acc (g)\n" + rows(step=0.5), 43200.0, G),
+    ("units after a slash", "t/ms;a/g\n" + rows(step=5.0, sign=";"), 0.005, G),
+    ("units after a word", "Time in ms\tAcceleration in cm/s^2\n" + rows(step=5.0, sign="\t"), 0.005, 0.01),
+    ("units as names", "ms,g\n" + rows(step=5.0), 0.005, G),
+    ("units below the names", "Time,Acceleration\n(ms),(cm/s/s)\n" + rows(step=5.0), 0.005, 0.01),
+    ("units above the names", "sec;gal\nTime;Acc\n" + rows(step=0.02, sign=";"), 0.02, 0.01),
+    ("a rule below the names", "Time (sec)  Acc (g)\n----------  -------\n" + rows(sign="  "), 0.01, G),
+    ("a title above the names", "El Centro (1940), NS (180)\nTime (s), a (g)\n" + rows(), 0.01, G),
+    ("the unit in the title", "Acceleration in (cm/s2)\nt, a\n" + rows(), 0.01, 0.01),
+    ("processing program", "Station X\n\nTime [sec]    Acceleration [g]\n" + rows(sign="    "), 0.01, G),
+    ("names between single blanks", "Time (ms) Ground acceleration (g)\n" + rows(step=10.0, sign=" "), 0.01, G),
+    ("names in a comment", "% t (ms)  a (mg)\n" + rows(step=10.0, sign="  "), 0.01, 1e-3 * G),
+    ("names of variables", "Time_s_,Acc_m_s_2_\n" + rows(), 0.01, 1.0),
+    ("percent of g", "Time (s),Acceleration (%g)\n" + rows(), 0.01, 0.01 * G),
+    ("feet", "TIME SEC\tACC FT/SEC2\n" + rows(sign="\t"), 0.01, FT),
+    ("inches", "Time (s),Acc (in/s^2)\n" + rows(), 0.01, IN),
+    ("m s^-2", "Time (s),Acc (m s^-2)\n" + rows(), 0.01, 1.0),
+    ("two named columns of whole numbers", "t (ms),a (mg)\n0,5\n10,-7\n20,6\n30,0\n", 0.01, None),
+    ("accelerations first", "a (g),t (ms)\n" + wide(SAMPLES, [0.0, 5.0, 10.0, 15.0]), 0.005, G),
+    ("numbers of rows", "Index,Time (s),a (g)\n" + wide(COUNT, TIMES, SAMPLES), 0.01, G),
+    ("numbers of rows without a name", ",time (ms),a_g\n" + wide(COUNT, [0.0, 5.0, 10.0, 15.0], SAMPLES), 0.005, G),
+    ("velocities beside", "Time [s];v [cm/s];d [cm];a [g]\n" + wide(TIMES, OTHER, OTHER, SAMPLES, sign=";"), 0.01, G),
+    ("a large value that belongs to the motion", "t (s),a (mm/s2)\n0,999\n0.01,850\n0.02,-999\n0.03,0\n", 0.01, None),
+    (
+        "logger",
+        "LabVIEW Measurement\nSeparator\tTab\n***End_of_Header***\n\nSamples\t4\nDelta_X\t0.010000\n"
+        "***End_of_Header***\nX_Value\tAcceleration (g)\n" + rows(sign="\t"),
+        0.01,
+        G,
+    ),
+    (
+        "telephone",
+        '"Time (s)";"Acceleration x (m/s^2)"\n0,000000000E0;1,000000E-1\n1,000000000E-2;-4,000000E-1\n'
+        "2,000000000E-2;2,500000E-1\n3,000000000E-2;0,000000E0\n",
+        0.01,
+        1.0,
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "dt", "factor"), [each[1:] for each in READ], ids=[each[0] for each in READ])
+def test_a_table_is_read_as_its_heading_says(content: str, dt: float, factor: float | None, tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_bytes(content.encode())
+    (channel,) = channels(path)
+    assert channel.dt == pytest.approx(dt, rel=1e-15)
+    if factor is None:
+        assert len(channel.acceleration) == 4
+    else:
+        assert channel.acceleration == pytest.approx(np.array(SAMPLES) * factor, rel=1e-15)
+
+
+#: Name, content, line, and what is said of it.
+REFUSED = [
+    ("overflowed", "time (s),a (g)\n0.00,********\n" + rows(start=1), 2, "'********' is not a number"),
+    ("the letter O", "0.00,O.1\n" + rows(start=1), 1, "'O.1' is not a number"),
+    ("a time with the letter O", "time (s),a (g)\nO,0.1\n" + rows(start=1), 2, "'O' is not a number"),
+    ("a number with a letter", "t;a\n0;0,1x\n" + rows(start=1, sign=";", point=","), 2, "'0.1x' is not a number"),
+    ("a number with its unit", "time (s),a (g)\n0.00,0.1g\n" + rows(start=1), 2, "'0.1g' is not a number"),
+    ("thousands", "time (s);a (g)\n0;1.234,5\n" + rows(start=1, sign=";"), 2, "'1.234.5' is not a number, in"),
+    ("thousands between commas", "time (s),a (g)\n0,1.234,5\n" + rows(start=1), 2, "row: 3, in those below: 2"),
+    ("an empty time", "time (s),a (g)\n,0.1\n" + rows(start=1), 2, "row: 1, in those below: 2"),
+    ("an empty value", "time (s),a (g)\n0,\n" + rows(start=1), 2, "row: 1, in those below: 2"),
+    ("a spreadsheet's error", "time (s),a (g)\n0,#N/A\n" + rows(start=1), 2, "'#N/A' is not a number"),
+    ("a spreadsheet's error first", "time (s);a (g)\n#NV;0,1\n" + rows(sign=";", point=","), 2, "'#NV' is not"),
+    ("a spreadsheet's error among rows", "a (g)\n0.1\n#DIV/0!\n0.2\n", 3, "'#DIV/0!' is not a number"),
+    ("a narrow column", "a (g)\n0.1\n########\n0.2\n", 3, "'########' is not a number"),
+    ("not a number", "time (s),a (g)\n0,NaN\n" + rows(start=1), 2, "'NaN' is not a finite number"),
+    ("a dash", "0 -\n0.01 0.1\n0.02 0.3\n", 1, "'-' is not a number"),
+    ("a word for a value", "t (s)\ta (g)\n0\tfaulty\n" + rows(start=1, sign="\t"), 2, "'faulty' is not"),
+    ("a word for a time", "time,a (g)\nx,1\n" + rows(start=1), 2, "'x' is not a number"),
+    ("a word for a time first", "t (s)  a (g)\nx  0.1\n" + rows(start=1, sign="  "), 2, "'x' is not a number"),
+    ("a word for a time, no heading", "x;0,1\n" + rows(start=1, sign=";"), 1, "'x' is not a number"),
+    ("two spoilt rows", "t,a\n0,?\n\n0.01,?\n" + rows(start=2), 2, "'?' is not a number"),
+    ("one spoilt number", "a (g)\n0.l\n0.2\n0.3\n", 2, "'0.l' is not a number"),
+    ("9999", "time (s),a (g)\n0,0.1\n0.01,9999\n0.02,0.2\n", 3, "9999 seems to stand for a missing value"),
+    ("-9999.0", "time (s),a (g)\n0,0.1\n0.01,0.1\n0.02,-9999.0\n", 4, "-9999 seems to stand for a missing value"),
+    ("many of -999.9", "a (gal)\n1\n-999.9\n-999.9\n-3\n", 3, "-999.9 seems to stand for a missing value"),
+    ("a time of 9999", "time (s),a (g)\n0,0.1\n0.01,0.1\n9999,0.3\n", 4, "9999 seems to stand for a missing value"),
+    ("dates", "Time,a (g)\n2024-01-31 10:00:00.00,0.1\n2024-01-31 10:00:00.01,0.2\n", 2, "write times in seconds"),
+    ("an unknown unit of time", "Time (fortnights),a (g)\n" + rows(), 1, "not clear from 'fortnights'"),
+    ("a unit of time of something", "Duration (min): 3\nTime,a (g)\n" + rows(), 2, "not clear from 'min'"),
+    ("metres", "Time (m),a (g)\n" + rows(), 1, "not clear from 'm'"),
+    ("volts", "Time (s),Sensor (mV)\n" + rows(), 1, "the heading says 'mV', which is no unit of acceleration"),
+    ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the heading says 'cm/s'"),
+    ("a factor", "Time (s),a (10^-3 g)\n" + rows(), 1, "the heading says '10^-3 g'"),
+    ("two units", "Time (s),a (g or cm/s2)\n" + rows(), 1, "the heading says 'g or cm/s2'"),
+    ("numbers of rows and no times", "Sample,a (g)\n" + wide(COUNT, SAMPLES), 2, "give dt= in seconds"),
+    ("components and no times", "NS (g),EW (g)\n" + wide(OTHER, SAMPLES), 2, "give dt= in seconds"),
+    ("a spectrum", "Period (s),Sa (g)\n" + rows(), 1, "the column 'Period' is that of a spectrum"),
+    ("a spectrum of frequencies", "Frequency (Hz);a (g)\n" + rows(sign=";"), 1, "'Frequency' is that of a spectrum"),
+    ("unnamed columns", "0 1 2\n1 2 3\n2 3 4\n", 1, "each line holds 3 numbers"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "line", "what"), [each[1:] for each in REFUSED], ids=[each[0] for each in REFUSED])
+def test_what_is_lost_or_unclear_in_a_table_is_refused_with_its_line(
+    content: str, line: int, what: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "table.csv"
+    path.write_bytes(content.encode())
+    with pytest.raises(UnreadableRecord) as caught:
+        channels(path, dt=0.01 if "," not in content and ";" not in content and "\t" not in content else None)
+    message = str(caught.value)
+    assert message.startswith(f"{path}, line {line}: ")
+    assert what in message
+    assert "\n" not in message
+
+
+def test_every_column_of_times_is_for_the_channels_after_it(tmp_path: Path) -> None:
+    path = tmp_path / "pairs.csv"
+    later = [5.0, 5.02, 5.04, 5.06]
+    path.write_text("t1 (s),NS (g),t2 (s),EW (g)\n" + wide(TIMES, SAMPLES, later, OTHER))
+    first, second = channels(path)
+    assert [(each.name, each.dt) for each in (first, second)] == [("NS", 0.01), ("EW", 0.02)]
+
+
+def test_channels_without_times_take_the_step_that_is_given(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("NS (g),EW (g)\n" + wide(OTHER, SAMPLES))
+    first, second = channels(path, dt=0.02)
+    assert (first.name, first.dt, second.name) == ("NS", 0.02, "EW")
+    path.write_text("Sample,a (g)\n" + wide(COUNT, SAMPLES))
+    assert read(path, dt=0.02).step == 0.02
+    path.write_text("Sample,a (g)\n1,0.1\n2,0.3\n4,0.5\n")
+    with pytest.raises(UnreadableRecord, match="line 4: the number of this row does not follow"):
+        read(path, dt=0.02)
+
+
+def test_units_overrule_what_a_heading_says_and_lines_before_the_rows_may_hold_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "table.txt"
+    for title in ("1940 El Centro", "Magnitude 6.5", "180 deg", "Test 3, 12 March", "4 points", "# 0.00 0.1x"):
+        path.write_text(f"{title}\n" + rows(sign=" ", start=1))
+        assert read(path, units="g").samples[1] == pytest.approx(G * np.array(SAMPLES))
+    path.write_text("Time,0,90,UP\n" + wide(TIMES, SAMPLES, OTHER, OTHER))
+    assert [each.name for each in channels(path, units="g")] == ["0", "90", "UP"]
+    path.write_text("Time (s),v (cm/s)\n" + rows())
+    (channel,) = channels(path, units="g")
+    assert channel.metadata["heading units"] == "cm/s"
+    assert identify(path).reason == "from line 2 on each line holds two numbers, between them a comma"
+
+
+def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("t (ms),a (g)\n0,0.1\n5,0.2\n20,0.3\n")
+    (channel,) = channels(path)
+    assert channel.dt is None
+    assert channel.times is not None and channel.times.tolist() == [0.0, 0.005, 0.02]
+    path.write_text("t (ms),a (g)\n0,0.1\n5,0.2\n10,0.3\n")
+    assert read(path, dt=0.005).step == 0.005
+    with pytest.raises(UnreadableRecord, match=r"the sampling step is 0\.005 s, not dt = 5 s"):
+        read(path, dt=5.0)
+
+
+@pytest.mark.parametrize("unit", ["cm", "cm/s", "m/s", "mm"])
+def test_a_table_of_displacements_or_velocities_is_refused_without_advice_to_rename_them(tmp_path, unit):
+    path = tmp_path / "other.csv"
+    path.write_text(f"time (s),u ({unit})\n0.00,1\n0.01,2\n0.02,3\n0.03,2\n")
+    with pytest.raises(UnreadableRecord, match=r"no unit of an acceleration; give a table of accelerations$"):
+        read(path)
+
+
+def test_a_missing_row_among_even_times_is_noted(tmp_path):
+    def written(name, left_out):
+        path = tmp_path / name
+        rows = [f"{0.01 * k:.2f},{0.1 * ((7 * k) % 5 - 2):.3f}" for k in range(40) if k not in left_out]
+        path.write_text("\n".join(["time (s),a (g)", *rows]))
+        return reading_notes(read(path))
+
+    (note,) = written("gap.csv", {17})
+    assert note.startswith("the times go on by 0.01 s, but by 0.02 s after 0.16 s: are rows missing?")
+    assert written("whole.csv", set()) == ()
