@@ -7,11 +7,11 @@ are not, though ``float`` takes them: "0.2" is more often a mistake than a wish.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,14 +22,19 @@ from rocking.errors import RockingError
 #: Characters of a value in a message.
 _SHOWN: Final = 60
 
-Error = Callable[[str], RockingError]
+
+class Error(Protocol):
+    """What makes an error of a sentence, the names of arguments in it, and the value that is refused."""
+
+    def __call__(self, message: str, *arguments: str, value: object = None) -> RockingError:
+        """Return the error."""
 
 
 def number(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one real number (perhaps not finite)."""
     result = _real(value)
     if result is None:
-        raise error(f"{name} must be a number, not {shown(value)}")
+        raise error(f"{{}} must be a number, not {shown(value)}", name, value=value)
     return result
 
 
@@ -37,7 +42,7 @@ def finite(value: object, name: str, error: Error) -> float:
     """Return `value` as a float, or raise `error` unless it is one finite number."""
     result = _real(value)
     if result is None or not math.isfinite(result):
-        raise error(f"{name} must be a finite number, not {shown(value)}")
+        raise error(f"{{}} must be a finite number, not {shown(value)}", name, value=value)
     return result
 
 
@@ -45,7 +50,7 @@ def positive(value: object, name: str, error: Error, unit: str = "") -> float:
     """Return `value` as a float, or raise `error` unless it is one positive finite number."""
     result = _real(value)
     if result is None or not (math.isfinite(result) and result > 0.0):
-        raise error(f"{name} must be a positive number{_in(unit)}, not {shown(value)}")
+        raise error(f"{{}} must be a positive number{_in(unit)}, not {shown(value)}", name, value=value)
     return result
 
 
@@ -53,7 +58,7 @@ def within(value: object, name: str, error: Error, low: float, high: float, unit
     """Return `value` as a float, or raise `error` unless it is a number from `low` to `high`, both included."""
     result = _real(value)
     if result is None or not low <= result <= high:
-        raise error(f"{name} must be a number from {low:g} to {high:g}{_in(unit)}, not {shown(value)}")
+        raise error(f"{{}} must be a number from {low:g} to {high:g}{_in(unit)}, not {shown(value)}", name, value=value)
     return result
 
 
@@ -61,7 +66,7 @@ def share(value: object, name: str, error: Error, below: float = 1.0) -> float:
     """Return `value` as a float, or raise `error` unless it is a number above 0 and below `below`."""
     result = _real(value)
     if result is None or not 0.0 < result < below:
-        raise error(f"{name} must be a number between 0 and {below:g}, not {shown(value)}")
+        raise error(f"{{}} must be a number between 0 and {below:g}, not {shown(value)}", name, value=value)
     return result
 
 
@@ -71,42 +76,44 @@ def whole(value: object, name: str, error: Error, least: int, most: int | None =
     usable = isinstance(single, Integral) and not isinstance(single, bool)
     if not usable or not least <= single or not (most is None or single <= most):
         bounds = f"of at least {least}" if most is None else f"from {least} to {most}"
-        raise error(f"{name} must be a whole number {bounds}, not {shown(value)}")
+        raise error(f"{{}} must be a whole number {bounds}, not {shown(value)}", name, value=value)
     return int(single)
 
 
 def text(value: object, name: str, error: Error) -> str:
     """Return `value`, or raise `error` unless it is text."""
     if not isinstance(value, str):
-        raise error(f"{name} must be text, not {shown(value)}")
+        raise error(f"{{}} must be text, not {shown(value)}", name, value=value)
     return value
 
 
 def path(value: object, name: str, error: Error) -> Path:
     """Return `value` as a path, or raise `error` unless it is one, or text."""
     if not isinstance(value, (str, PathLike)):
-        raise error(f"{name} must be text or a path, not {shown(value)}")
+        raise error(f"{{}} must be text or a path, not {shown(value)}", name, value=value)
     return Path(value)
 
 
 def one_of(value: object, name: str, error: Error, choices: Sequence[str]) -> str:
     """Return `value`, or raise `error` unless it is one of the choices."""
     if not isinstance(value, str) or value not in choices:
-        raise error(f"{name} must be one of {', '.join(choices)}, not {shown(value)}")
+        raise error(f"{{}} must be one of {', '.join(choices)}, not {shown(value)}", name, value=value)
     return value
 
 
 def mapping(value: object, name: str, error: Error, example: str) -> Mapping[Any, Any]:
     """Return `value`, or raise `error` unless it is a mapping with an entry or more."""
     if not isinstance(value, Mapping) or not value:
-        raise error(f"{name} must be a mapping with one entry or more, as {example}, not {shown(value)}")
+        raise error(
+            f"{{}} must be a mapping with one entry or more, as {example}, not {shown(value)}", name, value=value
+        )
     return value
 
 
 def several(value: object, name: str, error: Error) -> list[Any]:
     """Return what `value` holds, one after the other, or raise `error` where it is text, a mapping or no collection."""
     if isinstance(value, (str, Mapping)) or not isinstance(value, Iterable):
-        raise error(f"{name} must be a list, not {shown(value)}")
+        raise error(f"{{}} must be a list, not {shown(value)}", name, value=value)
     return [*value]
 
 
@@ -121,15 +128,15 @@ def grid_size(sizes: Mapping[str, int], error: Error, most: int = 10_000_000) ->
 def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return real numbers (perhaps not finite) as an array of their shape, or raise `error`."""
     if np.ma.is_masked(values):
-        raise error(f"{name} must be numbers throughout, but some are masked")
+        raise error("{} must be numbers throughout, but some are masked", name, value=values)
     try:
         given = np.asarray(values)
         if given.dtype.kind == "O":
             given = np.reshape([number(value, name, error) for value in given.ravel()], given.shape)
     except (TypeError, ValueError):
-        raise error(f"{name} must be a number or an array of numbers, not {shown(values)}") from None
+        raise error(f"{{}} must be a number or an array of numbers, not {shown(values)}", name, value=values) from None
     if given.dtype.kind not in "iuf" and given.size:
-        raise error(f"{name} must be a number or an array of numbers, not {shown(values)}")
+        raise error(f"{{}} must be a number or an array of numbers, not {shown(values)}", name, value=values)
     return np.asarray(given, dtype=np.float64)
 
 
@@ -137,7 +144,7 @@ def positive_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return one or more positive finite numbers as a flat array, or raise `error`."""
     axis = np.atleast_1d(numbers(values, name, error))
     if axis.ndim != 1 or not axis.size or not np.all(np.isfinite(axis) & (axis > 0.0)):
-        raise error(f"{name} must be one or more positive finite numbers")
+        raise error("{} must be one or more positive finite numbers", name, value=values)
     return axis
 
 
@@ -145,7 +152,7 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return positive finite numbers in increasing order, or raise `error`."""
     axis = positive_numbers(values, name, error)
     if not np.all(np.diff(axis) > 0.0):
-        raise error(f"{name} must increase from one to the next")
+        raise error("{} must increase from one to the next", name, value=values)
     return axis
 
 

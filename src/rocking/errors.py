@@ -1,11 +1,111 @@
 """Exceptions of the package: one base class, one subclass per kind of bad input.
 
-Every message is one sentence that says what is wrong, where, and how to mend it.
+Every message is one sentence that says what is wrong, where, and how to correct it. What it is about is also kept as
+data, so that no code needs to read a sentence.
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+#: How a name of an argument is written: the command line writes its option, a page the label of its field.
+Spelling = Callable[[str], str]
+
+
+def as_argument(name: str) -> str:
+    """Write the name of an argument as Python does."""
+    return name
+
+
+@dataclass(frozen=True)
+class Message:
+    """A sentence that may name arguments.
+
+    Attributes
+    ----------
+    template : str
+        The sentence; each "{}" in it stands for a name of an argument.
+    arguments : tuple of str
+        Those names, in their order.
+    """
+
+    template: str
+    arguments: tuple[str, ...] = ()
+
+    def text(self, spelling: Spelling = as_argument) -> str:
+        """Return the sentence in one line, with names as ``spelling`` writes them.
+
+        Examples
+        --------
+        >>> Message("{} needs {}, in s", ("sa", "period")).text(lambda name: f"--{name}")
+        '--sa needs --period, in s'
+        """
+        first, *others = self.template.split("{}", len(self.arguments))
+        names = map(spelling, self.arguments)
+        return " ".join("".join([first, *(name + rest for name, rest in zip(names, others, strict=False))]).split())
 
 
 class RockingError(Exception):
-    """Base of every error that the package raises on purpose."""
+    """Base of every error that the package raises on purpose.
+
+    Parameters
+    ----------
+    message : str
+        One sentence; each "{}" in it stands for one of `arguments`.
+    *arguments : str
+        Names of the arguments that the sentence names, the one that is wrong first.
+    path : str, optional
+        The file that is wrong; the sentence itself does not name it.
+    line : int, optional
+        The line of the file, from 1.
+    value : object, optional
+        What was given.
+
+    Attributes
+    ----------
+    argument : str or None
+        Name of the argument that is wrong.
+    message : Message
+        The sentence without the file's name.
+    path, line, value
+        As above.
+
+    Examples
+    --------
+    >>> error = InvalidMotion("{} must be positive, in s, not -1", "dt", path="a.csv", line=3, value=-1)
+    >>> print(error)
+    a.csv, line 3: dt must be positive, in s, not -1
+    >>> error.argument, error.path, error.line, error.value
+    ('dt', 'a.csv', 3, -1)
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *arguments: str,
+        path: str | None = None,
+        line: int | None = None,
+        value: object = None,
+    ) -> None:
+        super().__init__(message, *arguments)
+        self.message = Message(message, arguments)
+        self.path, self.line, self.value = path, line, value
+
+    @property
+    def argument(self) -> str | None:
+        """Name of the argument that is wrong, where the message names one."""
+        return self.message.arguments[0] if self.message.arguments else None
+
+    def text(self, spelling: Spelling = as_argument) -> str:
+        """Return file, line and sentence, with names of arguments as ``spelling`` writes them."""
+        where = (
+            "" if self.path is None else f"{self.path}: " if self.line is None else f"{self.path}, line {self.line}: "
+        )
+        return where + self.message.text(spelling)
+
+    def __str__(self) -> str:
+        return self.text()
 
 
 class InvalidBlock(RockingError):
@@ -33,21 +133,10 @@ class StudyError(RockingError):
 
 
 class DamagedStudy(StudyError):
-    """A unit of a study is damaged, and can be computed again.
-
-    Attributes
-    ----------
-    fault : str
-        Which unit it is, and what is wrong with it.
-    """
-
-    def __init__(self, fault: str) -> None:
-        super().__init__(fault)
-        self.fault = fault
+    """A unit of a study is damaged, and can be computed again: the message says which, and what is wrong with it."""
 
     def __str__(self) -> str:
-        """Say how it is mended, too."""
-        return f"{self.fault}: the study's verify(repair=True) computes it again"
+        return f"{self.text()}: the study's verify(repair=True) computes it again"
 
 
 class OutsideFit(UserWarning):

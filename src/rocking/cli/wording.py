@@ -37,7 +37,7 @@ def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
     if isinstance(error, CycloptsError):
         return f"{sentence}; see {command} --help"
     if isinstance(error, DamagedStudy):
-        return f"{error.fault}: rocking study verify FOLDER --repair computes it again"
+        return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
     return in_options(sentence, app, arguments)
 
 

@@ -534,7 +534,7 @@ def _fault(part: Store | Round, key: Key) -> str:
     try:
         part.outcomes(key)
     except DamagedStudy as error:
-        return error.fault
+        return error.text()
     return ""
 
 
