@@ -10,9 +10,8 @@ from kernel_records import MINUS, PLUS, ULP, in_units_of_g, rocking_block, rules
 from oracles.exact import exact, first_above, polynomial, turning_points
 
 from rocking.kernels.arc import expand
-from rocking.kernels.impact import advance, strike
-from rocking.kernels.state import new_scratch
-from rocking.kernels.status import IMPACT, OVERTURN, STEP
+from rocking.kernels.events import advance, apply_impact
+from rocking.kernels.state import IMPACT, OVERTURN, STEP, new_scratch
 
 QUARTER_TURN = 0.5 * math.pi
 
@@ -154,7 +153,7 @@ def test_an_impact_slows_down_and_enters_the_next_side(entered: tuple[int, int],
     block["entered"] = entered
     for side in (PLUS, MINUS):
         hit = state_of(side, 1e-18, v)
-        speed = strike(block, hit)
+        speed = apply_impact(block, hit)
         assert speed == max(0.0, -v)
         assert (hit["side"], hit["u"], hit["v"]) == (entered[side], 0.0, (0.5, 0.8)[side] * speed)
         assert hit["impacts"] == 1

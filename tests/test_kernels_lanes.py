@@ -14,21 +14,18 @@ from oracles.weighted import Arc
 from rocking.kernels import state
 from rocking.kernels.arc import Line, evaluate, expand
 from rocking.kernels.ground import Ground
-from rocking.kernels.lanes.crew import (
+from rocking.kernels.lanes.pool import (
     LONGEST_SUBSTEP,
     LONGEST_WEIGHTED_SUBSTEP,
     WIDTH,
-    Crew,
-    crew_of,
-    lean,
+    Pool,
     load,
+    pool_of,
+    set_angles,
     stumpff,
     unload,
 )
-from rocking.kernels.lanes.events import is_quiet
-from rocking.kernels.lanes.linear import step_linear
-from rocking.kernels.lanes.nonlinear import step_nonlinear
-from rocking.kernels.lanes.weighted import step_weighted
+from rocking.kernels.lanes.steps import is_event_free, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.state import Record, Records, new_scratch
 
 mp = mpmath.mp.clone()
@@ -91,12 +88,12 @@ def stepped(
     fallen: float = QUARTER_TURN,
 ) -> list[Step]:
     """Take up to a group of blocks through one sample that starts with row[0] and changes by row[1] per second."""
-    crew: Crew = crew_of(blocks, states, 1, h, way.substeps if way.nonlinear else 0)
+    pool: Pool = pool_of(blocks, states, 1, h, way.substeps if way.nonlinear else 0)
     for lane in range(len(blocks)):
-        load(crew, lane, lane)
+        load(pool, lane, lane)
         if way.nonlinear:
-            lean(crew, lane, lane)
-    group = crew.groups[0]
+            set_angles(pool, lane, lane)
+    group = pool.groups[0]
     before = states.copy()
     if way.nonlinear:
         busy = step_nonlinear(group, row, way.weight, h + late, h, way.substeps, fallen)
@@ -109,7 +106,7 @@ def stepped(
     assert not np.any(group["event"][len(blocks) :]) or not np.all(np.isfinite(row))  # empty lanes
     ground = in_units_of_g([0.0, 1.0, 2.0], [[0.0, 0.0]] * 2)
     for lane in range(len(blocks)):
-        assert unload(ground, crew, lane, 1) == lane
+        assert unload(ground, pool, lane, 1) == lane
     return [Step(blocks[k], before[k], states[k], not events[k]) for k in range(len(blocks))]
 
 
@@ -451,7 +448,7 @@ def test_the_test_of_events_never_calls_not_a_number_quiet(which: int) -> None:
     numbers = [0.1, 0.2, 1.0, 0.01, 0.01, -0.1, 0.1, 0.5, 1.5]
 
     def quiet(x: list[float]) -> bool:
-        return bool(is_quiet((x[0], x[1]), x[2], x[3], x[4], (x[5], x[6]), x[7], x[8]))
+        return bool(is_event_free((x[0], x[1]), x[2], x[3], x[4], (x[5], x[6]), x[7], x[8]))
 
     assert quiet(numbers)
     numbers[which] = math.nan

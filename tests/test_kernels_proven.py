@@ -10,9 +10,9 @@ from test_kernels_march import Run, record, run, with_rows
 
 from rocking.kernels import state
 from rocking.kernels.ground import Ground
-from rocking.kernels.proven import pass_proven_impacts
+from rocking.kernels.rest import pass_proven_impacts
 from rocking.kernels.state import Record
-from rocking.kernels.tables import PROVEN_A_TURN, has_room
+from rocking.kernels.trace import PROVEN_PER_ITERATION, has_space
 
 
 def one_by_one(ground: Ground) -> Ground:
@@ -93,11 +93,11 @@ def test_nothing_is_passed_beyond_the_end_of_the_piece() -> None:
     assert found["offset"] == pytest.approx(flight, rel=1e-2)
 
 
-def test_a_turn_passes_no_more_impacts_than_every_table_has_room_for() -> None:
+def test_a_turn_passes_no_more_impacts_than_every_table_has_space_for() -> None:
     found = passed(STEADY, proven(1e-3), e=0.99)
-    assert found["impacts"] == found["nodes"] == PROVEN_A_TURN
-    assert not has_room(rules_for(), state.new_table(PROVEN_A_TURN + 2), proven(1e-3))
-    assert has_room(rules_for(), state.new_table(PROVEN_A_TURN + 3), proven(1e-3))
+    assert found["impacts"] == found["nodes"] == PROVEN_PER_ITERATION
+    assert not has_space(rules_for(), state.new_table(PROVEN_PER_ITERATION + 2), proven(1e-3))
+    assert has_space(rules_for(), state.new_table(PROVEN_PER_ITERATION + 3), proven(1e-3))
 
 
 def test_a_table_that_is_full_within_a_proven_sequence_changes_no_bit() -> None:

@@ -13,7 +13,7 @@ from kernel_records import ULP
 from oracles.exact import as_float, exact, polynomial, real_roots
 
 from rocking.kernels import root
-from rocking.kernels.root import curvature_bound, first_root
+from rocking.kernels.events import curvature_bound, first_root
 
 quick = settings(deadline=None, max_examples=150)
 

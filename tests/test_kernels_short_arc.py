@@ -13,10 +13,9 @@ from oracles.exact import exact, real_roots
 from oracles.weighted import Arc
 
 from rocking.kernels.arc import Line, evaluate, expand
-from rocking.kernels.impact import Arrival, advance
+from rocking.kernels.events import StepEnd, advance
 from rocking.kernels.short_arc import short_step
-from rocking.kernels.state import Record, new_scratch
-from rocking.kernels.status import IMPACT, OVERTURN, STEP, UNDECIDED
+from rocking.kernels.state import IMPACT, OVERTURN, STEP, UNDECIDED, Record, new_scratch
 
 quick = settings(deadline=None, max_examples=200)
 weights = pytest.mark.parametrize("weighted", [False, True], ids=["at rest", "weighted"])
@@ -38,11 +37,11 @@ class Case:
         self.rules = rules_for(nonlinear=nonlinear)
         self.scratch = new_scratch()
 
-    def short(self, start: Record, left: float) -> Arrival:
+    def short(self, start: Record, left: float) -> StepEnd:
         return short_step(self.ground, self.block, self.rules, start, left)
 
-    def long(self, start: Record, left: float) -> tuple[Arrival, float]:
-        """Arrival, and how far the series reaches."""
+    def long(self, start: Record, left: float) -> tuple[StepEnd, float]:
+        """StepEnd, and how far the series reaches."""
         order, h, _ = expand(self.ground, self.block, self.rules, self.scratch, start, left)
         return advance(start, self.scratch, order, h, self.block["fallen"]), h
 

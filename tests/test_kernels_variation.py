@@ -10,7 +10,7 @@ from kernel_records import Pair, block_of, ground_of, in_units_of_g, rocking_blo
 from oracles import multiprecision
 from oracles.problem import Problem
 
-from rocking.kernels import state, variation
+from rocking.kernels import state
 from rocking.kernels.arc import evaluate, expand, restoring
 from rocking.kernels.state import Record, new_scratch
 from rocking.kernels.trace import Trail
@@ -63,7 +63,7 @@ def test_the_variation_along_an_arc_is_the_derivative_by_what_is_changed(
         assert h >= 0.9 * at
         return np.array(evaluate(scratch["rotation"], order, at)[:2])
 
-    scratch, work = new_scratch(), np.zeros(variation.WORK)
+    scratch, work = new_scratch(), state.record(state.VARIATION)
     trail = Trail(*problem(0.0), rules, state.records(0, state.NODE_ROW))
     _, h, _ = expand(*problem(0.0), rules, scratch, state_of(side, u, v), step)
     at = 0.8 * h
