@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernel_records import ULP, in_units_of_g, one_sided, rocking_block, rules_for, state_of
-from oracles.weighted import Arc
+from oracles.taylor import System, after
 
 from rocking.kernels import state
 from rocking.kernels.arc import Line, evaluate, expand
@@ -100,7 +100,7 @@ def stepped(
     elif way.weight is not None:
         busy = step_weighted(group, row, way.weight, h + late, way.substeps, fallen)
     else:
-        busy = step_linear(group, row[0], row[1], h, late, fallen)
+        busy = step_linear(group, row, h, late, fallen)
     events = np.array(group["event"][: len(blocks)], dtype=bool)
     assert busy == np.sum(group["event"])
     assert not np.any(group["event"][len(blocks) :]) or not np.all(np.isfinite(row))  # empty lanes
@@ -129,15 +129,11 @@ def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: flo
 
 
 def linear_end(step: Step, row: tuple[float, float], t: float) -> tuple[mpmath.mpf, mpmath.mpf]:
-    """Rotation and velocity by Stumpff's functions in 60 digits."""
+    """Rotation and velocity in 60 digits."""
     side = int(step.start["side"])
-    lam, gain, threshold = (mp.mpf(float(step.block[name][side])) for name in ("stiffness", "gain", "threshold"))
-    sign, t = 1 - 2 * side, mp.mpf(t)
-    u, v = mp.mpf(float(step.start["u"])), mp.mpf(float(step.start["v"]))
-    w = lam * u - gain * (threshold + sign * mp.mpf(row[0]))
-    j = lam * v - gain * sign * mp.mpf(row[1])
-    c = [sum((lam * t * t) ** i / mp.factorial(k + 2 * i) for i in range(30)) for k in range(4)]
-    return u + v * t + c[2] * w * t**2 + c[3] * j * t**3, v + c[1] * w * t + c[2] * j * t**2
+    lam, gain, threshold = (float(step.block[name][side]) for name in ("stiffness", "gain", "threshold"))
+    push = [(1 - 2 * side) * x for x in row]
+    return after(System(lam, threshold, gain=gain), step.start["u"], step.start["v"], t, push)
 
 
 @pytest.mark.parametrize("late", [0.0, 1e-9, -1e-9])
@@ -231,11 +227,11 @@ def test_a_quiet_step_is_exact_while_the_weight_changes(nonlinear: bool, kind: s
                 continue
             quiet += 1
             side = int(step.start["side"])
-            p, alpha = math.sqrt(step.block["stiffness"][side]), float(step.block["slenderness"][side])
+            lam, alpha = float(step.block["stiffness"][side]), float(step.block["slenderness"][side])
             toward = (push[0] * (1 - 2 * side), push[1] * (1 - 2 * side))
-            arc = Arc(nonlinear, p, alpha, float(step.start["u"]), float(step.start["v"]), toward, weight)
-            u, v = arc.after(1.0)
-            pulls = p * p * (alpha * (abs(weight[0]) + abs(weight[1])) + abs(push[0]) + abs(push[1]))
+            system = System(lam, alpha, nonlinear)
+            u, v = after(system, step.start["u"], step.start["v"], 1.0, toward, weight)
+            pulls = lam * (alpha * (abs(weight[0]) + abs(weight[1])) + abs(push[0]) + abs(push[1]))
             size = max(abs(step.start["u"]), abs(step.start["v"]), abs(u), abs(v), pulls, 0.125 * alpha * nonlinear)
             assert abs(step.end["u"] - u) <= 8.0 * substeps * ULP * size
             assert abs(step.end["v"] - v) <= 8.0 * substeps * ULP * size

@@ -29,9 +29,9 @@ def passed(ground: Ground, start: Record, *, rows: int = 100, left: float = 9.0,
     return start
 
 
-def proven(v: float, *, peak: float = 1.0, worth: float = 1e-5, offset: float = 0.0) -> Record:
+def proven(v: float, *, peak: float = 1.0, proof_speed: float = 1e-5, offset: float = 0.0) -> Record:
     """Just after an impact from which chattering has been proven."""
-    return state_of(0, 0.0, v, peak=peak, worth=worth, run=1, offset=offset)
+    return state_of(0, 0.0, v, peak=peak, proof_speed=proof_speed, run=1, offset=offset)
 
 
 STEADY = in_units_of_g([0.0, 9.0], [[0.02, 0.01]])
@@ -65,7 +65,7 @@ def test_impacts_are_passed_down_to_the_speed_that_is_worth_a_proof() -> None:
     assert found["run"] == found["impacts"] + 1
     assert found["budget"] == 10**6 - found["impacts"]
     assert 1e-5 < found["v"] < 1.2e-5
-    assert found["struck"] == found["offset"]
+    assert found["last_impact_time"] == found["offset"]
 
 
 def test_a_peak_among_proven_impacts_is_not_lost() -> None:

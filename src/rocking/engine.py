@@ -270,7 +270,7 @@ def _march_on(ground: Ground, rules: Record, bodies: Records, states: Records, s
                 return
             one["budget"] = SLICE
             one["ending"] = march(ground, bodies[k], rules, nothing, scratch, one)
-            if one["ending"] != state.Ending.PAUSED:
+            if int(one["ending"]) != state.Ending.PAUSED:
                 break
         else:
             one["ending"] = state.Ending.UNFINISHED

@@ -11,7 +11,6 @@ import numpy as np
 
 from rocking.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.state import Records, attributed
 
 #: Relative allowance for rounding in bounds.
 ROUNDING = 2.0**-48
@@ -24,20 +23,17 @@ _LONGEST_WINDOW = 128
 
 _START, _LENGTH, _FIRST = 0, 1, 2
 
-#: Bounds on one stretch for one component: a `Window` as a record.
-STRETCH_BOUNDS = np.dtype([(name, "f8") for name in ("low", "high", "slope", "jumps")], align=True)
-
 
 class Ground(NamedTuple):
     """A motion, seen by one of its components.
 
-    Its pieces; bounds on each stretch of them (`STRETCH_BOUNDS`), a row each and a column for each component; its
+    Its pieces; bounds on each stretch of them of shape (stretches, components, 4), the last as in `Window`; its
     approximation error (g); the number of coefficients
     of a component, and the column of the first one of this component: the horizontal one, but for `vertical_of`.
     """
 
     pieces: Floats
-    stretches: Records
+    stretches: Floats
     error: float
     columns: int
     first: int
@@ -65,7 +61,7 @@ def ground_of(
     components = [coefficients] if vertical is None else [coefficients, vertical]
     columns = max(2, *(component.shape[1] for component in components))
     pieces = np.zeros((len(coefficients) + 1, _FIRST + columns * len(components)))
-    stretches = attributed(np.zeros((-(-len(pieces) // STRETCH), len(components)), dtype=STRETCH_BOUNDS))
+    stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), len(Window._fields)))
     ground = Ground(pieces, stretches, error * unit, columns, _FIRST)
     for k, component in enumerate(components):
         seen = ground._replace(first=_FIRST + k * columns)
@@ -81,8 +77,8 @@ def components(ground: Ground, pieces: Integers) -> list[Floats]:
 
 def greatest_weight(ground: Ground) -> float:
     """Greatest size of the weight in the ground's frame, over that at rest."""
-    lifts = ground.stretches[:, 1:]
-    return max(float(np.max(np.abs(1.0 + lifts[name]), initial=1.0)) for name in ("low", "high"))
+    lifts = Window(*np.moveaxis(ground.stretches[:, 1:], -1, 0))
+    return float(np.max(np.abs(1.0 + np.array([lifts.low, lifts.high])), initial=1.0))
 
 
 @kernel
@@ -111,14 +107,14 @@ def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground,
 def put_stretch(ground: Ground, stretch: int, bounds: Window) -> None:
     """Write the bounds on a stretch."""
     row = ground.stretches[stretch, component_of(ground)]
-    row.low, row.high, row.slope, row.jumps = bounds
+    row[0], row[1], row[2], row[3] = bounds
 
 
 @inlined
 def stretch_bounds(ground: Ground, stretch: int) -> Window:
     """Bounds on a stretch."""
     row = ground.stretches[stretch, component_of(ground)]
-    return Window(row.low, row.high, row.slope, row.jumps)
+    return Window(row[0], row[1], row[2], row[3])
 
 
 @inlined
@@ -309,7 +305,7 @@ def next_beyond(ground: Ground, piece: int, below: float, above: float) -> int:
     while piece < last_piece(ground):
         stretch = piece // STRETCH
         weight = 1.0 + (stretch_bounds(vertical_of(ground), stretch).low if has_vertical(ground) else 0.0)
-        bounds = ground.stretches[stretch, 0]
+        bounds = stretch_bounds(ground, stretch)
         if bounds.low < below * weight or bounds.high > above * weight:
             return piece
         piece = (stretch + 1) * STRETCH

@@ -37,18 +37,19 @@ def march(ground: Ground, block: Record, rules: Record, table: Records, scratch:
 
     RUNNING: the piece ``state.until`` is reached; a block at rest may have gone on to its next uplift. PAUSED: the
     budget is spent. FULL: the table has no space left. After each of them, call again with the same state. DONE,
-    OVERTURNED, BALANCED: the march is over.
+    OVERTURNED, BALANCED: the march is over. A plain integer is returned: to make an `IntEnum` of it takes numba as long
+    as a short march.
     """
     while state.piece < state.until:
         if state.budget <= 0:
-            return Ending.PAUSED
+            return Ending.PAUSED.value
         if not has_space(rules, table, state):
-            return Ending.FULL
+            return Ending.FULL.value
         state.budget -= 1
         ending = march_step(ground, block, rules, table, scratch, state)
         if ending != Ending.RUNNING:
-            return ending
-    return Ending.RUNNING
+            return ending.value
+    return Ending.RUNNING.value
 
 
 @inlined

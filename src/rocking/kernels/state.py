@@ -146,7 +146,7 @@ def new_states(count: int, budget: int) -> Records:
     states = records(count, STATE)
     states["side"] = AT_REST
     states["until"] = TO_THE_END
-    states["ending"] = Ending.RUNNING
+    states["ending"] = Ending.RUNNING.value
     states["budget"] = budget
     return states
 
