@@ -1,9 +1,11 @@
 """Fixtures shared by all tests."""
 
+import json
 import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -49,3 +51,11 @@ def shared() -> Path:
     if not SHARED.is_dir():
         pytest.skip("the shared folder with reference data is not on this machine")
     return SHARED
+
+
+@pytest.fixture(scope="session")
+def reference() -> dict[str, Any]:
+    """Values of many digits that were computed elsewhere: chattering, and responses to records."""
+    path = Path(__file__).parent / "data" / "reference.json"
+    values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return values

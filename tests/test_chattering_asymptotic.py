@@ -1,7 +1,5 @@
 """The paper's asymptotic scheme: Eq. 65 against its printed terms, and against the exact sequence."""
 
-import json
-
 import numpy as np
 import pytest
 from oracles.paper_scheme import cycles
@@ -10,8 +8,7 @@ from rocking import chattering
 from rocking.errors import InvalidOption
 
 
-def test_eq65_of_the_reference(shared):
-    reference = json.loads((shared / "reference" / "reference.json").read_text())
+def test_eq65_of_the_reference(reference):
     for case in reference["paper_scheme_eq65"]:
         time = chattering.chattering_time(case["a"], case["omega"], case["eta"], method="asymptotic")
         assert time == pytest.approx(case["tau"], rel=1e-13)

@@ -1,7 +1,5 @@
 """The critical amplitude: exact, proven from both sides, the paper's fits, and the closed approximation."""
 
-import json
-
 import numpy as np
 import pytest
 from oracles.sine_chattering import settle
@@ -11,8 +9,7 @@ from rocking.chattering.theory.surface_coefficients import LARGEST_ERROR
 from rocking.errors import InvalidOption
 
 
-def test_critical_amplitudes_of_the_reference(shared):
-    reference = json.loads((shared / "reference" / "reference.json").read_text())
+def test_critical_amplitudes_of_the_reference(reference):
     for case in reference["critical_amplitude"]:
         assert chattering.critical_amplitude(case["omega"], case["eta"]) == pytest.approx(case["value"], abs=1e-13)
 

@@ -1,7 +1,5 @@
 """Impact by impact: intervals and speeds in 80 digits, and the bracket on the time of rest, proven."""
 
-import json
-
 import numpy as np
 import pytest
 from flint import arb
@@ -22,8 +20,7 @@ CASES = [
 ]
 
 
-def test_first_intervals_of_the_reference(shared):
-    reference = json.loads((shared / "reference" / "reference.json").read_text())
+def test_first_intervals_of_the_reference(reference):
     for case in reference["chattering_time"]:
         if "first_intervals" in case:
             sequence = chattering.sequence(case["a"], case["omega"], case["eta"])

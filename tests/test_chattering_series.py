@@ -1,7 +1,5 @@
 """The consistent expansion: coefficients, rising order of its error, and where it stops converging."""
 
-import json
-
 import mpmath
 import numpy as np
 import pytest
@@ -11,17 +9,17 @@ from rocking import chattering
 from rocking.errors import InvalidOption
 
 
-def test_coefficients_of_the_reference(shared):
-    known = json.loads((shared / "reference" / "reference.json").read_text())["series_at_eta_092"]
+def test_coefficients_of_the_reference(reference):
+    known = reference["series_at_eta_092"]
     coefficients = chattering.series_coefficients(known["omega"], 0.92, order=4) * known["omega"]
     assert coefficients[0] == pytest.approx(known["c1"], rel=1e-12)
     assert coefficients[1] == pytest.approx(known["c3"], rel=1e-9)
     assert coefficients[2:] == pytest.approx([known["c5"], known["c7"]], rel=1e-8)
 
 
-def test_frequency_enters_as_known(shared):
+def test_frequency_enters_as_known(reference):
     """C1 omega is free of omega, and C_{2k+1} omega a polynomial of degree k in 1/omega^2."""
-    known = json.loads((shared / "reference" / "reference.json").read_text())["series_at_eta_092"]
+    known = reference["series_at_eta_092"]
     omega = np.array([0.5, 1.0, 2.0, 4.0, 8.0])
     scaled = chattering.series_coefficients(omega, 0.92, order=4) * omega[:, None]
     assert scaled[:, 0] == pytest.approx(known["c1"], rel=1e-12)

@@ -21,11 +21,6 @@ from rocking.kernels.sine.sequence import semianalytical_phases
 EPS_SERIES_C1 = 10.827447906757
 
 
-@pytest.fixture(scope="module")
-def reference(shared):
-    return json.loads((shared / "reference" / "reference.json").read_text())
-
-
 def random_parameters(count, seed, spread=1.5):
     """Omega in [0.4, 10], eta in [0.5, 0.97], and amplitudes on both sides of the critical one, many close to it."""
     rng = np.random.default_rng(seed)

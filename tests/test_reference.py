@@ -1,6 +1,5 @@
 """Whole responses and chattering times against values computed elsewhere."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +14,6 @@ from oracles.scipy_events import integrate
 import rocking
 
 ULP = 2.0**-52
-
-
-@pytest.fixture(scope="module")
-def reference(shared: Path) -> dict[str, Any]:
-    loaded: dict[str, Any] = json.loads((shared / "reference" / "reference.json").read_text())
-    return loaded
 
 
 @pytest.fixture(scope="module")

@@ -114,7 +114,7 @@ def test_the_bound_of_nine_terms_is_that_of_any_number() -> None:
         nothing, rest = arc.is_left_out_nothing(tuple(sizes), tuple(angles), lam, strength)
         assert rest == pytest.approx(np.arange(2.0, 9.0) @ sizes[2:])
         if nothing:
-            assert bound <= 2.0**-48 * sizes.sum()
+            assert bound <= 2.0**-52 * sizes.sum()
         elif bound > 0.0:
-            assert bound >= 0.9 * 2.0**-48 * sizes.sum()
+            assert bound >= 0.9 * 2.0**-52 * sizes.sum()
     assert judged > 500

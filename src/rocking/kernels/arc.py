@@ -31,7 +31,7 @@ _LEFT_OUT = 2.0**-54
 
 #: Nine times the largest bound on all that nine terms leave out of a nonlinear velocity, over the sum of their sizes.
 #: The bound is a few times what they leave out. It holds where two sums are below a quarter.
-_LEFT_OUT_OF_NINE = 9.0 * 2.0**-48
+_LEFT_OUT_OF_NINE = 9.0 * 2.0**-52
 _QUARTER = 0.25
 
 #: Of the velocity's terms: none that is smaller counts.
@@ -343,7 +343,7 @@ def strength_of(weight: Line | None, push: Line, t: float) -> Line:
 
 @inlined
 def is_left_out_nothing(r: Nine, z: Seven, stiff: float, strength: Line) -> tuple[bool, float]:
-    """Whether nine terms leave out next to nothing (2^-48); and the size of all that the first leaves out of u''.
+    """Whether nine terms leave out next to nothing (2^-52); and the size of all that the first leaves out of u''.
 
     `left_out_nonlinear` for a motion and a weight that change evenly, with time, as in u'', counted in steps of length
     h; ``stiff`` is lam h^2.

@@ -16,7 +16,7 @@ WIDTH = 32
 #: Largest sqrt(|lam W|) h of a block in lanes, W being its weight over that at rest; of one substep of the nonlinear
 #: model; and of one of the linear model while the weight changes.
 LONGEST_STEP = 1.0
-LONGEST_SUBSTEP = 0.055
+LONGEST_SUBSTEP = 0.04
 LONGEST_WEIGHTED_SUBSTEP = 0.125
 
 #: Rotation of a lane without a block.

@@ -1,0 +1,96 @@
+"""The public names of the package, and what numpydoc finds missing in their docstrings.
+
+    python tests/public_names.py
+
+lists the faults, one a line, and exits with 1 where there are some.
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import rocking
+
+#: Checks of numpydoc: form and order of sections; parameters, returns and yields without a name, a type or a word.
+CHECKS = frozenset({"GL01", "GL03", "GL05", "GL06", "GL07", "GL08", "PR02", "PR03", "PR04", "PR07", "RT03"})
+
+#: Those of functions and methods, which also need parameters, results and an example.
+CHECKS_OF_FUNCTIONS = CHECKS | {"PR01", "RT01", "YD01", "EX01"}
+
+
+def public_modules() -> Iterator[Any]:
+    """Modules that a user reaches by attributes: the package, and each module among the names of one."""
+    waiting, seen = [rocking], set()
+    while waiting:
+        module = waiting.pop()
+        seen.add(module.__name__)
+        yield module
+        members = [getattr(module, name) for name in names_of(module)]
+        waiting += [each for each in members if inspect.ismodule(each) and each.__name__ not in seen]
+
+
+def names_of(module: Any) -> list[str]:
+    """Names that a module offers: those it lists, or the public ones that it defines."""
+    listed = getattr(module, "__all__", None)
+    own = (name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__)
+    return sorted(listed or (name for name in own if not name.startswith("_")))
+
+
+def public_names() -> dict[str, Any]:
+    """Functions and classes by the name under which a user finds them."""
+    found: dict[str, Any] = {}
+    for module in public_modules():
+        for name in names_of(module):
+            value = getattr(module, name)
+            if callable(value) and (value.__module__ or "").startswith("rocking"):
+                found.setdefault(f"{module.__name__}.{name}", value)
+    return found
+
+
+def public_members() -> dict[str, Any]:
+    """Functions, classes, and their own methods and properties, each by its name."""
+    found: dict[str, Any] = {}
+    for name, value in public_names().items():
+        found[name] = value
+        if inspect.isclass(value):
+            own = {key: member for key, member in vars(value).items() if not key.startswith("_")}
+            found |= {f"{name}.{key}": _plain(member) for key, member in own.items() if _is_member(member)}
+    return found
+
+
+def callables() -> dict[str, Callable[..., Any]]:
+    """Functions, methods, and classes whose constructor is part of the interface."""
+    return {name: value for name, value in public_members().items() if callable(value)}
+
+
+def faults() -> list[str]:
+    """List what is missing in the docstrings, one fault a line."""
+    from numpydoc.docscrape import get_doc_object
+    from numpydoc.validate import validate
+
+    found = []
+    for name, member in public_members().items():
+        wanted = CHECKS_OF_FUNCTIONS if inspect.isfunction(member) else CHECKS
+        # What a property is, its one line says; and a class that only the package makes has attributes.
+        if isinstance(member, property) or "Attributes\n" in (inspect.getdoc(member) or ""):
+            wanted = wanted - {"PR02", "PR03"}
+        errors = validate(get_doc_object(member))["errors"]
+        found += [f"{name}: {code} {text}" for code, text in errors if code in wanted]
+    return found
+
+
+def _is_member(member: Any) -> bool:
+    return inspect.isfunction(member) or isinstance(member, (property, classmethod, staticmethod))
+
+
+def _plain(member: Any) -> Any:
+    return member.__func__ if isinstance(member, (classmethod, staticmethod)) else member
+
+
+if __name__ == "__main__":
+    lines = faults()
+    print("\n".join(lines))
+    sys.exit(bool(lines))
