@@ -9,8 +9,8 @@ from rocking import chattering
 from rocking.chattering.theory import duration
 from rocking.kernels.sine import Verdict, lanes
 from rocking.kernels.sine.arc import State, arc, basis
-from rocking.kernels.sine.sequence import remaining_phase, remaining_series, rest_phase
-from rocking.kernels.sine.series import PowerSeries
+from rocking.kernels.sine.sequence import remaining_phase, rest_phase
+from rocking.kernels.sine.series import PowerSeries, remaining_series
 
 
 def exact_basis(t, delta):
