@@ -204,7 +204,7 @@ def count_lane_steps(ground: Ground, rules: Record, scratch: Record, whole: pool
     """Lanes taken over all samples: the loop of `scheduler.run_lanes`, counting."""
     count = 0
     for piece in range(last_piece(ground)):
-        count += whole.tally.active
+        count += whole.counts.active
         scheduler.step_groups(ground, rules, scratch, whole, piece, substeps)
         scheduler.compact(whole)
         scheduler.admit_waiting(ground, rules, scratch, whole, piece)
@@ -232,7 +232,7 @@ def quiet_steps(groups: state.Records, calls: int) -> int:
     """Many quiet steps of the same lanes."""
     busy = 0
     for _ in range(calls):
-        busy += step_linear(groups[0], 0.1, 10.0, 0.01, 0.0, 1.5)
+        busy += step_linear(groups[0], (0.1, 10.0), 0.01, 0.0, 1.5)
     return busy
 
 
