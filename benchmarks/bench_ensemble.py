@@ -21,8 +21,8 @@ import numpy as np
 import rocking
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, last_piece
-from rocking.kernels.lanes import crew, scheduler
-from rocking.kernels.lanes.linear import step_linear
+from rocking.kernels.lanes import pool, scheduler
+from rocking.kernels.lanes.steps import step_linear
 from rocking.kernels.state import Record
 from rocking.problem import ground_of, records_of, rules_of
 from rocking.treatment import Certified
@@ -103,7 +103,7 @@ def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     ground = ground_of(motion, blocks.gravity)
     bodies = records_of(blocks, model, how.limits(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
-    whole = crew.crew_of(bodies, states, len(ground.pieces) - 1, 1.0, 0)
+    whole = pool.pool_of(bodies, states, len(ground.pieces) - 1, 1.0, 0)
     scheduler.march_each(ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole)
 
 
@@ -192,22 +192,22 @@ def lane_steps(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     states = state.new_states(len(blocks), state.TO_THE_END)
     assert motion.step is not None, "lanes take even samples"
     width = motion.step * float(blocks.p.max())
-    substeps = math.ceil(width / crew.LONGEST_SUBSTEP) if model == "nonlinear" else 0
-    whole = crew.crew_of(bodies, states, len(motion.coefficients), motion.step, substeps)
+    substeps = math.ceil(width / pool.LONGEST_SUBSTEP) if model == "nonlinear" else 0
+    whole = pool.pool_of(bodies, states, len(motion.coefficients), motion.step, substeps)
     return count_lane_steps(
         ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole, substeps
     )
 
 
 @numba.njit(error_model="numpy")
-def count_lane_steps(ground: Ground, rules: Record, scratch: Record, whole: crew.Crew, substeps: int) -> int:
+def count_lane_steps(ground: Ground, rules: Record, scratch: Record, whole: pool.Pool, substeps: int) -> int:
     """Lanes taken over all samples: the loop of `scheduler.run_lanes`, counting."""
     count = 0
     for piece in range(last_piece(ground)):
-        count += whole.tally.active
+        count += whole.counts.active
         scheduler.step_groups(ground, rules, scratch, whole, piece, substeps)
-        scheduler.close_ranks(whole)
-        scheduler.join(ground, rules, scratch, whole, piece)
+        scheduler.compact(whole)
+        scheduler.admit_waiting(ground, rules, scratch, whole, piece)
     return count
 
 
@@ -217,11 +217,11 @@ OPERATIONS = 47
 
 def arithmetic() -> tuple[float, float]:
     """Time of a quiet linear step per lane, and the time its operations take at this core's measured rate, ns."""
-    bodies, states = state.records(crew.WIDTH, state.BLOCK), state.new_states(crew.WIDTH, 0)
-    groups = crew.crew_of(bodies, states, 1, 0.01, 0).groups
+    bodies, states = state.records(pool.WIDTH, state.BLOCK), state.new_states(pool.WIDTH, 0)
+    groups = pool.pool_of(bodies, states, 1, 0.01, 0).groups
     groups["u"] = 0.5
     calls = 20_000
-    smooth = shortest(lambda: quiet_steps(groups, calls)) / (calls * crew.WIDTH)
+    smooth = shortest(lambda: quiet_steps(groups, calls)) / (calls * pool.WIDTH)
     work = np.full(64, 1.0)
     rate = shortest(lambda: multiply_add(work, 200_000)) / (200_000 * 64 * 2)
     return 1e9 * smooth, 1e9 * rate * OPERATIONS
@@ -232,7 +232,7 @@ def quiet_steps(groups: state.Records, calls: int) -> int:
     """Many quiet steps of the same lanes."""
     busy = 0
     for _ in range(calls):
-        busy += step_linear(groups[0], 0.1, 10.0, 0.01, 0.0, 1.5)
+        busy += step_linear(groups[0], (0.1, 10.0), 0.01, 0.0, 1.5)
     return busy
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from oracles.problem import Problem
 
-from rocking.kernels import state, status
+from rocking.kernels import state
 from rocking.kernels.ground import Ground
 from rocking.kernels.ground import ground_of as laid_out
 from rocking.kernels.state import Record
@@ -73,7 +73,7 @@ def one_sided(stiffness: float, gain: float, threshold: float, e: float) -> Reco
 def rules_for(
     *,
     nonlinear: bool = False,
-    treatment: int = status.CERTIFIED,
+    treatment: int = state.RestRule.CERTIFIED,
     tolerance: float = 1e-12,
     stop: float = math.inf,
     record: bool = True,

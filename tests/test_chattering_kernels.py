@@ -7,12 +7,10 @@ from numpy.polynomial import polynomial
 
 from rocking import chattering
 from rocking.chattering.theory import duration
-from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED, lanes
-from rocking.kernels.sine.arc import State, arc
-from rocking.kernels.sine.basis import basis
-from rocking.kernels.sine.closure import remaining_phase, remaining_series
-from rocking.kernels.sine.power_series import PowerSeries
-from rocking.kernels.sine.sequence import rest_phase
+from rocking.kernels.sine import Verdict, lanes
+from rocking.kernels.sine.arc import State, arc, basis
+from rocking.kernels.sine.sequence import remaining_phase, rest_phase
+from rocking.kernels.sine.series import PowerSeries, remaining_series
 
 
 def exact_basis(t, delta):
@@ -45,23 +43,25 @@ def test_the_basis_is_right_on_both_sides_of_every_change_of_sum(reach, delta):
 
 def test_an_arc_tells_what_became_of_it():
     lands = State(0.01, 0.3, 0.5)
-    assert arc(lands, 0.06, 1.0, 1.0, 2.0)[0] == FOUND
+    assert arc(lands, 0.06, 1.0, 1.0, 2.0)[0] == Verdict.FOUND
     assert arc(lands, 1e-3, 1.0, 1.0, 2.0)[1] == pytest.approx(arc(lands, 0.06, 1.0, 1.0, 2.0)[1], rel=1e-15)
-    assert arc(lands, 0.06, 1.0, 1.0, 0.02)[0] == OUTLASTS
-    assert arc(State(1.0, 0.3, 0.5), 0.06, 1.0, 1e12, 3.0)[0] == OUTLASTS
+    assert arc(lands, 0.06, 1.0, 1.0, 0.02)[0] == Verdict.INCOMPLETE
+    assert arc(State(1.0, 0.3, 0.5), 0.06, 1.0, 1e12, 3.0)[0] == Verdict.INCOMPLETE
 
 
 @pytest.mark.parametrize("omega", [1e-6, 1e-3, 2.0, 1e3])
 def test_a_sequence_has_a_status_and_finite_numbers(omega):
     critical = float(chattering.critical_amplitude(omega, 0.5)) - 1.0
-    for share, status in ((0.5, FOUND), (1.01, OUTLASTS), (30.0, OUTLASTS)):
+    for share, status in ((0.5, Verdict.FOUND), (1.01, Verdict.INCOMPLETE), (30.0, Verdict.INCOMPLETE)):
         told, phase = rest_phase(share * critical, 1.0 / omega**2, 0.5)
         assert told == status
         assert 0.0 < phase <= np.pi
 
 
 def test_what_is_not_resolved_is_told_as_infinite():
-    told = duration._told(np.array([1.0, 2.0, 3.0]), np.array([FOUND, OUTLASTS, UNRESOLVED], np.int8))
+    told = duration._told(
+        np.array([1.0, 2.0, 3.0]), np.array([Verdict.FOUND, Verdict.INCOMPLETE, Verdict.UNRESOLVED], np.int8)
+    )
     assert told == pytest.approx([1.0, np.nan, np.inf], nan_ok=True)
 
 
@@ -78,7 +78,7 @@ def test_every_number_of_sequences_fills_the_lanes(count):
     assert (np.isfinite(times) == (share < 1.0)).all()
     for k in (0, count // 2, count - 1):
         status, phase = rest_phase(a[k] - 1.0, 1.0 / omega[k] ** 2, eta[k])
-        expected = phase / omega[k] if status == FOUND else np.nan
+        expected = phase / omega[k] if status == Verdict.FOUND else np.nan
         assert times[k] == pytest.approx(expected, rel=1e-12, nan_ok=True)
 
 

@@ -10,7 +10,7 @@ from oracles.sine_chattering import settle
 from oracles.slow_sine import rest_time
 
 from rocking import chattering
-from rocking.kernels.sine.critical import distance_exponent
+from rocking.kernels.sine.sequence import distance_exponent
 
 #: Shares of a_cr - 1, some close to either side of one.
 SHARES = (1e-3, 0.4, 0.95, 1.003)

@@ -15,7 +15,7 @@ from oracles.sine_chattering import settle
 from rocking import chattering
 from rocking.chattering.theory import duration
 from rocking.errors import InvalidOption
-from rocking.kernels.sine import FOUND
+from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.sequence import semianalytical_phases
 
 EPS_SERIES_C1 = 10.827447906757
@@ -92,7 +92,7 @@ def test_a_hundred_thousand_verdicts_agree_with_the_semianalytical_scheme():
     exact = chattering.chattering_time(a, omega, eta)
     phases, statuses = np.zeros(a.size), np.zeros(a.size, np.int8)
     semianalytical_phases((a, omega, eta), np.full(a.size, 1000), phases, statuses)
-    resolved = np.where(statuses == FOUND, phases / omega, np.nan)
+    resolved = np.where(statuses == Verdict.FOUND, phases / omega, np.nan)
     both = np.isfinite(exact) & np.isfinite(resolved)
     assert both.mean() > 0.5
     differ = np.flatnonzero(np.isnan(exact) != np.isnan(resolved))

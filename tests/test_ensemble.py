@@ -39,9 +39,12 @@ def is_known(response, model, block, motion):
 
 
 def disagreements(blocks, motions, model, pairs):
-    """Pairs (motion, block) in which ensemble and single simulation differ though the response is known."""
+    """Pairs (motion, block) in which ensemble and single simulation differ though the response is known.
+
+    At least nine of ten pairs agree or are known.
+    """
     result = simulate_many(blocks, motions, model=model)
-    found = []
+    found, unknown = [], 0
     for m, b in pairs:
         response, cell = simulate(blocks[b], motions[m], model=model), result.isel(motion=m, block=b)
         rests = int(np.sum(response.events["kind"] == "rest"))
@@ -53,6 +56,9 @@ def disagreements(blocks, motions, model, pairs):
         )
         if not same and is_known(response, model, blocks[b], motions[m]):
             found.append((m, b, response.peak_rotation, float(cell.peak_rotation)))
+        elif not same:
+            unknown += 1
+    assert unknown <= 0.1 * len(pairs)
     return found
 
 
@@ -83,14 +89,16 @@ def test_pulses_agree_with_single_simulations(model):
 
 def test_counts_and_times_are_those_of_the_response(records):
     blocks = random_blocks(20, 5)
-    result = simulate_many(blocks, records[1], model="linear").isel(motion=0)
+    result, judged = simulate_many(blocks, records[1], model="linear").isel(motion=0), 0
     for b, block in enumerate(blocks):
         response, cell = simulate(block, records[1], model="linear"), result.isel(block=b)
         if response.ambiguous:
             continue
+        judged += 1
         assert len(response.impacts) == int(cell.impacts)
         assert float(cell.time_at_rest) == pytest.approx(response.time_at_rest, abs=1e-6)
         assert float(cell.peak_time) == pytest.approx(response.peak_time, abs=1e-6)
+    assert judged >= 10
 
 
 def test_reversing_the_motion_mirrors_the_blocks(records):
@@ -140,11 +148,13 @@ def test_a_stop_inside_a_sample_is_kept_to(records):
 def test_treatments_are_passed_on(records):
     blocks = random_blocks(20, 10)
     how = VelocityThreshold(1e-3)
-    result = simulate_many(blocks, records[1], chattering=how)
+    result, judged = simulate_many(blocks, records[1], chattering=how), 0
     for b, block in enumerate(blocks):
         response = simulate(block, records[1], chattering=how)
         if not response.ambiguous:
             assert int(result.impacts[0, b]) == len(response.impacts)
+            judged += 1
+    assert judged >= 10
 
 
 def test_one_block_and_lists_of_blocks(records):

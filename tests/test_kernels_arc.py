@@ -6,26 +6,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernel_records import in_units_of_g, one_sided, rocking_block, rules_for, state_of
+from oracles.taylor import System, after, coefficients, mp
 
 from rocking.kernels.arc import (
     NEGLIGIBLE,
     converged,
     evaluate,
     expand,
-    expand_linear,
     expand_nonlinear,
     linear_order,
     shortened_linear,
     step_length,
 )
+from rocking.kernels.recurrences import linear_coefficients
 from rocking.kernels.state import ORDER, Record, new_scratch
 
 ULP = 2.0**-52
 
 quick = settings(deadline=None, max_examples=40)
-
-mp = mpmath.mp.clone()
-mp.dps = 90  # the closed form cancels
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
@@ -57,34 +55,6 @@ def value(c: list[mpmath.mpf], t: mpmath.mpf) -> mpmath.mpf:
     return total
 
 
-def linear_arc(
-    u: float, v: float, lam: float, gain: float, threshold: float, A: np.ndarray, t: float
-) -> tuple[mpmath.mpf, mpmath.mpf]:
-    """u = (polynomial) + a cosh p t + b sinh p t, p = sqrt(lam), with the sum of gain/lam (D^2/lam)^m (threshold + A).
-
-    The functions are trigonometric for a negative lam; for lam = 0 the motion is integrated twice.
-    """
-    lam, t = mp.mpf(lam), mp.mpf(t)
-    derivative = [mp.mpf(gain) * mp.mpf(float(x)) for x in A]
-    derivative[0] += mp.mpf(gain) * mp.mpf(threshold)
-    if lam == 0:
-        series = [mp.mpf(u), mp.mpf(v), *[-x / ((k + 1) * (k + 2)) for k, x in enumerate(derivative)]]
-        return value(series, t), value([k * x for k, x in enumerate(series)][1:], t)
-    derivative = [x / lam for x in derivative]
-    polynomial = [mp.mpf(0)] * len(derivative)
-    while derivative:
-        polynomial = [p + (derivative[k] if k < len(derivative) else 0) for k, p in enumerate(polynomial)]
-        derivative = [(k + 1) * (k + 2) * derivative[k + 2] / lam for k in range(len(derivative) - 2)]
-    slope = [k * p for k, p in enumerate(polynomial)][1:]
-    p = mp.sqrt(lam)
-    a = mp.mpf(u) - polynomial[0]
-    b = (mp.mpf(v) - (slope[0] if slope else 0)) / p
-    return (
-        mp.re(value(polynomial, t) + a * mp.cosh(p * t) + b * mp.sinh(p * t)),
-        mp.re(value(slope, t) + p * (a * mp.sinh(p * t) + b * mp.cosh(p * t))),
-    )
-
-
 def assert_solves_the_nonlinear_equation(
     c: np.ndarray, order: int, h: float, lam: float, alpha: float, A: np.ndarray
 ) -> None:
@@ -108,7 +78,7 @@ def linear_series(
     scratch["ground"][: len(A)] = A
     degree = len(A) - 1
     order = linear_order(lam, h) if degree <= 1 else ORDER
-    expand_linear(one_sided(lam, gain, threshold, 0.5), start, scratch, degree, order)
+    linear_coefficients(one_sided(lam, gain, threshold, 0.5), start, scratch, degree, order)
     if degree > 1:
         order = converged(scratch["rotation"], degree, h)
         if order > ORDER:
@@ -143,14 +113,15 @@ gains = st.floats(0.1, 3.0)
 
 @quick
 @given(rotations, speeds, frequencies, stiffnesses, gains, slendernesses, motions, st.floats(0.01, 1.0))
-def test_a_linear_series_gives_the_closed_form(
+def test_a_linear_series_is_the_solution(
     u: float, v: float, p: float, sign: float, gain: float, threshold: float, A: list[float], share: float
 ) -> None:
     motion = motion_over(A, share / p)
     system = sign * p * p, gain * p * p, threshold
     c, order, h = linear_series(u, v, *system, motion, share / p)
     assert 0.0 < h <= share / p
-    assert_series_is(c, order, h, linear_arc(u, v, *system, motion, h))
+    lam, gain, threshold = system
+    assert_series_is(c, order, h, after(System(lam, threshold, gain=gain), u, v, h, list(motion)))
 
 
 @quick
@@ -159,11 +130,8 @@ def test_what_a_linear_series_leaves_out_is_negligible(
     u: float, v: float, p: float, sign: float, alpha: float, A: list[float], share: float
 ) -> None:
     motion = motion_over(A, share / p)
-    c, order, h = linear_series(u, v, sign * p * p, p * p, alpha, motion, share / p)
-    full = [mp.mpf(float(x)) for x in c[:2]]
-    for k in range(80):
-        force = sign * full[k] - (mp.mpf(float(motion[k])) if k < len(motion) else 0) - (mp.mpf(alpha) if k == 0 else 0)
-        full.append(mp.mpf(p * p) * force / ((k + 1) * (k + 2)))
+    _, order, h = linear_series(u, v, sign * p * p, p * p, alpha, motion, share / p)
+    full = coefficients(System(sign * p * p, alpha, gain=p * p), u, v, list(motion), order=80)
     sizes = [abs(x) * mp.mpf(h) ** k for k, x in enumerate(full)]
     assert sum(sizes[order + 1 :]) <= 4.0 * NEGLIGIBLE * max(sizes)
 

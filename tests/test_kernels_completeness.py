@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from kernel_records import rocking_block, state_of
 
 import rocking
-from rocking.kernels.completeness import note_complete
 from rocking.kernels.state import AT_REST, new_scratch, records
+from rocking.kernels.uplift import note_complete
 from rocking.motion.exceedance import exceedances
 from rocking.problem import ground_of
 

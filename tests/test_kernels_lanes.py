@@ -9,26 +9,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernel_records import ULP, in_units_of_g, one_sided, rocking_block, rules_for, state_of
-from oracles.weighted import Arc
+from oracles.taylor import System, after
 
 from rocking.kernels import state
 from rocking.kernels.arc import Line, evaluate, expand
 from rocking.kernels.ground import Ground
-from rocking.kernels.lanes.crew import (
+from rocking.kernels.lanes.pool import (
     LONGEST_SUBSTEP,
     LONGEST_WEIGHTED_SUBSTEP,
     WIDTH,
-    Crew,
-    crew_of,
-    lean,
+    Pool,
     load,
+    pool_of,
+    set_angles,
     stumpff,
     unload,
 )
-from rocking.kernels.lanes.events import is_quiet
-from rocking.kernels.lanes.linear import step_linear
-from rocking.kernels.lanes.nonlinear import step_nonlinear
-from rocking.kernels.lanes.weighted import step_weighted
+from rocking.kernels.lanes.steps import is_event_free, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.state import Record, Records, new_scratch
 
 mp = mpmath.mp.clone()
@@ -91,25 +88,25 @@ def stepped(
     fallen: float = QUARTER_TURN,
 ) -> list[Step]:
     """Take up to a group of blocks through one sample that starts with row[0] and changes by row[1] per second."""
-    crew: Crew = crew_of(blocks, states, 1, h, way.substeps if way.nonlinear else 0)
+    pool: Pool = pool_of(blocks, states, 1, h, way.substeps if way.nonlinear else 0)
     for lane in range(len(blocks)):
-        load(crew, lane, lane)
+        load(pool, lane, lane)
         if way.nonlinear:
-            lean(crew, lane, lane)
-    group = crew.groups[0]
+            set_angles(pool, lane, lane)
+    group = pool.groups[0]
     before = states.copy()
     if way.nonlinear:
         busy = step_nonlinear(group, row, way.weight, h + late, h, way.substeps, fallen)
     elif way.weight is not None:
         busy = step_weighted(group, row, way.weight, h + late, way.substeps, fallen)
     else:
-        busy = step_linear(group, row[0], row[1], h, late, fallen)
+        busy = step_linear(group, row, h, late, fallen)
     events = np.array(group["event"][: len(blocks)], dtype=bool)
     assert busy == np.sum(group["event"])
     assert not np.any(group["event"][len(blocks) :]) or not np.all(np.isfinite(row))  # empty lanes
     ground = in_units_of_g([0.0, 1.0, 2.0], [[0.0, 0.0]] * 2)
     for lane in range(len(blocks)):
-        assert unload(ground, crew, lane, 1) == lane
+        assert unload(ground, pool, lane, 1) == lane
     return [Step(blocks[k], before[k], states[k], not events[k]) for k in range(len(blocks))]
 
 
@@ -132,15 +129,11 @@ def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: flo
 
 
 def linear_end(step: Step, row: tuple[float, float], t: float) -> tuple[mpmath.mpf, mpmath.mpf]:
-    """Rotation and velocity by Stumpff's functions in 60 digits."""
+    """Rotation and velocity in 60 digits."""
     side = int(step.start["side"])
-    lam, gain, threshold = (mp.mpf(float(step.block[name][side])) for name in ("stiffness", "gain", "threshold"))
-    sign, t = 1 - 2 * side, mp.mpf(t)
-    u, v = mp.mpf(float(step.start["u"])), mp.mpf(float(step.start["v"]))
-    w = lam * u - gain * (threshold + sign * mp.mpf(row[0]))
-    j = lam * v - gain * sign * mp.mpf(row[1])
-    c = [sum((lam * t * t) ** i / mp.factorial(k + 2 * i) for i in range(30)) for k in range(4)]
-    return u + v * t + c[2] * w * t**2 + c[3] * j * t**3, v + c[1] * w * t + c[2] * j * t**2
+    lam, gain, threshold = (float(step.block[name][side]) for name in ("stiffness", "gain", "threshold"))
+    push = [(1 - 2 * side) * x for x in row]
+    return after(System(lam, threshold, gain=gain), step.start["u"], step.start["v"], t, push)
 
 
 @pytest.mark.parametrize("late", [0.0, 1e-9, -1e-9])
@@ -234,11 +227,11 @@ def test_a_quiet_step_is_exact_while_the_weight_changes(nonlinear: bool, kind: s
                 continue
             quiet += 1
             side = int(step.start["side"])
-            p, alpha = math.sqrt(step.block["stiffness"][side]), float(step.block["slenderness"][side])
+            lam, alpha = float(step.block["stiffness"][side]), float(step.block["slenderness"][side])
             toward = (push[0] * (1 - 2 * side), push[1] * (1 - 2 * side))
-            arc = Arc(nonlinear, p, alpha, float(step.start["u"]), float(step.start["v"]), toward, weight)
-            u, v = arc.after(1.0)
-            pulls = p * p * (alpha * (abs(weight[0]) + abs(weight[1])) + abs(push[0]) + abs(push[1]))
+            system = System(lam, alpha, nonlinear)
+            u, v = after(system, step.start["u"], step.start["v"], 1.0, toward, weight)
+            pulls = lam * (alpha * (abs(weight[0]) + abs(weight[1])) + abs(push[0]) + abs(push[1]))
             size = max(abs(step.start["u"]), abs(step.start["v"]), abs(u), abs(v), pulls, 0.125 * alpha * nonlinear)
             assert abs(step.end["u"] - u) <= 8.0 * substeps * ULP * size
             assert abs(step.end["v"] - v) <= 8.0 * substeps * ULP * size
@@ -451,7 +444,7 @@ def test_the_test_of_events_never_calls_not_a_number_quiet(which: int) -> None:
     numbers = [0.1, 0.2, 1.0, 0.01, 0.01, -0.1, 0.1, 0.5, 1.5]
 
     def quiet(x: list[float]) -> bool:
-        return bool(is_quiet((x[0], x[1]), x[2], x[3], x[4], (x[5], x[6]), x[7], x[8]))
+        return bool(is_event_free((x[0], x[1]), x[2], x[3], x[4], (x[5], x[6]), x[7], x[8]))
 
     assert quiet(numbers)
     numbers[which] = math.nan

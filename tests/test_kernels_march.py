@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from kernel_records import MINUS, NO_GROUND, PLUS, ULP, Pair, in_units_of_g, rocking_block, rules_for
 from numpy.testing import assert_array_equal
 
-from rocking.kernels import state, status
+from rocking.kernels import state
 from rocking.kernels.ground import Ground
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records, new_scratch, new_states
@@ -73,7 +73,7 @@ def run(
     alpha: Pair = (0.15, 0.15),
     e: Pair = (0.9, 0.9),
     nonlinear: bool = False,
-    treatment: int = status.CERTIFIED,
+    treatment: int = state.RestRule.CERTIFIED,
     limit: float = 0.0,
     stop: float = math.inf,
     rotation: float = 0.0,
@@ -87,7 +87,7 @@ def run(
     rules = rules_for(nonlinear=nonlinear, treatment=treatment, stop=stop, record=keep)
     table, at, scratch = state.new_table(rows), started(rotation, velocity), new_scratch()
     ending = march(ground, block, rules, table, scratch, at)
-    while ending == status.FULL and len(table) < 200_000:
+    while ending == state.Ending.FULL and len(table) < 200_000:
         table = state.grown(table)
         ending = march(ground, block, rules, table, scratch, at)
     nodes = table["node"][: at["nodes"]].copy()
@@ -98,7 +98,7 @@ def run(
 def assert_sound(found: Run) -> None:
     """Time never runs backwards, the block is never below the ground, and no NaN has come in."""
     nodes, impacts = found.nodes, found.impacts
-    assert found.ending in (status.DONE, status.FELL)
+    assert found.ending in (state.Ending.DONE, state.Ending.OVERTURNED)
     assert all(np.all(np.isfinite(nodes[name])) for name in nodes.dtype.names)
     assert np.all(np.diff(nodes["time"]) >= -2.0 * ULP * nodes["time"][1:])
     assert np.all(nodes["u"] >= 0.0)
@@ -145,7 +145,7 @@ def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, colu
         guard = table[size:].tobytes()
         ending = march(ground, block, rules, table[:size], scratch, at)
         assert table[size:].tobytes() == guard
-        while ending == status.FULL:
+        while ending == state.Ending.FULL:
             size *= 2
             grown = state.records(max(size, 8) + 5, state.TABLE)
             grown.view(np.uint8)[:] = 0xA5
@@ -167,7 +167,7 @@ def test_a_march_in_slices_is_the_march_in_one(nonlinear: bool, budget: int) -> 
     whole = run(ground, nonlinear=nonlinear)
     table, at, scratch, pauses = state.new_table(4096), started(), new_scratch(), 0
     at["budget"] = budget
-    while march(ground, block, rules, table, scratch, at) == status.PAUSED:
+    while march(ground, block, rules, table, scratch, at) == state.Ending.PAUSED:
         at["budget"] = budget
         pauses += 1
     assert pauses > 1
@@ -184,8 +184,8 @@ def test_a_march_from_piece_to_piece_is_the_march_in_one(nonlinear: bool) -> Non
     for until in [*range(1, len(ground.pieces)), state.TO_THE_END]:
         at["until"] = until
         ending = march(ground, block, rules, table, scratch, at)
-        assert ending == (status.GOING if until < state.TO_THE_END and at["piece"] >= until else whole.ending)
-        if ending != status.GOING:
+        assert ending == (state.Ending.RUNNING if until < state.TO_THE_END and at["piece"] >= until else whole.ending)
+        if ending != state.Ending.RUNNING:
             break
     assert_array_equal(table["impact"][: at["impacts"]], whole.impacts)
     assert_array_equal(table["event"][: at["events"]], whole.events)
@@ -236,7 +236,7 @@ def test_rectangular_pulses_uplift_by_their_jumps_and_the_block_rests_between(no
     rows = np.zeros((3, columns))
     rows[:, 0] = 0.3, 0.0, -0.3
     found = run(in_units_of_g([0.0, 0.1, 20.0, 20.1], rows), nonlinear=nonlinear)
-    assert found.kinds == [status.UPLIFT, status.REST, status.UPLIFT, status.REST]
+    assert found.kinds == [state.EventKind.UPLIFT, state.EventKind.REST, state.EventKind.UPLIFT, state.EventKind.REST]
     assert found.events["time"][[0, 2]].tolist() == [0.0, 20.0]
     assert found.events["side"].tolist() == [-1, 0, 1, 0]
     first, second = found.events["time"][1], found.events["time"][3] - 20.0
@@ -247,9 +247,9 @@ def test_rectangular_pulses_uplift_by_their_jumps_and_the_block_rests_between(no
 @pytest.mark.parametrize("row", [[0.2], [0.2, -0.01], [0.2, 0.0, -0.05]])
 def test_a_motion_of_one_piece_may_uplift_at_its_very_start(row: list[float]) -> None:
     found = run(in_units_of_g([0.0, 0.2], [row]))
-    assert found.events[0].tolist() == (0.0, status.UPLIFT, -1)
-    assert found.kinds == [status.UPLIFT, status.REST]
-    assert found.ending == status.DONE
+    assert found.events[0].tolist() == (0.0, state.EventKind.UPLIFT, -1)
+    assert found.kinds == [state.EventKind.UPLIFT, state.EventKind.REST]
+    assert found.ending == state.Ending.DONE
     assert_sound(found)
 
 
@@ -295,11 +295,11 @@ def test_coefficients_that_are_zero_change_nothing(nonlinear: bool, columns: int
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_a_march_stops_in_an_arc_at_rest_and_exactly_at_an_impact(nonlinear: bool) -> None:
     whole = run(record(1), nonlinear=nonlinear)
-    impact, rest = whole.impacts["time"][5], whole.events["time"][whole.events["kind"] == status.REST][-1]
+    impact, rest = whole.impacts["time"][5], whole.events["time"][whole.events["kind"] == state.EventKind.REST][-1]
     middle = 0.5 * (whole.impacts["time"][5] + whole.impacts["time"][6])
     for stop in (middle, impact, rest + 0.5, 1e3, whole.nodes["time"][7], whole.events["time"][0]):
         found = run(record(1), nonlinear=nonlinear, stop=stop)
-        assert (found.ending, found.at["end"]) == (status.DONE, stop)
+        assert (found.ending, found.at["end"]) == (state.Ending.DONE, stop)
         before = whole.impacts[whole.impacts["time"] < stop]
         assert_array_equal(found.impacts[: len(before)], before)
         assert len(found.impacts) - len(before) in ((0, 1) if stop == impact else (0,))
@@ -312,7 +312,7 @@ def test_a_march_may_stop_between_the_last_impact_resolved_and_rest() -> None:
     last, rest = whole.impacts["time"][-1], whole.events["time"][-1]
     assert rest > last
     found = run(NO_GROUND, velocity=0.1, stop=0.5 * (last + rest))
-    assert (found.ending, found.kinds) == (status.DONE, [])
+    assert (found.ending, found.kinds) == (state.Ending.DONE, [])
     assert found.sequences["lower"][0] <= rest <= found.sequences["upper"][0]
     assert_array_equal(found.traced(np.linspace(last, found.at["end"], 9)[2:]), np.zeros((7, 3)))
 
@@ -320,7 +320,7 @@ def test_a_march_may_stop_between_the_last_impact_resolved_and_rest() -> None:
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_without_loss_the_block_rocks_on_until_the_stop(nonlinear: bool) -> None:
     found = run(NO_GROUND, velocity=0.1, e=(1.0, 1.0), nonlinear=nonlinear, stop=50.0)
-    assert (found.ending, found.at["end"], len(found.sequences)) == (status.DONE, 50.0, 0)
+    assert (found.ending, found.at["end"], len(found.sequences)) == (state.Ending.DONE, 50.0, 0)
     assert np.max(np.abs(found.impacts["speed_after"] - 0.1)) <= 1e-13
     assert np.ptp(np.diff(found.impacts["time"])) <= 1e-12
     assert_sound(found)
@@ -328,16 +328,16 @@ def test_without_loss_the_block_rocks_on_until_the_stop(nonlinear: bool) -> None
 
 def test_a_block_on_its_corner_balances() -> None:
     for nonlinear in (False, True):
-        assert run(NO_GROUND, rotation=0.15, nonlinear=nonlinear).ending == status.BALANCED
-        assert run(NO_GROUND, rotation=0.15, nonlinear=nonlinear, stop=9.0).ending == status.DONE
+        assert run(NO_GROUND, rotation=0.15, nonlinear=nonlinear).ending == state.Ending.BALANCED
+        assert run(NO_GROUND, rotation=0.15, nonlinear=nonlinear, stop=9.0).ending == state.Ending.DONE
         fallen = run(NO_GROUND, rotation=0.15 * (1.0 + ULP), nonlinear=nonlinear)
-        assert (fallen.ending, fallen.kinds) == (status.FELL, [status.TOPPLED])
+        assert (fallen.ending, fallen.kinds) == (state.Ending.OVERTURNED, [state.EventKind.OVERTURN])
         assert fallen.at["peak"] == 0.5 * math.pi
         assert fallen.at["peak_time"] == fallen.at["end"] == fallen.events["time"][0]
 
 
 def test_intervals_that_time_can_no_longer_tell_apart_end_a_sequence() -> None:
-    found = run(NO_GROUND, velocity=0.1, treatment=status.TIME, limit=math.inf)
+    found = run(NO_GROUND, velocity=0.1, treatment=state.RestRule.TIME, limit=math.inf)
     exact = run(NO_GROUND, velocity=0.1)
     assert found.at["stalled"] == 1
     assert np.isnan(found.sequences["lower"][0])
@@ -345,16 +345,18 @@ def test_intervals_that_time_can_no_longer_tell_apart_end_a_sequence() -> None:
     assert found.events["time"][-1] == pytest.approx(exact.events["time"][-1], abs=1e-12)
 
 
-@pytest.mark.parametrize("treatment, limit", [(status.VELOCITY, 1e-9), (status.INTERVAL, 1e-9), (status.TIME, 2.0)])
+@pytest.mark.parametrize(
+    "treatment, limit", [(state.RestRule.VELOCITY, 1e-9), (state.RestRule.INTERVAL, 1e-9), (state.RestRule.TIME, 2.0)]
+)
 def test_other_treatments_end_a_sequence_at_their_threshold(treatment: int, limit: float) -> None:
     found = run(NO_GROUND, velocity=0.1, treatment=treatment, limit=limit)
-    assert (found.ending, found.kinds, found.at["stalled"]) == (status.DONE, [status.REST], 0)
+    assert (found.ending, found.kinds, found.at["stalled"]) == (state.Ending.DONE, [state.EventKind.REST], 0)
     measure = {
-        status.VELOCITY: -found.impacts["speed_after"],
-        status.INTERVAL: -np.diff(found.impacts["time"], prepend=0.0),
-        status.TIME: found.impacts["time"],
+        state.RestRule.VELOCITY: -found.impacts["speed_after"],
+        state.RestRule.INTERVAL: -np.diff(found.impacts["time"], prepend=0.0),
+        state.RestRule.TIME: found.impacts["time"],
     }[treatment]
-    threshold = limit if treatment == status.TIME else -limit
+    threshold = limit if treatment == state.RestRule.TIME else -limit
     assert np.all(measure[:-1] < threshold)
     assert measure[-1] >= threshold
 
@@ -389,7 +391,7 @@ def test_an_impact_without_speed_ends_at_rest_and_poisons_nothing() -> None:
     found = run(in_units_of_g([0.0, 2.0], [row]), rotation=0.1, velocity=-0.3)
     assert len(found.impacts) > 0
     assert found.impacts["speed_before"][0] <= 1e-7
-    assert found.ending in (status.DONE, status.FELL)
+    assert found.ending in (state.Ending.DONE, state.Ending.OVERTURNED)
     assert all(np.all(np.isfinite(found.nodes[name])) for name in found.nodes.dtype.names)
 
 

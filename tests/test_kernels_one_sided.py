@@ -8,7 +8,7 @@ import pytest
 from kernel_records import NO_GROUND, ULP, in_units_of_g, one_sided, rules_for, state_of
 from test_kernels_march import Run, run
 
-from rocking.kernels import status
+from rocking.kernels import state
 from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.ground import Ground
 from rocking.kernels.state import Record, new_scratch
@@ -46,7 +46,7 @@ def test_a_ball_on_a_table_at_rest_stops_bouncing_at_zenos_time(e: float, v: flo
     """The sum of 2 v e^n/g; that of the speeds is geometric, too, and the certificate's bracket holds it."""
     ground = in_units_of_g([0.0, 1e3], [[0.0] * columns])
     found, zeno = thrown(ground, ball(e), v), 2.0 * v / (G * (1.0 - e))
-    assert found.kinds == [status.REST]
+    assert found.kinds == [state.EventKind.REST]
     assert found.events["time"][0] == pytest.approx(zeno, rel=1e-13, abs=1e-12)
     (sequence,) = found.sequences
     assert sequence["lower"] <= zeno * (1.0 + 1e-14)
@@ -65,7 +65,7 @@ def test_a_ball_without_any_motion_of_the_table_needs_no_piece_of_it() -> None:
         found = thrown(NO_GROUND, ball(0.5), 1.0, u)
         first = (1.0 + math.sqrt(1.0 + 2.0 * G * u)) / G
         speed = math.sqrt(1.0 + 2.0 * G * u)
-        assert found.ending == status.DONE
+        assert found.ending == state.Ending.DONE
         assert found.impacts["time"][0] == pytest.approx(first, rel=1e-14)
         assert found.events["time"][-1] == pytest.approx(first + 2.0 * 0.5 * speed / (G * 0.5), rel=1e-13)
 
@@ -114,7 +114,7 @@ def test_a_ball_on_a_table_that_moves_like_a_sine_bounces_as_in_many_digits(freq
     (sequence,) = found.sequences
     rest = sine_impacts(amplitude, frequency, e, v, 400 if e == 0.9 else 60)[-1][0]
     assert sequence["lower"] - 1e-11 <= rest <= sequence["upper"] + 1e-11
-    assert found.kinds == [status.REST]
+    assert found.kinds == [state.EventKind.REST]
     assert found.events["time"][0] == pytest.approx(rest, abs=1e-11)
 
 
@@ -122,7 +122,7 @@ def test_a_table_that_falls_away_faster_than_the_ball_lets_it_fly() -> None:
     """At rest until the table's acceleration passes -g, and then up by what it falls more."""
     ground = in_units_of_g([0.0, 1.0, 1.2, 9.0], [[0.0, -0.5], [-2.0, 0.0], [0.0, 0.0]])
     found = thrown(ground, ball(0.5), 0.0)
-    assert found.kinds == [status.UPLIFT, status.REST]
+    assert found.kinds == [state.EventKind.UPLIFT, state.EventKind.REST]
     assert found.events["time"][0] == 1.0
     assert found.events["side"][0] == 1
     v, u = G * 0.2, 0.5 * G * 0.04
@@ -156,7 +156,7 @@ def test_an_oscillator_returns_to_its_stop_as_in_closed_form(e: float, v: float,
     count = len(found.impacts)
     assert found.impacts["time"] == pytest.approx(times[:count], rel=1e-12)
     assert found.impacts["speed_before"] == pytest.approx(speeds[:count], rel=1e-11)
-    assert found.kinds == [status.REST]
+    assert found.kinds == [state.EventKind.REST]
     assert found.events["time"][0] == pytest.approx(times[-1], abs=2e-12)
     (sequence,) = found.sequences
     assert sequence["lower"] - 1e-13 <= times[-1] <= sequence["upper"] + 1e-13

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from numba import config
 
-from rocking.kernels import parts
+from rocking.kernels import compiled
 from rocking.kernels.compiled import inlined, kernel, shared
 
 pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
@@ -82,9 +82,9 @@ def test_what_an_inlined_part_calls_is_not_inlined_for_that() -> None:
 
 
 def test_parts_are_compiled_in_numbas_own_way_where_its_libraries_are_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parts, "_POSSIBLE", False)
+    monkeypatch.setattr(compiled, "_POSSIBLE", False)
     longer, twice = chain(inlined, shared)
-    assert not isinstance(longer, parts.Part)
+    assert not isinstance(longer, compiled.Part)
     assert twice(9.0) == 8.0
     assert longer(9.0) == 4.0
 

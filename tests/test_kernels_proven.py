@@ -10,9 +10,9 @@ from test_kernels_march import Run, record, run, with_rows
 
 from rocking.kernels import state
 from rocking.kernels.ground import Ground
-from rocking.kernels.proven import pass_proven_impacts
+from rocking.kernels.rest import pass_proven_impacts
 from rocking.kernels.state import Record
-from rocking.kernels.tables import PROVEN_A_TURN, has_room
+from rocking.kernels.trace import PROVEN_PER_ITERATION, has_space
 
 
 def one_by_one(ground: Ground) -> Ground:
@@ -29,9 +29,9 @@ def passed(ground: Ground, start: Record, *, rows: int = 100, left: float = 9.0,
     return start
 
 
-def proven(v: float, *, peak: float = 1.0, worth: float = 1e-5, offset: float = 0.0) -> Record:
+def proven(v: float, *, peak: float = 1.0, proof_speed: float = 1e-5, offset: float = 0.0) -> Record:
     """Just after an impact from which chattering has been proven."""
-    return state_of(0, 0.0, v, peak=peak, worth=worth, run=1, offset=offset)
+    return state_of(0, 0.0, v, peak=peak, proof_speed=proof_speed, run=1, offset=offset)
 
 
 STEADY = in_units_of_g([0.0, 9.0], [[0.02, 0.01]])
@@ -65,7 +65,7 @@ def test_impacts_are_passed_down_to_the_speed_that_is_worth_a_proof() -> None:
     assert found["run"] == found["impacts"] + 1
     assert found["budget"] == 10**6 - found["impacts"]
     assert 1e-5 < found["v"] < 1.2e-5
-    assert found["struck"] == found["offset"]
+    assert found["last_impact_time"] == found["offset"]
 
 
 def test_a_peak_among_proven_impacts_is_not_lost() -> None:
@@ -93,11 +93,11 @@ def test_nothing_is_passed_beyond_the_end_of_the_piece() -> None:
     assert found["offset"] == pytest.approx(flight, rel=1e-2)
 
 
-def test_a_turn_passes_no_more_impacts_than_every_table_has_room_for() -> None:
+def test_a_turn_passes_no_more_impacts_than_every_table_has_space_for() -> None:
     found = passed(STEADY, proven(1e-3), e=0.99)
-    assert found["impacts"] == found["nodes"] == PROVEN_A_TURN
-    assert not has_room(rules_for(), state.new_table(PROVEN_A_TURN + 2), proven(1e-3))
-    assert has_room(rules_for(), state.new_table(PROVEN_A_TURN + 3), proven(1e-3))
+    assert found["impacts"] == found["nodes"] == PROVEN_PER_ITERATION
+    assert not has_space(rules_for(), state.new_table(PROVEN_PER_ITERATION + 2), proven(1e-3))
+    assert has_space(rules_for(), state.new_table(PROVEN_PER_ITERATION + 3), proven(1e-3))
 
 
 def test_a_table_that_is_full_within_a_proven_sequence_changes_no_bit() -> None:

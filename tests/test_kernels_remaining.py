@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from oracles import multiprecision, one_piece
 from oracles.problem import Problem
 
-from rocking.kernels.proven import LARGEST_BETA, LARGEST_GAMMA, proven_arc
-from rocking.kernels.remainder import deviation, refined_bracket
-from rocking.kernels.remaining import Restoring, remaining_time
+from rocking.kernels.remaining import Restoring, deviation, refined_bracket, remaining_time
+from rocking.kernels.rest import LARGEST_BETA, LARGEST_GAMMA, proven_arc
 
 GRAVITY = 9.80665
 FOREVER = 1e9

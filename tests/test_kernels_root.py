@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from kernel_records import ULP
 from oracles.exact import as_float, exact, polynomial, real_roots
 
-from rocking.kernels import root
-from rocking.kernels.root import curvature_bound, first_root
+from rocking.kernels import events
+from rocking.kernels.events import curvature_bound, first_root
 
 quick = settings(deadline=None, max_examples=150)
 
@@ -173,13 +173,13 @@ def test_the_curvature_is_never_below_its_bound(terms: list[float], lead: int, h
 def visited(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Times at which the uncompiled search evaluates its series."""
     seen: list[float] = []
-    evaluate = root.deflated
+    evaluate = events.deflated
 
     def counted(c: np.ndarray, lead: int, order: int, t: float) -> tuple[float, float]:
         seen.append(t)
         return evaluate(c, lead, order, t)
 
-    monkeypatch.setattr(root, "deflated", counted)
+    monkeypatch.setattr(events, "deflated", counted)
     return seen
 
 

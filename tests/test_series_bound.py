@@ -5,37 +5,15 @@ import math
 import numpy as np
 import pytest
 from kernel_records import in_units_of_g, rocking_block, rules_for, state_of
-from mpmath import MPContext
+from oracles.taylor import System, angles, coefficients, mp
 
 from rocking.kernels import arc
 from rocking.kernels.arc import ORDER, evaluate, expand
 from rocking.kernels.state import new_scratch
 
-mp = MPContext()
-mp.dps = 60
 TERMS = 90
 
 Polynomial = list[float]
-
-
-def exact(nonlinear: bool, p: float, alpha: float, u: float, v: float, push: Polynomial, weight: Polynomial) -> list:
-    """Coefficients of the rotation on side +, by the recurrence of the equation of motion."""
-    a, w = ([mp.mpf(x) for x in values] for values in (push, weight))
-    c = [mp.mpf(u), mp.mpf(v)]
-    psi = mp.mpf(alpha) - c[0]
-    sine, cosine = [mp.sin(psi)], [mp.cos(psi)]
-    for k in range(TERMS):
-        if nonlinear:
-            pull = mp.fsum(w[j] * sine[k - j] for j in range(min(k + 1, len(w))))
-            pull += mp.fsum(a[j] * cosine[k - j] for j in range(min(k + 1, len(a))))
-            turns = [(j + 1) * c[j + 1] for j in range(k + 1)]
-            sine.append(-mp.fsum(turns[j] * cosine[k - j] for j in range(k + 1)) / (k + 1))
-            cosine.append(mp.fsum(turns[j] * sine[k - j] for j in range(k + 1)) / (k + 1))
-        else:
-            heights = [(mp.mpf(alpha) if i == 0 else 0) - c[i] for i in range(k + 1)]
-            pull = mp.fsum(w[j] * heights[k - j] for j in range(min(k + 1, len(w)))) + (a[k] if k < len(a) else 0)
-        c.append(-(mp.mpf(p) ** 2) * pull / ((k + 1) * (k + 2)))
-    return c
 
 
 def drawn(random: np.random.Generator) -> tuple[float, float, float, Polynomial, Polynomial]:
@@ -67,7 +45,7 @@ def test_a_series_ends_where_what_it_leaves_out_is_nothing(nonlinear: bool) -> N
         ground = in_units_of_g([0.0, 1e3], [push], vertical=[[weight[0] - 1.0, *weight[1:]]])
         scratch, start = new_scratch(), state_of(0, u, v, peak=2.0)
         order, h, _ = expand(ground, block, rules_for(nonlinear=nonlinear), scratch, start, 1.0)
-        c = exact(nonlinear, 1.0, alpha, u, v, push, weight)
+        c = coefficients(System(1.0, alpha, nonlinear), u, v, push, weight, TERMS)
         rates = [k * c[k] * mp.mpf(h) ** k for k in range(1, TERMS)]
         assert abs(rates[-1]) + abs(rates[-2]) + abs(rates[-9]) <= mp.mpf("1e-25") * max(map(abs, rates))
         largest = float(max(abs(x) for x in rates))
@@ -92,18 +70,13 @@ def test_the_bound_holds_all_that_a_series_leaves_out(nonlinear: bool, order: in
         if degree >= order - 1:
             continue
         h = 10.0 ** random.uniform(-1.5, 0.0)
-        c = exact(nonlinear, 1.0, alpha, u, v, push, weight)
+        c = coefficients(System(1.0, alpha, nonlinear), u, v, push, weight, TERMS)
         scratch = new_scratch()
         for name, values in (("ground", push), ("weight", weight)):
             scratch[name][: len(values)] = values
         scratch["rotation"][: order + 1] = [float(x) for x in c[: order + 1]]
         if nonlinear:
-            # sin and cos of alpha - u from the exact rotation
-            sine, cosine = [mp.sin(alpha - c[0])], [mp.cos(alpha - c[0])]
-            for k in range(order):
-                turns = [(j + 1) * c[j + 1] for j in range(k + 1)]
-                sine.append(-mp.fsum(turns[j] * cosine[k - j] for j in range(k + 1)) / (k + 1))
-                cosine.append(mp.fsum(turns[j] * sine[k - j] for j in range(k + 1)) / (k + 1))
+            sine, cosine = angles(alpha, c, order)
             scratch["sine"][:order] = [float(x) for x in sine[:order]]
             scratch["cosine"][:order] = [float(x) for x in cosine[:order]]
             bound, _ = arc.left_out_nonlinear(scratch, 1.0, (len(push) - 1, len(weight) - 1), order, h)

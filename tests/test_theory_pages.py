@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking.chattering import critical_amplitude, sequence
-from rocking.kernels.sine.critical import distance_exponent
+from rocking.kernels.sine.sequence import distance_exponent
 
 FREQUENCIES = st.floats(math.log(0.02), math.log(200.0)).map(math.exp)
 

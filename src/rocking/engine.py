@@ -17,12 +17,13 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
 from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import Unfinished
-from rocking.kernels import state, status
-from rocking.kernels.completeness import note_complete
+from rocking.kernels import state
 from rocking.kernels.ground import Ground, greatest_weight, has_vertical
-from rocking.kernels.lanes import crew, scheduler
+from rocking.kernels.lanes import pool as lanes
+from rocking.kernels.lanes import scheduler
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
+from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
 from rocking.problem import ground_of, records_of, rules_of, step_of
 from rocking.treatment import Treatment
@@ -49,7 +50,7 @@ SLICE: Final = 50_000
 _FIRST_SLICE: Final = 5_000
 
 #: Blocks that go through a motion together: as many as the fastest cache holds.
-_TOGETHER: Final = 16 * crew.WIDTH
+_TOGETHER: Final = 16 * lanes.WIDTH
 
 #: Block-steps of one task: enough to pay for the call, few enough to stop soon when interrupted.
 _TASK: Final = 8_000_000
@@ -224,7 +225,7 @@ def _companies(ground: Ground, bodies: Records, step: float | None, model: Model
     substeps = np.full(len(bodies), -1)
     if step is not None:
         width = step * np.sqrt(np.abs(bodies["stiffness"]).max(axis=1) * greatest_weight(ground))
-        substeps = np.where(width <= crew.LONGEST_STEP, _substeps(ground, width, model), -1.0).astype(np.int64)
+        substeps = np.where(width <= lanes.LONGEST_STEP, _substeps(ground, width, model), -1.0).astype(np.int64)
     for count in np.unique(substeps):
         chosen = np.flatnonzero(substeps == count)
         for start in range(0, len(chosen), _TOGETHER):
@@ -234,8 +235,8 @@ def _companies(ground: Ground, bodies: Records, step: float | None, model: Model
 def _substeps(ground: Ground, width: Floats, model: Model) -> Floats:
     """Count the substeps of a sample in lanes, for each sqrt(|lam W|) h; 0 where one formula spans it."""
     if model == "nonlinear":
-        return np.ceil(width / crew.LONGEST_SUBSTEP)
-    return np.ceil(width / crew.LONGEST_WEIGHTED_SUBSTEP) if has_vertical(ground) else np.zeros(len(width))
+        return np.ceil(width / lanes.LONGEST_SUBSTEP)
+    return np.ceil(width / lanes.LONGEST_WEIGHTED_SUBSTEP) if has_vertical(ground) else np.zeros(len(width))
 
 
 def _march_together(
@@ -250,7 +251,7 @@ def _march_together(
     bodies, states = whole
     pieces = len(ground.pieces) - 1
     finer = max(substeps, 0) if rules["nonlinear"] else 0
-    together = crew.crew_of(bodies[chosen], states[chosen], pieces, step or 1.0, finer)
+    together = lanes.pool_of(bodies[chosen], states[chosen], pieces, step or 1.0, finer)
     if substeps < 0:
         scheduler.march_each(ground, rules, state.new_scratch(), together)
     else:
@@ -261,7 +262,7 @@ def _march_together(
 def _march_on(ground: Ground, rules: Record, bodies: Records, states: Records, stop: threading.Event | None) -> None:
     """Take those on that have used up their first slice of steps, until their budget is spent."""
     nothing, scratch = state.new_table(0), state.new_scratch()
-    for k in np.flatnonzero(np.isin(states["ending"], (status.GOING, status.PAUSED))):
+    for k in np.flatnonzero(np.isin(states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
         one = states[k]
         one["until"] = state.TO_THE_END
         for _ in range(slices(ground)):
@@ -269,10 +270,10 @@ def _march_on(ground: Ground, rules: Record, bodies: Records, states: Records, s
                 return
             one["budget"] = SLICE
             one["ending"] = march(ground, bodies[k], rules, nothing, scratch, one)
-            if one["ending"] != status.PAUSED:
+            if int(one["ending"]) != state.Ending.PAUSED:
                 break
         else:
-            one["ending"] = status.UNFINISHED
+            one["ending"] = state.Ending.UNFINISHED
 
 
 def slices(ground: Ground) -> int:
@@ -289,10 +290,10 @@ def _complete(ground: Ground, bodies: Records, states: Records) -> Flags:
 
 def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes = np.empty(len(states), dtype=OUTCOME)
-    outcomes["overturned"] = states["ending"] == status.FELL
-    outcomes["unfinished"] = states["ending"] == status.UNFINISHED
+    outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
+    outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
     early = (states["side"] != state.AT_REST) | (states["end"] < motion_end)
-    outcomes["stopped"] = (states["ending"] == status.DONE) & early
+    outcomes["stopped"] = (states["ending"] == state.Ending.DONE) & early
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
         ("rests", "rests"), ("time_at_rest", "resting"), ("first_uplift", "first_uplift"),

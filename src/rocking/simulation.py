@@ -9,7 +9,7 @@ from rocking.block import Block, Blocks, one_block
 from rocking.compiling import SIMULATIONS, announce
 from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
-from rocking.kernels import state, status
+from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.accepted import one_motion
@@ -100,7 +100,7 @@ def simulate(
     start["side"], start["u"], start["v"] = _initial_state(initial_rotation, initial_velocity)
     start["peak"] = start["u"]
     ending, table = _marched(trail, start)
-    if ending == status.BALANCED:
+    if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give duration= or another initial state")
     return Response.from_march(block, motion, model, how, trail, table, start)
 
@@ -110,18 +110,18 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     ground, block, rules, _ = trail
     table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))
     scratch = state.new_scratch()
-    ending = status.PAUSED
+    ending = state.Ending.PAUSED
     for _ in range(slices(ground)):
         start["budget"] = SLICE
         ending = march(ground, block, rules, table, scratch, start)
-        while ending == status.FULL:
+        while ending == state.Ending.FULL:
             table = state.grown(table)
             ending = march(ground, block, rules, table, scratch, start)
-        if ending != status.PAUSED:
+        if ending != state.Ending.PAUSED:
             return ending, table
     start["end"] = table["node"]["time"][start["nodes"] - 1]
-    start["ending"] = status.UNFINISHED
-    return status.UNFINISHED, table
+    start["ending"] = state.Ending.UNFINISHED
+    return state.Ending.UNFINISHED, table
 
 
 def _initial_state(rotation: float, velocity: float) -> tuple[int, float, float]:

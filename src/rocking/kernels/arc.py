@@ -1,14 +1,6 @@
-"""One arc between two events as a Taylor series (paper, Eq. 15), linear or nonlinear alike.
+"""One arc between two events as a Taylor series (paper, Eq. 15): its order, the length of a step, what it leaves out.
 
-The rotation is written in the frame of the side that the block leans to: u = |theta| >= 0, and the ground acceleration
-as A(t) = i a(t)/g with i the sign of that side. A vertical ground acceleration changes the weight: W(t) = 1 + a_v(t)/g.
-The two models read
-
-    linear      u'' = W lam u - gain (W threshold + A)
-    nonlinear   u'' = -lam (W sin(alpha - u) + A cos(alpha - u))
-
-and the coefficients c[k] of u follow by recurrence. In the linear model lam may have any sign: p^2 for a rocking block
-(whose gain is p^2, too), 0 for a ball, negative for an oscillator with a stop.
+The equations and the recurrences for the coefficients are in `recurrences`.
 """
 
 import math
@@ -18,6 +10,16 @@ import numpy as np
 from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import Ground, acceleration, has_vertical, local_series, vertical_of
+from rocking.kernels.recurrences import (
+    INTEGRATED_TWICE,
+    Line,
+    Nine,
+    Seven,
+    angle_coefficients,
+    linear_coefficients,
+    nonlinear_coefficient,
+    weighted_coefficient,
+)
 from rocking.kernels.state import ORDER, Record
 
 #: Terms of the velocity below this fraction of the largest one no longer count. (Those of the rotation are no measure:
@@ -40,17 +42,6 @@ _SHORTENINGS = 200
 
 #: First step from an impact, over the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
-
-_WEIGHT = 1.0 / ((np.arange(ORDER + 1) + 1.0) * (np.arange(ORDER + 1) + 2.0))
-_INVERSE = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
-
-
-#: A quantity that changes evenly: its value, and its slope or its change over a step.
-Line = tuple[float, float]
-
-#: Sizes of nine terms of the velocity, and of the seven terms after the first of sin and cos(alpha - u).
-Nine = tuple[float, float, float, float, float, float, float, float, float]
-Seven = tuple[float, float, float, float, float, float, float]
 
 
 @inlined
@@ -81,12 +72,6 @@ def weight_series(ground: Ground, piece: int, offset: float, W: Floats) -> int:
     return degree
 
 
-@inlined
-def borne(weight: Line | None, this: float, before: float) -> float:
-    """Coefficient of the weight times a series, from two neighbouring ones of the series; None: the weight is 1."""
-    return this if weight is None else weight[0] * this + weight[1] * before
-
-
 @shared
 def expand(
     ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float
@@ -109,9 +94,9 @@ def expand(
         return order, h, degree
     if degree <= 1:
         order = linear_order(block.stiffness[state.side], h)
-        expand_linear(block, state, scratch, degree, order)
+        linear_coefficients(block, state, scratch, degree, order)
         return order, h, degree
-    expand_linear(block, state, scratch, degree, ORDER)
+    linear_coefficients(block, state, scratch, degree, ORDER)
     order = converged(scratch.rotation, degree, h)
     if order > ORDER:
         return ORDER, shortened_linear(scratch, block.stiffness[state.side], 0, h), degree
@@ -158,7 +143,7 @@ def linear_order(lam: float, h: float) -> int:
     squared = abs(lam) * h * h
     ratio = 1.0
     for k in range(2, ORDER - 2, 2):
-        ratio *= squared * _WEIGHT[k]
+        ratio *= squared * INTEGRATED_TWICE[k]
         if ratio <= NEGLIGIBLE:
             return k + 1
     return ORDER
@@ -182,37 +167,19 @@ def converged(c: Floats, degree: int, h: float) -> int:
     return ORDER + 1
 
 
-@inlined
-def expand_linear(block: Record, state: Record, scratch: Record, degree: int, order: int) -> None:
-    """Series of a linear arc, up to ``order``."""
-    c, A, side = scratch.rotation, scratch.ground, state.side
-    lam, gain = block.stiffness[side], block.gain[side]
-    c[0] = state.u
-    c[1] = state.v
-    c[2] = 0.5 * (lam * state.u - gain * (block.threshold[side] + A[0]))
-    for k in range(1, degree + 1):
-        c[k + 2] = (lam * c[k] - gain * A[k]) * _WEIGHT[k]
-    for k in range(degree + 1, order - 1):
-        c[k + 2] = lam * c[k] * _WEIGHT[k]
-
-
 @shared
 def expand_linear_weighted(block: Record, state: Record, scratch: Record, degree: int, h: float) -> tuple[int, float]:
     """Series of a linear arc while the weight changes; the motion's polynomials are of one degree.
 
     Returns (order, h'). The series ends where what it leaves out is proven not to count.
     """
-    c, A, W, side = scratch.rotation, scratch.ground, scratch.weight, state.side
-    lam, gain, threshold = block.stiffness[side], block.gain[side], block.threshold[side]
+    c, lam = scratch.rotation, block.stiffness[state.side]
     c[0] = state.u
     c[1] = state.v
     power = h * h
     largest = term = abs(state.v) * h
     for k in range(ORDER - 1):
-        value = -gain * (threshold * W[k] + A[k]) if k <= degree else 0.0
-        for j in range(min(k, degree) + 1):
-            value += lam * W[j] * c[k - j]
-        c[k + 2] = value * _WEIGHT[k]
+        c[k + 2] = weighted_coefficient(block, state.side, scratch, degree, k)
         previous = term
         term = (k + 2) * abs(c[k + 2]) * power
         largest = max(largest, term)
@@ -232,38 +199,24 @@ def expand_nonlinear(
 
     Returns (order, h'). The series ends where what it leaves out is proven not to count.
     """
-    c, A, W, S, C = scratch.rotation, scratch.ground, scratch.weight, scratch.sine, scratch.cosine
-    lam, psi = block.stiffness[state.side], block.slenderness[state.side] - state.u
-    degree, changes = degrees
+    c, lam = scratch.rotation, block.stiffness[state.side]
+    psi = block.slenderness[state.side] - state.u
     c[0] = state.u
     c[1] = state.v
-    S[0] = math.sin(psi)
-    C[0] = math.cos(psi)
+    scratch.sine[0] = math.sin(psi)
+    scratch.cosine[0] = math.cos(psi)
     power = h * h
     largest = term = abs(state.v) * h
     for k in range(ORDER - 1):
-        value = W[0] * S[k]
-        for j in range(1, min(k, changes) + 1):
-            value += W[j] * S[k - j]
-        for j in range(min(k, degree) + 1):
-            value += A[j] * C[k - j]
-        value *= -lam * _WEIGHT[k]
-        c[k + 2] = value
+        c[k + 2] = nonlinear_coefficient(lam, scratch, degrees, k)
         previous = term
-        term = (k + 2) * abs(value) * power
+        term = (k + 2) * abs(c[k + 2]) * power
         largest = max(largest, term)
-        if k > degree and term + previous <= NEGLIGIBLE * largest:
+        if k > degrees[0] and term + previous <= NEGLIGIBLE * largest:
             beyond, _ = left_out_nonlinear(scratch, lam, degrees, k + 2, h)
             if beyond <= _LEFT_OUT * largest:
                 return k + 2, h
-        sine = 0.0
-        cosine = 0.0
-        for j in range(k + 1):
-            turn = (j + 1) * c[j + 1]
-            sine -= turn * C[k - j]
-            cosine += turn * S[k - j]
-        S[k + 1] = sine * _INVERSE[k + 1]
-        C[k + 1] = cosine * _INVERSE[k + 1]
+        angle_coefficients(scratch, k)
         power *= h
     for _ in range(_SHORTENINGS):
         beyond, largest = left_out_nonlinear(scratch, lam, degrees, ORDER, h)

@@ -29,8 +29,7 @@ from rocking.kernels.ground import (
     start_of,
     vertical_of,
 )
-from rocking.kernels.remainder import deviation, refined_bracket
-from rocking.kernels.remaining import Restoring, remaining_time
+from rocking.kernels.remaining import Restoring, deviation, refined_bracket, remaining_time
 from rocking.kernels.state import Record
 
 #: Window of the proof over the first estimate of the remaining time.

@@ -23,14 +23,12 @@ _LONGEST_WINDOW = 128
 
 _START, _LENGTH, _FIRST = 0, 1, 2
 
-#: Columns of a stretch for one component.
-_BOUNDS = 4
-
 
 class Ground(NamedTuple):
     """A motion, seen by one of its components.
 
-    Its pieces; a `Window` for each stretch of them, a row each; its approximation error (g); the number of coefficients
+    Its pieces; bounds on each stretch of them of shape (stretches, components, 4), the last as in `Window`; its
+    approximation error (g); the number of coefficients
     of a component, and the column of the first one of this component: the horizontal one, but for `vertical_of`.
     """
 
@@ -63,27 +61,28 @@ def ground_of(
     components = [coefficients] if vertical is None else [coefficients, vertical]
     columns = max(2, *(component.shape[1] for component in components))
     pieces = np.zeros((len(coefficients) + 1, _FIRST + columns * len(components)))
-    stretches = np.zeros((-(-len(pieces) // STRETCH), _BOUNDS * len(components)))
+    stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), len(Window._fields)))
     ground = Ground(pieces, stretches, error * unit, columns, _FIRST)
     for k, component in enumerate(components):
         seen = ground._replace(first=_FIRST + k * columns)
-        lay_out(breakpoints, component, unit, seen, np.zeros(columns))
+        fill(breakpoints, component, unit, seen, np.zeros(columns))
     return ground
 
 
 def components(ground: Ground, pieces: Integers) -> list[Floats]:
     """Coefficients (g, g/s, ...) of a motion on some pieces: horizontal ones, and vertical ones if it has any."""
-    columns, count = ground.columns, ground.stretches.shape[1] // _BOUNDS
-    return [ground.pieces[pieces, _FIRST + k * columns :][:, :columns] for k in range(count)]
+    columns = ground.columns
+    return [ground.pieces[pieces, _FIRST + k * columns :][:, :columns] for k in range(ground.stretches.shape[1])]
 
 
 def greatest_weight(ground: Ground) -> float:
     """Greatest size of the weight in the ground's frame, over that at rest."""
-    return float(np.max(np.abs(1.0 + ground.stretches[:, _BOUNDS : _BOUNDS + 2]), initial=1.0))
+    lifts = Window(*np.moveaxis(ground.stretches[:, 1:], -1, 0))
+    return float(np.max(np.abs(1.0 + np.array([lifts.low, lifts.high])), initial=1.0))
 
 
 @kernel
-def lay_out(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground, A: Floats) -> None:
+def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground, A: Floats) -> None:
     """Fill the rows of a ground for one component: pieces, and bounds on stretches of them. ``A`` is scratch space."""
     pieces, last = ground.pieces, coefficients.shape[0]
     for k in range(last):
@@ -106,28 +105,28 @@ def lay_out(breakpoints: Floats, coefficients: Floats, unit: float, ground: Grou
 
 @inlined
 def put_stretch(ground: Ground, stretch: int, bounds: Window) -> None:
-    """Write down the bounds on a stretch."""
-    for k in range(_BOUNDS):
-        ground.stretches[stretch, first_bound(ground) + k] = bounds[k]
+    """Write the bounds on a stretch."""
+    row = ground.stretches[stretch, component_of(ground)]
+    row[0], row[1], row[2], row[3] = bounds
 
 
 @inlined
 def stretch_bounds(ground: Ground, stretch: int) -> Window:
     """Bounds on a stretch."""
-    row, k = ground.stretches[stretch], first_bound(ground)
-    return Window(row[k], row[k + 1], row[k + 2], row[k + 3])
+    row = ground.stretches[stretch, component_of(ground)]
+    return Window(row[0], row[1], row[2], row[3])
 
 
 @inlined
-def first_bound(ground: Ground) -> int:
-    """Column of a component's first bound on a stretch."""
-    return 0 if ground.first == _FIRST else _BOUNDS
+def component_of(ground: Ground) -> int:
+    """Return 0 for the horizontal component, 1 for the vertical one."""
+    return 0 if ground.first == _FIRST else 1
 
 
 @inlined
 def has_vertical(ground: Ground) -> bool:
     """Whether the motion has a vertical component."""
-    return ground.stretches.shape[1] > _BOUNDS
+    return ground.stretches.shape[1] > 1
 
 
 @inlined
@@ -306,7 +305,8 @@ def next_beyond(ground: Ground, piece: int, below: float, above: float) -> int:
     while piece < last_piece(ground):
         stretch = piece // STRETCH
         weight = 1.0 + (stretch_bounds(vertical_of(ground), stretch).low if has_vertical(ground) else 0.0)
-        if ground.stretches[stretch, 0] < below * weight or ground.stretches[stretch, 1] > above * weight:
+        bounds = stretch_bounds(ground, stretch)
+        if bounds.low < below * weight or bounds.high > above * weight:
             return piece
         piece = (stretch + 1) * STRETCH
     return last_piece(ground)

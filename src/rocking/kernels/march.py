@@ -7,35 +7,22 @@ import numpy as np
 from rocking.kernels.arc import evaluate, expand, restoring
 from rocking.kernels.certificate import unproven
 from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.events import StepEnd, advance, apply_impact, first_root
 from rocking.kernels.ground import Ground, has_vertical, is_straight, last_piece, length_of, start_of
-from rocking.kernels.impact import Arrival, advance, strike
-from rocking.kernels.proven import pass_proven_impacts
-from rocking.kernels.rest import ULP, Rest, note_impact, note_proof, proven_bounds, rest_after_impact, time_of
-from rocking.kernels.root import first_root
-from rocking.kernels.short_arc import short_step
-from rocking.kernels.state import AT_REST, Record, Records
-from rocking.kernels.status import (
-    BALANCED,
-    CERTIFIED,
-    DONE,
-    FELL,
-    FULL,
-    GOING,
-    IMPACT,
-    OVERTURN,
-    PAUSED,
-    REST,
-    STEP,
-    TOPPLED,
-    UNDECIDED,
-    UPLIFT,
+from rocking.kernels.rest import (
+    ULP,
+    Rest,
+    count_impact,
+    pass_proven_impacts,
+    proven_bounds,
+    record_proof,
+    rest_after_impact,
+    time_of,
 )
-from rocking.kernels.tables import has_room, write_event, write_impact, write_node, write_sequence
+from rocking.kernels.short_arc import short_step, undecided
+from rocking.kernels.state import AT_REST, Ending, EventKind, Outcome, Record, Records, RestRule
+from rocking.kernels.trace import has_space, write_event, write_impact, write_node, write_sequence
 from rocking.kernels.uplift import next_uplift
-
-# Further outcomes of an arc, besides STEP, IMPACT and OVERTURN.
-_STOPPED = 3
-_STUCK = 4
 
 #: Depth of a dip below zero rotation that is lost in rounding, over the highest rotation so far.
 _TOUCH = 2.0**-46
@@ -46,39 +33,41 @@ _NEAR_TIE = 2.0**-36
 
 @kernel
 def march(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
-    """Follow one block through one motion, from its state on; returns how it ended (`status`).
+    """Follow one block through one motion, from its state on; returns how it ended (`Ending`).
 
-    GOING: the piece ``state.until`` is reached; a block at rest may have gone on to its next uplift. PAUSED: the
-    budget is spent. FULL: the table has no room left. After each of them, call again with the same state.
+    RUNNING: the piece ``state.until`` is reached; a block at rest may have gone on to its next uplift. PAUSED: the
+    budget is spent. FULL: the table has no space left. After each of them, call again with the same state. DONE,
+    OVERTURNED, BALANCED: the march is over. A plain integer is returned: to make an `IntEnum` of it takes numba as long
+    as a short march.
     """
     while state.piece < state.until:
         if state.budget <= 0:
-            return PAUSED
-        if not has_room(rules, table, state):
-            return FULL
+            return Ending.PAUSED.value
+        if not has_space(rules, table, state):
+            return Ending.FULL.value
         state.budget -= 1
-        ending = turn(ground, block, rules, table, scratch, state)
-        if ending != GOING:
-            return ending
-    return GOING
+        ending = march_step(ground, block, rules, table, scratch, state)
+        if ending != Ending.RUNNING:
+            return ending.value
+    return Ending.RUNNING.value
 
 
 @inlined
-def turn(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
-    """One turn of a march: to the next uplift of a block at rest, or along an arc to its first event."""
+def march_step(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
+    """One iteration of a march: to the next uplift of a block at rest, or along an arc to its first event."""
     write_node(ground, rules, table, state)
     if state.side == AT_REST:
-        return lift_off(ground, block, rules, table, scratch, state)
+        return rest_until_uplift(ground, block, rules, table, scratch, state)
     if state.run > 0 and state.u == 0.0 and may_pass(ground, rules):
         pass_proven_impacts(ground, block, rules, table, state, time_left(ground, rules, state))
     outcome = follow_arc(ground, block, rules, scratch, state)
-    if outcome == IMPACT:
+    if outcome == Outcome.IMPACT:
         return pass_impact(ground, block, rules, table, scratch, state)
-    if outcome == OVERTURN:
-        return fall(ground, block, rules, table, state)
-    if outcome == _STOPPED:
-        return stop(ground, rules, table, state)
-    return BALANCED if outcome == _STUCK else GOING
+    if outcome == Outcome.OVERTURN:
+        return end_by_overturning(ground, block, rules, table, state)
+    if outcome == Outcome.STOPPED:
+        return end_by_stopping(ground, rules, table, state)
+    return Ending.BALANCED if outcome == Outcome.BALANCED else Ending.RUNNING
 
 
 @inlined
@@ -88,21 +77,23 @@ def may_pass(ground: Ground, rules: Record) -> bool:
 
 
 @inlined
-def lift_off(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
+def rest_until_uplift(
+    ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record
+) -> int:
     """Stay at rest until the motion passes a threshold; DONE when it never does, and the response is over."""
     found = next_uplift(ground, block, scratch, state.piece, state.offset, rules.stop)
     if found.side == AT_REST or start_of(ground, found.piece) + found.offset >= rules.stop:
         over = start_of(ground, last_piece(ground))
         state.end = max(state.rested, over) if rules.endless else rules.stop
         state.resting += state.end - state.rested
-        return DONE
+        return Ending.DONE
     state.piece = found.piece
     state.offset = found.offset
     state.side = found.side
     state.smooth = not found.jump
     state.u = state.v = 0.0
-    state.uplifted = state.struck = time_of(ground, state)
-    state.worth = np.inf
+    state.uplifted = state.last_impact_time = time_of(ground, state)
+    state.proof_speed = np.inf
     state.resting += state.uplifted - state.rested
     if state.uplifts == 0:
         state.first_uplift = state.uplifted
@@ -110,79 +101,79 @@ def lift_off(ground: Ground, block: Record, rules: Record, table: Records, scrat
     if has_vertical(ground) and state.rests > 0 and state.uplifted - state.rested <= _NEAR_TIE * state.uplifted:
         # The last of its impacts may have come too late.
         state.near_ties += is_weightless(ground, block, state, state.offset)
-    write_event(rules, table, state, state.uplifted, UPLIFT)
-    return GOING
+    write_event(rules, table, state, state.uplifted, EventKind.UPLIFT)
+    return Ending.RUNNING
 
 
 @inlined
 def follow_arc(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record) -> int:
-    """One Taylor step along the arc, or as much of it as its first event leaves."""
+    """One Taylor step along the arc, up to its first event at most; returns what ended it (`Outcome`)."""
     left = time_left(ground, rules, state)
     if left <= 0.0:
-        return _STOPPED
-    arrival = Arrival(UNDECIDED, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return Outcome.STOPPED
+    end = undecided()
     if not state.smooth:
-        arrival = short_step(ground, block, rules, state, left)
-    if arrival.outcome == UNDECIDED:
-        arrival = long_step(ground, block, rules, scratch, state, left)
-    if has_vertical(ground) and arrival.outcome == STEP and state.v < 0.0 <= arrival.v:
-        state.near_ties += nearly_touches(ground, block, rules, scratch, state, arrival.time)
-    return arrive(ground, rules, state, arrival, left)
+        end = short_step(ground, block, rules, state, left)
+    if end.outcome == Outcome.UNDECIDED:
+        end = long_step(ground, block, rules, scratch, state, left)
+    if has_vertical(ground) and end.outcome == Outcome.STEP and state.v < 0.0 <= end.v:
+        state.near_ties += nearly_touches(ground, block, rules, scratch, state, end.time)
+    return finish_step(ground, rules, state, end, left)
 
 
 @inlined
-def long_step(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float) -> Arrival:
+def long_step(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float) -> StepEnd:
     """Step along the full series of the arc."""
     order, h, _ = expand(ground, block, rules, scratch, state, left)
     if state.smooth:  # the acceleration at an uplift is zero, whatever rounding says
         scratch.rotation[2] = 0.0
     balanced = state.v == 0.0 and scratch.rotation[2] == 0.0
     if balanced and state.piece == last_piece(ground) and rules.endless:
-        return Arrival(_STUCK, 0.0, state.u, 0.0, 0.0, 0.0)
+        return StepEnd(Outcome.BALANCED, 0.0, state.u, 0.0, 0.0, 0.0)
     return advance(state, scratch, order, h, block.fallen)
 
 
 @inlined
-def arrive(ground: Ground, rules: Record, state: Record, arrival: Arrival, left: float) -> int:
-    """Take the state to the end of a step; returns what ended it."""
-    if arrival.height > state.peak:
-        state.peak = arrival.height
-        state.peak_time = time_of(ground, state) + arrival.top
-    stopped = arrival.outcome == STEP and arrival.time >= left and is_last(ground, rules, state)
-    pass_time(state, arrival.time)
-    state.u = arrival.u
-    state.v = arrival.v
+def finish_step(ground: Ground, rules: Record, state: Record, end: StepEnd, left: float) -> int:
+    """Move the state to the end of a step; returns what ended it (`Outcome`)."""
+    if end.peak > state.peak:
+        state.peak = end.peak
+        state.peak_time = time_of(ground, state) + end.peak_time
+    stopped = end.outcome == Outcome.STEP and end.time >= left and is_last(ground, rules, state)
+    advance_time(state, end.time)
+    state.u = end.u
+    state.v = end.v
     state.smooth = False
     if stopped:
-        return _STOPPED
-    if arrival.outcome == STEP:
-        enter_piece(ground, state, arrival.time >= left)
-    return arrival.outcome
+        return Outcome.STOPPED
+    if end.outcome == Outcome.STEP:
+        enter_piece(ground, state, end.time >= left)
+    return end.outcome
 
 
 @inlined
 def pass_impact(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
     """Pass an impact, and come to rest where it is so decided; DONE when the march ends there."""
-    settle(ground, state)
+    normalize_offset(ground, state)
     if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
         pushed = abs(restoring(ground, block, state.side, state.piece, state.offset))
         depth = 0.5 * state.v * state.v / pushed  # of the dip below zero rotation, if there were no ground
         state.near_ties += depth <= _NEAR_TIE * state.peak
         if depth <= _TOUCH * state.peak:  # no impact, which would leave the block on the other side
             state.v = 0.0
-            return GOING
+            return Ending.RUNNING
     time = time_of(ground, state)
-    speed = strike(block, state)
+    speed = apply_impact(block, state)
     write_impact(rules, table, state, time, speed)
-    note_impact(state)
+    count_impact(state)
     proof = unproven()
-    if rules.treatment == CERTIFIED and state.v <= state.worth:
+    if rules.treatment == RestRule.CERTIFIED and state.v <= state.proof_speed:
         proof = proven_bounds(ground, block, rules, scratch, state)
-        note_proof(ground, rules, state, proof)
+        record_proof(ground, rules, state, proof)
     rest = rest_after_impact(ground, block, rules, state, proof)
-    state.struck = time
+    state.last_impact_time = time
     if math.isnan(rest.time):
-        return GOING
+        return Ending.RUNNING
     return come_to_rest(ground, rules, table, state, rest)
 
 
@@ -198,15 +189,15 @@ def is_weightless(ground: Ground, block: Record, state: Record, offset: float) -
 def nearly_touches(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, h: float) -> bool:
     """Whether the arc from a state turns within h so near to the ground that rounding may hide an impact.
 
-    Where weight presses the block down it goes on alike with the impact and without.
+    Where weight presses the block down the motion is the same with the impact and without.
     """
     order, _, _ = expand(ground, block, rules, scratch, state, h)
     c, d = scratch.rotation, scratch.spare
     for k in range(order):
         d[k] = -(k + 1) * c[k + 1]
-    turn = first_root(d, 0, order - 1, h)
-    lowest, _, _ = evaluate(c, order, turn)
-    return bool(lowest <= _NEAR_TIE * state.peak and is_weightless(ground, block, state, state.offset + turn))
+    lowest_time = first_root(d, 0, order - 1, h)
+    lowest, _, _ = evaluate(c, order, lowest_time)
+    return bool(lowest <= _NEAR_TIE * state.peak and is_weightless(ground, block, state, state.offset + lowest_time))
 
 
 @inlined
@@ -222,35 +213,35 @@ def come_to_rest(ground: Ground, rules: Record, table: Records, state: Record, r
     state.run = 0
     if time + rest.time >= rules.stop:
         state.end = rules.stop
-        return DONE
+        return Ending.DONE
     state.side = AT_REST
     state.u = state.v = 0.0
     state.rested = time + rest.time
     if state.rests == 0:
         state.first_rest = state.rested
     state.rests += 1
-    write_event(rules, table, state, state.rested, REST)
+    write_event(rules, table, state, state.rested, EventKind.REST)
     state.offset += rest.time
-    settle(ground, state)
-    return GOING
+    normalize_offset(ground, state)
+    return Ending.RUNNING
 
 
 @inlined
-def fall(ground: Ground, block: Record, rules: Record, table: Records, state: Record) -> int:
+def end_by_overturning(ground: Ground, block: Record, rules: Record, table: Records, state: Record) -> int:
     """End a march in overturning."""
     state.end = state.peak_time = time_of(ground, state)
     state.peak = block.fallen
     write_node(ground, rules, table, state)
-    write_event(rules, table, state, state.end, TOPPLED)
-    return FELL
+    write_event(rules, table, state, state.end, EventKind.OVERTURN)
+    return Ending.OVERTURNED
 
 
 @inlined
-def stop(ground: Ground, rules: Record, table: Records, state: Record) -> int:
-    """End a march where it was told to stop, in the middle of an arc."""
+def end_by_stopping(ground: Ground, rules: Record, table: Records, state: Record) -> int:
+    """End a march in the middle of an arc, at the time given by the rules."""
     state.end = rules.stop
     write_node(ground, rules, table, state)
-    return DONE
+    return Ending.DONE
 
 
 @inlined
@@ -268,8 +259,8 @@ def is_last(ground: Ground, rules: Record, state: Record) -> bool:
 
 
 @inlined
-def pass_time(state: Record, t: float) -> None:
-    """Move on by t, and never by nothing, so that every march ends."""
+def advance_time(state: Record, t: float) -> None:
+    """Advance the time by t, and by an ulp at least, so that every march ends."""
     start = state.offset
     state.offset += t
     if state.offset == start:
@@ -283,12 +274,12 @@ def enter_piece(ground: Ground, state: Record, over: bool) -> None:
         state.piece += 1
         state.offset = 0.0
     else:
-        settle(ground, state)
+        normalize_offset(ground, state)
 
 
 @inlined
-def settle(ground: Ground, state: Record) -> None:
-    """Bring the offset inside its own piece."""
+def normalize_offset(ground: Ground, state: Record) -> None:
+    """Bring the offset within its piece."""
     while state.offset >= length_of(ground, state.piece):
         state.offset -= length_of(ground, state.piece)
         state.piece += 1

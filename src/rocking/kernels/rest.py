@@ -1,23 +1,25 @@
-"""Whether a block comes to rest after an impact, and when: proven, imposed, or because time hardly advances."""
+"""Whether a block comes to rest after an impact, and when; and the impacts of a sequence that is proven to end."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from rocking.kernels.arc import restoring
+from rocking.kernels.arc import restoring, sign_of
 from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.ground import Ground, length_of, start_of
-from rocking.kernels.state import Record
-from rocking.kernels.status import CERTIFIED, INTERVAL, TIME, VELOCITY
+from rocking.kernels.ground import Ground, coefficient, length_of, start_of
+from rocking.kernels.remaining import THIRD, Pair
+from rocking.kernels.state import Record, Records, RestRule
+from rocking.kernels.trace import PROVEN_PER_ITERATION, write_impact, write_node
 
 ULP = 2.0**-52
 
 #: A proof that failed is tried again once the speed has fallen by this factor.
 _SLOWER = 0.6
 
-#: One whose bracket is too wide, once it is expected to be good enough: by a little less, and at least by this factor.
+#: A proof whose bracket is too wide is tried again at the speed at which it is expected to be narrow enough, times the
+#: first factor, and at most at the speed times the second.
 _SOONER = 0.97
 _SLOWEST = 0.95
 
@@ -41,19 +43,19 @@ def time_of(ground: Ground, state: Record) -> float:
 
 
 @inlined
-def note_impact(state: Record) -> None:
-    """Count an impact of a proven sequence; before a proof, see when one is worth trying."""
+def count_impact(state: Record) -> None:
+    """Count an impact of a proven sequence; before a proof, decide at which speed one is tried."""
     if state.run > 0:
         state.run += 1
-    elif state.v > state.worth:
-        state.worth = max(state.worth, _SLOWER * state.v)
+    elif state.v > state.proof_speed:
+        state.proof_speed = max(state.proof_speed, _SLOWER * state.v)
 
 
 @inlined
-def note_proof(ground: Ground, rules: Record, state: Record, proof: Proof) -> None:
-    """Remember from when on chattering is proven, and when the next proof is worth trying."""
+def record_proof(ground: Ground, rules: Record, state: Record, proof: Proof) -> None:
+    """Store since when chattering is proven, and at which speed the next proof is tried."""
     if not proof.upper >= 0.0:
-        state.worth = _SLOWER * state.v
+        state.proof_speed = _SLOWER * state.v
         return
     if state.run == 0:
         state.run = 1
@@ -63,7 +65,7 @@ def note_proof(ground: Ground, rules: Record, state: Record, proof: Proof) -> No
     # The width of a bracket of higher order falls with the fifth power of the speed. It needs a rest within the present
     # piece; that of lower order does not, and is quadratic.
     finer = _SOONER * excess**-0.2 if wait == 0.0 else 1.0 - wait / proof.time
-    state.worth = state.v * min(_SLOWEST, max(finer, math.sqrt(1.0 / excess)))
+    state.proof_speed = state.v * min(_SLOWEST, max(finer, math.sqrt(1.0 / excess)))
 
 
 @inlined
@@ -81,7 +83,7 @@ def time_to_piece(ground: Ground, state: Record, time: float) -> float:
 
 @shared
 def proven_bounds(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record) -> Proof:
-    """Proven bounds on the time to rest, with room for the rounding of all times."""
+    """Proven bounds on the time to rest, widened by the rounding of all times; all NaN: no proof."""
     lower, upper, time, height = prove_rest(ground, block, rules, scratch, state)
     slack = allowance(time_of(ground, state), upper, state)
     return Proof(max(0.0, lower - slack), upper + slack, time, height)
@@ -89,21 +91,21 @@ def proven_bounds(ground: Ground, block: Record, rules: Record, scratch: Record,
 
 @inlined
 def allowance(time: float, upper: float, state: Record) -> float:
-    """Room for the rounding of the times, and of the arcs resolved since the first proof."""
+    """Allow for the rounding of the times, and of the arcs resolved since the first proof."""
     since = time - state.run_start if state.run > 0 else 0.0
     return 4.0 * ULP * time + 8.0 * ULP * (max(state.run, 1) + 4) * (since + upper)
 
 
 @shared
 def rest_after_impact(ground: Ground, block: Record, rules: Record, state: Record, proof: Proof) -> Rest:
-    """Decide on rest at an impact, given the bounds that are proven there, if any."""
+    """Decide on rest at an impact, given the bounds that are proven there (NaN: none)."""
     time = time_of(ground, state)
-    if rules.treatment == CERTIFIED:
+    if rules.treatment == RestRule.CERTIFIED:
         # What is not resolved any more must not be higher than what was.
         good = max(rules.tolerance, 4.0 * allowance(time, proof.upper, state))
         if proof.upper - proof.lower <= good and proof.height <= state.peak:
             return Rest(proof.lower, proof.upper, proof.time, False)
-    elif is_imposed(rules, block.limit[state.side], state.v, time - state.struck, time - state.uplifted):
+    elif is_imposed(rules, block.limit[state.side], state.v, time - state.last_impact_time, time - state.uplifted):
         return Rest(np.nan, np.nan, 0.0, False)
     stalled = has_stalled(ground, block, state)
     return Rest(np.nan, np.nan, 0.0 if stalled or state.v == 0.0 else np.nan, stalled)
@@ -112,11 +114,11 @@ def rest_after_impact(ground: Ground, block: Record, rules: Record, state: Recor
 @inlined
 def is_imposed(rules: Record, limit: float, v: float, interval: float, since_uplift: float) -> bool:
     """Whether a treatment other than the certificate brings the block to rest at this impact."""
-    if rules.treatment == VELOCITY:
+    if rules.treatment == RestRule.VELOCITY:
         return v <= limit
-    if rules.treatment == INTERVAL:
+    if rules.treatment == RestRule.INTERVAL:
         return interval <= limit
-    return rules.treatment == TIME and since_uplift >= limit
+    return rules.treatment == RestRule.TIME and since_uplift >= limit
 
 
 @inlined
@@ -126,4 +128,81 @@ def has_stalled(ground: Ground, block: Record, state: Record) -> bool:
     fastest = max(abs(block.stiffness[0]), abs(block.stiffness[1]))
     least = ULP * (time + (1.0 / math.sqrt(fastest) if fastest > 0.0 else 0.0))
     pressed = restoring(ground, block, state.side, state.piece, state.offset)
-    return bool(time - state.struck <= least and 2.0 * state.v <= least * pressed)
+    return bool(time - state.last_impact_time <= least and 2.0 * state.v <= least * pressed)
+
+
+#: Largest |beta| and |gamma| of `proven_arc`: what its sums leave out is below 2^-54 of them.
+LARGEST_BETA = 1.0 / 64.0
+LARGEST_GAMMA = 2.0**-14
+
+
+@shared
+def pass_proven_impacts(
+    ground: Ground, block: Record, rules: Record, table: Records, state: Record, left: float
+) -> None:
+    """March the linear model through some impacts within ``left``, up to the one at which another proof is tried.
+
+    The ground acceleration changes evenly; the state is one just after an impact.
+    """
+    rate = coefficient(ground, state.piece, 1)
+    end = state.offset + left
+    for _ in range(PROVEN_PER_ITERATION):
+        side, v = state.side, state.v
+        g = restoring(ground, block, side, state.piece, state.offset)
+        t, speed = proven_arc(v, g, block.gain[side] * sign_of(side) * rate, block.stiffness[side])
+        slower = block.restitution[side] * speed
+        # The arc lies below its first tangent.
+        if not (t < end - state.offset and slower > state.proof_speed and v * t <= state.peak):
+            return
+        state.side = block.entered[side]
+        state.v = slower
+        state.offset += t
+        state.last_impact_time = start_of(ground, state.piece) + state.offset
+        state.impacts += 1
+        state.run += 1
+        state.budget -= 1
+        write_impact(rules, table, state, state.last_impact_time, speed)
+        write_node(ground, rules, table, state)
+
+
+@inlined
+def proven_arc(v: float, g: float, rate: float, stiffness: float) -> Pair:
+    """Duration and impact speed of an arc under g + rate t - stiffness u that starts with speed v.
+
+    To full precision for |beta| = |rate| v/g^2 and |gamma| = |stiffness| v^2/g^2 up to the limits above, NaN beyond.
+    Half the duration is (v/g) x with x + b x^2 = 1, b = 2 beta/3, and a correction for gamma. The sum for x, with
+    Catalan's numbers, converges for |b| < 1/4; all sums stop where what is left is below rounding.
+    """
+    if not g > 0.0:
+        return math.nan, math.nan
+    inverse = 1.0 / g
+    pace = v * inverse
+    beta, gamma = rate * pace * inverse, stiffness * pace * pace
+    if not (abs(beta) <= LARGEST_BETA and abs(gamma) <= LARGEST_GAMMA):
+        return math.nan, math.nan
+    x = half_duration(2.0 * THIRD * beta)
+    tilt = beta * x
+    q = gamma * x * x
+    # The equation's value, slope and half its second derivative at x.
+    bent = q * (q * (2.0 / 15.0 - q * (17.0 / 315.0)) - THIRD)
+    value = x * ((1.0 + tilt) * bent + tilt * q * (1.0 / 45.0 - q * (2.0 / 945.0)))
+    bending = 2.0 * q * (1.0 + tilt) * (q * (4.0 / 15.0) - THIRD)
+    slope = 1.0 + (4.0 / 3.0) * tilt + (1.0 + 2.0 * tilt) * bent + bending + (4.0 / 45.0) * tilt * q
+    curving = 2.0 * THIRD * beta - gamma * x * (1.0 + (28.0 / 15.0) * tilt)
+    step = 1.0 / slope
+    newton = value * step
+    x -= newton * (1.0 + curving * step * newton)
+    q = gamma * x * x
+    gain = 2.0 * beta * x * x * (THIRD - q * (1.0 / 45.0 - q * (2.0 / 945.0)))
+    return 2.0 * pace * x, v + v * gain
+
+
+@inlined
+def half_duration(b: float) -> float:
+    """Root of x + b x^2 = 1 near 1 for |b| <= 1/96: a sum with Catalan's numbers, in pairs of terms."""
+    square = b * b
+    fourth = square * square
+    low = (1.0 - b) + square * (2.0 - 5.0 * b)
+    middle = (14.0 - 42.0 * b) + square * (132.0 - 429.0 * b)
+    high = (1430.0 - 4862.0 * b) + square * 16796.0
+    return low + fourth * (middle + fourth * high)

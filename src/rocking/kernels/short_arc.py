@@ -1,22 +1,19 @@
-"""Steps so short that nine terms of the series are exact: in registers, with one look at what may happen on the way.
+"""Steps so short that nine terms of the series are exact: in registers, with one bound on what may happen on the way.
 
-What cannot be seen at a glance (two impacts close to each other, a rotation near the highest so far, a fall) is left
-UNDECIDED, and takes the long way through `expand` and `advance`. The series are the same, so are the answers.
+What the bound does not decide (two impacts close to each other, a rotation near the highest so far, a fall) is left
+UNDECIDED, and goes through `expand` and `advance`. The series are the same, and so are the answers.
 """
 
 import math
 
 import numpy as np
 
-from rocking.kernels.arc import Line, Seven, borne, is_left_out_nothing, sign_of, strength_of, weight_at
+from rocking.kernels.arc import is_left_out_nothing, sign_of, strength_of, weight_at
 from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.events import StepEnd
 from rocking.kernels.ground import Ground, acceleration, coefficient, has_vertical, is_straight, vertical_of
-from rocking.kernels.impact import Arrival
-from rocking.kernels.state import Record
-from rocking.kernels.status import IMPACT, STEP, UNDECIDED
-
-#: Coefficients c[0] to c[9].
-Series = tuple[float, float, float, float, float, float, float, float, float, float]
+from rocking.kernels.recurrences import Line, Seven, Ten, linear_ten, nonlinear_ten, weighted_ten
+from rocking.kernels.state import Outcome, Record
 
 #: Largest lam t^2 of a linear step, lam |W| t^2 of one while the weight W changes, and (lam (|W| + |a|/g) + v^2) t^2 of
 #: a nonlinear one.
@@ -36,7 +33,7 @@ _SETTLED = 1e-8
 
 
 @inlined
-def short_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> Arrival:
+def short_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> StepEnd:
     """Step to the next impact or over ``left``, or the part of it that is short; UNDECIDED where it is not simple."""
     if not is_straight(ground):
         return undecided()
@@ -45,33 +42,33 @@ def short_step(ground: Ground, block: Record, rules: Record, state: Record, left
     if rules.nonlinear:
         return short_nonlinear_step(ground, block, state, left, None)
     c = linear_series(ground, block, state)
-    arrival = look(c, reach_linear(block, state, left), state, block.fallen)
-    return arrival if is_complete(c, arrival.time) else undecided()
+    end = resolve_step(c, reach_linear(block, state, left), state, block.fallen)
+    return end if is_complete(c, end.time) else undecided()
 
 
 @shared
-def short_weighted_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> Arrival:
+def short_weighted_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> StepEnd:
     """Step in the same way while the weight changes."""
     weight, lam = weight_line(ground, state), block.stiffness[state.side]
     if rules.nonlinear:
         return short_nonlinear_step(ground, block, state, left, weight)
     c = weighted_series(ground, block, state, weight)
-    arrival = look(c, reach_weighted(lam, weight, left), state, block.fallen)
-    return arrival if is_complete_weighted(c, lam, weight, arrival.time) else undecided()
+    end = resolve_step(c, reach_weighted(lam, weight, left), state, block.fallen)
+    return end if is_complete_weighted(c, lam, weight, end.time) else undecided()
 
 
 @inlined
-def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> Arrival:
+def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> StepEnd:
     """Step in the same way in the nonlinear model."""
     c, angles = nonlinear_series(ground, block, state, weight)
-    arrival = look(c, reach_nonlinear(ground, block, state, left, weight), state, block.fallen)
+    end = resolve_step(c, reach_nonlinear(ground, block, state, left, weight), state, block.fallen)
     push = (acceleration(ground, state.piece, state.offset), coefficient(ground, state.piece, 1))
-    complete = is_complete_nonlinear(c, angles, block.stiffness[state.side], (push, weight), arrival.time)
-    return arrival if complete else undecided()
+    complete = is_complete_nonlinear(c, angles, block.stiffness[state.side], (push, weight), end.time)
+    return end if complete else undecided()
 
 
 @inlined
-def is_complete_weighted(c: Series, lam: float, weight: Line, t: float) -> bool:
+def is_complete_weighted(c: Ten, lam: float, weight: Line, t: float) -> bool:
     """Whether nine terms of a linear series are enough at t while the weight changes.
 
     Each coefficient is made of the one two before and, as the weight changes, of the one three before. So the last
@@ -85,7 +82,7 @@ def is_complete_weighted(c: Series, lam: float, weight: Line, t: float) -> bool:
 
 
 @inlined
-def is_complete_nonlinear(c: Series, z: Seven, lam: float, pulls: tuple[Line, Line | None], t: float) -> bool:
+def is_complete_nonlinear(c: Ten, z: Seven, lam: float, pulls: tuple[Line, Line | None], t: float) -> bool:
     """Whether nine terms of a nonlinear series are enough at t; ``pulls`` are push and weight."""
     t2 = t * t
     t3, t4 = t2 * t, t2 * t2
@@ -98,9 +95,9 @@ def is_complete_nonlinear(c: Series, z: Seven, lam: float, pulls: tuple[Line, Li
 
 
 @inlined
-def undecided() -> Arrival:
+def undecided() -> StepEnd:
     """No answer."""
-    return Arrival(UNDECIDED, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return StepEnd(Outcome.UNDECIDED, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inlined
@@ -139,123 +136,77 @@ def greatest(weight: Line | None, left: float) -> float:
 
 
 @inlined
-def linear_series(ground: Ground, block: Record, state: Record) -> Series:
+def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
     """Series of a linear arc under a ground acceleration that changes evenly."""
     side = state.side
-    lam, gain = block.stiffness[side], block.gain[side]
-    push = sign_of(side) * acceleration(ground, state.piece, state.offset)
-    rate = sign_of(side) * coefficient(ground, state.piece, 1)
-    c2 = 0.5 * (lam * state.u - gain * (block.threshold[side] + push))
-    c3 = (lam * state.v - gain * rate) * (1.0 / 6.0)
-    return linear_tail(state.u, state.v, c2, c3, lam)
+    gain = block.gain[side]
+    push = push_line(ground, state)
+    return linear_ten(state.u, state.v, block.stiffness[side], gain * (block.threshold[side] + push[0]), gain * push[1])
 
 
 @inlined
-def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) -> Series:
+def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) -> Ten:
     """Series of a linear arc under two ground accelerations that change evenly."""
-    side, u, v = state.side, state.u, state.v
-    lam, gain = block.stiffness[side], block.gain[side]
-    push = sign_of(side) * acceleration(ground, state.piece, state.offset)
-    rate = sign_of(side) * coefficient(ground, state.piece, 1)
-    z = lam * u - gain * block.threshold[side]
-    c2 = 0.5 * (borne(weight, z, 0.0) - gain * push)
-    c3 = (1.0 / 6.0) * (borne(weight, lam * v, z) - gain * rate)
-    c4, c5 = lam * borne(weight, c2, v) * (1.0 / 12.0), lam * borne(weight, c3, c2) * (1.0 / 20.0)
-    c6, c7 = lam * borne(weight, c4, c3) * (1.0 / 30.0), lam * borne(weight, c5, c4) * (1.0 / 42.0)
-    c8, c9 = lam * borne(weight, c6, c5) * (1.0 / 56.0), lam * borne(weight, c7, c6) * (1.0 / 72.0)
-    return u, v, c2, c3, c4, c5, c6, c7, c8, c9
+    side, gain = state.side, block.gain[state.side]
+    push = push_line(ground, state)
+    pushes = (gain * push[0], gain * push[1])
+    return weighted_ten(state.u, state.v, block.stiffness[side], gain * block.threshold[side], pushes, weight)
 
 
 @inlined
-def linear_tail(u: float, v: float, c2: float, c3: float, lam: float) -> Series:
-    """Series of a linear arc from its first four coefficients."""
-    c4, c5 = lam * c2 * (1.0 / 12.0), lam * c3 * (1.0 / 20.0)
-    c6, c7 = lam * c4 * (1.0 / 30.0), lam * c5 * (1.0 / 42.0)
-    c8, c9 = lam * c6 * (1.0 / 56.0), lam * c7 * (1.0 / 72.0)
-    return u, v, c2, c3, c4, c5, c6, c7, c8, c9
-
-
-@inlined
-def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line | None) -> tuple[Series, Seven]:
-    """Series of a nonlinear arc under a ground acceleration that changes evenly, by the recurrence of `arc`.
-
-    The weight may change evenly, too, or not at all (None). The second
-    tuple has the sums of the sizes of the coefficients of sin and cos, from the first power to the seventh.
-    """
-    side, u, v = state.side, state.u, state.v
-    l2 = -0.5 * block.stiffness[side]
-    a = sign_of(side) * acceleration(ground, state.piece, state.offset)
-    b = sign_of(side) * coefficient(ground, state.piece, 1)
-    s0, c0 = block.sine[side], block.cosine[side]
+def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line | None) -> tuple[Ten, Seven]:
+    """Series of a nonlinear arc under ground accelerations that change evenly; see `nonlinear_ten`."""
+    side, u = state.side, state.u
+    angle = (block.sine[side], block.cosine[side])
     if u != 0.0:
         psi = block.slenderness[side] - u
-        s0, c0 = math.sin(psi), math.cos(psi)
-    u2 = l2 * (borne(weight, s0, 0.0) + a * c0)
-    s1, c1 = -(v * c0), v * s0
-    u3 = l2 * (borne(weight, s1, s0) + (a * c1 + b * c0)) * (1.0 / 3.0)
-    r2 = 2.0 * u2
-    s2, c2 = -0.5 * (v * c1 + r2 * c0), 0.5 * (v * s1 + r2 * s0)
-    u4 = l2 * (borne(weight, s2, s1) + (a * c2 + b * c1)) * (1.0 / 6.0)
-    r3 = 3.0 * u3
-    s3, c3 = -(v * c2 + r2 * c1 + r3 * c0) * (1.0 / 3.0), (v * s2 + r2 * s1 + r3 * s0) * (1.0 / 3.0)
-    u5 = l2 * (borne(weight, s3, s2) + (a * c3 + b * c2)) * (1.0 / 10.0)
-    r4 = 4.0 * u4
-    s4 = -0.25 * ((v * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
-    c4 = 0.25 * ((v * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
-    u6 = l2 * (borne(weight, s4, s3) + (a * c4 + b * c3)) * (1.0 / 15.0)
-    r5 = 5.0 * u5
-    s5 = -0.2 * ((v * c4 + r2 * c3) + (r3 * c2 + r4 * c1) + r5 * c0)
-    c5 = 0.2 * ((v * s4 + r2 * s3) + (r3 * s2 + r4 * s1) + r5 * s0)
-    u7 = l2 * (borne(weight, s5, s4) + (a * c5 + b * c4)) * (1.0 / 21.0)
-    r6 = 6.0 * u6
-    s6 = -(1.0 / 6.0) * ((v * c5 + r2 * c4) + (r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0))
-    c6 = (1.0 / 6.0) * ((v * s5 + r2 * s4) + (r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0))
-    u8 = l2 * (borne(weight, s6, s5) + (a * c6 + b * c5)) * (1.0 / 28.0)
-    r7 = 7.0 * u7
-    s7 = -(1.0 / 7.0) * ((v * c6 + r2 * c5) + (r3 * c4 + r4 * c3) + ((r5 * c2 + r6 * c1) + r7 * c0))
-    c7 = (1.0 / 7.0) * ((v * s6 + r2 * s5) + (r3 * s4 + r4 * s3) + ((r5 * s2 + r6 * s1) + r7 * s0))
-    u9 = l2 * (borne(weight, s7, s6) + (a * c7 + b * c6)) * (1.0 / 36.0)
-    low = (abs(v), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
-    angles = (*low, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
-    return (u, v, u2, u3, u4, u5, u6, u7, u8, u9), angles
+        angle = (math.sin(psi), math.cos(psi))
+    return nonlinear_ten((u, state.v), angle, block.stiffness[side], push_line(ground, state), weight)
 
 
 @inlined
-def look(c: Series, t: float, state: Record, fallen: float) -> Arrival:
-    """Where a short arc is after t, or at its first impact before; UNDECIDED where that takes a closer look."""
+def push_line(ground: Ground, state: Record) -> Line:
+    """Ground acceleration in the frame of the state's side, and its slope, where it changes evenly."""
+    sign = sign_of(state.side)
+    return sign * acceleration(ground, state.piece, state.offset), sign * coefficient(ground, state.piece, 1)
+
+
+@inlined
+def resolve_step(c: Ten, t: float, state: Record, fallen: float) -> StepEnd:
+    """Where a short arc is after t, or at its first impact before; UNDECIDED where that takes a closer resolve_step."""
     if c[1] == 0.0 and c[2] == 0.0:  # balanced, perhaps for ever
         return undecided()
-    outcome = STEP
+    outcome = Outcome.STEP
     rest = later_curvature(c, t)
     most = 2.0 * c[2] + 6.0 * max(c[3], 0.0) * t + rest
     least = 2.0 * c[2] + 6.0 * min(c[3], 0.0) * t - rest
     if c[0] == 0.0:
         # u/t > v + min(u'')/2 t: no impact while that is positive.
         if not c[1] + 0.5 * min(least, 0.0) * t > 0.0:
-            t, outcome = impact_from_ground(c, t), IMPACT
+            t, outcome = impact_from_ground(c, t), Outcome.IMPACT
     else:
         end = rotation(c, t)
         # No dip below both ends by more than t^2/8 of the curvature.
         if not min(c[0], end) > 0.125 * t * t * max(most, 0.0):
             falls = most < 0.0 or c[1] + max(most, 0.0) * t < 0.0
-            t, outcome = impact_from_above(c, t) if end < 0.0 and falls else np.nan, IMPACT
+            t, outcome = impact_from_above(c, t) if end < 0.0 and falls else np.nan, Outcome.IMPACT
     if math.isnan(t):
         return undecided()
-    end, speed = (rotation(c, t) if outcome == STEP else 0.0), velocity(c, t)
-    top, height = t, end
+    end, speed = (rotation(c, t) if outcome == Outcome.STEP else 0.0), velocity(c, t)
+    peak_time, peak = t, end
     rises = c[1] + min(least, 0.0) * t > 0.0
     if not rises and max(c[0], end) - 0.125 * t * t * min(least, 0.0) > state.peak:
         if not (most < 0.0 and c[1] > 0.0 and speed < 0.0):
             return undecided()
-        top = summit(c, t)
-        height = rotation(c, top)
-    if not max(c[0], height) < fallen:
+        peak_time = highest_time(c, t)
+        peak = rotation(c, peak_time)
+    if not max(c[0], peak) < fallen:
         return undecided()
-    return Arrival(outcome, t, end, speed, top, height)
+    return StepEnd(outcome, t, end, speed, peak_time, peak)
 
 
 @inlined
-def later_curvature(c: Series, t: float) -> float:
+def later_curvature(c: Ten, t: float) -> float:
     """Size of what the terms from the fourth power on add to u'' within t, at most."""
     high = 56.0 * abs(c[8]) + 72.0 * abs(c[9]) * t
     middle = 30.0 * abs(c[6]) + 42.0 * abs(c[7]) * t
@@ -265,7 +216,7 @@ def later_curvature(c: Series, t: float) -> float:
 
 
 @inlined
-def is_complete(c: Series, t: float) -> bool:
+def is_complete(c: Ten, t: float) -> bool:
     """Whether nine terms of a linear series are enough at t, for the velocity to its last place."""
     t2 = t * t
     t4 = t2 * t2
@@ -273,7 +224,7 @@ def is_complete(c: Series, t: float) -> bool:
 
 
 @inlined
-def rotation(c: Series, t: float) -> float:
+def rotation(c: Ten, t: float) -> float:
     """Value of a series, added up in pairs: a shorter wait than Horner's rule."""
     t2 = t * t
     low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
@@ -282,7 +233,7 @@ def rotation(c: Series, t: float) -> float:
 
 
 @inlined
-def velocity(c: Series, t: float) -> float:
+def velocity(c: Ten, t: float) -> float:
     """Value of a series' derivative."""
     t2 = t * t
     low = (2.0 * c[2] + 3.0 * c[3] * t) + (4.0 * c[4] + 5.0 * c[5] * t) * t2
@@ -291,7 +242,7 @@ def velocity(c: Series, t: float) -> float:
 
 
 @inlined
-def over_time(c: Series, t: float) -> tuple[float, float]:
+def over_time(c: Ten, t: float) -> tuple[float, float]:
     """Value and slope of a series without constant term, divided by t."""
     t2 = t * t
     low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
@@ -302,7 +253,7 @@ def over_time(c: Series, t: float) -> tuple[float, float]:
 
 
 @inlined
-def summit(c: Series, left: float) -> float:
+def highest_time(c: Ten, left: float) -> float:
     """Time of the highest rotation of an arc that is concave, rises first and falls at ``left``; NaN: not found."""
     t = min(left, -0.5 * c[1] / c[2])
     for _ in range(_NEWTON_STEPS):
@@ -317,7 +268,7 @@ def summit(c: Series, left: float) -> float:
 
 
 @inlined
-def impact_from_ground(c: Series, left: float) -> float:
+def impact_from_ground(c: Ten, left: float) -> float:
     """Duration of the arc that an impact starts, where it ends before ``left`` and u/t falls all the way; else NaN."""
     root = c[2] * c[2] - 4.0 * c[3] * c[1]
     if not (c[2] < 0.0 and root > 0.0):
@@ -336,7 +287,7 @@ def impact_from_ground(c: Series, left: float) -> float:
 
 
 @inlined
-def impact_from_above(c: Series, left: float) -> float:
+def impact_from_above(c: Ten, left: float) -> float:
     """Time to the one root of an arc that is above ground now and below it at ``left``; NaN if it is not found."""
     square = c[1] * c[1] - 4.0 * c[2] * c[0]
     if not square > 0.0:

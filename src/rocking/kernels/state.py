@@ -1,12 +1,14 @@
-"""What a march carries along, as numpy records: compiled code passes them by pointer, and reads fields by name."""
+"""What kernels work on, as numpy records, and the integer codes that they return.
 
+Compiled code passes a record by pointer and reads its fields by name. Compiled, an integer code is a plain integer.
+"""
+
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
 from numba import config
 from numpy.typing import NDArray
-
-from rocking.kernels.status import GOING
 
 Records = NDArray[np.void]
 
@@ -19,8 +21,55 @@ ORDER = 22
 #: Side of a block at rest.
 AT_REST = -1
 
-#: A march that ends at no piece of the motion.
+#: The value of ``until`` of a march that ends at no piece of the motion.
 TO_THE_END = 2**62
+
+
+class Outcome(IntEnum):
+    """What ended one Taylor step."""
+
+    STEP = 0
+    IMPACT = 1
+    OVERTURN = 2
+    #: The time at which the march was to stop is reached.
+    STOPPED = 3
+    #: The block is balanced on a corner and nothing will ever move it.
+    BALANCED = 4
+    #: A short step cannot tell; the full series must.
+    UNDECIDED = 5
+
+
+class EventKind(IntEnum):
+    """Kinds of event in a response."""
+
+    UPLIFT = 0
+    REST = 1
+    OVERTURN = 2
+
+
+class RestRule(IntEnum):
+    """What is compared with a limit to bring a sequence of impacts to rest; CERTIFIED: a proof, and no limit."""
+
+    CERTIFIED = 0
+    VELOCITY = 1
+    INTERVAL = 2
+    TIME = 3
+
+
+class Ending(IntEnum):
+    """How a march ended. RUNNING, FULL and PAUSED ones can be continued."""
+
+    DONE = 0
+    OVERTURNED = 1
+    BALANCED = 2
+    #: The table has no space left.
+    FULL = 3
+    #: The piece at which the march was to end is reached.
+    RUNNING = 4
+    #: The budget of iterations is spent.
+    PAUSED = 5
+    #: The whole budget of a simulation is spent.
+    UNFINISHED = 6
 
 
 def _record(**fields: Any) -> np.dtype[np.void]:
@@ -35,25 +84,25 @@ _SERIES = ("f8", (ORDER + 2,))
 #: A block, side by side: lambda in u'' = lambda u - ...; uplift threshold in g and its gain (the restoring acceleration
 #: at zero rotation is gain (threshold + side a/g)); restitution on leaving the side, and the side entered from it; the
 #: rotation at which the block has overturned; slenderness, its sine and cosine; limit of a treatment other than the
-#: certificate. What most turns of a march need comes first, here and below: fewer cache lines to fetch.
+#: certificate. What most iterations of a march need comes first, here and below: fewer cache lines are read.
 BLOCK = _record(
     stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, restitution=_SIDES, entered=("i8", (2,)), fallen="f8",
     slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES,
 )  # fmt: skip
 
-#: How to compute: model, end of chattering (see `status`), width of a good bracket (s), when to stop (s), whether that
+#: How to compute: model, end of chattering (`RestRule`), width of a good bracket (s), when to stop (s), whether that
 #: is never, and whether the tables are written or only the state is kept.
 RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endless="?", record="?")
 
-#: Where a march stands. ``until`` is the first piece that is not marched through and ``budget`` the number of turns
-#: left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a jump;
-#: ``worth`` is the speed below which a proof is worth trying; ``stalled`` counts the rests brought about only because
+#: The state of a march. ``until`` is the first piece that is not marched through and ``budget`` the number of
+#: iterations left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a
+#: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests that came only because
 #: time hardly advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties``
-#: counts what was decided in the last digits: whether a block that nothing weighs down touches the ground.
+#: counts what was decided in the last digits: whether a block without weight touches the ground.
 STATE = _record(
     piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
-    run="i8", worth="f8", struck="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8", run_start="f8",
-    uplifted="f8", rested="f8", first_uplift="f8", first_rest="f8", resting="f8", end="f8",
+    run="i8", proof_speed="f8", last_impact_time="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8",
+    run_start="f8", uplifted="f8", rested="f8", first_uplift="f8", first_rest="f8", resting="f8", end="f8",
     nodes="i8", events="i8", sequences="i8", uplifts="i8", rests="i8", stalled="i8", near_ties="i8",
 )  # fmt: skip
 
@@ -69,6 +118,9 @@ TABLE = _record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQU
 
 #: Scratch space: the series of one step; of the ground, the weight and sin and cos(alpha - u) about its start; a spare.
 SCRATCH = _record(rotation=_SERIES, ground=_SERIES, weight=_SERIES, sine=_SERIES, cosine=_SERIES, spare=_SERIES)
+
+#: Scratch space of a variation: series of the stiffness, of the forcing and of the variation itself.
+VARIATION = _record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
 
 
 def records(count: int, kind: np.dtype[np.void]) -> Records:
@@ -90,11 +142,11 @@ def record(kind: np.dtype[np.void], **values: Any) -> Record:
 
 
 def new_states(count: int, budget: int) -> Records:
-    """States of blocks at rest at time zero, on their way to the end."""
+    """States of blocks at rest at time zero that march to the end of the motion."""
     states = records(count, STATE)
     states["side"] = AT_REST
     states["until"] = TO_THE_END
-    states["ending"] = GOING
+    states["ending"] = Ending.RUNNING.value
     states["budget"] = budget
     return states
 
@@ -110,5 +162,5 @@ def new_table(rows: int) -> Records:
 
 
 def grown(table: Records) -> Records:
-    """Table with twice the room and the same rows."""
+    """Table with the same rows and as many more."""
     return attributed(np.concatenate([table, np.zeros_like(table)]))

@@ -1,4 +1,7 @@
-"""Rotation, velocity and acceleration anywhere in a response, from the series of the arc in which it lies."""
+"""What a response keeps of a march, row by row, and its rotation at any time, from the series of its arcs.
+
+Nothing is written where the rules say so.
+"""
 
 from typing import NamedTuple
 
@@ -6,16 +9,86 @@ import numpy as np
 
 from rocking.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate, expand, sign_of
-from rocking.kernels.compiled import kernel
+from rocking.kernels.compiled import inlined, kernel
 from rocking.kernels.ground import Ground, start_of
 from rocking.kernels.state import AT_REST, NODE_ROW, Record, Records, records
 
-#: Nodes of a response that has not begun.
+#: Largest number of impacts of a proven sequence in one iteration of a march, and of rows of one kind that it writes.
+PROVEN_PER_ITERATION = 64
+_ROWS_PER_ITERATION = PROVEN_PER_ITERATION + 3
+
+
+@inlined
+def has_space(rules: Record, table: Records, state: Record) -> bool:
+    """Whether the table has space for what one iteration of the march can write."""
+    most = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
+    return not rules.record or most + _ROWS_PER_ITERATION <= table.shape[0]
+
+
+@inlined
+def signed(side: int) -> int:
+    """Sign of the rotation on a side: +1, -1, and 0 at rest."""
+    return 0 if side == AT_REST else 1 - 2 * side
+
+
+@inlined
+def write_node(ground: Ground, rules: Record, table: Records, state: Record) -> None:
+    """Write the state into the table."""
+    if not rules.record:
+        return
+    row = table[state.nodes].node
+    row.time = start_of(ground, state.piece) + state.offset
+    row.piece = state.piece
+    row.offset = state.offset
+    row.side = state.side
+    row.u = state.u
+    row.v = state.v
+    state.nodes += 1
+
+
+@inlined
+def write_event(rules: Record, table: Records, state: Record, time: float, kind: int) -> None:
+    """Write an uplift, a rest or an overturning."""
+    if rules.record:
+        row = table[state.events].event
+        row.time = time
+        row.kind = kind
+        row.side = signed(state.side)
+    state.events += 1
+
+
+@inlined
+def write_impact(rules: Record, table: Records, state: Record, time: float, speed: float) -> None:
+    """Write the last impact, from the state after it and the speed before."""
+    if not rules.record:
+        return
+    row = table[state.impacts - 1].impact
+    row.time = time
+    row.side = signed(state.side)
+    row.speed_before = speed
+    row.speed_after = state.v
+
+
+@inlined
+def write_sequence(rules: Record, table: Records, state: Record, time: float, rest: tuple[float, float, float]) -> None:
+    """Write a chattering sequence that ends, from its last impact's time and (lower, upper, time) to rest."""
+    lower, upper, to_rest = rest
+    if rules.record:
+        row = table[state.sequences].sequence
+        row.start = state.run_start
+        row.end = time + to_rest
+        row.lower = time + lower
+        row.upper = time + upper
+        row.impacts = state.run
+    state.sequences += 1
+
+
+#: Nodes of a response before its march.
 NO_NODES = records(0, NODE_ROW)
 
 
 class Trail(NamedTuple):
-    """What it takes to follow a response again: the problem and the nodes of its steps."""
+    """What a response is computed again from: the problem and the nodes of its steps."""
 
     ground: Ground
     block: Record

@@ -4,22 +4,27 @@ A quantity x is changed to x (1 + epsilon), and d/d epsilon at 0 is carried alon
 equation of motion, through an impact by the saltation that follows from its shift in time.
 """
 
-import numpy as np
+from enum import IntEnum
 
 from rocking.arrays import Floats
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of, weight_at
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, vertical_of
-from rocking.kernels.state import AT_REST, ORDER, Record
+from rocking.kernels.recurrences import INTEGRATED_TWICE, variation_coefficients
+from rocking.kernels.state import AT_REST, Record
 from rocking.kernels.trace import Trail
 
-#: What may be changed: the motion, the initial rotation and velocity, and p, slenderness and restitution of both sides.
-MOTION, ROTATION, VELOCITY, FREQUENCY, SLENDERNESS, RESTITUTION = range(6)
 
-#: Shape of the work space: series of the stiffness, of the forcing and of the variation.
-WORK = (3, ORDER + 2)
+class Quantity(IntEnum):
+    """What is changed: the motion, the initial rotation or velocity, or p, slenderness or restitution of both sides."""
 
-_WEIGHT = 1.0 / ((np.arange(ORDER + 1) + 1.0) * (np.arange(ORDER + 1) + 2.0))
+    MOTION = 0
+    ROTATION = 1
+    VELOCITY = 2
+    FREQUENCY = 3
+    SLENDERNESS = 4
+    RESTITUTION = 5
+
 
 #: An uplift is a jump where the motion is beyond the threshold by more than this fraction of it.
 _JUMP = 1e-9
@@ -27,43 +32,44 @@ _JUMP = 1e-9
 
 @kernel
 def vary(
-    trail: Trail, scratch: Record, work: Floats, what: int, peak_time: float, impacts: Floats, events: Floats
+    trail: Trail, scratch: Record, work: Record, quantity: int, peak_time: float, impacts: Floats, events: Floats
 ) -> float:
     """Change of the peak rotation per unit of epsilon; shifts of the times of all impacts and events into arrays.
 
-    Assumes a peak that is not an overturning. ``work`` is scratch space.
+    Assumes a peak that is not an overturning. ``work`` is scratch space (`state.VARIATION`).
     """
     nodes = trail.nodes
-    struck = happened = 0
-    du = nodes[0].u if what == ROTATION else 0.0
-    dv = nodes[0].v if what == VELOCITY else 0.0
+    impact_count = event_count = 0
+    du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
+    dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
     at_peak = du
     for k in range(nodes.shape[0]):
         node = nodes[k]
         if k + 1 == nodes.shape[0]:
-            if node.side != AT_REST and happened < events.shape[0]:
-                events[happened] = -du / node.v
+            if node.side != AT_REST and event_count < events.shape[0]:
+                events[event_count] = -du / node.v
             break
         following = nodes[k + 1]
         if node.side == AT_REST:
-            events[happened] = uplift_shift(trail, following, what)
-            happened += 1
+            events[event_count] = uplift_shift(trail, following, quantity)
+            event_count += 1
             du = dv = 0.0
         elif following.side == AT_REST:
-            events[happened] = rest_shift(trail, node, what, dv, impacts[struck - 1] if struck > 0 else 0.0, following)
-            happened += 1
+            shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
+            events[event_count] = rest_shift(trail, node, quantity, dv, shift, following)
+            event_count += 1
         else:
-            order = expand_variation(trail, scratch, work, node, what, (du, dv), following.time - node.time)
+            order = expand_variation(trail, scratch, work, node, quantity, (du, dv), following.time - node.time)
             if node.time < peak_time <= following.time:
-                at_peak, _, _ = evaluate(work[2], order, peak_time - node.time)
+                at_peak, _, _ = evaluate(work.change, order, peak_time - node.time)
             t = elapsed(trail, node, following)
-            du, dv, _ = evaluate(work[2], order, t)
+            du, dv, _ = evaluate(work.change, order, t)
             if following.u == 0.0 and (following.side != node.side or following.v > 0.0):  # no touch
                 _, speed, _ = evaluate(scratch.rotation, order, t)
                 shift = du / -speed
-                du, dv = saltation(trail, node, following, what, shift, (dv, -speed))
-                impacts[struck] = shift
-                struck += 1
+                du, dv = saltation(trail, node, following, quantity, shift, (dv, -speed))
+                impacts[impact_count] = shift
+                impact_count += 1
     return at_peak
 
 
@@ -79,32 +85,28 @@ def elapsed(trail: Trail, node: Record, following: Record) -> float:
 
 @shared
 def expand_variation(
-    trail: Trail, scratch: Record, work: Floats, node: Record, what: int, start: tuple[float, float], left: float
+    trail: Trail, scratch: Record, work: Record, node: Record, quantity: int, start: tuple[float, float], left: float
 ) -> int:
-    """Series of the variation along the arc from a node, into the last row of ``work``; returns its order."""
+    """Series of the variation along the arc from a node, into ``work.change``; returns its order."""
     order, _, degree = expand(trail.ground, trail.block, trail.rules, scratch, node, left)
     expand_coefficients(trail, scratch, work, node.side, degree, order)
-    if what == FREQUENCY:
+    if quantity == Quantity.FREQUENCY:
         for k in range(order - 1):
-            work[1, k] = 2.0 * scratch.rotation[k + 2] / _WEIGHT[k]
-    elif what == SLENDERNESS:
+            work.forcing[k] = 2.0 * scratch.rotation[k + 2] / INTEGRATED_TWICE[k]
+    elif quantity == Quantity.SLENDERNESS:
         for k in range(order - 1):
-            work[1, k] = -trail.block.slenderness[node.side] * work[0, k]
-    elif what != MOTION:
+            work.forcing[k] = -trail.block.slenderness[node.side] * work.stiffness[k]
+    elif quantity != Quantity.MOTION:
         for k in range(order - 1):
-            work[1, k] = 0.0
-    work[2, 0], work[2, 1] = start
-    for k in range(order - 1):
-        value = work[1, k]
-        for j in range(k + 1):
-            value += work[0, j] * work[2, k - j]
-        work[2, k + 2] = value * _WEIGHT[k]
+            work.forcing[k] = 0.0
+    work.change[0], work.change[1] = start
+    variation_coefficients(work, order)
     return order
 
 
 @inlined
-def expand_coefficients(trail: Trail, scratch: Record, work: Floats, side: int, degree: int, order: int) -> None:
-    """Series of d u''/d u, and of u'' per unit of change of the motion, into the first two rows of ``work``."""
+def expand_coefficients(trail: Trail, scratch: Record, work: Record, side: int, degree: int, order: int) -> None:
+    """Write the series of d u''/d u, and of u'' per unit of change of the motion, into ``work``."""
     lam, gain, threshold = trail.block.stiffness[side], trail.block.gain[side], trail.block.threshold[side]
     A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
     changes = degree if has_vertical(trail.ground) else 0
@@ -118,14 +120,14 @@ def expand_coefficients(trail: Trail, scratch: Record, work: Floats, side: int, 
             for j in range(min(k, degree) + 1):
                 stiffness -= A[j] * S[k - j]
                 forcing += A[j] * C[k - j]
-            work[0, k] = lam * stiffness
-            work[1, k] = -lam * forcing
+            work.stiffness[k] = lam * stiffness
+            work.forcing[k] = -lam * forcing
         else:
-            work[0, k] = lam * W[k] if k <= changes else 0.0
+            work.stiffness[k] = lam * W[k] if k <= changes else 0.0
             forcing = gain * (A[k] + threshold * added_weight(W, k, changes)) if k <= degree else 0.0
             for j in range(min(k, changes) + 1):
                 forcing -= lam * added_weight(W, j, changes) * scratch.rotation[k - j]
-            work[1, k] = -forcing
+            work.forcing[k] = -forcing
 
 
 @inlined
@@ -138,7 +140,7 @@ def added_weight(W: Floats, k: int, changes: int) -> float:
 
 @inlined
 def saltation(
-    trail: Trail, node: Record, following: Record, what: int, shift: float, rates: tuple[float, float]
+    trail: Trail, node: Record, following: Record, quantity: int, shift: float, rates: tuple[float, float]
 ) -> tuple[float, float]:
     """Variation after an impact that shifts; ``rates`` are that of the velocity before it, and the speed of impact."""
     block = trail.block
@@ -146,12 +148,12 @@ def saltation(
     left = restoring(trail.ground, block, node.side, following.piece, following.offset)
     entered = restoring(trail.ground, block, following.side, following.piece, following.offset)
     e = block.restitution[node.side]
-    faster = -(dv - left * shift) + (speed if what == RESTITUTION else 0.0)
+    faster = -(dv - left * shift) + (speed if quantity == Quantity.RESTITUTION else 0.0)
     return -e * speed * shift, e * faster + entered * shift
 
 
 @inlined
-def uplift_shift(trail: Trail, node: Record, what: int) -> float:
+def uplift_shift(trail: Trail, node: Record, quantity: int) -> float:
     """Shift of the uplift with which a node begins."""
     ground, block, rules, _ = trail
     threshold = block.threshold[node.side]
@@ -159,9 +161,9 @@ def uplift_shift(trail: Trail, node: Record, what: int) -> float:
     rate = -push_rate(ground, block, node.side, node.piece, node.offset)
     if abs(push - threshold) > _JUMP * threshold:
         return 0.0
-    if what == MOTION:
+    if quantity == Quantity.MOTION:
         return -push / rate
-    if what == SLENDERNESS:
+    if quantity == Quantity.SLENDERNESS:
         growth = 1.0 + threshold * threshold if rules.nonlinear else 1.0
         weight = weight_at(ground, node.piece, node.offset)
         return block.slenderness[node.side] * growth * weight / rate
@@ -183,7 +185,7 @@ def push_rate(ground: Ground, block: Record, side: int, piece: int, offset: floa
 
 
 @inlined
-def rest_shift(trail: Trail, node: Record, what: int, dv: float, shift: float, rest: Record) -> float:
+def rest_shift(trail: Trail, node: Record, quantity: int, dv: float, shift: float, rest: Record) -> float:
     """Shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
 
     ``shift`` is that of the impact with which the node begins, ``dv`` the variation of the velocity after it at the
@@ -195,9 +197,9 @@ def rest_shift(trail: Trail, node: Record, what: int, dv: float, shift: float, r
     j = block.entered[i]
     g_i = restoring(trail.ground, block, i, node.piece, node.offset)
     g_j = restoring(trail.ground, block, j, node.piece, node.offset)
-    dg_i, dg_j = restoring_shift(trail, node, i, what, shift), restoring_shift(trail, node, j, what, shift)
+    dg_i, dg_j = restoring_shift(trail, node, i, quantity, shift), restoring_shift(trail, node, j, quantity, shift)
     e_i, e_j = block.restitution[i], block.restitution[j]
-    de = 1.0 if what == RESTITUTION else 0.0
+    de = 1.0 if quantity == Quantity.RESTITUTION else 0.0
     per_speed = 2.0 * (1.0 / g_i + e_i / g_j)
     change = -2.0 * (dg_i / (g_i * g_i) + e_i * dg_j / (g_j * g_j) - de * e_i / g_j)
     change += per_speed * 2.0 * de * e_i * e_j / (1.0 - e_i * e_j)
@@ -205,16 +207,16 @@ def rest_shift(trail: Trail, node: Record, what: int, dv: float, shift: float, r
 
 
 @inlined
-def restoring_shift(trail: Trail, node: Record, j: int, what: int, shift: float) -> float:
+def restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: float) -> float:
     """Change of a side's restoring acceleration at an impact that shifts."""
     ground, block, rules, _ = trail
     here = acceleration(ground, node.piece, node.offset)
     change = block.gain[j] * shift * push_rate(ground, block, j, node.piece, node.offset)
-    if what == MOTION:
+    if quantity == Quantity.MOTION:
         change += block.gain[j] * push_at(ground, block, j, node.piece, node.offset)
-    elif what == FREQUENCY:
+    elif quantity == Quantity.FREQUENCY:
         change += 2.0 * restoring(ground, block, j, node.piece, node.offset)
-    elif what == SLENDERNESS:
+    elif quantity == Quantity.SLENDERNESS:
         weight = weight_at(ground, node.piece, node.offset)
         stiff = block.cosine[j] * weight - sign_of(j) * here * block.sine[j] if rules.nonlinear else weight
         change += block.stiffness[j] * stiff * block.slenderness[j]

@@ -15,7 +15,7 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Block
 from rocking.contact import contact_forces
 from rocking.errors import InvalidOption
-from rocking.kernels import state, status
+from rocking.kernels import state
 from rocking.kernels.ground import components
 from rocking.kernels.march import march
 from rocking.kernels.trace import Trail
@@ -52,7 +52,7 @@ def with_all_impacts(trail: Trail, block: Block, *, cut: bool) -> Trail:
         return trail
     body, rules, scratch = trail.block.copy(), trail.rules.copy(), state.new_scratch()
     body["limit"] = slowest
-    rules["treatment"], rules["endless"], rules["record"] = status.VELOCITY, False, True
+    rules["treatment"], rules["endless"], rules["record"] = state.RestRule.VELOCITY, False, True
     table = state.new_table(1024)
     parts, done = [], 0
     for row in closing:
@@ -61,7 +61,7 @@ def with_all_impacts(trail: Trail, block: Block, *, cut: bool) -> Trail:
             start[name] = nodes[name][row]
         start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
         rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
-        while march(trail.ground, body, rules, table, scratch, start) == status.FULL:
+        while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
             table = state.grown(table)
         found = table["node"][1 : start["nodes"]]
         parts += [nodes[done : row + 1], found[(found["side"] != state.AT_REST) & (found["time"] < rules["stop"])]]

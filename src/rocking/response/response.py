@@ -15,7 +15,7 @@ from rocking import svg
 from rocking.arrays import Floats, as_asked
 from rocking.block import Block
 from rocking.contact import friction_coefficient, friction_demand
-from rocking.kernels import state, status
+from rocking.kernels import state
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
 from rocking.plot import RotationUnits
@@ -105,14 +105,14 @@ class Response:
     ) -> Response:
         """Response from the table and the last state of a march."""
         events = table["event"][: end["events"]]
-        overturned = bool(len(events)) and events["kind"][-1] == status.TOPPLED
+        overturned = bool(len(events)) and int(events["kind"][-1]) == state.EventKind.OVERTURN
         return cls(
             block=block,
             motion=motion,
             model=model,
             treatment=treatment,
             overturned=bool(overturned),
-            unfinished=bool(end["ending"] == status.UNFINISHED),
+            unfinished=int(end["ending"]) == state.Ending.UNFINISHED,
             overturn_time=float(events["time"][-1]) if overturned else math.nan,
             peak_rotation=float(end["peak"]),
             peak_time=float(end["peak_time"]),

@@ -50,7 +50,7 @@ class Sensitivity:
         """Sensitivity of a response with that many impacts and events: one pass along its steps for each quantity."""
         count = len(QUANTITIES)
         peak, struck, happened = np.zeros(count), np.zeros((count, impacts)), np.zeros((count, events))
-        scratch, work = state.new_scratch(), np.zeros(variation.WORK)
+        scratch, work = state.new_scratch(), state.record(state.VARIATION)
         for k in range(count):
             peak[k] = variation.vary(trail, scratch, work, k, peak_time, struck[k], happened[k])
         if overturned:

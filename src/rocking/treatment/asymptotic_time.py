@@ -12,7 +12,7 @@ from rocking import checks
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption, OutsideFit
-from rocking.kernels import status
+from rocking.kernels import state
 from rocking.motion.motion import Motion
 from rocking.treatment.base import Model, Treatment
 
@@ -53,7 +53,7 @@ class AsymptoticTime(Treatment):
     """
 
     name: ClassVar[str] = "time"
-    code: ClassVar[int] = status.TIME
+    code: ClassVar[int] = state.RestRule.TIME
 
     critical: Critical = "eq76"
 
@@ -90,7 +90,7 @@ class AsymptoticTime(Treatment):
 
     def _critical(self, frequency: Floats, restitution: Floats) -> Floats:
         from rocking.kernels import paper
-        from rocking.kernels.sine.critical import critical_amplitudes
+        from rocking.kernels.sine.sequence import critical_amplitudes
 
         found = np.ones(frequency.size)
         lossy = np.flatnonzero(restitution.ravel() < 1.0)

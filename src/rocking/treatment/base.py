@@ -20,12 +20,12 @@ _BY_NAME: dict[str, type[Treatment]] = {}
 class Treatment(ABC):
     """How a sequence of impacts ends. A class of its own is found by its `name` as soon as it is imported.
 
-    What is compared with its limits at an impact is one of the measures that kernels know (`rocking.kernels.status`).
+    What is compared with its limits at an impact is one of the measures that kernels know (`rocking.kernels.state`).
     """
 
     #: Name in ``chattering=`` and on the command line.
     name: ClassVar[str]
-    #: What the kernels compare with the limits, a code of `rocking.kernels.status`.
+    #: What the kernels compare with the limits, a code of `rocking.kernels.state`.
     code: ClassVar[int]
 
     def __init_subclass__(cls) -> None:

@@ -11,7 +11,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
-from rocking.kernels import status
+from rocking.kernels import state
 from rocking.motion.motion import Motion
 from rocking.treatment.base import Model, Treatment
 
@@ -37,7 +37,7 @@ class Certified(Treatment):
     """
 
     name: ClassVar[str] = "certified"
-    code: ClassVar[int] = status.CERTIFIED
+    code: ClassVar[int] = state.RestRule.CERTIFIED
 
     tolerance: float = 1e-12
 

@@ -11,7 +11,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
-from rocking.kernels import status
+from rocking.kernels import state
 from rocking.motion.motion import Motion
 from rocking.treatment.base import Model, Treatment
 
@@ -32,7 +32,7 @@ class VelocityThreshold(Treatment):
     """
 
     name: ClassVar[str] = "velocity"
-    code: ClassVar[int] = status.VELOCITY
+    code: ClassVar[int] = state.RestRule.VELOCITY
 
     threshold: float = 5e-10
 
@@ -65,7 +65,7 @@ class IntervalThreshold(Treatment):
     """
 
     name: ClassVar[str] = "interval"
-    code: ClassVar[int] = status.INTERVAL
+    code: ClassVar[int] = state.RestRule.INTERVAL
 
     threshold: float = 1e-9
 

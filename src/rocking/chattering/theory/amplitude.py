@@ -14,7 +14,7 @@ from rocking.chattering.theory.parameters import broadcast, checked_frequency, c
 from rocking.compiling import AMPLITUDES, announce
 from rocking.errors import InvalidOption
 from rocking.kernels.paper import fitted_amplitudes
-from rocking.kernels.sine.critical import critical_amplitudes
+from rocking.kernels.sine.sequence import critical_amplitudes
 from rocking.treatment.asymptotic_time import warn_outside_fit
 
 

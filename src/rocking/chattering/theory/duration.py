@@ -26,8 +26,8 @@ from rocking.chattering.theory.parameters import (
 from rocking.chattering.theory.series import series_times
 from rocking.compiling import SEQUENCES, announce
 from rocking.errors import InvalidOption
-from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED
-from rocking.kernels.sine.first_arc import first_landing
+from rocking.kernels.sine import Verdict
+from rocking.kernels.sine.arc import first_landing
 from rocking.kernels.sine.lanes import BLOCK, BLOCKS, LANES, Answers, rest_phases
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
 from rocking.kernels.sine.sequence import resolve, semianalytical_phases
@@ -233,12 +233,12 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     capacity = _FIRST_CAPACITY
     while True:
         status, impacts, phases = _resolved(amplitude, frequency, restitution, tolerance, capacity)
-        if status != UNRESOLVED or impacts.size < capacity:
+        if status != Verdict.UNRESOLVED or impacts.size < capacity:
             break
         capacity *= 2
         if capacity > _LARGEST_CAPACITY:
             raise InvalidOption(f"the sequence takes more than {_LARGEST_CAPACITY} impacts: lower eta = {eta!r}")
-    if status == FOUND:
+    if status == Verdict.FOUND:
         return ChatteringSequence(impacts, True, *phases)
     return ChatteringSequence(impacts, False, math.nan, math.nan, math.nan)
 
@@ -274,7 +274,7 @@ def first_arc(a: float, omega: float) -> tuple[float, float]:
     if amplitude == 1.0:
         return 0.0, 0.0
     status, phase, speed = first_landing(amplitude - 1.0, frequency)
-    return (phase / frequency, speed / frequency) if status == FOUND else (math.nan, math.nan)
+    return (phase / frequency, speed / frequency) if status == Verdict.FOUND else (math.nan, math.nan)
 
 
 def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
@@ -346,7 +346,7 @@ def _resolved(
 def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     shape, (amplitudes, frequencies, restitutions) = broadcast(a, omega, eta)
     phases = np.where(amplitudes == 1.0, 0.0, math.nan)
-    statuses = np.full(phases.size, FOUND, np.int8)
+    statuses = np.full(phases.size, Verdict.FOUND, np.int8)
 
     def part(some: slice) -> None:
         sequences = amplitudes[some], frequencies[some], restitutions[some]
@@ -359,8 +359,8 @@ def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
 
 def _told(phases: Floats, statuses: NDArray[np.int8]) -> Floats:
     """Mark phases as the interface does times: NaN for incomplete chattering, infinity for what is not resolved."""
-    phases[statuses == OUTLASTS] = math.nan
-    phases[statuses == UNRESOLVED] = math.inf
+    phases[statuses == Verdict.INCOMPLETE] = math.nan
+    phases[statuses == Verdict.UNRESOLVED] = math.inf
     return phases
 
 
@@ -401,10 +401,10 @@ def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int |
     sequences = amplitudes[complete], frequencies[complete], restitutions[complete]
     impacts = resolved_by_default(sequences[2]) if resolved is None else np.full(complete.size, resolved)
     phases = np.zeros(complete.size)
-    statuses = np.full(complete.size, UNRESOLVED, np.int8)
+    statuses = np.full(complete.size, Verdict.UNRESOLVED, np.int8)
     semianalytical_phases(sequences, impacts, phases, statuses)
     # Complete by proof: an estimate beyond half a period is a bad one, not a verdict.
-    phases[statuses == UNRESOLVED] = math.inf
+    phases[statuses == Verdict.UNRESOLVED] = math.inf
     times[complete] = phases / sequences[1]
     return times.reshape(shape)[()]
 

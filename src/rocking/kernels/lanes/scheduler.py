@@ -1,59 +1,63 @@
-"""Who steps, who is played exactly, and who waits: the loop over the samples of a record."""
+"""The loop over the samples of a record: which lanes step together, which blocks march alone, and which wait."""
 
 from rocking.kernels.compiled import inlined, kernel
 from rocking.kernels.ground import Ground, coefficient, has_vertical, last_piece, length_of, start_of, vertical_of
-from rocking.kernels.lanes.crew import WIDTH, Crew, lean, load, relocate, unload, vacate
-from rocking.kernels.lanes.linear import step_linear
-from rocking.kernels.lanes.nonlinear import step_nonlinear
-from rocking.kernels.lanes.weighted import step_weighted
+from rocking.kernels.lanes.pool import WIDTH, Pool, empty, load, move_block, set_angles, unload
+from rocking.kernels.lanes.steps import step_linear, step_nonlinear, step_weighted
 from rocking.kernels.march import march
-from rocking.kernels.state import AT_REST, TO_THE_END, Record
-from rocking.kernels.status import GOING
+from rocking.kernels.state import AT_REST, TO_THE_END, Ending, Record
 
 
 @kernel
-def run_lanes(ground: Ground, rules: Record, scratch: Record, crew: Crew, substeps: int) -> None:
-    """March every block of a crew through a record of even samples, and on to its own end.
+def run_lanes(ground: Ground, rules: Record, scratch: Record, pool: Pool, substeps: int) -> None:
+    """March every block of a pool through a record of even samples, and on to its own end.
 
-    ``ending`` of every state says how it ended (`status`); GOING and PAUSED ones can be taken on one by one.
-    ``substeps`` is how many a sample is divided into: 0 in the linear model under a constant weight.
+    ``substeps`` is how many a sample is divided into: 0 in the linear model under a constant weight. Afterwards
+    ``ending`` of every state is an `Ending`; RUNNING and PAUSED ones can be continued one by one.
     """
-    piece = next_joining(crew, 0)
+    piece = next_waited_for(pool, 0)
     while piece < last_piece(ground) and start_of(ground, piece + 1) <= rules.stop:
-        step_groups(ground, rules, scratch, crew, piece, substeps)
-        close_ranks(crew)
-        join(ground, rules, scratch, crew, piece)
+        step_groups(ground, rules, scratch, pool, piece, substeps)
+        compact(pool)
+        admit_waiting(ground, rules, scratch, pool, piece)
         piece += 1
-        if crew.tally.active == 0:
-            if crew.tally.waiting == 0:
+        if pool.counts.active == 0:
+            if pool.counts.waiting == 0:
                 return
-            piece = next_joining(crew, piece)
-    for lane in range(crew.tally.active):
-        unload(ground, crew, lane, piece)
-    for index in range(crew.blocks.shape[0]):
-        if crew.states[index].ending == GOING:
-            play(ground, rules, scratch, crew, index, TO_THE_END)
+            piece = next_waited_for(pool, piece)
+    for lane in range(pool.counts.active):
+        unload(ground, pool, lane, piece)
+    for index in range(pool.blocks.shape[0]):
+        if pool.states[index].ending == Ending.RUNNING:
+            march_until(ground, rules, scratch, pool, index, TO_THE_END)
+
+
+@kernel
+def march_each(ground: Ground, rules: Record, scratch: Record, pool: Pool) -> None:
+    """March every block of a pool to its end, one after the other; ``ending`` of every state is then an `Ending`."""
+    for index in range(pool.blocks.shape[0]):
+        march_until(ground, rules, scratch, pool, index, TO_THE_END)
 
 
 @inlined
-def next_joining(crew: Crew, piece: int) -> int:
-    """First piece from this one on at which a block joins; the motion's end where there is none."""
-    while piece < crew.first.shape[0] - 1 and crew.first[piece] < 0:
+def next_waited_for(pool: Pool, piece: int) -> int:
+    """First piece from this one on for which a block waits; the motion's end where there is none."""
+    while piece < pool.first.shape[0] - 1 and pool.first[piece] < 0:
         piece += 1
     return piece
 
 
 @inlined
-def step_groups(ground: Ground, rules: Record, scratch: Record, crew: Crew, piece: int, substeps: int) -> None:
-    """Take all lanes through one sample: together, or exactly where that may hold an event."""
-    for first in range(0, crew.tally.active, WIDTH):
-        group = crew.groups[first // WIDTH]
-        busy = step_group(ground, rules, group, piece, substeps, crew.fallen)
+def step_groups(ground: Ground, rules: Record, scratch: Record, pool: Pool, piece: int, substeps: int) -> None:
+    """Move all lanes through one sample: together, or by a march where that may hold an event."""
+    for first in range(0, pool.counts.active, WIDTH):
+        group = pool.groups[first // WIDTH]
+        events = step_group(ground, rules, group, piece, substeps, pool.fallen)
         slot = 0
-        while busy > 0:
+        while events > 0:
             if group.event[slot] != 0:
-                replay(ground, rules, scratch, crew, piece, first + slot)
-                busy -= 1
+                march_sample(ground, rules, scratch, pool, piece, first + slot)
+                events -= 1
             slot += 1
 
 
@@ -70,71 +74,64 @@ def step_group(ground: Ground, rules: Record, group: Record, piece: int, substep
         return step_weighted(group, push, weight, length, substeps, fallen)
     if rules.nonlinear:
         return step_nonlinear(group, push, None, length, h, substeps, fallen)
-    return step_linear(group, push[0], push[1], h, length - h, fallen)
+    return step_linear(group, push, h, length - h, fallen)
 
 
 @inlined
-def replay(ground: Ground, rules: Record, scratch: Record, crew: Crew, piece: int, lane: int) -> None:
-    """Play a sample exactly for the block of a lane, which keeps it if it rocks on."""
-    index = unload(ground, crew, lane, piece)
-    if play(ground, rules, scratch, crew, index, piece + 1):
-        take(rules, crew, lane, index)
+def march_sample(ground: Ground, rules: Record, scratch: Record, pool: Pool, piece: int, lane: int) -> None:
+    """March the block of a lane through one sample; it keeps its lane if it rocks on."""
+    index = unload(ground, pool, lane, piece)
+    if march_until(ground, rules, scratch, pool, index, piece + 1):
+        admit(rules, pool, lane, index)
     else:
-        vacate(crew, lane)
-        crew.holes[crew.tally.holes] = lane
-        crew.tally.holes += 1
+        empty(pool, lane)
+        pool.free[pool.counts.free] = lane
+        pool.counts.free += 1
 
 
 @inlined
-def take(rules: Record, crew: Crew, lane: int, index: int) -> None:
+def admit(rules: Record, pool: Pool, lane: int, index: int) -> None:
     """Let a lane carry a block."""
-    load(crew, lane, index)
+    load(pool, lane, index)
     if rules.nonlinear:
-        lean(crew, lane, index)
+        set_angles(pool, lane, index)
 
 
 @inlined
-def play(ground: Ground, rules: Record, scratch: Record, crew: Crew, index: int, until: int) -> bool:
-    """March a block up to a piece; tells whether it rocks there, else puts it down for when it does."""
-    state = crew.states[index]
+def march_until(ground: Ground, rules: Record, scratch: Record, pool: Pool, index: int, until: int) -> bool:
+    """March a block up to a piece; returns whether it rocks there, else lets it wait for the piece in which it does."""
+    state = pool.states[index]
     state.until = until
-    state.ending = march(ground, crew.blocks[index], rules, crew.table, scratch, state)
-    if state.ending != GOING:
+    state.ending = march(ground, pool.blocks[index], rules, pool.table, scratch, state)
+    if state.ending != Ending.RUNNING:
         return False
     if state.side != AT_REST and state.piece == until and state.offset == 0.0:
         return True
-    crew.following[index] = crew.first[state.piece]
-    crew.first[state.piece] = index
-    crew.tally.waiting += 1
+    pool.following[index] = pool.first[state.piece]
+    pool.first[state.piece] = index
+    pool.counts.waiting += 1
     return False
 
 
 @inlined
-def close_ranks(crew: Crew) -> None:
+def compact(pool: Pool) -> None:
     """Fill the lanes that have become free with the last ones."""
-    while crew.tally.holes > 0:
-        crew.tally.holes -= 1
-        crew.tally.active -= 1
-        hole = crew.holes[crew.tally.holes]
-        if hole != crew.tally.active:
-            relocate(crew, crew.tally.active, hole)
+    while pool.counts.free > 0:
+        pool.counts.free -= 1
+        pool.counts.active -= 1
+        lane = pool.free[pool.counts.free]
+        if lane != pool.counts.active:
+            move_block(pool, pool.counts.active, lane)
 
 
 @inlined
-def join(ground: Ground, rules: Record, scratch: Record, crew: Crew, piece: int) -> None:
-    """Play a piece for the blocks that wait for it, and take in those that rock at its end."""
-    index = crew.first[piece]
+def admit_waiting(ground: Ground, rules: Record, scratch: Record, pool: Pool, piece: int) -> None:
+    """March the blocks that wait for a piece through it, and admit those that rock at its end."""
+    index = pool.first[piece]
     while index >= 0:
-        following = crew.following[index]
-        crew.tally.waiting -= 1
-        if play(ground, rules, scratch, crew, index, piece + 1):
-            take(rules, crew, crew.tally.active, index)
-            crew.tally.active += 1
+        following = pool.following[index]
+        pool.counts.waiting -= 1
+        if march_until(ground, rules, scratch, pool, index, piece + 1):
+            admit(rules, pool, pool.counts.active, index)
+            pool.counts.active += 1
         index = following
-
-
-@kernel
-def march_each(ground: Ground, rules: Record, scratch: Record, crew: Crew) -> None:
-    """March every block of a crew to its end, one after the other."""
-    for index in range(crew.blocks.shape[0]):
-        play(ground, rules, scratch, crew, index, TO_THE_END)

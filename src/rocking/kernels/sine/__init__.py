@@ -21,16 +21,18 @@ it below. Hence no search for an earlier root; and an arc that is still up at x 
 Under slow forcing an arc grows like exp(t/omega), beyond the range of a double. All that is asked of a long arc is
 its sign and its root, which a positive factor leaves as they are: there the basis is taken times exp(-t/omega).
 
-What becomes of an arc or of a sequence is told by a code, never by a number that is none:
+What becomes of an arc or of a sequence is a `Verdict`, never a number that is NaN or infinite.
 """
 
-from typing import Final
+from enum import IntEnum
 
-#: The impact, or the phase of rest, is found (the latter with a proof).
-FOUND: Final = 0
 
-#: An arc is still up at x = pi: chattering is incomplete.
-OUTLASTS: Final = 1
+class Verdict(IntEnum):
+    """What becomes of an arc or of a sequence."""
 
-#: Neither is certain in double precision.
-UNRESOLVED: Final = 2
+    #: The impact, or the phase of rest, is found (the latter with a proof).
+    FOUND = 0
+    #: An arc is still up at x = pi: chattering is incomplete.
+    INCOMPLETE = 1
+    #: Neither is certain in double precision.
+    UNRESOLVED = 2

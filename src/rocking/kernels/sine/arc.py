@@ -1,11 +1,98 @@
-"""One arc: from the impact, or the uplift, that starts it to the impact that ends it."""
+"""One arc: the functions of time that it is a sum of, its duration and impact, and the first arc beyond half a period.
+
+Beyond half a period the ground pulls the block down and pushes it up in turn: the first side's restoring acceleration
+P = 1 - cos x - kappa sin x is negative in the first part of each period, up to 2 arctan(kappa), and positive in the
+second. Where it is positive, an arc that has come down to zero goes on falling (U'' = delta U - P), so that its sign at
+the end shows whether it has ended. Where it is negative, the height is convex as long as it is positive, so that its
+lowest point shows it.
+"""
 
 import math
 from typing import Final, NamedTuple
 
-from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED
-from rocking.kernels.sine.basis import Basis, basis
+from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.sine import Verdict
+
+#: Orders of the sums, and the largest t^2 (1 + delta) at which so many terms reach full precision.
+BRIEF: Final = 2
+SHORT: Final = 3
+MEDIUM: Final = 5
+LONG: Final = 9
+LONGEST: Final = 14
+REACH_BRIEF: Final = 0.0012
+REACH_SHORT: Final = 0.003
+REACH_MEDIUM: Final = 0.12
+REACH_LONG: Final = 1.5
+REACH_LONGEST: Final = 12.0
+
+_INVERSE_FACTORIAL: Final = tuple(1.0 / math.factorial(k) for k in range(2 * LONGEST + 5))
+
+
+class Basis(NamedTuple):
+    """Values at a time t; E and W, which grow, are scaled by the positive factor ``decay``.
+
+    With S = sinh(sqrt(delta) t)/sqrt(delta) and C = (cosh(sqrt(delta) t) - 1)/delta,
+    t^3 E = (S - sin t)/(1 + delta) and t^4 W = (C - 1 + cos t)/(1 + delta).
+    """
+
+    sine: float  # sin(t)/t
+    versine: float  # (1 - cos t)/t^2
+    E: float
+    W: float
+    decay: float
+
+
+@inlined
+def summed_basis(q: float, delta: float, order: int) -> Basis:
+    """Add up powers of q = t^2; decay is one."""
+    sine = 1.0
+    versine = _INVERSE_FACTORIAL[2]
+    E = _INVERSE_FACTORIAL[3]
+    W = _INVERSE_FACTORIAL[4]
+    power = 1.0
+    mixed = 1.0
+    for m in range(1, order + 1):
+        power *= -q
+        mixed = mixed * (delta * q) + power
+        sine += power * _INVERSE_FACTORIAL[2 * m + 1]
+        versine += power * _INVERSE_FACTORIAL[2 * m + 2]
+        E += mixed * _INVERSE_FACTORIAL[2 * m + 3]
+        W += mixed * _INVERSE_FACTORIAL[2 * m + 4]
+    power *= -q
+    sine += power * _INVERSE_FACTORIAL[2 * order + 3]
+    versine += power * _INVERSE_FACTORIAL[2 * order + 4]
+    return Basis(sine, versine, E, W, 1.0)
+
+
+@inlined
+def closed_basis(t: float, delta: float) -> Basis:
+    """Follow the definitions, for long arcs; decay is exp(-sqrt(delta) t), so that nothing overflows."""
+    q = t * t
+    growth = math.sqrt(delta) * t
+    decay = math.exp(-growth)
+    sine = math.sin(t) / t
+    versine = 2.0 * math.sin(0.5 * t) ** 2 / q
+    S = -0.5 * math.expm1(-2.0 * growth) / growth
+    C = 0.5 * (math.expm1(-growth) / growth) ** 2
+    total = (1.0 + delta) * q
+    return Basis(sine, versine, (S - decay * sine) / total, (C - decay * versine) / total, decay)
+
+
+@shared
+def basis(t: float, delta: float) -> Basis:
+    """Return the basis at any t > 0: by the shortest sum of full precision, in closed form where there is none."""
+    q = t * t
+    reach = q * (1.0 + delta)
+    if reach < REACH_SHORT:
+        return summed_basis(q, delta, SHORT)
+    if reach < REACH_MEDIUM:
+        return summed_basis(q, delta, MEDIUM)
+    if reach < REACH_LONG:
+        return summed_basis(q, delta, LONG)
+    if reach < REACH_LONGEST:
+        return summed_basis(q, delta, LONGEST)
+    return closed_basis(t, delta)
+
 
 #: No first arc ends before x = pi beyond this a - 1: even without growth, U(pi) = pi kappa - pi^2/2 + 2.
 LARGEST_EXCESS: Final = math.hypot(1.0, math.pi / 2 - 2 / math.pi) - 1.0
@@ -144,14 +231,14 @@ def precise(landing: Landing, t: float, delta: float) -> bool:
 def arc(start: State, t: float, s: float, delta: float, left: float) -> tuple[int, float, State]:
     """Duration of an arc and state just before its impact, from an estimate t of the duration.
 
-    Status: FOUND; OUTLASTS if it is still up when the time ``left`` to x = pi is over; UNRESOLVED.
+    Status: FOUND; INCOMPLETE if it is still up when the time ``left`` to x = pi is over; UNRESOLVED.
     """
     for _ in range(_CORRECTIONS):
         if not (0.0 < t < left and delta * t * t < _LARGEST_GROWTH**2):
             break
         landing = land(t, start, s, delta, basis(t, delta))
         if precise(landing, t, delta) and landing.t < left:
-            return FOUND, landing.t, landing.impact
+            return Verdict.FOUND, landing.t, landing.impact
         t = landing.t
     return bracketed_arc(start, s, delta, left)
 
@@ -163,7 +250,7 @@ def bracketed_arc(start: State, s: float, delta: float, left: float) -> tuple[in
     A corrected estimate is taken where the bounds are closing in at least as fast as by halving.
     """
     if outlasts(start, s, delta, left):
-        return OUTLASTS, left, start
+        return Verdict.INCOMPLETE, left, start
     low = 0.0
     high = left
     t = 0.5 * left
@@ -174,7 +261,7 @@ def bracketed_arc(start: State, s: float, delta: float, left: float) -> tuple[in
         if delta * t * t < _LARGEST_GROWTH**2:
             landing = land(t, start, s, delta, at)
             if precise(landing, t, delta) and landing.t < left:
-                return FOUND, landing.t, landing.impact
+                return Verdict.FOUND, landing.t, landing.impact
             corrected = landing.t
         if height(t, start, s, delta, at) > 0.0:
             low = t
@@ -183,7 +270,7 @@ def bracketed_arc(start: State, s: float, delta: float, left: float) -> tuple[in
         closing_in = high - low <= 0.5 * width
         width = high - low
         t = corrected if closing_in and low < corrected < high else 0.5 * (low + high)
-    return UNRESOLVED, left, start
+    return Verdict.UNRESOLVED, left, start
 
 
 @inlined
@@ -194,7 +281,7 @@ def outlasts(start: State, s: float, delta: float, left: float) -> bool:
 
 @inlined
 def guess_first_impact(kappa: float, delta: float) -> float:
-    """Phase of the first impact to two orders in kappa (Eq. 32, mended)."""
+    """Phase of the first impact to two orders in kappa (Eq. 32, corrected)."""
     return 4.0 * kappa / (1.0 + (4.0 / 15.0) * (1.0 - delta) * kappa * kappa)
 
 
@@ -209,7 +296,7 @@ def first_arc(excess: float, delta: float) -> tuple[int, float, State]:
     """Status and phase of the first impact for a = 1 + excess > 1, and the state just before it."""
     start = uplift(min(excess, LARGEST_EXCESS))
     if excess > LARGEST_EXCESS:
-        return OUTLASTS, math.pi, start
+        return Verdict.INCOMPLETE, math.pi, start
     return arc(start, guess_first_impact(-start.D, delta), 1.0, delta, math.pi)
 
 
@@ -217,3 +304,63 @@ def first_arc(excess: float, delta: float) -> tuple[int, float, State]:
 def bounced(impact: State, eta: float) -> State:
     """State after an impact."""
     return State(eta * impact.V, impact.P, impact.D)
+
+
+#: Longest arc that is followed, as a time p t: rounding grows by its exponential.
+LONGEST_ARC: Final = 20.0
+
+_MOST_HALVINGS: Final = 2_000
+
+
+@kernel
+def first_landing(excess: float, omega: float) -> tuple[int, float, float]:
+    """Phase of the first impact for a = 1 + excess > 1, and the speed before it; INCOMPLETE if none comes in time."""
+    delta = 1.0 / (omega * omega)
+    start = uplift(excess)
+    turn = 2.0 * math.atan(-start.D)
+    for period in range(1 + int(LONGEST_ARC * omega / (2.0 * math.pi))):
+        begin = 2.0 * math.pi * period
+        pulled = begin + turn
+        end = begin + 2.0 * math.pi
+        if period > 0:
+            lowest = lowest_point(begin, pulled, start, delta)
+            if height(lowest, start, 1.0, delta, basis(lowest, delta)) <= 0.0:
+                return landed(begin, lowest, start, delta)
+        if height(end, start, 1.0, delta, basis(end, delta)) <= 0.0:
+            return landed(pulled, end, start, delta)
+    return Verdict.INCOMPLETE, end, 0.0
+
+
+@inlined
+def lowest_point(low: float, high: float, start: State, delta: float) -> float:
+    """Where an arc that is convex as long as it is up is lowest; where it is not up, if it comes down."""
+    if rise(low, start, 1.0, delta, basis(low, delta)) >= 0.0:
+        return low
+    if rise(high, start, 1.0, delta, basis(high, delta)) <= 0.0:
+        return high
+    for _ in range(_MOST_HALVINGS):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        at = basis(middle, delta)
+        if height(middle, start, 1.0, delta, at) <= 0.0:
+            return middle
+        if rise(middle, start, 1.0, delta, at) < 0.0:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@shared
+def landed(low: float, high: float, start: State, delta: float) -> tuple[int, float, float]:
+    """Status, phase and speed of the one landing between two phases."""
+    for _ in range(_MOST_HALVINGS):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        if height(middle, start, 1.0, delta, basis(middle, delta)) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return Verdict.FOUND, high, land(high, start, 1.0, delta, basis(high, delta)).impact.V

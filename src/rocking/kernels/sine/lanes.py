@@ -20,20 +20,10 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.sine import FOUND, UNRESOLVED
+from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.arc import (
-    LARGEST_EXCESS,
-    State,
-    brief,
-    guess_brief,
-    guess_first_impact,
-    guess_landing,
-    land,
-    precise,
-    uplift,
-)
-from rocking.kernels.sine.basis import (
     BRIEF,
+    LARGEST_EXCESS,
     LONG,
     LONGEST,
     MEDIUM,
@@ -43,17 +33,26 @@ from rocking.kernels.sine.basis import (
     REACH_MEDIUM,
     REACH_SHORT,
     SHORT,
+    State,
+    brief,
+    guess_brief,
+    guess_first_impact,
+    guess_landing,
+    land,
+    precise,
     summed_basis,
+    uplift,
 )
-from rocking.kernels.sine.closure import (
+from rocking.kernels.sine.sequence import (
     LEVELS,
     agree,
     extrapolate,
+    proven,
     remaining_phase,
+    rest_after_impact,
+    rest_phase,
     richardson_weights,
 )
-from rocking.kernels.sine.proof import proven
-from rocking.kernels.sine.sequence import rest_phase, settle
 
 #: Sequences in a block: eight vectors of eight doubles, since the chain of operations of one vector is long.
 LANES: Final = 64
@@ -106,7 +105,7 @@ _IDLE: Final = 4
 _TWICE_CORRECTED: Final = 0.2 * REACH_MEDIUM
 _MORE_TERMS: Final = 0.8 * REACH_SHORT
 
-#: No sequence's remaining phase has been seen to settle before its speed falls by the factor exp(-4).
+#: No sequence's remaining phase has been seen to rest_after_impact before its speed falls by the factor exp(-4).
 _FAR_FROM_REST: Final = 4.0
 
 #: Pairs after which the lanes that still run are left to the scalar path.
@@ -427,12 +426,12 @@ def answer_closing(closing: Block, answers: Answers) -> None:
     prove(closing, closing.filled)
     for lane in range(closing.filled):
         i = closing.index[lane]
-        if closing.status[lane] == FOUND:
-            answers.statuses[i] = FOUND
+        if closing.status[lane] == Verdict.FOUND:
+            answers.statuses[i] = Verdict.FOUND
             answers.phases[i] = closing.x[lane] + closing.row[LEVELS, lane]
         else:
             entered = entered_by(closing, lane)
-            status, phase = settle(closing.x[lane], entered, closing.delta[lane], closing.eta[lane])
+            status, phase = rest_after_impact(closing.x[lane], entered, closing.delta[lane], closing.eta[lane])
             answers.statuses[i] = status
             answers.phases[i] = phase
     closing.filled = 0
@@ -449,7 +448,7 @@ def prove(closing: Block, count: int) -> None:
             closing.eta[lane],
             closing.row[LEVELS, lane],
         )
-        closing.status[lane] = FOUND if holds else UNRESOLVED
+        closing.status[lane] = Verdict.FOUND if holds else Verdict.UNRESOLVED
 
 
 @shared
@@ -461,6 +460,6 @@ def answer_alone(block: Block, lane: int, answers: Answers) -> None:
     if block.status[lane] == _NOT_LANDED:
         status, phase = rest_phase(block.excess[lane], delta, eta)
     else:
-        status, phase = settle(block.x[lane], entered_by(block, lane), delta, eta)
+        status, phase = rest_after_impact(block.x[lane], entered_by(block, lane), delta, eta)
     answers.statuses[i] = status
     answers.phases[i] = phase

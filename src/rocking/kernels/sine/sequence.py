@@ -1,4 +1,8 @@
-"""One sequence, impact by impact: the phase of rest, the resolved impacts, and the paper's Eq. 75."""
+"""One sequence, impact by impact: the phase of rest with its proof, the resolved impacts, and the critical amplitude.
+
+The phase that remains to rest is an expansion in the speed, extrapolated over successive pairs of impacts. The
+critical amplitude is the largest a whose first chattering sequence accumulates before x = pi.
+"""
 
 import math
 from typing import Any, Final
@@ -7,11 +11,102 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Floats, Integers
+from rocking.kernels.certificate import Bounds, geometric_bracket
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED
-from rocking.kernels.sine.arc import State, arc, bounced, first_arc, guess_landing
-from rocking.kernels.sine.closure import LEVELS, agree, extrapolate, remaining_phase, richardson_weights
-from rocking.kernels.sine.proof import WINDOW, bracket, proven
+from rocking.kernels.remaining import Restoring, remaining_time
+from rocking.kernels.sine import Verdict
+from rocking.kernels.sine.arc import LARGEST_EXCESS, State, arc, bounced, first_arc, guess_landing
+
+#: Orders of the speed that the expansion of the remaining phase has right.
+ORDER: Final = 2
+
+#: Extrapolations above that expansion, and the relative agreement at which their result is taken.
+LEVELS: Final = 5
+CLOSED: Final = 1e-13
+
+#: One closure and its successive extrapolations, and the factors of these.
+Row = tuple[float, float, float, float, float, float]
+Weights = tuple[float, float, float, float, float]
+
+
+@inlined
+def remaining_phase(entered: State, delta: float, eta: float) -> float:
+    """Remaining phase on entering the second side, to some orders in the speed: `remaining_time`, in phase."""
+    V, P, D = entered
+    return remaining_time(V, Restoring(2.0 - P, -D, 0.0, delta, eta, 0.0), Restoring(P, D, 0.0, delta, eta, 0.0))
+
+
+@inlined
+def richardson_weights(eta: float) -> Weights:
+    """Factors by which extrapolation weighs the change from one pair of impacts to the next.
+
+    With Q = eta^2 the closures of successive pairs err by sums of Q^{kn}, k = ORDER + 1, ORDER + 2, ..., with
+    these very ratios at any amplitude, so each column removes one term.
+    """
+    Q = eta * eta
+    q1 = Q * Q * Q
+    q2 = q1 * Q
+    q3 = q2 * Q
+    q4 = q3 * Q
+    q5 = q4 * Q
+    return q1 / (1.0 - q1), q2 / (1.0 - q2), q3 / (1.0 - q3), q4 / (1.0 - q4), q5 / (1.0 - q5)
+
+
+@inlined
+def extrapolate(T: float, gone: float, weights: Weights, last: Row) -> Row:
+    """Add one closure T of the remaining phase to the ``last`` row of Richardson's table; ``gone`` has passed since.
+
+    All of it in remaining, not absolute, phase, so that the amplified rounding stays relative to what remains.
+    """
+    r1 = T + (T - (last[0] - gone)) * weights[0]
+    r2 = r1 + (r1 - (last[1] - gone)) * weights[1]
+    r3 = r2 + (r2 - (last[2] - gone)) * weights[2]
+    r4 = r3 + (r3 - (last[3] - gone)) * weights[3]
+    r5 = r4 + (r4 - (last[4] - gone)) * weights[4]
+    return T, r1, r2, r3, r4, r5
+
+
+@inlined
+def agree(row: Row, last: Row, gone: float, x: float) -> bool:
+    """Whether the remaining phase is settled: the last extrapolation changed little, and so did the last pair.
+
+    The first alone deceives where Q is small, the second where Q is close to one.
+    """
+    remaining = row[LEVELS]
+    expected = last[LEVELS] - gone
+    return (abs(remaining - row[LEVELS - 1]) <= CLOSED * x) & (abs(remaining - expected) <= CLOSED * x)
+
+
+#: Window of the certificate over the estimate of the remaining phase.
+WINDOW: Final = 1.5
+
+#: Relative allowance for what P has gathered of rounding over a sequence.
+_ROUNDING: Final = 1e-12
+
+
+@inlined
+def bracket(entered: State, window: float, delta: float, eta: float) -> tuple[float, float]:
+    """Bounds on the remaining phase on entering the second side; where there is no proof no comparison holds (NaN).
+
+    They hold if the upper one lies within the window of phase and the window ends before x = pi: P rises there, at
+    a rate of D at first, and |P''| <= a.
+    """
+    V, P, D = entered
+    rate = (D + window * math.sqrt((1.0 - P) * (1.0 - P) + D * D)) * (1.0 + _ROUNDING)
+    low = P * (1.0 - _ROUNDING)
+    high = (P + window * rate) * (1.0 + _ROUNDING)
+    second = Bounds(delta, 2.0 - high, 2.0 - low, high - low, rate, 0.0)
+    first = Bounds(delta, low, high, high - low, rate, 0.0)
+    return geometric_bracket(V, second, first, eta, eta)
+
+
+@inlined
+def proven(x: float, entered: State, delta: float, eta: float, remaining: float) -> bool:
+    """Whether complete chattering is proven on entering the second side, with this remaining phase in the bracket."""
+    window = WINDOW * remaining
+    lower, upper = bracket(entered, window, delta, eta)
+    return (upper <= window) & (lower <= remaining) & (remaining <= upper) & (x + window < math.pi)
+
 
 #: Below this speed a block is at rest: what remains is nothing beside any phase.
 _STILL: Final = 1e-120
@@ -27,42 +122,42 @@ IMPACT: Final = np.dtype((np.record, [("interval", np.float64), ("before", np.fl
 def rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float]:
     """Status and phase omega tau_ch of rest for a = 1 + excess > 1; the phase means nothing unless it is FOUND."""
     status, x, impact = first_arc(excess, delta)
-    if status != FOUND:
+    if status != Verdict.FOUND:
         return status, x
-    return settle(x, bounced(impact, eta), delta, eta)
+    return rest_after_impact(x, bounced(impact, eta), delta, eta)
 
 
 @shared
-def settle(x: float, entered: State, delta: float, eta: float) -> tuple[int, float]:
+def rest_after_impact(x: float, entered: State, delta: float, eta: float) -> tuple[int, float]:
     """Status and phase of rest of a block that enters the second side at x."""
     weights = richardson_weights(eta)
     row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     gone = 0.0
     for pair in range(_MAXIMUM_PAIRS):
         if entered.V < _STILL:
-            return FOUND, x
+            return Verdict.FOUND, x
         last = row
         row = extrapolate(remaining_phase(entered, delta, eta), gone, weights, last)
         remaining = row[LEVELS]
         if pair > LEVELS and agree(row, last, gone, x) and proven(x, entered, delta, eta, remaining):
-            return FOUND, x + remaining
+            return Verdict.FOUND, x + remaining
         status, second, impact = next_arc(x, entered, -1.0, delta)
-        if status != FOUND:
+        if status != Verdict.FOUND:
             return status, x
         status, first, impact = next_arc(x + second, bounced(impact, eta), 1.0, delta)
-        if status != FOUND:
+        if status != Verdict.FOUND:
             return status, x
         entered = bounced(impact, eta)
         gone = second + first
         x += gone
-    return UNRESOLVED, x
+    return Verdict.UNRESOLVED, x
 
 
 @inlined
 def next_arc(x: float, start: State, s: float, delta: float) -> tuple[int, float, State]:
     """Status and duration of the arc that starts at phase x, and the state before its impact; a block at rest stays."""
     if start.V < _STILL:
-        return FOUND, 0.0, State(0.0, start.P, start.D)
+        return Verdict.FOUND, 0.0, State(0.0, start.P, start.D)
     return arc(start, guess_landing(start, s, delta), s, delta, math.pi - x)
 
 
@@ -79,7 +174,7 @@ def resolve(
     x = 0.0
     s = 1.0
     for n in range(impacts.size):
-        if status != FOUND:
+        if status != Verdict.FOUND:
             return status, n, x, x, x
         x += duration
         impacts[n].interval = duration
@@ -92,9 +187,9 @@ def resolve(
             window = WINDOW * remaining
             lower, upper = bracket(start, window, delta, eta)
             if upper <= window and x + window < math.pi and upper - lower <= tolerance * x:
-                return FOUND, n + 1, x + min(max(remaining, lower), upper), x + lower, x + upper
+                return Verdict.FOUND, n + 1, x + min(max(remaining, lower), upper), x + lower, x + upper
         status, duration, impact = next_arc(x, start, s, delta)
-    return UNRESOLVED, impacts.size, x, x, x
+    return Verdict.UNRESOLVED, impacts.size, x, x, x
 
 
 @kernel
@@ -119,14 +214,91 @@ def semianalytical_phase(excess: float, delta: float, eta: float, resolved: int)
     x = newer
     s = 1.0
     for _ in range(resolved + 1):
-        if status != FOUND:
+        if status != Verdict.FOUND:
             return status, x
         s = -s
         older = newer
         status, newer, impact = next_arc(x, bounced(impact, eta), s, delta)
         x += newer
-    if status != FOUND:
+    if status != Verdict.FOUND:
         return status, x
     pair = eta * eta
     rest = x + (older + newer) * (pair / (1.0 - pair))
-    return FOUND if rest < math.pi else OUTLASTS, rest
+    return Verdict.FOUND if rest < math.pi else Verdict.INCOMPLETE, rest
+
+
+#: Width of the final bracket on a - 1, over a: half an ulp.
+_WIDTH: Final = 2.0**-53
+
+#: Distance kept from the extrapolated critical value, over the distance it was extrapolated.
+_CAUTION: Final = 0.01
+
+#: Relative width of the bracket below which extrapolation starts.
+_NEAR: Final = 0.1
+
+_MAXIMUM_STEPS: Final = 400
+
+
+@kernel
+def critical_amplitudes(omega: Floats, eta: Floats, amplitudes: Floats) -> None:
+    """Critical amplitude for each omega and eta < 1."""
+    for i in range(amplitudes.size):
+        amplitudes[i] = 1.0 + critical_excess(1.0 / (omega[i] * omega[i]), eta[i])
+
+
+@shared
+def critical_excess(delta: float, eta: float) -> float:
+    """Largest a - 1 with complete chattering, by a bracket that closes around an extrapolated value.
+
+    Near it pi - x_rest ~ (critical - excess)^nu, so (pi - x_rest)^(1/nu) is extrapolated to zero from the last two
+    complete sequences; trying a little below and above the result shrinks the bracket from both ends, and halving it
+    every third time bounds the number of steps whatever the extrapolation is worth.
+    """
+    power = 1.0 / distance_exponent(eta)
+    low = 0.0
+    high = LARGEST_EXCESS
+    low_gap = math.pi**power
+    older = -1.0
+    older_gap = low_gap
+    for step in range(_MAXIMUM_STEPS):
+        if high - low <= _WIDTH * (1.0 + low):
+            break
+        trial = 0.5 * (low + high)
+        if step % 3 > 0 and high - low < _NEAR * high and older_gap > low_gap:
+            guess = low + low_gap * (low - older) / (older_gap - low_gap)
+            caution = max(_CAUTION * abs(guess - low), 0.25 * _WIDTH)
+            aimed = guess - caution if step % 3 == 1 else guess + caution
+            trial = aimed if low < aimed < high else trial
+        status, x = rest_phase(trial, delta, eta)
+        if status == Verdict.FOUND:
+            older = low
+            older_gap = low_gap
+            low = trial
+            low_gap = (math.pi - x) ** power
+        else:
+            high = trial
+    return low
+
+
+@inlined
+def distance_exponent(eta: float) -> float:
+    """Exponent nu of pi - x_rest ~ (critical - excess)^nu.
+
+    Close to x = pi the second side's restoring acceleration is proportional to the phase s that is left, and the
+    impact map scales: with speed w = v s^2 times a constant, an arc of duration z s has v = z/2 - z^2/6 and leaves
+    s (1 - z), v' = eta^2 (z/2 - z^2/3)/(1 - z)^2. The critical sequence stays at the fixed point; a
+    neighbour leaves it by the factor dv'/dv per pair while s falls by 1 - z.
+    """
+    pair = eta * eta
+    low = 0.0
+    high = 1.0
+    for _ in range(60):
+        z = 0.5 * (low + high)
+        if (0.5 - z / 6.0) * (1.0 - z) ** 2 > pair * (0.5 - z / 3.0):
+            low = z
+        else:
+            high = z
+    z = 0.5 * (low + high)
+    relative_growth = (0.5 - 2.0 * z / 3.0) / (0.5 * z - z * z / 3.0) + 2.0 / (1.0 - z)
+    growth = relative_growth * (0.5 * z - z * z / 6.0) / (0.5 - z / 3.0)
+    return -math.log(1.0 - z) / math.log(growth)

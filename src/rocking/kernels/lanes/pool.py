@@ -1,4 +1,4 @@
-"""The lanes: which block each one carries, its state, and the constants of its step."""
+"""A pool of lanes: which block each lane carries, its state, and the constants of its step."""
 
 import math
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ LONGEST_SUBSTEP = 0.04
 LONGEST_WEIGHTED_SUBSTEP = 0.125
 
 #: Rotation of a lane without a block.
-NOBODYS_ROTATION = 1e-300
+EMPTY_ROTATION = 1e-300
 
 _LANES = ("f8", (WIDTH,))
 _SIDES = ("f8", (2,))
@@ -47,14 +47,14 @@ STEP_CONSTANTS = np.dtype(
     align=True,
 )
 
-#: How many lanes are taken, how many of them have become free, and how many blocks wait for their uplift.
-TALLY = np.dtype([("active", "i8"), ("holes", "i8"), ("waiting", "i8")], align=True)
+#: How many lanes are in use, how many of them have become free, and how many blocks wait for their uplift.
+COUNTS = np.dtype([("active", "i8"), ("free", "i8"), ("waiting", "i8")], align=True)
 
 
-class Crew(NamedTuple):
-    """Blocks, their states and step constants; the lanes; and who joins at which piece of the motion.
+class Pool(NamedTuple):
+    """Blocks, their states and step constants; groups of lanes; and which blocks wait for which piece of the motion.
 
-    ``first[piece]`` is the first block that joins at a piece, ``following[block]`` the next one (-1: none). ``holes``
+    ``first[piece]`` is the first block that waits for a piece, ``following[block]`` the next one (-1: none). ``free``
     lists the lanes that have become free. ``table`` has no rows.
     """
 
@@ -64,35 +64,35 @@ class Crew(NamedTuple):
     groups: Records
     first: Integers
     following: Integers
-    holes: Integers
-    tally: Record
+    free: Integers
+    counts: Record
     table: Records
     fallen: float
 
 
-def crew_of(blocks: Records, states: Records, pieces: int, h: float, substeps: int) -> Crew:
-    """Crew that starts with every block waiting at the first piece; ``substeps`` is 0 in the linear model."""
+def pool_of(blocks: Records, states: Records, pieces: int, h: float, substeps: int) -> Pool:
+    """Pool in which every block waits for the first piece; ``substeps`` is 0 in the linear model."""
     count = len(blocks)
     groups = _on_cache_lines(-(-count // WIDTH), GROUP)
     groups["block"] = -1
-    groups["u"] = NOBODYS_ROTATION
+    groups["u"] = EMPTY_ROTATION
     groups["peak"] = np.inf
     first = np.full(pieces + 1, -1, dtype=np.int64)
     following = np.arange(1, count + 1, dtype=np.int64)
     following[-1] = -1
     first[0] = 0
-    return Crew(
+    return Pool(
         blocks, states, step_constants(blocks, h, substeps), groups, first, following,
-        np.zeros(count, dtype=np.int64), record(TALLY, waiting=count), new_table(0), float(blocks["fallen"].min()),
+        np.zeros(count, dtype=np.int64), record(COUNTS, waiting=count), new_table(0), float(blocks["fallen"].min()),
     )  # fmt: skip
 
 
 def _on_cache_lines(count: int, kind: np.dtype[np.void]) -> Records:
-    """Zeroed records that start on a cache line: vectors that straddle two lines load at half the speed."""
+    """Zeroed records that start on a cache line: vectors that cross two lines load at half the speed."""
     line = 64
-    room = np.zeros(count * kind.itemsize + line, dtype=np.uint8)
-    skip = -room.ctypes.data % line
-    return attributed(room[skip : skip + count * kind.itemsize].view(kind))
+    space = np.zeros(count * kind.itemsize + line, dtype=np.uint8)
+    skip = -space.ctypes.data % line
+    return attributed(space[skip : skip + count * kind.itemsize].view(kind))
 
 
 def step_constants(blocks: Records, h: float, substeps: int) -> Records:
@@ -126,10 +126,10 @@ def stumpff(k: int, q: Any) -> Floats:
 
 
 @inlined
-def load(crew: Crew, lane: int, index: int) -> None:
-    """Put a block into a lane."""
-    group, slot = crew.groups[lane // WIDTH], lane % WIDTH
-    state, steps = crew.states[index], crew.steps[index]
+def load(pool: Pool, lane: int, index: int) -> None:
+    """Put a block into a lane, but for its sine and cosine."""
+    group, slot = pool.groups[lane // WIDTH], lane % WIDTH
+    state, steps = pool.states[index], pool.steps[index]
     side = state.side
     group.block[slot] = index
     group.u[slot] = state.u
@@ -145,24 +145,24 @@ def load(crew: Crew, lane: int, index: int) -> None:
 
 
 @inlined
-def lean(crew: Crew, lane: int, index: int) -> None:
+def set_angles(pool: Pool, lane: int, index: int) -> None:
     """Set a lane's sine and cosine of alpha - u."""
-    group, slot = crew.groups[lane // WIDTH], lane % WIDTH
-    state = crew.states[index]
-    psi = crew.blocks[index].slenderness[state.side] - state.u
+    group, slot = pool.groups[lane // WIDTH], lane % WIDTH
+    state = pool.states[index]
+    psi = pool.blocks[index].slenderness[state.side] - state.u
     group.sine[slot] = math.sin(psi)
     group.cosine[slot] = math.cos(psi)
 
 
 @inlined
-def unload(ground: Ground, crew: Crew, lane: int, piece: int) -> int:
-    """Take a block's state from its lane, at the start of a piece; returns the block.
+def unload(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
+    """Write a lane's numbers into its block's state, at the start of a piece; returns the block.
 
-    The highest rotation of a lane that still rises has not been written yet.
+    The highest rotation of a lane that still rises has not been written before.
     """
-    group, slot = crew.groups[lane // WIDTH], lane % WIDTH
+    group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     index = group.block[slot]
-    state = crew.states[index]
+    state = pool.states[index]
     state.piece = piece
     state.offset = 0.0
     state.u = group.u[slot]
@@ -174,11 +174,11 @@ def unload(ground: Ground, crew: Crew, lane: int, piece: int) -> int:
 
 
 @inlined
-def vacate(crew: Crew, lane: int) -> None:
-    """Leave a lane empty, with numbers that no step ever changes or marks."""
-    group, slot = crew.groups[lane // WIDTH], lane % WIDTH
+def empty(pool: Pool, lane: int) -> None:
+    """Leave a lane without a block, with numbers that no step changes and that never mean an event."""
+    group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     group.block[slot] = -1
-    group.u[slot] = NOBODYS_ROTATION
+    group.u[slot] = EMPTY_ROTATION
     group.v[slot] = group.sine[slot] = group.cosine[slot] = 0.0
     group.peak[slot] = np.inf
     group.stiffness[slot] = group.pull[slot] = group.push[slot] = group.curve[slot] = 0.0
@@ -186,17 +186,17 @@ def vacate(crew: Crew, lane: int) -> None:
 
 
 @inlined
-def relocate(crew: Crew, lane: int, to: int) -> None:
+def move_block(pool: Pool, lane: int, to: int) -> None:
     """Move a block from one lane to another."""
-    here, slot = crew.groups[lane // WIDTH], lane % WIDTH
-    there, place = crew.groups[to // WIDTH], to % WIDTH
+    here, slot = pool.groups[lane // WIDTH], lane % WIDTH
+    there, place = pool.groups[to // WIDTH], to % WIDTH
     index = here.block[slot]
-    state = crew.states[index]
+    state = pool.states[index]
     state.u = here.u[slot]
     state.v = here.v[slot]
     peak = here.peak[slot]
     there.sine[place] = here.sine[slot]
     there.cosine[place] = here.cosine[slot]
-    load(crew, to, index)
+    load(pool, to, index)
     there.peak[place] = peak
-    vacate(crew, lane)
+    empty(pool, lane)

@@ -1,0 +1,201 @@
+"""What ends a step of an arc: an impact, a rotation at which the block has fallen, or nothing; and the impact.
+
+The first positive root of a power series is found without any chance of stepping over it.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rocking.arrays import Floats
+from rocking.kernels.arc import evaluate
+from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.ground import move
+from rocking.kernels.state import Outcome, Record
+
+_EPSILON = 2.0**-53
+
+#: After so many steps the search goes on within a window that is so many times as long as what has been searched.
+_STEPS_PER_WINDOW = 8
+_WINDOW = 4.0
+
+#: Some six steps find a simple root; a near touch takes tens to thousands. A series that is still not negative after
+#: so many lies within 1e-10 of zero, relative to its curvature: that counts as a touch.
+_MAXIMUM_STEPS = 100_000
+
+
+@shared
+def first_root(c: Floats, lead: int, order: int, h: float) -> float:
+    """First root in (0, h] of sum_k c[lead + k] t^k; NaN when there is none.
+
+    The series is the paper's Eq. 20: what is left of Eq. 15 after division by t^lead. It must not be negative
+    at 0. On [0, h] the second derivative is never below -bound, so the parabola with that curvature through the
+    current value and slope lies below the series, and its root is a step that no root of the series can precede.
+    Near a simple root the steps converge quadratically, always from the left. Where they are short because the bound
+    holds for all of a much longer interval, a window, with a bound of its own, goes before them.
+
+    A series that rounding makes negative at 0 counts as zero there, and that zero not as a root.
+    """
+    while lead < order and c[lead] == 0.0:
+        lead += 1
+    t = 0.0
+    f = max(0.0, c[lead])
+    slope = c[lead + 1] if lead < order else 0.0
+    if f == 0.0 and slope <= 0.0:
+        return np.nan
+    window = h
+    bound = curvature_bound(c, lead, order, window)
+    for n in range(1, _MAXIMUM_STEPS + 1):
+        root = math.sqrt(slope * slope + 2.0 * bound * f)
+        # The two forms of the parabola's root; neither subtracts numbers of the same sign.
+        above, below = (slope + root, bound) if slope > 0.0 else (2.0 * f, root - slope)
+        if above <= below * (window - t):
+            step = above / below
+            t += step
+            if step <= _EPSILON * t:
+                return t
+        elif window < h:  # no root in the window
+            t = window
+        else:
+            return np.nan
+        if t == window or n % _STEPS_PER_WINDOW == 0:
+            window = min(h, _WINDOW * t)
+            bound = curvature_bound(c, lead, order, window)
+        f, slope = deflated(c, lead, order, t)
+        if f <= 0.0:
+            return t
+    return t
+
+
+@inlined
+def curvature_bound(c: Floats, lead: int, order: int, h: float) -> float:
+    """Bound B >= 0 with f'' >= -B on [0, h] for the deflated series f: terms that help are left out."""
+    lowest = 0.0
+    power = 1.0
+    for k in range(2, order - lead + 1):
+        curvature = k * (k - 1) * c[lead + k] * power
+        if k == 2 or curvature < 0.0:
+            lowest += curvature
+        power *= h
+    return max(0.0, -lowest)
+
+
+@inlined
+def deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float, float]:
+    """Value and slope of sum_k c[lead + k] t^k."""
+    f = c[order]
+    slope = 0.0
+    for k in range(order - 1, lead - 1, -1):
+        slope = slope * t + f
+        f = f * t + c[k]
+    return f, slope
+
+
+class StepEnd(NamedTuple):
+    """How a step ends (`Outcome`); time, u, u' there; time and size of the highest rotation on it.
+
+    Where no rotation on it is above the highest so far, the last two are those of its end.
+    """
+
+    outcome: int
+    time: float
+    u: float
+    v: float
+    peak_time: float
+    peak: float
+
+
+@shared
+def advance(state: Record, scratch: Record, order: int, h: float, fallen: float) -> StepEnd:
+    """Follow the series of an arc to its first event within h; the outcome is STEP, IMPACT or OVERTURN."""
+    c, d = scratch.rotation, scratch.spare
+    lead = 0 if state.u > 0.0 else (1 if state.v > 0.0 else 2)
+    time = first_root(c, lead, order, h)
+    outcome = Outcome.IMPACT
+    if math.isnan(time):
+        time = h
+        outcome = Outcome.STEP
+    end, speed, _ = evaluate(c, order, time)
+    if end <= 0.0:  # also without a root: one within rounding of the step's end must not be left behind
+        outcome, end = Outcome.IMPACT, 0.0
+    peak_time, peak = time, end
+    if is_higher_between(state, end, c, order, time):
+        peak_time, peak = highest(order, time, c, d)
+    if peak >= fallen:
+        passage = first_passage(c, order, fallen, peak_time, d)
+        _, speed, _ = evaluate(c, order, passage)
+        return StepEnd(Outcome.OVERTURN, passage, fallen, speed, passage, fallen)
+    if outcome == Outcome.IMPACT:
+        end = 0.0
+    return StepEnd(outcome, time, end, speed, peak_time, peak)
+
+
+@inlined
+def is_higher_between(state: Record, end: float, c: Floats, order: int, h: float) -> bool:
+    """Whether a series may be higher within (0, h) than at both ends, and than the highest rotation so far."""
+    bend = curvature_bound(c, 0, order, h)
+    if max(state.u, end) + 0.125 * h * h * bend <= state.peak:
+        return False
+    if state.v > 0.0:
+        return bool(state.v < bend * h)
+    rise = state.v
+    power = h
+    for k in range(2, order + 1):
+        rise += max(0.0, c[k]) * power
+        power *= h
+    return rise > 0.0
+
+
+@shared
+def highest(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
+    """Time and value of a series' maximum on (0, h], from one turning point to the next. ``d`` is scratch space."""
+    best_time = h
+    best, _, _ = evaluate(c, order, h)
+    for k in range(order):
+        d[k] = (k + 1) * c[k + 1]
+    t = 0.0
+    rising = True
+    for _ in range(order):
+        lead = 0
+        while lead < order - 1 and d[lead] == 0.0:
+            lead += 1
+        if d[lead] < 0.0:
+            rising = not rising
+            for k in range(order):
+                d[k] = -d[k]
+        turn = first_root(d, lead, order - 1, h - t)
+        if not turn > 0.0:
+            break
+        t += turn
+        value, _, _ = evaluate(c, order, t)
+        if rising and value > best:
+            best_time, best = t, value
+        move(d, order - 1, turn)
+        d[0] = 0.0
+    return best_time, best
+
+
+@inlined
+def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> float:
+    """First time in (0, h] at which a series that starts below ``level``, and is not below it at h, reaches it.
+
+    ``d`` is scratch space.
+    """
+    d[0] = level - c[0]
+    for k in range(1, order + 1):
+        d[k] = -c[k]
+    time = first_root(d, 0, order, h)
+    return h if math.isnan(time) else time
+
+
+@inlined
+def apply_impact(block: Record, state: Record) -> float:
+    """Impact: the angular speed drops and the side changes; returns the speed before."""
+    left = state.side
+    speed = max(0.0, -state.v)
+    state.side = block.entered[left]
+    state.u = 0.0
+    state.v = block.restitution[left] * speed
+    state.impacts += 1
+    return speed

@@ -1,0 +1,232 @@
+"""All recurrences for the Taylor coefficients of an arc, side by side.
+
+The rotation u >= 0 is counted in the frame of the block's side, and so is the ground acceleration A(t) = i a(t)/g with
+i the sign of that side. A vertical ground acceleration changes the weight: W(t) = 1 + a_v(t)/g. The equations are
+
+    linear      u'' = W lam u - gain (W threshold + A)
+    nonlinear   u'' = -lam (W sin(alpha - u) + A cos(alpha - u))
+
+In the linear model lam may have any sign: p^2 for a rocking block (whose gain is p^2, too), 0 for a ball, negative for
+an oscillator with a stop.
+
+Each equation is written three times, for three purposes: to any order into arrays (`arc`); nine terms of one arc in
+registers (`short_arc`); and some ten terms of many lanes at once (`lanes.steps`). One text for all was measured: as
+loops over tuples it takes twelve times as long in lanes, which then do not vectorise; unrolled, it changes the last bit
+of some results, since each form adds its terms in the order that makes the shortest chain of operations for it. So one
+test compares all forms with one calculation in 40 digits.
+
+No function here fails: a NaN among the arguments makes every later coefficient NaN.
+"""
+
+import numpy as np
+
+from rocking.kernels.compiled import inlined
+from rocking.kernels.state import ORDER, Record
+
+#: A quantity that changes evenly: its value, and its slope or its change over a step.
+Line = tuple[float, float]
+
+#: Coefficients c[0] to c[9] of a rotation; nine terms of a velocity; sizes of seven terms of sin and cos(alpha - u).
+Ten = tuple[float, float, float, float, float, float, float, float, float, float]
+Nine = tuple[float, float, float, float, float, float, float, float, float]
+Seven = tuple[float, float, float, float, float, float, float]
+
+#: Factors that integrate the term of power k twice, 1/((k + 1) (k + 2)), and the term of power k - 1 once, 1/k.
+INTEGRATED_TWICE = 1.0 / ((np.arange(ORDER + 1) + 1.0) * (np.arange(ORDER + 1) + 2.0))
+_INTEGRATED = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
+
+
+@inlined
+def times_weight(weight: Line | None, this: float, before: float) -> float:
+    """Coefficient of the weight times a series, from two neighbouring ones of the series; None: the weight is 1."""
+    return this if weight is None else weight[0] * this + weight[1] * before
+
+
+# ---- To any order: the motion's and the weight's polynomials are scratch.ground and scratch.weight ----
+
+
+@inlined
+def linear_coefficients(block: Record, state: Record, scratch: Record, degree: int, order: int) -> None:
+    """Write c[0] to c[order] of a linear arc under a constant weight and a motion of a degree into scratch.rotation."""
+    c, A, side = scratch.rotation, scratch.ground, state.side
+    lam, gain = block.stiffness[side], block.gain[side]
+    c[0] = state.u
+    c[1] = state.v
+    c[2] = 0.5 * (lam * state.u - gain * (block.threshold[side] + A[0]))
+    for k in range(1, degree + 1):
+        c[k + 2] = (lam * c[k] - gain * A[k]) * INTEGRATED_TWICE[k]
+    for k in range(degree + 1, order - 1):
+        c[k + 2] = lam * c[k] * INTEGRATED_TWICE[k]
+
+
+@inlined
+def weighted_coefficient(block: Record, side: int, scratch: Record, degree: int, k: int) -> float:
+    """Coefficient c[k + 2] of a linear arc while the weight changes, from those before it.
+
+    ``degree`` is that of both the motion and the weight.
+    """
+    c, A, W = scratch.rotation, scratch.ground, scratch.weight
+    lam, gain, threshold = block.stiffness[side], block.gain[side], block.threshold[side]
+    value = -gain * (threshold * W[k] + A[k]) if k <= degree else 0.0
+    for j in range(min(k, degree) + 1):
+        value += lam * W[j] * c[k - j]
+    return value * INTEGRATED_TWICE[k]
+
+
+@inlined
+def nonlinear_coefficient(lam: float, scratch: Record, degrees: tuple[int, int], k: int) -> float:
+    """Coefficient c[k + 2] of a nonlinear arc, from sin and cos(alpha - u) up to k; degrees of motion and weight."""
+    A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
+    degree, changes = degrees
+    value = W[0] * S[k]
+    for j in range(1, min(k, changes) + 1):
+        value += W[j] * S[k - j]
+    for j in range(min(k, degree) + 1):
+        value += A[j] * C[k - j]
+    value *= -lam * INTEGRATED_TWICE[k]
+    return value
+
+
+@inlined
+def angle_coefficients(scratch: Record, k: int) -> None:
+    """Write the coefficients k + 1 of sin and cos(alpha - u), from those before and c[1] to c[k + 1]."""
+    c, S, C = scratch.rotation, scratch.sine, scratch.cosine
+    sine = 0.0
+    cosine = 0.0
+    for j in range(k + 1):
+        rate = (j + 1) * c[j + 1]
+        sine -= rate * C[k - j]
+        cosine += rate * S[k - j]
+    S[k + 1] = sine * _INTEGRATED[k + 1]
+    C[k + 1] = cosine * _INTEGRATED[k + 1]
+
+
+@inlined
+def variation_coefficients(work: Record, order: int) -> None:
+    """Write the coefficients 2 to ``order`` of x'' = stiffness x + forcing into work.change, whose first two stand."""
+    stiffness, forcing, x = work.stiffness, work.forcing, work.change
+    for k in range(order - 1):
+        value = forcing[k]
+        for j in range(k + 1):
+            value += stiffness[j] * x[k - j]
+        x[k + 2] = value * INTEGRATED_TWICE[k]
+
+
+# ---- Nine terms of one arc, under a motion and a weight that change evenly ----
+
+
+@inlined
+def linear_ten(u: float, v: float, lam: float, pull: float, rate: float) -> Ten:
+    """Coefficients of u'' = lam u - pull - rate t."""
+    c2, c3 = 0.5 * (lam * u - pull), (lam * v - rate) * (1.0 / 6.0)
+    c4, c5 = lam * c2 * (1.0 / 12.0), lam * c3 * (1.0 / 20.0)
+    c6, c7 = lam * c4 * (1.0 / 30.0), lam * c5 * (1.0 / 42.0)
+    c8, c9 = lam * c6 * (1.0 / 56.0), lam * c7 * (1.0 / 72.0)
+    return u, v, c2, c3, c4, c5, c6, c7, c8, c9
+
+
+@inlined
+def weighted_ten(u: float, v: float, lam: float, at_rest: float, push: Line, weight: Line) -> Ten:
+    """Coefficients of u'' = weight (lam u - at_rest) - push, weight and push being lines in time."""
+    z = lam * u - at_rest
+    c2 = 0.5 * (times_weight(weight, z, 0.0) - push[0])
+    c3 = (1.0 / 6.0) * (times_weight(weight, lam * v, z) - push[1])
+    c4, c5 = lam * times_weight(weight, c2, v) * (1.0 / 12.0), lam * times_weight(weight, c3, c2) * (1.0 / 20.0)
+    c6, c7 = lam * times_weight(weight, c4, c3) * (1.0 / 30.0), lam * times_weight(weight, c5, c4) * (1.0 / 42.0)
+    c8, c9 = lam * times_weight(weight, c6, c5) * (1.0 / 56.0), lam * times_weight(weight, c7, c6) * (1.0 / 72.0)
+    return u, v, c2, c3, c4, c5, c6, c7, c8, c9
+
+
+@inlined
+def nonlinear_ten(start: Line, angle: Line, lam: float, push: Line, weight: Line | None) -> tuple[Ten, Seven]:
+    """Coefficients of u'' = -lam (weight sin(alpha - u) + push cos(alpha - u)), weight and push being lines in time.
+
+    ``start`` is u and v, ``angle`` sin and cos(alpha - u) there; a weight of None is 1. The second tuple has the sums
+    of the sizes of the coefficients of sin and cos, from the first power to the seventh.
+    """
+    u, v = start
+    s0, c0 = angle
+    a, b = push
+    l2 = -0.5 * lam
+    u2 = l2 * (times_weight(weight, s0, 0.0) + a * c0)
+    s1, c1 = -(v * c0), v * s0
+    u3 = l2 * (times_weight(weight, s1, s0) + (a * c1 + b * c0)) * (1.0 / 3.0)
+    r2 = 2.0 * u2
+    s2, c2 = -0.5 * (v * c1 + r2 * c0), 0.5 * (v * s1 + r2 * s0)
+    u4 = l2 * (times_weight(weight, s2, s1) + (a * c2 + b * c1)) * (1.0 / 6.0)
+    r3 = 3.0 * u3
+    s3, c3 = -(v * c2 + r2 * c1 + r3 * c0) * (1.0 / 3.0), (v * s2 + r2 * s1 + r3 * s0) * (1.0 / 3.0)
+    u5 = l2 * (times_weight(weight, s3, s2) + (a * c3 + b * c2)) * (1.0 / 10.0)
+    r4 = 4.0 * u4
+    s4 = -0.25 * ((v * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
+    c4 = 0.25 * ((v * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
+    u6 = l2 * (times_weight(weight, s4, s3) + (a * c4 + b * c3)) * (1.0 / 15.0)
+    r5 = 5.0 * u5
+    s5 = -0.2 * ((v * c4 + r2 * c3) + (r3 * c2 + r4 * c1) + r5 * c0)
+    c5 = 0.2 * ((v * s4 + r2 * s3) + (r3 * s2 + r4 * s1) + r5 * s0)
+    u7 = l2 * (times_weight(weight, s5, s4) + (a * c5 + b * c4)) * (1.0 / 21.0)
+    r6 = 6.0 * u6
+    s6 = -(1.0 / 6.0) * ((v * c5 + r2 * c4) + (r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0))
+    c6 = (1.0 / 6.0) * ((v * s5 + r2 * s4) + (r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0))
+    u8 = l2 * (times_weight(weight, s6, s5) + (a * c6 + b * c5)) * (1.0 / 28.0)
+    r7 = 7.0 * u7
+    s7 = -(1.0 / 7.0) * ((v * c6 + r2 * c5) + (r3 * c4 + r4 * c3) + ((r5 * c2 + r6 * c1) + r7 * c0))
+    c7 = (1.0 / 7.0) * ((v * s6 + r2 * s5) + (r3 * s4 + r4 * s3) + ((r5 * s2 + r6 * s1) + r7 * s0))
+    u9 = l2 * (times_weight(weight, s7, s6) + (a * c7 + b * c6)) * (1.0 / 36.0)
+    low = (abs(v), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
+    return (u, v, u2, u3, u4, u5, u6, u7, u8, u9), (*low, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
+
+
+# ---- Terms of the velocity in lanes: time is counted in substeps, so that they add up to the change over one ----
+
+
+@inlined
+def weighted_rates(r1: float, z0: float, q: float, push: Line, weight: Line) -> tuple[Nine, float, float]:
+    """Terms r1 to r9, and r10 and r11, of the velocity of a linear arc while the weight changes.
+
+    u'' = weight z - push with z = q u - (a constant) and z0 its value at the start.
+    """
+    w, d = weight
+    r2, z1 = w * z0 - push[0], q * r1
+    r3, z2 = 0.5 * ((w * z1 + d * z0) - push[1]), 0.5 * (q * r2)
+    r4, z3 = (1.0 / 3.0) * (w * z2 + d * z1), (1.0 / 3.0) * (q * r3)
+    r5, z4 = 0.25 * (w * z3 + d * z2), 0.25 * (q * r4)
+    r6, z5 = 0.2 * (w * z4 + d * z3), 0.2 * (q * r5)
+    r7, z6 = (1.0 / 6.0) * (w * z5 + d * z4), (1.0 / 6.0) * (q * r6)
+    r8, z7 = (1.0 / 7.0) * (w * z6 + d * z5), (1.0 / 7.0) * (q * r7)
+    r9, z8 = 0.125 * (w * z7 + d * z6), 0.125 * (q * r8)
+    r10, z9 = (1.0 / 9.0) * (w * z8 + d * z7), (1.0 / 9.0) * (q * r9)
+    r11 = 0.1 * (w * z9 + d * z8)
+    return (r1, r2, r3, r4, r5, r6, r7, r8, r9), r10, r11
+
+
+@inlined
+def nonlinear_rates(r1: float, angle: Line, l2: float, push: Line, weight: Line | None) -> tuple[Nine, Seven]:
+    """Terms r1 to r9 of the velocity of a nonlinear arc; l2 is -lam/2, ``angle`` sin and cos(alpha - u) at the start.
+
+    A weight of None is 1. The second tuple is as that of `nonlinear_ten`.
+    """
+    s0, c0 = angle
+    a, b = push
+    r2 = 2.0 * (l2 * (times_weight(weight, s0, 0.0) + a * c0))
+    s1, c1 = -(r1 * c0), r1 * s0
+    r3 = l2 * (times_weight(weight, s1, s0) + (a * c1 + b * c0))
+    s2, c2 = -0.5 * (r1 * c1 + r2 * c0), 0.5 * (r1 * s1 + r2 * s0)
+    r4 = (2.0 / 3.0) * (l2 * (times_weight(weight, s2, s1) + (a * c2 + b * c1)))
+    s3, c3 = -(1.0 / 3.0) * (r1 * c2 + (r2 * c1 + r3 * c0)), (1.0 / 3.0) * (r1 * s2 + (r2 * s1 + r3 * s0))
+    r5 = 0.5 * (l2 * (times_weight(weight, s3, s2) + (a * c3 + b * c2)))
+    s4 = -0.25 * ((r1 * c3 + r2 * c2) + (r3 * c1 + r4 * c0))
+    c4 = 0.25 * ((r1 * s3 + r2 * s2) + (r3 * s1 + r4 * s0))
+    r6 = 0.4 * (l2 * (times_weight(weight, s4, s3) + (a * c4 + b * c3)))
+    s5 = -0.2 * ((r1 * c4 + r2 * c3) + (r3 * c2 + (r4 * c1 + r5 * c0)))
+    c5 = 0.2 * ((r1 * s4 + r2 * s3) + (r3 * s2 + (r4 * s1 + r5 * s0)))
+    r7 = (1.0 / 3.0) * (l2 * (times_weight(weight, s5, s4) + (a * c5 + b * c4)))
+    s6 = -(1.0 / 6.0) * ((r1 * c5 + r2 * c4) + ((r3 * c3 + r4 * c2) + (r5 * c1 + r6 * c0)))
+    c6 = (1.0 / 6.0) * ((r1 * s5 + r2 * s4) + ((r3 * s3 + r4 * s2) + (r5 * s1 + r6 * s0)))
+    r8 = (2.0 / 7.0) * (l2 * (times_weight(weight, s6, s5) + (a * c6 + b * c5)))
+    s7 = -(1.0 / 7.0) * (((r1 * c6 + r2 * c5) + (r3 * c4 + r4 * c3)) + ((r5 * c2 + r6 * c1) + r7 * c0))
+    c7 = (1.0 / 7.0) * (((r1 * s6 + r2 * s5) + (r3 * s4 + r4 * s3)) + ((r5 * s2 + r6 * s1) + r7 * s0))
+    r9 = 0.25 * (l2 * (times_weight(weight, s7, s6) + (a * c7 + b * c6)))
+    low = (abs(r1), abs(s2) + abs(c2), abs(s3) + abs(c3), abs(s4) + abs(c4))
+    angles = (*low, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
+    return (r1, r2, r3, r4, r5, r6, r7, r8, r9), angles
