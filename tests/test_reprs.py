@@ -39,7 +39,7 @@ RESULTS = {
     "block": lambda path: BLOCK,
     "two-sided block": lambda path: rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4),
     "blocks": lambda path: rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.1, 0.2]),
-    "motion": lambda path: RECORD.scaled(pga=5.0).with_vertical(RECORD),
+    "motion": lambda path: RECORD.scaled_to(5.0).with_vertical(RECORD),
     "response": lambda path: rocking.simulate(BLOCK, RECORD),
     "fragility": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10),
     "bootstrapped fragility": lambda path: rocking.fit_fragility(

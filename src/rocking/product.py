@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,10 +15,10 @@ from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.constants import VERSION
 from rocking.engine import Setup, Task, parts_of
-from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion import measures
+from rocking.errors import InvalidOption
 from rocking.motion.arguments import STRONGEST
 from rocking.motion.motion import Motion
+from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.problem import rules_of
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
@@ -55,52 +54,34 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """How motions are scaled: a measure and its values; without one, not at all.
+    """Levels of a measure that motions are scaled to; without a measure, motions as they are.
 
     Attributes
     ----------
-    measure : {"factor", "pga", "pgv", "sa"} or None
+    measure : Measure or None
         What `values` are: factors, peak accelerations (m/s^2), peak velocities (m/s), spectral accelerations (m/s^2).
     values : ndarray
-        Values of the measure.
-    options : mapping
-        period (s) and damping of "sa".
+        Levels of the measure.
     """
 
-    measure: str | None = None
+    measure: Measure | None = None
     values: Floats = field(default_factory=lambda: np.ones(1))
-    options: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, *, period: float | None, damping: float, **measures: ArrayLike | None) -> Scales:
-        """Scales from the one measure that is given.
+    def of(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
+        """Scales from arguments.
 
         Raises
         ------
         InvalidOption
-            If there are several, or an argument is out of place or range.
+            If an argument is out of its range, or there is a measure without levels.
         """
-        given = {name: values for name, values in measures.items() if values is not None}
-        if len(given) > 1:
-            raise InvalidOption(f"motions can be scaled to one measure only, not to {' and '.join(given)}")
-        if "sa" not in given and period is not None:
-            raise InvalidOption("period= belongs to sa=; give sa= as well, or neither")
-        if not given:
+        known = Measure.of(measure, among=SCALES)
+        if levels is None:
+            if known.name != "factor":
+                raise InvalidOption("{} says what {} are: give those as well", "measure", "levels")
             return cls()
-        ((name, target),) = given.items()
-        values = checks.positive_numbers(target, name, InvalidOption)
-        if name != "sa":
-            return cls(name, values)
-        if period is None:
-            raise InvalidOption("sa= needs period=, in s")
-        return cls(
-            name,
-            values,
-            {
-                "period": checks.positive(period, "period", InvalidOption, "s"),
-                "damping": checks.within(damping, "damping", InvalidOption, 0.0, math.nextafter(1.0, 0.0)),
-            },
-        )
+        return cls(known, checks.positive_numbers(levels, "levels", InvalidOption))
 
     @property
     def count(self) -> int:
@@ -108,12 +89,13 @@ class Scales:
         return len(self.values)
 
     @property
-    def units(self) -> str:
-        """Units of the values."""
-        return {"factor": "1", "pgv": "m/s"}.get(self.measure or "factor", "m/s^2")
+    def about(self) -> dict[str, Any]:
+        """Name of the measure, its units, and its period (s) and damping where it has them."""
+        measure = self.measure or FACTOR
+        return {"measure": measure.name, "units": measure.units, **measure.options()}
 
     def factors(self, motion: Motion) -> Floats:
-        """Factors that bring a motion to the values of the measure.
+        """Factors that bring a motion to the levels.
 
         Raises
         ------
@@ -134,12 +116,7 @@ class Scales:
         InvalidMotion
             If the motion is zero throughout.
         """
-        if self.measure is None or self.measure == "factor":
-            return 1.0
-        now = measures.target(motion, self.measure, self.options.get("period"), self.options.get("damping", 0.0))
-        if now == 0.0:
-            raise InvalidMotion(f"{motion.name} is zero throughout and cannot be scaled to a {self.measure}")
-        return now
+        return (self.measure or FACTOR).positive(motion, motion.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,11 +195,10 @@ class Product:
         return whole.isel({name: 0 for name, is_gone in gone.items() if is_gone}, drop=True)
 
     def _coordinates(self) -> dict[str, Any]:
-        about = {"measure": self.scales.measure or "factor", "units": self.scales.units, **self.scales.options}
         return {
             "motion": ("motion", names_of(self.motions)),
             **verticals_of(self.motions),
-            "scale": ("scale", self.scales.values, about),
+            "scale": ("scale", self.scales.values, self.scales.about),
             "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in self.signs]),
             **block_coordinates(self.blocks),
         }

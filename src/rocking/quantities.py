@@ -9,9 +9,11 @@ from typing import Final
 
 import numpy as np
 
+from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.formats.units import find_unit
+from rocking.motion.scaling import FACTOR, Measure
 from rocking.tables import decimal
 
 #: What reads one number of an option: its text and the option's name, to SI units.
@@ -123,6 +125,47 @@ def values(text: str, option: str, quantity: Quantity = number) -> Floats:
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
         raise InvalidOption(f"{option}: a range with :log needs positive ends, not {text!r}")
     return _decimals(np.geomspace(start, stop, count))
+
+
+def scaling(given: Mapping[str, str | float | None], quantity: Quantity = acceleration) -> tuple[float, Measure] | None:
+    """Return the level that a motion is scaled to, and the measure that it is of; None where nothing is given.
+
+    Parameters
+    ----------
+    given : mapping
+        At most one of scale (a factor), pga, pgv (m/s) and sa ("0.4g@1.0", at a period, s), as texts or numbers.
+    quantity : callable
+        What reads accelerations.
+
+    Raises
+    ------
+    InvalidOption
+        If several are given, or one is not what it must be.
+
+    Examples
+    --------
+    >>> scaling({"pga": "0.5g"})
+    (4.903325, Measure(name='pga', period=None, damping=0.05))
+    >>> scaling({"scale": "-2"})[0], scaling({"sa": "3@0.5"})[1].period, scaling({})
+    (-2.0, 0.5, None)
+    """
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if not chosen:
+        return None
+    if len(chosen) > 1:
+        raise InvalidOption(f"{' and '.join(['{}'] * len(chosen))} scale the same motion; give one of them", *chosen)
+    ((name, value),) = chosen.items()
+    if name == "pga":
+        return quantity(str(value), name), Measure("pga")
+    if name == "sa":
+        level, at, period = str(value).partition("@")
+        if not at:
+            raise InvalidOption(f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {value!r}", name)
+        return quantity(level, name), Measure("sa", number(period, name))
+    plain = number(value, name) if isinstance(value, str) else float(value)
+    if name == "scale":
+        return checks.finite(plain, name, InvalidOption), FACTOR
+    return checks.positive(plain, name, InvalidOption, "m/s"), Measure("pgv")
 
 
 def _decimals(numbers: Floats) -> Floats:

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.intensity import Measure
-from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled
+from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled, units_of, values_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption
 from rocking.motion import accepted
 from rocking.motion.motion import Motion
+from rocking.motion.scaling import Measure
 from rocking.result import Result
 from rocking.tables import counted, text_table
 from rocking.treatment.base import Model
@@ -117,14 +117,11 @@ def compare_measures(
         Measure("pga_ratio"),
         Measure("pgv_ratio"),
     ]
-    lifting = Measure("pga_ratio").unit_of(many, model)
+    lifting = units_of(many, Measure("pga_ratio"), model)
     level = scaled.overturning_level.transpose("motion", "block").values
     factors = level * lifting / np.array([motion.pga for motion in shaken])[:, None]
     intensity = np.stack(
-        [
-            factors * np.array([measure.of(motion) for motion in shaken])[:, None] / measure.unit_of(many, model)
-            for measure in measures
-        ]
+        [factors * values_of(shaken, measure)[:, None] / units_of(many, measure, model) for measure in measures]
     )
     if np.any(np.isfinite(level).sum(axis=0) < 2):
         raise InvalidOption("fewer than two motions overturn a block, however strong; a dispersion needs more")

@@ -13,8 +13,9 @@ from rocking import checks, svg
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
-from rocking.motion import arguments, measures, piecewise, processing, scaling
+from rocking.motion import arguments, measures, piecewise, processing
 from rocking.motion.description import Description, labelled
+from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -225,7 +226,7 @@ class Motion:
         Examples
         --------
         >>> motion = Motion([0.0, 2.0], [[1.0]], name="step")
-        >>> motion.label, motion.scaled(pga=2.0).label, (-motion).delayed(1.0).label
+        >>> motion.label, motion.scaled_to(2.0).label, (-motion).delayed(1.0).label
         ('step', 'step, scaled by 2', 'step, polarity reversed, delayed by 1 s')
         """
         return labelled(self.name, self.history, "" if self.vertical is None else self.vertical.name)
@@ -367,47 +368,66 @@ class Motion:
         """
         return measures.table(self, periods)
 
-    def scaled(
-        self,
-        factor: float | None = None,
-        *,
-        pga: float | None = None,
-        pgv: float | None = None,
-        sa: float | None = None,
-        period: float | None = None,
-        damping: float | None = None,
-    ) -> Motion:
-        """Return the motion times a factor, or scaled to a target; give exactly one of the first four.
+    def scaled(self, factor: float) -> Motion:
+        """Return the motion times a factor.
 
         Parameters
         ----------
         factor : float
             Factor on the acceleration; a negative one reverses the polarity.
-        pga : float
-            Wanted peak ground acceleration, m/s^2, not g: half a g is ``pga=0.5 * 9.80665``. `history` says both.
-        pgv : float
-            Wanted peak ground velocity, m/s.
-        sa : float
-            Wanted spectral acceleration, m/s^2, at `period` and `damping`.
-        period : float
-            Period of the oscillator for `sa`, s.
-        damping : float
-            Its fraction of critical damping, 0.05 by default.
+
+        Returns
+        -------
+        Motion
 
         Raises
         ------
         InvalidMotion
-            If not exactly one target is given, a target is not positive, `period` or `damping` is given without `sa`,
-            or the motion is zero throughout.
+            If the factor is not a finite number, or the motion would become stronger than any may be.
 
         Examples
         --------
-        >>> half = Motion([0.0, 2.0], [[1.0]]).scaled(pga=0.5 * 9.80665)
+        >>> motion = Motion([0.0, 2.0], [[1.0]]).scaled(3.0)
+        >>> motion.pga, motion.history
+        (3.0, ('scaled by 3',))
+        """
+        by = checks.finite(factor, "factor", InvalidMotion)
+        return self._times(by, FACTOR.scaling(by, by))
+
+    def scaled_to(self, level: float, measure: MeasureName | Measure = "pga") -> Motion:
+        """Return the motion scaled to a level of an intensity measure.
+
+        Parameters
+        ----------
+        level : float
+            Wanted level, SI units: accelerations in m/s^2, not g; half a g is ``0.5 * 9.80665``. `history` says both.
+        measure : {"pga", "pgv", "factor"} or Measure
+            Peak acceleration (m/s^2), peak velocity (m/s), a factor on the motion as for `scaled`, or a spectral
+            acceleration (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
+
+        Returns
+        -------
+        Motion
+
+        Raises
+        ------
+        InvalidMotion
+            If `level` is not positive, the motion is zero throughout, or it would become stronger than any may be.
+        InvalidOption
+            If it is not a measure of a motion alone.
+
+        Examples
+        --------
+        >>> half = Motion([0.0, 2.0], [[1.0]]).scaled_to(0.5 * 9.80665)
         >>> half.coefficients.round(6), half.history
         (array([[4.903325]]), ('scaled by 4.90332 to a peak ground acceleration of 4.90332 m/s^2 (0.5 g)',))
         """
-        targets = {"factor": factor, "pga": pga, "pgv": pgv, "sa": sa}
-        return self._times(*scaling.factor_to(self, targets, period, damping))
+        wanted = Measure.of(measure, among=SCALES)
+        if wanted.name == "factor":
+            return self.scaled(level)
+        goal = checks.positive(level, "level", InvalidMotion, wanted.units)
+        factor = goal / wanted.positive(self, self.name)
+        return self._times(factor, wanted.scaling(goal, factor))
 
     def with_vertical(self, vertical: Motion | None) -> Motion:
         """Return the motion with a vertical component, which changes the weight of what stands on the ground.

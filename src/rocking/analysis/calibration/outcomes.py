@@ -20,7 +20,6 @@ from rocking.analysis.calibration.search import Problem, search
 from rocking.analysis.calibration.space import SIDED, Knowledge, Space, unit_of
 from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import OVERTURNING, fragility
-from rocking.analysis.intensity import MeasureName
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
@@ -28,6 +27,7 @@ from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
+from rocking.motion.scaling import IntensityName, Measure
 from rocking.tables import counted, named, text_table, write_text
 from rocking.treatment.base import Model
 
@@ -219,9 +219,7 @@ class Calibration:
         self,
         motions: Motion | Sequence[Motion],
         *,
-        measure: MeasureName = "pga",
-        period: float | None = None,
-        damping: float = 0.05,
+        measure: IntensityName | Measure = "pga",
         levels: ArrayLike | None = None,
         limits: Mapping[str, float] = OVERTURNING,
         model: Model | None = None,
@@ -231,7 +229,7 @@ class Calibration:
 
         Parameters
         ----------
-        motions, measure, period, damping, levels, limits
+        motions, measure, levels, limits
             As for `rocking.fragility`.
         model : {"linear", "nonlinear"}, optional
             Equation of motion, if not that of the calibration.
@@ -256,8 +254,6 @@ class Calibration:
             weights=self.weights,
             model=self.model if model is None else model,
             measure=measure,
-            period=period,
-            damping=damping,
             levels=levels,
             limits=limits,
             **options,

@@ -106,7 +106,7 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
         -(amplitude pi f / gamma) [ sin(2 pi f s / gamma) cos(2 pi f s + phase)
                                     + gamma sin(2 pi f s + phase) (1 + cos(2 pi f s / gamma)) ].
 
-    Note that `amplitude` is a velocity; use ``.scaled(pga=...)`` for a given acceleration. The
+    Note that `amplitude` is a velocity; use ``.scaled_to(level)`` for a given acceleration. The
     motion starts from rest, so its velocity equals v(t), which is zero at both ends.
 
     Parameters
