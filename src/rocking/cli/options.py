@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple
 from cyclopts import Group, Parameter
 
 from rocking.cli.wording import with_options
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, UnreadableRecord
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.motion.scaling import IntensityName, Measure
@@ -234,9 +234,10 @@ class FileOptions:
         return motion
 
 
-def refusal(name: str, error: Exception) -> str:
+def refusal(name: str, error: RockingError) -> str:
     """Return why a record cannot be read, with its name, in the words of the command line."""
-    sentence = str(error) if name in str(error) else f"{name}: {error}"
+    spelled = error.text(lambda argument: f"--{argument}" if f"--{argument}" in _OF_FILES else argument)
+    sentence = spelled if name in spelled else f"{name}: {spelled}"
     return with_options(sentence, _OF_FILES, _OF_FILES)
 
 

@@ -99,9 +99,9 @@ def samples(acceleration: ArrayLike) -> Floats:
 def step(dt: float) -> float:
     """Return a sampling step, s."""
     if np.ndim(dt) != 0:
-        raise InvalidMotion("dt must be one number; for uneven times use Motion.from_points(times, acceleration)")
-    positive = checks.positive(dt, "sampling step dt", InvalidMotion, "s")
-    return checks.within(positive, "sampling step dt", InvalidMotion, SHORTEST, 1.0 / SHORTEST, "s: check its units")
+        raise InvalidMotion("{} must be one number; for uneven times use Motion.from_points(times, acceleration)", "dt")
+    positive = checks.positive(dt, "dt", InvalidMotion, "s")
+    return checks.within(positive, "dt", InvalidMotion, SHORTEST, 1.0 / SHORTEST, "s: check its units")
 
 
 def instants(times: ArrayLike, count: int) -> Floats:

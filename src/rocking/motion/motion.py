@@ -522,14 +522,14 @@ class Motion:
         ('trimmed to 0.5-2 s', 'baseline of degree 0 removed')
         """
         steps: list[Callable[[piecewise.Piecewise], processing.Processed]] = []
-        kept = None if trim is None else processing.ends(self, *processing.pair(trim, "trim=(start, end)"))
+        kept = None if trim is None else processing.ends(self, *processing.pair(trim, "trim"))
         if baseline is not None:
             steps.append(lambda motion: processing.baseline(motion, baseline))
         if band_pass is not None:
-            low, high = processing.pair(band_pass, "band_pass=(low, high)")
+            low, high = processing.pair(band_pass, "band_pass")
             steps.append(lambda motion: processing.band_pass(motion, low, high, order=4 if order is None else order))
         elif order is not None:
-            raise InvalidMotion("order= belongs to band_pass=; give that as well, or neither")
+            raise InvalidMotion("{} belongs to {}; give that as well, or neither", "order", "band_pass")
         if resample is not None:
             steps.append(lambda motion: processing.resample(motion, resample))
         if kept is None and not steps:

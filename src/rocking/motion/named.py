@@ -100,7 +100,7 @@ def refuse_what_is_known(name: str, **said: object) -> None:
     for argument, value in said.items():
         if value is not None:
             raise UnreadableRecord(
-                f"{name}: a shipped record is one channel, with its step and units; leave {argument} out"
+                "a shipped record is one channel, with its step and units; leave {} out", argument, path=name
             )
 
 
@@ -118,7 +118,9 @@ def is_shipped(name: str) -> bool:
         return True
     meant = records.meant(name)
     if meant and not Path(name).suffix:
-        raise UnreadableRecord(f"{name}: there is no such file or shipped record; did you mean {' or '.join(meant)}?")
+        raise UnreadableRecord(
+            f"there is no such file or shipped record; did you mean {' or '.join(meant)}?", path=name
+        )
     return False
 
 
@@ -148,7 +150,7 @@ def _files(name: str) -> list[str]:
     if Path(name).is_dir():
         files = sorted(str(path) for path in Path(name).iterdir() if path.is_file() and not path.name.startswith("."))
         if not files:
-            raise UnreadableRecord(f"{name}: this folder holds no file; name one that holds records")
+            raise UnreadableRecord("this folder holds no file; name one that holds records", path=name)
         return files
     if not glob.has_magic(name) or Path(name).exists():
         return [name]
@@ -156,6 +158,6 @@ def _files(name: str) -> list[str]:
     matching = matching or fnmatch.filter(records.names(), name)
     if not matching:
         raise UnreadableRecord(
-            f"{name}: no file or shipped record matches this pattern; check the folder and the pattern"
+            "no file or shipped record matches this pattern; check the folder and the pattern", path=name
         )
     return matching

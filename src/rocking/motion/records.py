@@ -18,7 +18,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.errors import UnreadableRecord
-from rocking.motion.description import Description
+from rocking.motion.description import Description, Origin
 from rocking.motion.formats.units import choose_unit
 from rocking.motion.motion import Motion
 
@@ -148,7 +148,11 @@ def load(name: str) -> Motion:
         choose_unit(record.units).to_si(published),
         record.step,
         name=name,
-        description=Description("record", text=f"{'; '.join(facts)}; terms: {record.terms}"),
+        description=Description(
+            "record",
+            text=f"{'; '.join(facts)}; terms: {record.terms}",
+            origin=Origin(event=record.event, station=record.station, channel=record.direction, units=record.units),
+        ),
     )
 
 

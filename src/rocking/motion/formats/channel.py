@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, UnreadableRecord
-from rocking.motion.description import Description
+from rocking.motion.description import Description, Origin
 from rocking.motion.formats.source import Source
 from rocking.motion.formats.units import Unit
 from rocking.motion.motion import Motion
@@ -107,11 +107,26 @@ class Channel:
             If there are fewer than two samples, or they are too large for a motion.
         """
         name = " ".join(part for part in (self.station, self.name) if part)
-        description = Description("record", text=self._facts())
+        description = Description("record", text=self._facts(), origin=self.origin)
         if self.times is not None:
             return Motion.from_points(self.times, self.acceleration, name=name, description=description)
         assert self.dt is not None
         return Motion.from_samples(self.acceleration, self.dt, name=name, description=description)
+
+    @property
+    def origin(self) -> Origin:
+        """What the file says of the channel."""
+        return Origin(
+            format=self.metadata.get("format", ""),
+            file=self.metadata.get("file", ""),
+            event=self.event,
+            station=self.station,
+            channel=self.name,
+            number=self.number,
+            azimuth=self.azimuth,
+            units=self.units,
+            heading_units=self.metadata.get("heading units", ""),
+        )
 
     def _facts(self) -> str:
         facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}

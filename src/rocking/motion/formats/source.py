@@ -99,11 +99,14 @@ class Source:
             return None
         return min(position for position in map(self.data.find, _each(_CONTROL)) if position >= 0)
 
-    def error(self, message: str, at: int | None = None) -> UnreadableRecord:
-        """Return the error that says `message` about this file, at the line that holds the offset `at`."""
-        if at is None:
-            return UnreadableRecord(f"{self.path}: {message}")
-        return UnreadableRecord(f"{self.path}, line {self.line_number(at)}: {message}")
+    def error(self, message: str, at: int | None = None, *arguments: str) -> UnreadableRecord:
+        """Return the error that says `message` about this file, at the line that holds the offset `at`.
+
+        Each "{}" in the message stands for one of the `arguments` of `rocking.read`; the first is what is missing
+        or wrong.
+        """
+        line = None if at is None else self.line_number(at)
+        return UnreadableRecord(message, *arguments, path=self.path, line=line)
 
 
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
@@ -119,17 +122,17 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     try:
         raw = _content(name) if read is None else read(SIZE_LIMIT + 1)
     except FileNotFoundError as error:
-        raise UnreadableRecord(f"{name}: there is no such file; {_hint(name)}") from error
+        raise UnreadableRecord(f"there is no such file; {_hint(name)}", path=name) from error
     except PermissionError as error:
-        raise UnreadableRecord(f"{name}: this file may not be read; ask for permission to read it") from error
+        raise UnreadableRecord("this file may not be read; ask for permission to read it", path=name) from error
     except (OSError, ValueError) as error:
-        raise UnreadableRecord(f"{name}: this file could not be read ({error}); check the name and the disk") from error
+        raise UnreadableRecord(f"this file could not be read ({error}); check the name and the disk", path=name) from error
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
-        raise UnreadableRecord(f"{name}: this file is larger than {limit} MiB; cut the record into smaller files")
+        raise UnreadableRecord(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
     data = _text(raw)
     if not data.strip():
-        raise UnreadableRecord(f"{name}: this file is empty; get the record again")
+        raise UnreadableRecord("this file is empty; get the record again", path=name)
     return Source(name, raw, data)
 
 
@@ -163,9 +166,9 @@ def _stream_name(stream: Any) -> str:
 def _content(name: str) -> bytes:
     status = os.stat(name)  # noqa: PTH116 - Path() would turn an empty name into the current folder
     if stat.S_ISDIR(status.st_mode):
-        raise UnreadableRecord(f"{name}: this is a folder; name one record file in it")
+        raise UnreadableRecord("this is a folder; name one record file in it", path=name)
     if not stat.S_ISREG(status.st_mode):
-        raise UnreadableRecord(f"{name}: this is not a regular file; copy the record into one")
+        raise UnreadableRecord("this is not a regular file; copy the record into one", path=name)
     with open(name, "rb") as file:  # noqa: PTH123
         # A read sets aside as much memory as it is asked for.
         raw = file.read(min(status.st_size, SIZE_LIMIT) + 1)

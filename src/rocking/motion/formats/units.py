@@ -99,5 +99,7 @@ def choose_unit(units: str) -> Unit:
     """
     unit = find_unit(units) if isinstance(units, str) else None
     if unit is None or unit.name not in CHOICES:
-        raise UnreadableRecord(f"the units {units!r} are not known; give one of {', '.join(CHOICES)}")
+        raise UnreadableRecord(
+            f"the {{}} {units!r} are not known; give one of {', '.join(CHOICES)}", "units", value=units
+        )
     return unit
