@@ -13,8 +13,7 @@ from rocking import checks
 from rocking.block import Block, Blocks
 from rocking.engine import OUTCOME, cores, simulate_tasks
 from rocking.errors import InvalidOption
-from rocking.motion.accepted import several_motions
-from rocking.motion.motion import Motion
+from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.scaling import Measure, MeasureName
 from rocking.product import VARIABLES, Polarity, Product, Scales
 from rocking.progress import Progress
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 def simulate_many(
     blocks: Blocks | Block | Sequence[Block],
-    motions: Motion | Sequence[Motion],
+    motions: Motions,
     *,
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",
@@ -44,8 +43,8 @@ def simulate_many(
     ----------
     blocks : Blocks, Block or sequence of Block
         n blocks.
-    motions : Motion or sequence of Motion
-        m motions.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; a mapping gives them its names.
     model, chattering, duration
         As for `simulate`.
     levels : array_like, optional

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -16,8 +15,9 @@ from rocking.block import Blocks
 from rocking.constants import VERSION
 from rocking.engine import Setup, Task, parts_of
 from rocking.errors import InvalidOption
-from rocking.motion.arguments import STRONGEST
+from rocking.motion.arguments import names_of
 from rocking.motion.motion import Motion
+from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.problem import rules_of
 from rocking.treatment import Treatment
@@ -219,17 +219,6 @@ def verticals_of(motions: Sequence[Motion]) -> dict[str, Any]:
     """Names of the vertical components, as a coordinate of the dimension ``motion``; none where no motion has one."""
     names = ["" if motion.vertical is None else motion.vertical.name for motion in motions]
     return {"vertical": ("motion", names)} if any(motion.vertical for motion in motions) else {}
-
-
-def names_of(motions: Sequence[Motion]) -> list[str]:
-    """Names of motions, numbered where several share one: a row of a table must say which it is."""
-    shared = {name for name, count in Counter(motion.name for motion in motions).items() if count > 1}
-    seen: Counter[str] = Counter()
-    names = []
-    for motion in motions:
-        seen[motion.name] += 1
-        names.append(f"{motion.name} #{seen[motion.name]}" if motion.name in shared else motion.name)
-    return names
 
 
 def block_coordinates(blocks: Blocks) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
-from rocking.motion.accepted import several_motions
+from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
@@ -47,7 +47,7 @@ _VERDICT: Final = Certified(tolerance=1.0)
 
 def incremental_dynamic_analysis(
     blocks: Blocks | Block | Sequence[Block],
-    motions: Motion | Sequence[Motion],
+    motions: Motions,
     *,
     measure: IntensityName | Measure = "pga",
     levels: ArrayLike | None = None,
@@ -65,8 +65,8 @@ def incremental_dynamic_analysis(
     ----------
     blocks : Blocks, Block or sequence of Block
         n blocks.
-    motions : Motion or sequence of Motion
-        m motions.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; a mapping gives them its names.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
         Intensity measure that motions are scaled to: peak acceleration (m/s^2), peak velocity (m/s); in each block's
         own units PGA/(g tan alpha) and p PGV/(g tan alpha); or spectral acceleration (m/s^2) as

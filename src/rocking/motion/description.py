@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final
@@ -129,3 +129,19 @@ def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
     """
     both = f"{name} with vertical {vertical}" if vertical else name
     return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))
+
+
+def checked_description(given: Description) -> Description:
+    """Return the description, which must be one."""
+    if not isinstance(given, Description):
+        raise InvalidMotion(
+            f"the description of a motion must be a Description(family, parameters, text), not a {type(given).__name__}"
+        )
+    return given
+
+
+def checked_history(given: Iterable[str]) -> tuple[str, ...]:
+    """Sentences on what was done to a motion."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise InvalidMotion(f"the history of a motion must be a sequence of sentences, not {given!r}")
+    return tuple(checks.text(sentence, "sentence of a motion's history", InvalidMotion) for sentence in given)

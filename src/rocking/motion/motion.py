@@ -13,8 +13,8 @@ from rocking import checks, svg
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
-from rocking.motion import arguments, measures, piecewise, processing
-from rocking.motion.description import Description, labelled
+from rocking.motion import measures, piecewise, processing
+from rocking.motion.description import Description, checked_description, checked_history, labelled
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 
 if TYPE_CHECKING:
@@ -82,19 +82,19 @@ class Motion:
     step: float | None = field(init=False)
 
     def __post_init__(self) -> None:
-        breakpoints, coefficients = arguments.pieces(self.breakpoints, self.coefficients)
+        breakpoints, coefficients = piecewise.checked_pieces(self.breakpoints, self.coefficients)
         held = {
             "breakpoints": breakpoints,
             "coefficients": coefficients,
             "name": checks.text(self.name, "name of a motion", InvalidMotion),
-            "description": arguments.description(self.description),
-            "history": arguments.history(self.history),
+            "description": checked_description(self.description),
+            "history": checked_history(self.history),
             "error": checks.within(
-                self.error, "approximation error of a motion", InvalidMotion, 0.0, arguments.STRONGEST
+                self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.STRONGEST
             ),
         }
         if self.vertical is not None:
-            held["vertical"] = arguments.vertical(self.vertical, Motion)
+            _check_vertical(self.vertical)
         for name, value in held.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "step", piecewise.even_step(self))
@@ -145,7 +145,7 @@ class Motion:
         >>> motion.duration, motion.pga
         (0.06, 2.0)
         """
-        samples, step = arguments.samples(acceleration), arguments.step(dt)
+        samples, step = piecewise.checked_samples(acceleration), piecewise.checked_step(dt)
         times = piecewise.even_times(len(samples), step)
         return cls(
             times,
@@ -189,8 +189,8 @@ class Motion:
         >>> Motion.from_points([0.0, 1.0, 5.0], [0.0, 3.0, 0.0]).acceleration(3.0)
         1.5
         """
-        samples = arguments.samples(acceleration)
-        instants = arguments.instants(times, len(samples))
+        samples = piecewise.checked_samples(acceleration)
+        instants = piecewise.checked_times(times, len(samples))
         with np.errstate(over="ignore"):
             breakpoints = instants - instants[0]
         return cls(
@@ -535,7 +535,7 @@ class Motion:
         if kept is None and not steps:
             raise InvalidMotion("name what to do: trim, baseline, band_pass or resample")
         vertical = self.vertical
-        if vertical is not None and kept is not None and kept[0] > vertical.duration - arguments.SHORTEST:
+        if vertical is not None and kept is not None and kept[0] > vertical.duration - piecewise.SHORTEST:
             vertical = None  # it is over by then
         if vertical is not None:
             vertical = vertical._processed(kept, steps, self.step)
@@ -676,3 +676,13 @@ class Motion:
 
 def _peak(motion: Motion) -> str:
     return f"peak {motion.pga:.5g} m/s^2 ({motion.pga / STANDARD_GRAVITY:.4g} g)"
+
+
+def _check_vertical(given: object) -> None:
+    if not isinstance(given, Motion):
+        raise InvalidMotion(
+            f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type(given).__name__}",
+            "vertical",
+        )
+    if given.vertical is not None:
+        raise InvalidMotion("{} must be a motion without a vertical component of its own", "vertical")

@@ -17,7 +17,7 @@ from rocking import checks, quantities
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
-from rocking.motion.formats.request import Request
+from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.motion.scaling import SCALES, Measure, MeasureName

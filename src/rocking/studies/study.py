@@ -22,10 +22,9 @@ from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.block import Block, Blocks
 from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import DamagedStudy, InvalidOption, StudyError
-from rocking.motion.accepted import several_motions
-from rocking.motion.motion import Motion
+from rocking.motion.arguments import Motions, names_of, several_motions
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
-from rocking.product import Polarity, Product, Scales, names_of
+from rocking.product import Polarity, Product, Scales
 from rocking.studies import store as stores
 from rocking.studies.export import export
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
@@ -537,7 +536,7 @@ def _fault(part: Store | Round, key: Key) -> str:
 def study(
     folder: str | Path,
     blocks: Blocks | Block | Sequence[Block] | None = None,
-    motions: Motion | Sequence[Motion] | None = None,
+    motions: Motions | None = None,
     *,
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",

@@ -26,6 +26,7 @@ from rocking.block import Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.motion.arguments import Motions
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.tables import counted, named, text_table, write_text
@@ -147,9 +148,7 @@ class Calibration:
         """Standard deviation of each parameter's logarithm from test to test."""
         return {name: estimate.dispersion for name, estimate in self.estimates.items()}
 
-    def predict(
-        self, motions: Motion | Sequence[Motion], *, threads: int | None = None, progress: bool | None = None
-    ) -> Floats:
+    def predict(self, motions: Motions, *, threads: int | None = None, progress: bool | None = None) -> Floats:
         """Probability that each motion overturns the specimen.
 
         Parameters
@@ -217,7 +216,7 @@ class Calibration:
 
     def fragility(
         self,
-        motions: Motion | Sequence[Motion],
+        motions: Motions,
         *,
         measure: IntensityName | Measure = "pga",
         levels: ArrayLike | None = None,
@@ -261,7 +260,7 @@ class Calibration:
 
     def spectrum(
         self,
-        motions: Motion | Sequence[Motion],
+        motions: Motions,
         *,
         p: ArrayLike | None = None,
         model: Model | None = None,
@@ -510,7 +509,7 @@ def calibrate(
 
 
 def _outcomes(
-    blocks: Blocks, motions: Motion | Sequence[Motion], model: Model, threads: int | None, progress: bool | None
+    blocks: Blocks, motions: Motions, model: Model, threads: int | None, progress: bool | None
 ) -> NDArray[np.float32]:
     """1 where a block overturns under a motion, else 0; shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)

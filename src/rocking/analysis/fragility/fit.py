@@ -20,8 +20,7 @@ from rocking.block import Block, Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.motion.accepted import several_motions
-from rocking.motion.motion import Motion
+from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.product import Polarity
 from rocking.tables import counted
@@ -48,7 +47,7 @@ OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
 
 def fragility(
     blocks: Blocks | Block | Sequence[Block],
-    motions: Motion | Sequence[Motion],
+    motions: Motions,
     *,
     measure: IntensityName | Measure = "pga",
     levels: ArrayLike | None = None,
@@ -71,8 +70,8 @@ def fragility(
     blocks : Blocks, Block or sequence of Block
         One block; or several whose outcomes are pooled: against a measure in their own units, or of an ensemble that
         stands for one block that is not quite known, with `weights` (`Calibration.fragility` does so).
-    motions : Motion or sequence of Motion
-        m motions.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; a mapping gives them its names.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
         Intensity measure: peak acceleration (m/s^2), peak velocity (m/s); in each block's own units PGA/(g tan alpha)
         and p PGV/(g tan alpha); or spectral acceleration (m/s^2) as ``rocking.Measure("sa", period=1.0)``.

@@ -12,11 +12,9 @@ from collections.abc import Sequence
 from typing import BinaryIO, Protocol
 
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats import at2, cosmos, csmip_v1, csmip_v2, esm, knet, smc, table, through_obspy
+from rocking.motion.formats import at2, cosmos, csmip, esm, knet, smc, table, through_obspy
 from rocking.motion.formats.channel import Channel
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Source, open_source
+from rocking.motion.formats.source import Identification, Request, Source, open_source
 from rocking.motion.motion import Motion
 
 __all__ = ["Channel", "Identification", "channels", "content", "identify", "read"]
@@ -30,7 +28,7 @@ class _Reader(Protocol):
 
 
 #: In the order in which they are asked; the last two take what no title claims.
-_READERS: tuple[_Reader, ...] = (at2, cosmos, csmip_v1, csmip_v2, smc, esm, knet, table, through_obspy)
+_READERS: tuple[_Reader, ...] = (at2, cosmos, csmip, smc, esm, knet, table, through_obspy)
 
 _LISTED = 30
 

@@ -13,9 +13,7 @@ from typing import NamedTuple
 from rocking.arrays import Floats
 from rocking.motion.formats import csmip
 from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Line, Source
+from rocking.motion.formats.source import Identification, Line, Request, Source
 from rocking.motion.formats.units import find_unit
 from rocking.motion.formats.values import expect, read_values
 

@@ -6,9 +6,7 @@ import re
 from typing import NamedTuple
 
 from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Source
+from rocking.motion.formats.source import Identification, Request, Source
 from rocking.motion.formats.units import find_unit
 from rocking.motion.formats.values import parse, read_values
 

@@ -12,14 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.motion.formats.aligned import Layout
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Line, Source
-from rocking.motion.formats.timing import even_step, first_fault
+from rocking.motion.formats.channel import Channel, even_step, first_fault, to_acceleration
+from rocking.motion.formats.source import Identification, Line, Request, Source
 from rocking.motion.formats.units import find_unit
-from rocking.motion.formats.values import expect, read_values
+from rocking.motion.formats.values import Layout, expect, read_values
 
 NAME = "USGS SMC"
 

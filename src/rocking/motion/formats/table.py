@@ -18,12 +18,9 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats.channel import Channel, gap_at, missing_value, to_acceleration
+from rocking.motion.formats.channel import Channel, even_step, first_fault, gap_at, missing_value, to_acceleration
 from rocking.motion.formats.heading import RULE, Column, Heading, heading_of, names_columns
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Line, Source
-from rocking.motion.formats.timing import even_step, first_fault
+from rocking.motion.formats.source import Identification, Line, Request, Source
 from rocking.motion.formats.units import CHOICES, Unit
 from rocking.motion.formats.values import convert, not_a_number, parse, rows_of_numbers
 

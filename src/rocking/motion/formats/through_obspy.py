@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 
 from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Source
+from rocking.motion.formats.source import Identification, Request, Source
 from rocking.motion.formats.units import Unit
 
 #: PICKLE runs what a file tells it to; the other two open further files that a file names.
