@@ -76,7 +76,7 @@ def simulate_many(
     Notes
     -----
     The same engine as `simulate`: every impact is located and chattering is proven. Under evenly sampled records the
-    blocks that rock step together through each sample, and only those with an event in it are played one by one. What
+    blocks that rock step together through each sample, and only those with an event in it are marched one by one. What
     becomes of a block depends on the block and the motion alone, bit for bit, whatever is simulated beside it.
 
     Examples

@@ -69,13 +69,7 @@ class Scales:
 
     @classmethod
     def of(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
-        """Scales from arguments.
-
-        Raises
-        ------
-        InvalidOption
-            If an argument is out of its range, or there is a measure without levels.
-        """
+        """Scales from arguments."""
         known = Measure.of(measure, among=SCALES)
         if levels is None:
             if known.name != "factor":
@@ -95,13 +89,7 @@ class Scales:
         return {"measure": measure.name, "units": measure.units, **measure.options()}
 
     def factors(self, motion: Motion) -> Floats:
-        """Factors that bring a motion to the levels.
-
-        Raises
-        ------
-        InvalidMotion
-            If the motion is zero throughout, or would become stronger than any may be.
-        """
+        """Factors that bring a motion to the levels."""
         with np.errstate(over="ignore"):
             factors = self.values / self.now(motion)
         if not factors.max() * np.abs(motion.coefficients).max() <= STRONGEST:
@@ -109,13 +97,7 @@ class Scales:
         return factors
 
     def now(self, motion: Motion) -> float:
-        """Return what a motion measures as it is; 1 where scales are factors.
-
-        Raises
-        ------
-        InvalidMotion
-            If the motion is zero throughout.
-        """
+        """Return what a motion measures as it is; 1 where scales are factors."""
         return (self.measure or FACTOR).positive(motion, motion.name)
 
 

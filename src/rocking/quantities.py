@@ -138,11 +138,6 @@ def scaling(given: Mapping[str, str | float | None], quantity: Quantity = accele
     quantity : callable
         What reads accelerations.
 
-    Raises
-    ------
-    InvalidOption
-        If several are given, or one is not what it must be.
-
     Examples
     --------
     >>> scaling({"pga": "0.5g"})

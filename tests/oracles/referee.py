@@ -50,7 +50,7 @@ class Batch:
 
     @property
     def options(self) -> dict[str, Any]:
-        scaled = {} if self.factor is None else {"factor": [self.factor]}
+        scaled = {} if self.factor is None else {"levels": [self.factor]}
         return {"model": self.model, "duration": self.duration, "polarity": self.polarity, **scaled}
 
     @property

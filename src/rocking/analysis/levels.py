@@ -45,13 +45,7 @@ def pooled(blocks: Blocks | Block | Sequence[Block], weights: ArrayLike | None) 
 
 
 def mean_one(weights: ArrayLike | None, count: int) -> Floats:
-    """Weights of blocks, one each and 1 in the mean; all 1 where none are given.
-
-    Raises
-    ------
-    InvalidOption
-        If they are not one finite number for each block, none of them negative, and not all 0.
-    """
+    """Weights of blocks, one each and 1 in the mean; all 1 where none are given."""
     if weights is None:
         return np.ones(count)
     given = checks.numbers(weights, "weights", InvalidOption)
@@ -73,13 +67,7 @@ def _pair(sides: Floats) -> str:
 
 
 def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
-    """Return what each motion alone measures, in SI units.
-
-    Raises
-    ------
-    InvalidMotion
-        If one is zero throughout.
-    """
+    """Return what each motion alone measures, in SI units."""
     return np.array([measure.positive(motion, motion.name) for motion in motions])
 
 

@@ -21,11 +21,6 @@ Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
 def one_motion(motion: Motion | None) -> Motion | None:
     """Return the motion (None is free rocking).
 
-    Raises
-    ------
-    InvalidMotion
-        If it is anything else.
-
     Examples
     --------
     >>> one_motion("RSN6.AT2")
@@ -40,13 +35,6 @@ def one_motion(motion: Motion | None) -> Motion | None:
 
 def several_motions(motions: Motions) -> list[Motion]:
     """Return one motion or several as a list; those of a mapping under its names.
-
-    Raises
-    ------
-    InvalidMotion
-        If one is anything else.
-    InvalidOption
-        If there is none.
 
     Examples
     --------
@@ -71,13 +59,7 @@ def several_motions(motions: Motions) -> list[Motion]:
 
 
 def motions_by_name(motions: Motions) -> dict[str, Motion]:
-    """Return one motion or several by the names of a mapping, or else by their own.
-
-    Raises
-    ------
-    InvalidMotion, InvalidOption
-        As `several_motions`.
-    """
+    """Return one motion or several by the names of a mapping, or else by their own."""
     several = several_motions(motions)
     if isinstance(motions, Mapping):
         return dict(motions)

@@ -134,6 +134,10 @@ class Motion:
         description : Description, optional
             Where the samples come from.
 
+        Returns
+        -------
+        Motion
+
         Raises
         ------
         InvalidMotion
@@ -177,6 +181,10 @@ class Motion:
             Short name for tables and figures.
         description : Description, optional
             Where the points come from.
+
+        Returns
+        -------
+        Motion
 
         Raises
         ------
@@ -273,7 +281,23 @@ class Motion:
     @overload
     def acceleration(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
     def acceleration(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground acceleration, m/s^2, at the times `t` (s) and shaped like it; zero outside the motion."""
+        """Ground acceleration, m/s^2, at the times `t` (s) and shaped like it; zero outside the motion.
+
+        Parameters
+        ----------
+        t : float or array_like
+            Times, s.
+
+        Returns
+        -------
+        float or ndarray
+            m/s^2, shaped like `t`.
+
+        Examples
+        --------
+        >>> Motion([0.0, 2.0], [[1.0]]).acceleration([1.0, 3.0])
+        array([1., 0.])
+        """
         time = checks.numbers(t, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self.coefficients, time)
         result = np.where((time < 0.0) | (time > self.duration), 0.0, result)
@@ -284,7 +308,23 @@ class Motion:
     @overload
     def velocity(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
     def velocity(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground velocity at the times `t` (s), m/s, from rest; constant after the end of the motion."""
+        """Ground velocity at the times `t` (s), m/s, from rest; constant after the end of the motion.
+
+        Parameters
+        ----------
+        t : float or array_like
+            Times, s.
+
+        Returns
+        -------
+        float or ndarray
+            m/s, shaped like `t`.
+
+        Examples
+        --------
+        >>> Motion([0.0, 2.0], [[1.0]]).velocity([1.0, 3.0])
+        array([1., 2.])
+        """
         time = checks.numbers(t, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, measures.velocity_pieces(self), time)
         return result if result.ndim else float(result)
@@ -294,7 +334,23 @@ class Motion:
     @overload
     def displacement(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
     def displacement(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground displacement at the times `t` (s), m, from rest; after the end at the last velocity."""
+        """Ground displacement at the times `t` (s), m, from rest; after the end at the last velocity.
+
+        Parameters
+        ----------
+        t : float or array_like
+            Times, s.
+
+        Returns
+        -------
+        float or ndarray
+            m, shaped like `t`.
+
+        Examples
+        --------
+        >>> Motion([0.0, 2.0], [[1.0]]).displacement([1.0, 3.0])
+        array([0.5, 4. ])
+        """
         time = checks.numbers(t, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, measures.displacement_pieces(self), time)
         result = result + self.velocity(self.duration) * np.maximum(time - self.duration, 0.0)
@@ -312,6 +368,10 @@ class Motion:
 
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
         """Time between the fractions `start` and `end` of the Arias intensity, s; NaN if that is zero.
+
+        Returns
+        -------
+        float
 
         Raises
         ------
@@ -345,6 +405,11 @@ class Motion:
         damping : float
             Fraction of critical damping, from 0 to below 1.
 
+        Returns
+        -------
+        float or ndarray
+            m/s^2, shaped like `period`.
+
         Raises
         ------
         InvalidMotion
@@ -365,6 +430,10 @@ class Motion:
 
         Spectral accelerations (5 % damping) at `periods` (s) are added under names as
         ``"spectral_acceleration_0.5s_m_s2"``.
+
+        Returns
+        -------
+        dict of str to float
         """
         return measures.table(self, periods)
 
@@ -440,6 +509,10 @@ class Motion:
         vertical : Motion or None
             Vertical ground acceleration that starts at the same time, m/s^2, positive upwards; None for none.
 
+        Returns
+        -------
+        Motion
+
         Raises
         ------
         InvalidMotion
@@ -458,6 +531,10 @@ class Motion:
 
     def delayed(self, delay: float) -> Motion:
         """Return the motion after `delay` seconds of no acceleration.
+
+        Returns
+        -------
+        Motion
 
         Raises
         ------
@@ -505,6 +582,10 @@ class Motion:
         resample : float
             New sampling step, s: the motion's values at its multiples, joined by straight lines; a jump becomes a
             slope of one step. To a coarser step, remove what lies above its Nyquist frequency with `band_pass`.
+
+        Returns
+        -------
+        Motion
 
         Raises
         ------
@@ -605,6 +686,11 @@ class Motion:
         """Return the ends of a stretch of time, breakpoints in it, and times between them where pieces are curved.
 
         The breakpoints are those of both components.
+
+        Returns
+        -------
+        ndarray
+            s.
         """
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:

@@ -44,11 +44,6 @@ def named_motion(
     several : bool
         Whether `dt`, `units` and `channel` are for several files, of which those that say their step and units keep
         them, and those that hold one channel are taken whatever its name.
-
-    Raises
-    ------
-    UnreadableRecord
-        If there is neither, or the file cannot be read.
     """
     if is_shipped(name):
         if not several:
@@ -77,11 +72,6 @@ def named_vertical(
         The channel that is the horizontal motion, where that file has several.
     dt, units
         As for `rocking.read`.
-
-    Raises
-    ------
-    UnreadableRecord
-        If there is no such file, record or channel.
     """
     if Path(name).is_file() or name in records.names():
         return named_motion(name, dt=dt, units=units, several=True)
@@ -95,13 +85,7 @@ def named_vertical(
 
 
 def refuse_what_is_known(name: str, **said: object) -> None:
-    """Check that nothing is said of a shipped record that it knows itself.
-
-    Raises
-    ------
-    UnreadableRecord
-        If its channel, step or units are given.
-    """
+    """Check that nothing is said of a shipped record that it knows itself."""
     for argument, value in said.items():
         if value is not None:
             raise UnreadableRecord(
@@ -110,13 +94,7 @@ def refuse_what_is_known(name: str, **said: object) -> None:
 
 
 def is_shipped(name: str) -> bool:
-    """Whether a name is that of a shipped record, and not of a file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If it is neither, but close to the name of a shipped record.
-    """
+    """Whether a name is that of a shipped record, and not of a file."""
     if name == STANDARD_INPUT or Path(name).exists():
         return False
     if name in records.names():
@@ -134,11 +112,6 @@ def expanded(names: Iterable[str]) -> list[str]:
 
     A folder stands for the files in it, by name, hidden ones left out; a pattern for the files that match it, or where
     none does for the shipped records of such names.
-
-    Raises
-    ------
-    UnreadableRecord
-        If a folder holds no file, or nothing matches a pattern.
 
     Examples
     --------

@@ -66,6 +66,10 @@ class Record:
 def names() -> tuple[str, ...]:
     """Return the names of the shipped records.
 
+    Returns
+    -------
+    tuple of str
+
     Examples
     --------
     >>> names()[:3]
@@ -76,6 +80,10 @@ def names() -> tuple[str, ...]:
 
 def info(name: str) -> Record:
     """Return what is known of a shipped record: event, station, direction, step, source and terms.
+
+    Returns
+    -------
+    Record
 
     Raises
     ------
@@ -127,6 +135,10 @@ def load(name: str) -> Motion:
     ----------
     name : str
         One of `names`.
+
+    Returns
+    -------
+    Motion
 
     Raises
     ------

@@ -227,13 +227,7 @@ FACTOR: Final = Measure("factor")
 
 
 def intensities(values: ArrayLike) -> Floats:
-    """Return intensities at which a curve is asked for, as an array of their shape.
-
-    Raises
-    ------
-    InvalidOption
-        If one is no number, or negative.
-    """
+    """Return intensities at which a curve is asked for, as an array of their shape."""
     at = checks.numbers(values, "intensities", InvalidOption)
     if not np.all(at >= 0.0):
         raise InvalidOption("intensities must be numbers that are not negative")

@@ -43,13 +43,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If the file holds velocities or displacements, or more or fewer values than its NPTS.
-    """
+    """Return the one channel of the file."""
     header = _header(source)
     assert header is not None
     other = _other_quantity(header)

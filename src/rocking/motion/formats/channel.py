@@ -209,11 +209,6 @@ def to_acceleration(
     """Return numbers in `unit`, which stand at the offset `at` of the file, in m/s^2.
 
     Where each has a row of its own, `row_at` gives its offset.
-
-    Raises
-    ------
-    UnreadableRecord
-        If there are fewer than two, one is too large, or one stands for a missing value.
     """
     if len(values) < 2:
         raise source.error(f"{len(values)} values are too few for a record; get the whole file", at)

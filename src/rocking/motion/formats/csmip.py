@@ -44,13 +44,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the accelerations of all channels of the file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If a header is incomplete, or a channel lacks its acceleration or has more or fewer values than its header says.
-    """
+    """Return the accelerations of all channels of the file."""
     line = source.first_line()
     is_v1 = line is not None and V1_TITLE.search(line.text) is not None
     return _read_v1(source, request) if is_v1 else _read_v2(source, request)
@@ -98,13 +92,7 @@ def layout_in(text: str) -> Layout | None:
 
 
 def data_end(source: Source, start: int, *titles: re.Pattern[str]) -> int:
-    """Return where the numbers that begin at `start` end: at a trailer, at one of `titles` or with the file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If they end at anything else, which then is a spoilt number.
-    """
+    """Return where the numbers that begin at `start` end: at a trailer, at one of `titles` or with the file."""
     end = numeric_end(source, start)
     if end == len(source.data):
         return end
@@ -152,7 +140,9 @@ def _read_v1(source: Source, request: Request) -> list[Channel]:
     title = source.first_line()
     while title is not None:
         if not V1_TITLE.search(title.text):
-            raise source.error("a channel's 'Uncorrected Accelerogram' should begin here; mend the file", title.start)
+            raise source.error(
+                "a channel's 'Uncorrected Accelerogram' should begin here; correct the file", title.start
+            )
         channel, end = _v1_channel(source, request, title.start, len(found) + 1)
         found.append(channel)
         title = source.first_line(after_trailer(source, end))
@@ -194,7 +184,7 @@ def _v1_pairs(source: Source, request: Request, header: list[Line], ordinal: int
     values = expect(source, at, 2 * points, read_values(source, start, end, count=2 * points, layout=_V1_PAIRS))
     times, acceleration = values[0::2], to_acceleration(source, at, values[1::2], unit)
     if first_fault(times) is not None:
-        raise source.error("the times of the points that follow do not increase throughout; mend the file", start)
+        raise source.error("the times of the points that follow do not increase throughout; correct the file", start)
     dt = even_step(times)
     if dt is None:
         return _v1_labelled(source, header, ordinal, spelling, acceleration, None, times), end

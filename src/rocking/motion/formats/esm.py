@@ -33,13 +33,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If the file holds anything but acceleration, or more or fewer values than its NDATA.
-    """
+    """Return the one channel of the file."""
     entries, start = _entries(source)
     kind = entries["DATA_TYPE"]
     if kind.value.upper() != "ACCELERATION":

@@ -64,13 +64,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file, its offset kept.
-
-    Raises
-    ------
-    UnreadableRecord
-        If a header line is missing, or there are fewer counts than rate times duration, or a second's more.
-    """
+    """Return the one channel of the file, its offset kept."""
     entries, start = _entries(source)
     (rate,) = _positive(source, entries, "Sampling Freq", _RATE)
     gal, counts = _positive(source, entries, "Scale Factor", _SCALE)

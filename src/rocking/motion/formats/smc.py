@@ -58,13 +58,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If the file holds anything but acceleration, or header and data do not agree.
-    """
+    """Return the one channel of the file."""
     title = source.first_line()
     kind = _TITLE.match(title.text) if title is not None else None
     assert title is not None and kind is not None

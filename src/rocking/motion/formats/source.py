@@ -116,13 +116,7 @@ class Source:
 
 
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
-    """Read a file whole, or what is left of one that is open.
-
-    Raises
-    ------
-    UnreadableRecord
-        If it is missing, not a regular file, not readable, empty or larger than SIZE_LIMIT.
-    """
+    """Read a file whole, or what is left of one that is open."""
     read = getattr(path, "read", None)
     name = _name(path) if read is None else _stream_name(path)
     try:
@@ -226,15 +220,7 @@ class Request:
 
     @classmethod
     def checked(cls, dt: float | None, units: str | None, *, several: bool = False) -> Request:
-        """Return the request.
-
-        Raises
-        ------
-        InvalidMotion
-            If `dt` is not a positive number.
-        UnreadableRecord
-            If the units are not known.
-        """
+        """Return the request."""
         return cls(
             None if dt is None else checks.positive(dt, "dt", InvalidMotion, "s"),
             None if units is None else choose_unit(units),
@@ -242,13 +228,7 @@ class Request:
         )
 
     def step(self, source: Source, stated: float, at: int | None) -> float:
-        """Return the step (s) that the file states at the offset `at`.
-
-        Raises
-        ------
-        UnreadableRecord
-            If it is not positive, or `dt` says otherwise.
-        """
+        """Return the step (s) that the file states at the offset `at`."""
         # No file holds more samples than bytes, so this also bounds the record's length.
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
             raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
@@ -259,13 +239,7 @@ class Request:
         return stated
 
     def units(self, source: Source, stated: Unit | None, at: int | None) -> Unit:
-        """Return the unit that the file states at the offset `at`, or else the one asked for.
-
-        Raises
-        ------
-        UnreadableRecord
-            If there is neither, or the two differ.
-        """
+        """Return the unit that the file states at the offset `at`, or else the one asked for."""
         unit = stated or self.unit
         if unit is None:
             raise source.error(
@@ -278,13 +252,7 @@ class Request:
         return unit
 
     def units_by_heading(self, source: Source, heading: Unit | None, at: int | None) -> Unit:
-        """Return the unit that a heading in the file's own words names, or the one asked for, which overrules it.
-
-        Raises
-        ------
-        UnreadableRecord
-            If there is neither.
-        """
+        """Return the unit that a heading in the file's own words names, or the one asked for, which overrules it."""
         if self.several and heading is not None:
             return heading
         return self.units(source, None if self.unit is not None else heading, at)

@@ -43,13 +43,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return all traces of the file, times their calibration factor.
-
-    Raises
-    ------
-    UnreadableRecord
-        If ObsPy fails, a trace is not of finite numbers, or units are not given.
-    """
+    """Return all traces of the file, times their calibration factor."""
     identification = recognise(source)
     assert identification is not None
     unit = request.units(source, None, None)

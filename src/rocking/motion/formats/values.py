@@ -251,11 +251,6 @@ def read_values(
 
     Numbers are taken as blank-separated; where that fails or does not give `count` of them, by the columns of
     `layout`, so that numbers which touch are split where the Fortran program that wrote them meant it.
-
-    Raises
-    ------
-    UnreadableRecord
-        Naming the line and the text that is not a finite number.
     """
     if layout is not None and count is not None:
         aligned = _read_aligned(source, start, end, layout)
@@ -291,13 +286,7 @@ def rows_of_numbers(source: Source, start: int, columns: int, translation: bytes
 
 
 def expect(source: Source, at: int, count: int, values: Floats) -> Floats:
-    """Return `values`, of which the header at the offset `at` says that there are `count`.
-
-    Raises
-    ------
-    UnreadableRecord
-        If there are more or fewer.
-    """
+    """Return `values`, of which the header at the offset `at` says that there are `count`."""
     if len(values) != count:
         raise source.error(f"the header says {count} values but {len(values)} follow; get the whole file again", at)
     return values

@@ -41,6 +41,10 @@ def rectangular(amplitude: float, duration: float) -> Motion:
     duration : float
         s.
 
+    Returns
+    -------
+    Motion
+
     Raises
     ------
     InvalidMotion
@@ -72,6 +76,10 @@ def triangular(amplitude: float, duration: float) -> Motion:
         m/s^2.
     duration : float
         s.
+
+    Returns
+    -------
+    Motion
 
     Raises
     ------
@@ -113,6 +121,10 @@ def sine(amplitude: float, frequency: float, *, cycles: float, phase: float = 0.
     phase : float
         rad.
 
+    Returns
+    -------
+    Motion
+
     Raises
     ------
     InvalidMotion
@@ -138,6 +150,10 @@ def half_sine(amplitude: float, frequency: float) -> Motion:
     frequency : float
         Hz, of the whole sine: the pulse lasts ``1 / (2 frequency)``.
 
+    Returns
+    -------
+    Motion
+
     Raises
     ------
     InvalidMotion
@@ -161,6 +177,10 @@ def one_sine(amplitude: float, frequency: float) -> Motion:
     frequency : float
         Hz.
 
+    Returns
+    -------
+    Motion
+
     Raises
     ------
     InvalidMotion
@@ -183,6 +203,10 @@ def one_cosine(amplitude: float, frequency: float) -> Motion:
         m/s^2.
     frequency : float
         Hz.
+
+    Returns
+    -------
+    Motion
 
     Raises
     ------
@@ -211,6 +235,10 @@ def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int |
         Hz, of the sine: a lobe lasts ``1 / (2 frequency)``.
     lobes : int, optional
         Number of lobes, if `amplitude` is one number.
+
+    Returns
+    -------
+    Motion
 
     Raises
     ------
@@ -316,6 +344,10 @@ def ricker(
         Length of the motion, s, if the pulse is to be cut on both sides before it falls below 1e-16 of its
         peak.
 
+    Returns
+    -------
+    Motion
+
     Raises
     ------
     InvalidMotion
@@ -382,6 +414,10 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
         Phase nu, rad: 0 gives a symmetric and pi/2 an antisymmetric velocity pulse.
     gamma : float
         Oscillatory character, at least 1: the motion lasts ``gamma / frequency``.
+
+    Returns
+    -------
+    Motion
 
     Raises
     ------
