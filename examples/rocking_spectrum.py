@@ -21,7 +21,7 @@ RECORDS = (
 
 def main() -> float:
     """Draw the spectra; return the exponent with which the peak rotation falls as large similar blocks grow."""
-    motions = [rocking.records.load(name).scaled(pgv=0.5) for name in RECORDS]
+    motions = [rocking.records.load(name).scaled_to(0.5, "pgv") for name in RECORDS]
     spectrum = rocking_spectrum(motions, alpha=[0.1, 0.2], size=np.geomspace(0.3, 60.0, 48))
     OUT.mkdir(exist_ok=True)
     figure = spectrum.plot(against="size", title="Six records scaled to a PGV of 0.5 m/s")

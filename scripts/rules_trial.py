@@ -64,7 +64,7 @@ def all_motions():
         record = rocking.records.load(name)
         start, end = strong_part(record)
         trimmed = record.processed(trim=(max(start - 5.0, 0.0), min(end + 10.0, record.duration)))
-        found.append(trimmed.scaled(pga=rocking.Block(half_width=1.0, half_height=1.0).gravity))
+        found.append(trimmed.scaled_to(rocking.Block(half_width=1.0, half_height=1.0).gravity))
     return found
 
 
@@ -88,7 +88,7 @@ def ratings(blocks, motions):
 
 def exact_verdicts(blocks, motions):
     """Whether each block overturns under each motion at every level, shape (motion, level, block)."""
-    found = rocking.simulate_many(blocks, motions, pga=LEVELS * blocks.gravity, progress=False)
+    found = rocking.simulate_many(blocks, motions, levels=LEVELS * blocks.gravity, measure="pga", progress=False)
     return found.overturned.transpose("motion", "scale", "block").values
 
 

@@ -17,7 +17,7 @@ _ITS_OWN = ("lock", "runs.jsonl")
 def made(folder: Path, scales: int = 8) -> Study:
     """Make a study of six units for each scale, of a hundredth of a second, or open it."""
     motions = [rocking.records.load(name) for name in ("el-centro-meloland-270", "el-centro-meloland-360")]
-    return rocking.study(folder, BLOCKS, motions, pga=np.linspace(2.0, 9.0, scales), unit_blocks=512)
+    return rocking.study(folder, BLOCKS, motions, levels=np.linspace(2.0, 9.0, scales), measure="pga", unit_blocks=512)
 
 
 def digest(folder: Path) -> str:

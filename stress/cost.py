@@ -47,14 +47,14 @@ def at_once(blocks: rocking.Blocks, pga: float) -> Times:
     """Processor times of four motions, simulated at once."""
     motions = pulses(4)
     with timed() as taken:
-        rocking.simulate_many(blocks, motions, pga=[pga], model="linear", threads=1)
+        rocking.simulate_many(blocks, motions, levels=[pga], measure="pga", model="linear", threads=1)
     return taken[0]
 
 
 def as_study(blocks: rocking.Blocks, pga: float, width: int) -> Times:
     """Processor times of running them as a study of units of so many blocks."""
     with tempfile.TemporaryDirectory() as folder:
-        study = rocking.study(folder, blocks, pulses(4), pga=[pga], model="linear", unit_blocks=width)
+        study = rocking.study(folder, blocks, pulses(4), levels=[pga], measure="pga", model="linear", unit_blocks=width)
         with timed() as taken:
             report = study.run(threads=1)
         assert report.units == len(study.store.grid)
@@ -122,7 +122,7 @@ def listing(units: int) -> None:
     """Time how long a study of very many units takes to open and to list."""
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1000), alpha=0.2, restitution=0.9)
     with tempfile.TemporaryDirectory() as folder:
-        study = rocking.study(folder, blocks, pulses(1), factor=np.linspace(1.0, 2.0, units // 2), unit_blocks=512)
+        study = rocking.study(folder, blocks, pulses(1), levels=np.linspace(1.0, 2.0, units // 2), unit_blocks=512)
         for key in study.store.grid:
             (Path(folder) / "result" / name_of(key)).touch()
         start = time.perf_counter()
@@ -149,7 +149,9 @@ def memory(simulations: int, figure: Path | None) -> None:
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
     with tempfile.TemporaryDirectory() as folder:
-        study = rocking.study(folder, blocks, pulses(motions), pga=np.linspace(0.2, 2.0, 10), model="linear")
+        study = rocking.study(
+            folder, blocks, pulses(motions), levels=np.linspace(0.2, 2.0, 10), measure="pga", model="linear"
+        )
         report = study.run()
         print(report)
         ran = time.monotonic() - start

@@ -104,7 +104,9 @@ def theory(count: int) -> Iterator[tuple[str, Digest]]:
 def study(folder: Path) -> Iterator[tuple[str, Digest]]:
     """All files of a study but its log, which holds times."""
     blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-    made = rocking.study(folder, blocks, rocking.records.load(RECORD), pga=np.linspace(1.0, 6.0, 12), refine=1e-2)
+    made = rocking.study(
+        folder, blocks, rocking.records.load(RECORD), levels=np.linspace(1.0, 6.0, 12), measure="pga", refine=1e-2
+    )
     made.run()
     digest = Digest()
     for file in sorted(folder.rglob("*")):

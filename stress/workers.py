@@ -19,7 +19,7 @@ def made(folder: str, scales: int) -> rocking.Study:
     """Make a study of units of about a third of a second."""
     motion = rocking.records.load("el-centro-meloland-270")
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 16384), alpha=0.2, restitution=0.9)
-    return rocking.study(folder, blocks, motion, pga=np.linspace(2.0, 9.0, scales), unit_blocks=16384)
+    return rocking.study(folder, blocks, motion, levels=np.linspace(2.0, 9.0, scales), measure="pga", unit_blocks=16384)
 
 
 def processor_time(process: psutil.Process) -> float:

@@ -49,6 +49,22 @@ def test_every_one_of_several_motions_is_a_motion(take, motions):
         TAKES_A_MOTION[take](motions)
 
 
+@pytest.mark.parametrize("take", ["simulate_many", "rocking_spectrum"])
+def test_a_mapping_gives_motions_its_names(take):
+    take = {
+        "simulate_many": lambda motions: rocking.simulate_many(BLOCK, motions),
+        "rocking_spectrum": lambda motions: rocking.rocking_spectrum(motions, alpha=[0.2], p=[2.0]).data,
+    }[take]
+    named, listed = take({"weak": MOTION, "strong": 2.0 * MOTION}), take([MOTION, 2.0 * MOTION])
+    assert named.motion.values.tolist() == ["weak", "strong"]
+    np.testing.assert_array_equal(named.peak_rotation.values, listed.peak_rotation.values)
+
+
+def test_names_of_a_mapping_are_texts():
+    with pytest.raises(InvalidMotion, match="name of a motion must be text"):
+        rocking.simulate_many(BLOCK, {1: MOTION})
+
+
 TAKES_A_BLOCK = {
     "simulate": lambda block: rocking.simulate(block, MOTION),
     "simulate_many": lambda block: rocking.simulate_many(block, MOTION),
@@ -192,7 +208,7 @@ def test_a_fragility_names_its_limit_states():
 
 @pytest.mark.parametrize("level", [1e60, 1e300])
 def test_no_ensemble_is_shaken_more_than_a_motion_may_be(level):
-    for scale in ({"pga": level}, {"factor": level}):
+    for scale in ({"levels": level, "measure": "pga"}, {"levels": level}):
         with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+50 m/s\^2"):
             rocking.simulate_many(BLOCK, MOTION, **scale)
 

@@ -680,7 +680,7 @@ def test_fragility_and_spectrum_take_the_weights_and_the_model_of_the_calibratio
     # What is predicted for each motion is that share, allowing for few candidates and for a lapse.
     effective = found.diagnostics.effective
     expected = (effective * np.array(shares) + 0.5) / (effective + 1.0)
-    scaled = [motion.scaled(pga=3.0) for motion in motions]
+    scaled = [motion.scaled_to(3.0) for motion in motions]
     assert found.predict(scaled) == pytest.approx(found.lapse + (1.0 - 2.0 * found.lapse) * expected, abs=1e-6)
     nonlinear = found.fragility(motions, levels=levels, model="nonlinear")
     assert "nonlinear model" in nonlinear.description

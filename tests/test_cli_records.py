@@ -18,6 +18,7 @@ from rocking import quantities
 from rocking.cli import app, wording
 from rocking.errors import InvalidOption
 from rocking.motion.named import expanded
+from rocking.motion.scaling import Measure
 from rocking.plausibility import motion_notes
 from rocking.progress import note, notes_for
 
@@ -54,20 +55,20 @@ def test_full_sizes_are_twice_the_half_sizes(run):
 @pytest.mark.parametrize(
     ("option", "value", "target"),
     [
-        ("--pga", "0.5g", {"pga": 0.5 * GRAVITY}),
-        ("--pga", "490gal", {"pga": 4.9}),
-        ("--pga", "4.9", {"pga": 4.9}),
-        ("--pgv", "0.4", {"pgv": 0.4}),
-        ("--sa", "0.4g@1.0", {"sa": 0.4 * GRAVITY, "period": 1.0}),
-        ("--scale", "-2", {"factor": -2.0}),
+        ("--pga", "0.5g", (0.5 * GRAVITY, Measure("pga"))),
+        ("--pga", "490gal", (4.9, Measure("pga"))),
+        ("--pga", "4.9", (4.9, Measure("pga"))),
+        ("--pgv", "0.4", (0.4, Measure("pgv"))),
+        ("--sa", "0.4g@1.0", (0.4 * GRAVITY, Measure("sa", 1.0))),
+        ("--scale", "-2", (-2.0, Measure("factor"))),
     ],
 )
 def test_records_are_scaled_to_a_target_by_every_command(monkeypatch, run, command, option, value, target):
     seen = []
-    monkeypatch.setattr(rocking.Motion, "scaled", lambda motion, *_, **asked: seen.append(asked) or motion)
+    monkeypatch.setattr(rocking.Motion, "scaled_to", lambda motion, *asked: seen.append(asked) or motion)
     options = {"spectrum": ["--alpha", "0.2", "--p", "2"]}.get(command, BLOCK)
     run(command, RECORD, *options, option, value)
-    assert seen[0] == pytest.approx(target)
+    assert (pytest.approx(seen[0][0]), seen[0][1]) == target
 
 
 def test_one_target_at_most(run):

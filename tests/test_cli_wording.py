@@ -180,7 +180,7 @@ def test_a_motion_that_was_scaled_is_told_from_the_record(run):
     record = rocking.records.load(RECORD)
     scaled = record.scaled(2.0)
     assert (record.label, scaled.label) == (RECORD, f"{RECORD}, scaled by 2")
-    assert (scaled.name, record.scaled(pga=4.9).label) == (RECORD, f"{RECORD}, scaled by {4.9 / record.pga:.6g}")
+    assert (scaled.name, record.scaled_to(4.9).label) == (RECORD, f"{RECORD}, scaled by {4.9 / record.pga:.6g}")
     response = rocking.simulate(Block(width=0.24, height=1.1), scaled)
     assert scaled.label in repr(response)
     assert f"under {scaled.label}" in response.plot().get_suptitle().replace("\n", " ")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, Blocks, InvalidBlock, InvalidOption, VelocityThreshold, simulate, simulate_many
+from rocking import Block, Blocks, InvalidBlock, InvalidOption, Measure, VelocityThreshold, simulate, simulate_many
 
 ULP = 2.0**-52
 
@@ -116,17 +116,17 @@ def test_reversing_the_motion_mirrors_the_blocks(records):
 
 def test_scales_are_those_of_the_motion(records):
     blocks = random_blocks(10, 7)
-    for measure, values, options in (
-        ("factor", [0.5, 1.5], {}),
-        ("pga", [1.0, 4.0], {}),
-        ("pgv", [0.3, 0.9], {}),
-        ("sa", [2.0, 6.0], {"period": 0.8}),
+    for measure, values in (
+        (Measure("factor"), [0.5, 1.5]),
+        (Measure("pga"), [1.0, 4.0]),
+        (Measure("pgv"), [0.3, 0.9]),
+        (Measure("sa", period=0.8), [2.0, 6.0]),
     ):
-        result = simulate_many(blocks, records[:2], **{measure: values}, **options)
+        result = simulate_many(blocks, records[:2], levels=values, measure=measure)
         assert result.sizes == {"motion": 2, "scale": 2, "block": 10}
-        assert result.scale.attrs["measure"] == measure
+        assert result.scale.attrs["measure"] == measure.name
         for m, s in np.ndindex(2, 2):
-            scaled = records[m].scaled(**{measure: values[s]}, **options)
+            scaled = records[m].scaled_to(values[s], measure)
             alone = simulate_many(blocks, scaled)
             assert np.array_equal(result.peak_rotation[m, s], alone.peak_rotation[0])
 
@@ -177,12 +177,13 @@ def test_the_result_can_be_written_and_says_what_it_is(records, tmp_path):
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        ({"pga": 1.0, "pgv": 1.0}, "one measure"),
-        ({"sa": 1.0}, "period="),
-        ({"period": 1.0}, "sa="),
-        ({"factor": []}, "positive"),
-        ({"factor": [1.0, -1.0]}, "positive"),
-        ({"pga": "strong"}, "pga"),
+        ({"levels": 1.0, "measure": "pga_ratio"}, "measure must be one of factor, pga, pgv, sa"),
+        ({"levels": 1.0, "measure": Measure("pga_ratio")}, "measure must be one of factor, pga, pgv, sa"),
+        ({"levels": 1.0, "measure": "sa"}, "needs period"),
+        ({"measure": "pga"}, "levels"),
+        ({"levels": []}, "positive"),
+        ({"levels": [1.0, -1.0]}, "positive"),
+        ({"levels": "strong", "measure": "pga"}, "levels"),
         ({"polarity": "up"}, "polarity"),
         ({"threads": 0}, "threads"),
         ({"model": "cubic"}, "model"),

@@ -98,9 +98,9 @@ def query_of(page):
     return {name: values[0] for name, values in parse_qs(urlsplit(page.page.url).query).items()}
 
 
-def statue(**scale):
+def statue(level, measure="pga"):
     block = rocking.Block(width=0.24, height=1.1)
-    return rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled(**scale))
+    return rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(level, measure))
 
 
 def peak_shown(page):
@@ -112,7 +112,7 @@ def peak_shown(page):
 
 def test_the_first_page_shows_a_block_that_chatters(opened):
     page = opened()
-    response = statue(pga=0.4 * 9.80665)
+    response = statue(0.4 * 9.80665)
     assert page.text("#verdict") == "It rocks, comes to rest 4 times, and does not overturn."
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
     assert len(page.page.query_selector_all("#sequences tbody tr")) == 4
@@ -128,7 +128,7 @@ def test_a_slider_changes_the_response(opened):
     page.rested(lambda: (slider.focus(), slider.press("ArrowRight")))
     level = query_of(page)["pga"]
     assert level != "0.4g"
-    response = statue(pga=float(level[:-1]) * 9.80665)
+    response = statue(float(level[:-1]) * 9.80665)
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
     assert page.js("document.getElementById('pga').value") == level[:-1]
     assert page.js("document.getElementById('pga-slider').getAttribute('aria-valuetext')") == f"{level[:-1]} g"
@@ -167,7 +167,7 @@ def test_a_link_reproduces_what_is_shown(opened):
         "velocity",
     ]
     block = rocking.Block(width=0.24, height=1.1)
-    motion = rocking.records.load("ridgecrest-clc-090").scaled(pga=0.4 * 9.80665)
+    motion = rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665)
     response = rocking.simulate(block, motion, model="linear", chattering="velocity=0.001")
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
 
@@ -187,7 +187,7 @@ def plotted(page, name="first", where="histories"):
 
 @pytest.mark.parametrize("width", [10.0, 1e-2, 1e-6, 1e-9])
 def test_a_zoom_shows_the_engines_own_values(opened, width):
-    response = statue(pga=0.4 * 9.80665)
+    response = statue(0.4 * 9.80665)
     middle = float(response.impacts["time"][-30])
     page = opened(f"{STATUE}&from={middle - 0.5 * width!r}&to={middle + 0.5 * width!r}")
     line = plotted(page)
@@ -202,7 +202,7 @@ def test_a_zoom_shows_the_engines_own_values(opened, width):
 
 def test_ten_times_closer_again_and_again(opened):
     page = opened(STATUE)
-    response = statue(pga=0.4 * 9.80665)
+    response = statue(0.4 * 9.80665)
     rest = float(response.chattering["end"][-1])
     for _ in range(12):
         before = page.text("#depth")
@@ -245,7 +245,7 @@ def test_dragging_across_a_plot_zooms_in(opened):
 
 def test_ratios_of_intervals_are_drawn_against_eta_squared(opened):
     page = opened(STATUE)
-    response = statue(pga=0.4 * 9.80665)
+    response = statue(0.4 * 9.80665)
     lines = page.js(f"""() => {MODELS}
         .filter((each) => each.type === 'Label').map((each) => each.text)""")
     assert lines == [f"η² = {response.block.restitution**2:.4g}"]
@@ -255,7 +255,7 @@ def test_all_numbers_in_words(opened):
     page = opened(STATUE)
     page.page.click("#in-words summary")
     page.until("document.querySelectorAll('#words tr').length > 5")
-    expected = statue(pga=0.4 * 9.80665).summary().splitlines()
+    expected = statue(0.4 * 9.80665).summary().splitlines()
     found = page.js(
         "Array.from(document.querySelectorAll('#words tr'), (row) => Array.from(row.cells, (cell) => cell.textContent))"
     )
@@ -292,7 +292,7 @@ def test_a_block_by_its_parameters_with_two_sides(opened):
         [math.radians(float(each[:-3])) for each in found["alpha"].split(",")],
         [float(each) for each in found["restitution"].split(",")],
     )
-    response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled(pga=0.4 * 9.80665))
+    response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665))
     assert page.text("#figures div:first-child dd").startswith("overturns") == response.overturned
 
 
@@ -309,16 +309,16 @@ def test_a_block_off_its_middle_is_described_by_its_pivots_as_well(opened):
     block = rocking.Block.from_pivots(
         [float(each) for each in found["pivots"].split(",")], float(found["height_of_mass"]), float(found["gyration"])
     )
-    response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled(pga=0.4 * 9.80665))
+    response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665))
     assert page.text("#figures div:first-child dd").startswith("overturns") == response.overturned
 
 
 @pytest.mark.parametrize(
     ("kind", "value", "target"),
     [
-        ("pgv", "0.25", {"pgv": 0.25}),
-        ("sa", "0.6", {"sa": 0.6 * 9.80665, "period": 1.0}),
-        ("scale", "1.3", {"factor": 1.3}),
+        ("pgv", "0.25", (0.25, "pgv")),
+        ("sa", "0.6", (0.6 * 9.80665, rocking.Measure("sa", 1.0))),
+        ("scale", "1.3", (1.3, "factor")),
     ],
 )
 def test_a_record_is_scaled(opened, kind, value, target):
@@ -326,7 +326,7 @@ def test_a_record_is_scaled(opened, kind, value, target):
     page.rested(lambda: page.page.select_option("#scaled", kind))
     field = page.page.locator(f"#{kind}")
     page.rested(lambda: (field.fill(value), field.press("Enter")))
-    response = statue(**target)
+    response = statue(*target)
     shown = page.text("#figures div:first-child dd")
     if response.overturned:
         assert shown.startswith("overturns")
@@ -386,7 +386,7 @@ def test_a_record_shakes_upwards_as_well(opened, tmp_path):
     page.rested(lambda: page.page.select_option("#vertical", "ridgecrest-clc-up"))
     assert query_of(page)["vertical"] == "ridgecrest-clc-up"
     upwards = rocking.records.load("ridgecrest-clc-up")
-    motion = rocking.records.load("ridgecrest-clc-090").with_vertical(upwards).scaled(pga=0.4 * 9.80665)
+    motion = rocking.records.load("ridgecrest-clc-090").with_vertical(upwards).scaled_to(0.4 * 9.80665)
     response = rocking.simulate(rocking.Block(width=0.24, height=1.1), motion)
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, abs=6e-4)
     assert "vertical acceleration (ridgecrest-clc-up" in page.text("#legend")
@@ -580,7 +580,12 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
     folder = tmp_path_factory.mktemp("study") / "museum"
     blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 12), alpha=np.linspace(0.1, 0.3, 10), restitution=[0.9])
     made = rocking.study(
-        folder, blocks, rocking.records.load("el-centro-meloland-270"), pga=[2.0, 4.0], unit_blocks=512
+        folder,
+        blocks,
+        rocking.records.load("el-centro-meloland-270"),
+        levels=[2.0, 4.0],
+        measure="pga",
+        unit_blocks=512,
     )
     made.run(progress=False)
     running = served(Explorer(), {"view": "map"}, StudyView(folder))
@@ -619,7 +624,7 @@ def test_two_blocks_or_two_motions_are_compared(opened, what):
     page.until("[...new URLSearchParams(location.search).keys()].some((name) => name.startsWith('other.'))")
     other = {name[6:]: value for name, value in query_of(page).items() if name.startswith("other.")}
     block = rocking.Block(width=float(other.get("width", 0.24)), height=float(other.get("height", 1.1)))
-    motion = rocking.records.load(other.get("motion", "ridgecrest-clc-090")).scaled(pga=0.4 * 9.80665)
+    motion = rocking.records.load(other.get("motion", "ridgecrest-clc-090")).scaled_to(0.4 * 9.80665)
     response = rocking.simulate(block, motion)
     rests = int(np.sum(response.events["kind"] == "rest"))
     words = (

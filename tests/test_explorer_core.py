@@ -54,7 +54,7 @@ def test_a_case_is_what_the_package_makes_of_the_same_numbers():
     case = read_case({**STATUE, "model": "linear", "chattering": "velocity=1e-3"}, Shelf())
     expected = rocking.simulate(
         rocking.Block(width=0.24, height=1.1),
-        rocking.records.load("ridgecrest-clc-090").scaled(pga=0.4 * 9.80665),
+        rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665),
         model="linear",
         chattering="velocity=1e-3",
     )
@@ -100,7 +100,7 @@ def test_a_record_has_a_vertical_component(vertical, tmp_path, monkeypatch):
         keys[name.removesuffix(".csv")] = shelf.put(name, (tmp_path / name).read_bytes())
     case = read_case({**STATUE, "vertical": vertical.format(**keys)}, shelf)
     expected = rocking.simulate(
-        rocking.Block(width=0.24, height=1.1), horizontal.with_vertical(upwards).scaled(pga=0.4 * 9.80665)
+        rocking.Block(width=0.24, height=1.1), horizontal.with_vertical(upwards).scaled_to(0.4 * 9.80665)
     )
     assert case.simulate().peak_rotation == expected.peak_rotation
     script = tmp_path / "case.py"
@@ -117,7 +117,7 @@ def test_a_vertical_component_is_a_channel_of_the_same_file(tmp_path, monkeypatc
     file = Path(__file__).parent / "data" / "formats" / "two.v2"
     key = shelf.put(file.name, file.read_bytes())
     case = read_case({**STATUE, "motion": f"file:{key}", "channel": "1", "vertical": "2"}, shelf)
-    expected = rocking.read(file, channel=1).with_vertical(rocking.read(file, channel=2)).scaled(pga=0.4 * 9.80665)
+    expected = rocking.read(file, channel=1).with_vertical(rocking.read(file, channel=2)).scaled_to(0.4 * 9.80665)
     assert np.array_equal(case.motion.vertical.coefficients, expected.vertical.coefficients)
     assert as_command(case).startswith("rocking simulate two.v2 --vertical 2 ")
 
@@ -263,7 +263,7 @@ RESPONSES = {
     ),
     "scaled": lambda: rocking.simulate(
         rocking.Block(width=0.24, height=1.1, restitution=0.8),
-        rocking.records.load("ridgecrest-clc-090").scaled(pga=3.0),
+        rocking.records.load("ridgecrest-clc-090").scaled_to(3.0),
     ),
     "two-sided": lambda: rocking.simulate(
         rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4), rocking.pulses.one_sine(4.0, 1.0), model="linear"
@@ -644,7 +644,7 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("studies") / "museum"
     blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 7), alpha=np.linspace(0.1, 0.3, 5), restitution=[0.85, 0.9])
     motions = [rocking.pulses.one_sine(1.0, 1.0), rocking.records.load("el-centro-meloland-270")]
-    made = rocking.study(folder, blocks, motions, pga=[2.0, 4.0], polarity="both", unit_blocks=512)
+    made = rocking.study(folder, blocks, motions, levels=[2.0, 4.0], measure="pga", polarity="both", unit_blocks=512)
     made.run(progress=False)
     return StudyView(folder)
 
@@ -676,7 +676,7 @@ def test_a_slice_of_a_study_is_its_results(study):
 def test_a_verdict_that_the_duration_left_open_is_not_drawn_as_standing(tmp_path):
     blocks = rocking.Blocks.grid(p=[1.5, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-    made = rocking.study(tmp_path / "cut", blocks, motion, factor=[0.01, 1.0], duration=0.9, unit_blocks=512)
+    made = rocking.study(tmp_path / "cut", blocks, motion, levels=[0.01, 1.0], duration=0.9, unit_blocks=512)
     made.run()
     results = made.results()
     assert results.stopped.values.any()
@@ -703,10 +703,10 @@ def test_a_point_of_a_study_is_its_simulation(study):
 @pytest.mark.parametrize(
     ("scales", "label", "unit"),
     [
-        ({"factor": [0.5, 1.0]}, "Factor of the motion", ""),
-        ({"pga": [2.0, 4.0]}, "Peak ground acceleration", "m/s^2"),
-        ({"pgv": [0.2, 0.4]}, "Peak ground velocity", "m/s"),
-        ({"sa": [2.0, 4.0], "period": 0.5}, "Spectral acceleration at 0.5 s", "m/s^2"),
+        ({"levels": [0.5, 1.0]}, "Factor of the motion", ""),
+        ({"levels": [2.0, 4.0], "measure": "pga"}, "Peak ground acceleration", "m/s^2"),
+        ({"levels": [0.2, 0.4], "measure": "pgv"}, "Peak ground velocity", "m/s"),
+        ({"levels": [2.0, 4.0], "measure": rocking.Measure("sa", 0.5)}, "Spectral acceleration at 0.5 s", "m/s^2"),
     ],
 )
 def test_the_axis_of_scales_says_what_they_are(tmp_path, scales, label, unit):
@@ -719,7 +719,7 @@ def test_the_axis_of_scales_says_what_they_are(tmp_path, scales, label, unit):
 def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
     blocks = rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=[[0.2, 0.25], [0.2, 0.2], [0.3, 0.3]], restitution=0.9)
     motions = [rocking.records.load(f"el-centro-meloland-{which}") for which in ("270", "360")]
-    made = rocking.study(tmp_path / "list", blocks, motions, pga=[2.0, 4.0, 5.0])
+    made = rocking.study(tmp_path / "list", blocks, motions, levels=[2.0, 4.0, 5.0], measure="pga")
     made.run(progress=False)
     view = StudyView(tmp_path / "list")
     assert list(view.axes()) == ["block", "scale", "motion"]

@@ -553,7 +553,12 @@ def test_a_port_that_is_taken_is_said_so():
 def test_a_study_is_shown_and_a_point_of_it_opened(tmp_path, opened):
     blocks = rocking.Blocks.grid(p=np.linspace(2.0, 5.0, 4), alpha=np.linspace(0.1, 0.3, 5), restitution=[0.9])
     made = rocking.study(
-        tmp_path / "museum", blocks, rocking.pulses.one_sine(1.0, 1.0), pga=[2.0, 4.0], unit_blocks=512
+        tmp_path / "museum",
+        blocks,
+        rocking.pulses.one_sine(1.0, 1.0),
+        levels=[2.0, 4.0],
+        measure="pga",
+        unit_blocks=512,
     )
     with pytest.raises(StudyError, match="nothing of the study"):
         StudyView(tmp_path / "museum")

@@ -9,6 +9,7 @@ import tempfile
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,8 +18,9 @@ from hypothesis import strategies as st
 from oracles import record_files as written
 
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
+from rocking.motion import records
 from rocking.motion.formats import Channel, channels, identify, read, source, through_obspy, values
-from rocking.motion.formats.timing import even_step
+from rocking.motion.formats.channel import even_step
 
 GRAVITY = 9.80665
 SERIES = np.array(written.series(1)) / 100.0
@@ -182,7 +184,7 @@ def test_one_channel_is_chosen_by_number_or_name() -> None:
 
 def test_a_channel_not_chosen_or_unknown_lists_those_there_are() -> None:
     path = written.FOLDER / "two.v1"
-    assert "holds 2 channels; give channel= as one of 1 '90 Deg', 2 'Up'" in complaint(path)
+    assert "holds 2 channels; give channel as one of 1 '90 Deg', 2 'Up'" in complaint(path)
     assert "no channel 3; give one of 1 '90 Deg', 2 'Up'" in complaint(path, channel=3)
     assert "no channel 'north'" in complaint(path, channel="north")
     assert "no channel ''" in complaint(path, channel="")
@@ -222,7 +224,7 @@ def test_at2_headers_of_all_shapes(sizes: str, file: Callable[[str], Path]) -> N
 def test_at2_may_touch_and_may_lack_the_units_line(file: Callable[[str], Path]) -> None:
     packed = "".join(f"{value:15.8E}" for value in (-0.5, -0.25, 0.125, -0.0625, -0.03125)) + "\n"
     text = f"header\nNPTS=5, DT=.01\n{packed}"
-    assert "does not say its units; give units=" in complaint(file(text))
+    assert "does not say its units; give units as" in complaint(file(text))
     assert read(file(text), units="m/s2").samples[1].tolist() == [-0.5, -0.25, 0.125, -0.0625, -0.03125]
 
 
@@ -353,7 +355,7 @@ def test_esm_without_units_asks_for_them(file: Callable[[str], Path]) -> None:
     text = "".join(
         line for line in written.esm(written.series(1)).splitlines(keepends=True) if not line.startswith("UNITS")
     )
-    assert "give units=" in complaint(file(text))
+    assert "give units as one of" in complaint(file(text))
     assert read(file(text), units="gal").pga == read(written.FOLDER / "esm.asc").pga
 
 
@@ -474,8 +476,8 @@ def test_uneven_times_make_an_uneven_motion(file: Callable[[str], Path]) -> None
 @pytest.mark.parametrize(
     ("text", "request_", "what"),
     [
-        ("1\n2\n", {"units": "g"}, "line 1: the file does not say its sampling step; give dt= in seconds"),
-        ("1\n2\n", {"dt": 0.1}, "line 1: the file does not say its units; give units= as one of g, m/s2"),
+        ("1\n2\n", {"units": "g"}, "line 1: the file does not say its sampling step; give dt in seconds"),
+        ("1\n2\n", {"dt": 0.1}, "line 1: the file does not say its units; give units as one of g, m/s2"),
         ("0 1\n1 2\n1 3\n", {"units": "g"}, "line 3: the time does not increase from the row before"),
         ("0 1\n\n#\n1 2\n-1 3\n", {"units": "g"}, "line 5: the time does not increase from the row before"),
         ("0 1\n1 2\n2\n", {"units": "g"}, "line 3: columns in this row: 1, in the first: 2"),
@@ -569,7 +571,7 @@ def test_columns_that_a_heading_names_are_channels(delimiter: str, file: Callabl
     first, second = channels(path)
     assert [(each.number, each.name, each.dt) for each in (first, second)] == [(1, "NS", 0.1), (2, "EW", 0.1)]
     assert second.acceleration.tolist() == [0.04, 0.05, 0.09]
-    assert "the file holds 2 channels; give channel= as one of 1 'NS', 2 'EW'" in complaint(path)
+    assert "the file holds 2 channels; give channel as one of 1 'NS', 2 'EW'" in complaint(path)
     assert read(path, channel="NS").pga == read(path, channel=1).pga == 0.035
 
 
@@ -780,7 +782,7 @@ def waveform(form: str, points: int = 50) -> bytes:
 def test_other_formats_go_through_obspy(form: str, file: Callable[[bytes], Path]) -> None:
     path = file(waveform(form))
     assert identify(path).format == f"{form} (through ObsPy)"
-    assert "does not say its units; give units=" in complaint(path)
+    assert "does not say its units; give units as" in complaint(path)
     (channel,) = channels(path, units="cm/s2")
     assert (channel.name, channel.dt, len(channel.acceleration)) == ("HNZ", 0.01, 50)
     np.testing.assert_allclose(channel.acceleration, 0.03 * np.arange(50), rtol=1e-6, atol=1e-12)
@@ -918,3 +920,34 @@ def test_real_knet_of_obspy(file: Callable[[bytes], Path]) -> None:
     assert len(channel.acceleration) == trace.stats.npts == 5900
     np.testing.assert_allclose(channel.acceleration, trace.data * trace.stats.calib, rtol=1e-14)
     assert np.abs(channel.acceleration - channel.acceleration.mean()).max() == pytest.approx(0.04383, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "request_", "argument"),
+    [
+        ("1\n2\n", {"units": "g"}, "dt"),
+        ("1\n2\n", {"dt": 0.1}, "units"),
+        ("time (s), a (counts)\n0, 1\n1, 2\n", {}, "units"),
+        ("time (s), a (g), b (g)\n0, 1, 1\n1, 2, 1\n", {}, "channel"),
+    ],
+)
+def test_what_a_file_does_not_say_is_named_as_data(
+    file: Callable[[str], Path], text: str, request_: dict[str, Any], argument: str
+) -> None:
+    path = file(text)
+    with pytest.raises(UnreadableRecord) as caught:
+        read(path, **request_)
+    assert (caught.value.argument, caught.value.path) == (argument, str(path))
+    assert str(path) not in caught.value.message.text()
+
+
+def test_a_motion_knows_where_it_comes_from(file: Callable[[str], Path]) -> None:
+    path = file("time (s), N-S (g), UD (cm/s2)\n0, 1, 1\n1, 2, 1\n")
+    origin = read(path, channel="UD", units="gal").description.origin
+    assert origin is not None
+    assert (origin.format, origin.file, origin.channel, origin.number) == ("text table", path.name, "UD", 2)
+    assert (origin.units, origin.heading_units) == ("cm/s2", "cm/s2")
+    assert read(path, channel=1, units="gal").scaled(2.0).description.origin.heading_units == "g"
+    shipped = records.load("ridgecrest-clc-up").delayed(1.0).description.origin
+    assert shipped is not None
+    assert (shipped.channel, shipped.station) == ("up", records.info("ridgecrest-clc-up").station)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rocking.errors import RockingError
 from rocking.motion.formats import channels, table, values
-from rocking.motion.formats.aligned import Layout, read_aligned, read_columns
+from rocking.motion.formats.values import Layout, read_aligned, read_columns
 
 SAMPLES = sorted((Path(__file__).parent / "data" / "formats").iterdir())
 

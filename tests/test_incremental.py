@@ -52,7 +52,7 @@ def test_the_ends_of_every_band_are_where_the_verdict_changes(analysis, record):
                     if not math.isnan(level):
                         # Both verdicts within the tolerance; under a record bands have thinner ones beside them.
                         factors = 1.0 + np.linspace(-5e-7, 5e-7, 11)
-                        scaled = [motion.scaled(pgv=level * factor) for factor in factors]
+                        scaled = [motion.scaled_to(level * factor, "pgv") for factor in factors]
                         assert len({rocking.simulate(block, one).overturned for one in scaled}) == 2
 
 
@@ -71,7 +71,7 @@ def test_peaks_are_those_of_the_scaled_motion(analysis, record):
     blocks, dataset = analysis
     level = float(dataset.level[20])
     for k, block in enumerate(blocks):
-        response = rocking.simulate(block, record.scaled(pgv=level))
+        response = rocking.simulate(block, record.scaled_to(level, "pgv"))
         cell = dataset.isel(motion=0, level=20, block=k)
         assert float(cell.peak_rotation) == pytest.approx(response.peak_rotation, rel=1e-9)
         smaller = min(side.alpha for side in block.sides)
@@ -95,18 +95,18 @@ def test_without_levels_they_go_from_the_first_uplift_to_twice_the_first_overtur
 
 
 @pytest.mark.parametrize(
-    ("measure", "options", "units"),
+    ("measure", "units"),
     [
-        ("pga", {}, lambda block, motion: motion.pga),
-        ("pgv", {}, lambda block, motion: motion.pgv),
-        ("sa", {"period": 0.5}, lambda block, motion: motion.spectral_acceleration(0.5)),
-        ("pga_ratio", {}, lambda block, motion: motion.pga / block.minimum_acceleration),
-        ("pgv_ratio", {}, lambda block, motion: motion.pgv * block.p / block.minimum_acceleration),
+        ("pga", lambda block, motion: motion.pga),
+        ("pgv", lambda block, motion: motion.pgv),
+        (rocking.Measure("sa", period=0.5), lambda block, motion: motion.spectral_acceleration(0.5)),
+        ("pga_ratio", lambda block, motion: motion.pga / block.minimum_acceleration),
+        ("pgv_ratio", lambda block, motion: motion.pgv * block.p / block.minimum_acceleration),
     ],
 )
-def test_every_measure_finds_the_same_factor(measure, options, units):
+def test_every_measure_finds_the_same_factor(measure, units):
     blocks = [BLOCK, rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)]
-    dataset = incremental_dynamic_analysis(blocks, PULSE, measure=measure, **options)
+    dataset = incremental_dynamic_analysis(blocks, PULSE, measure=measure)
     reference = incremental_dynamic_analysis(blocks, PULSE, measure="pga")
     for k, block in enumerate(blocks):
         factor = float(dataset.overturning_level[0, k]) / units(block, PULSE)
@@ -158,7 +158,7 @@ def test_the_figure_shows_peaks_and_bands(analysis):
     [
         ({"measure": "pgd"}, "measure"),
         ({"measure": "sa"}, "period"),
-        ({"period": 1.0}, "period"),
+        ({"measure": "factor"}, "measure"),
         ({"levels": [2.0, 1.0]}, "increase"),
         ({"levels": []}, "levels"),
         ({"levels": [0.0, 1.0]}, "positive"),

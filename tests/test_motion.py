@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose, assert_array_equal
 
-from rocking.errors import InvalidMotion
+from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import pulses
 from rocking.motion.motion import Description, Motion
+from rocking.motion.scaling import Measure
 
 values = st.floats(-10.0, 10.0).map(lambda x: round(x, 3))
 
@@ -177,20 +178,20 @@ def test_scaling_is_linear(motion, factor):
     ],
 )
 def test_scaling_to_a_target_reaches_it_and_says_its_unit(target, said):
-    motion = Motion.from_samples([0.0, 1.0, -3.0, 2.0], 0.3).scaled(**{target: 1.7})
+    motion = Motion.from_samples([0.0, 1.0, -3.0, 2.0], 0.3).scaled_to(1.7, target)
     assert getattr(motion, target) == pytest.approx(1.7, rel=1e-15)
     assert motion.history[-1].endswith(said)
 
 
 def test_scaling_to_a_spectral_acceleration_reaches_it():
-    motion = Motion.from_samples([0.0, 1.0, -3.0, 2.0], 0.3).scaled(sa=2.0, period=0.7, damping=0.02)
+    motion = Motion.from_samples([0.0, 1.0, -3.0, 2.0], 0.3).scaled_to(2.0, Measure("sa", period=0.7, damping=0.02))
     assert motion.spectral_acceleration(0.7, 0.02) == pytest.approx(2.0, rel=1e-14)
     factor, said = f"{motion.coefficients[1, 0]:.6g}", "a spectral acceleration of 2 m/s^2 (0.2039 g) at 0.7 s"
     assert motion.history == (f"scaled by {factor} to {said}, damping 0.02",)
 
 
 def test_scaling_and_polarity_keep_the_description_true():
-    motion = -pulses.sine(2.0, 1.5, cycles=2, phase=0.1).scaled(pga=3.0)
+    motion = -pulses.sine(2.0, 1.5, cycles=2, phase=0.1).scaled_to(3.0)
     assert motion.description.family == "sine"
     assert motion.description.parameters == {"amplitude": -3.0, "frequency": 1.5, "cycles": 2.0, "phase": 0.1}
     assert motion.error == pytest.approx(3e-15)
@@ -198,34 +199,48 @@ def test_scaling_and_polarity_keep_the_description_true():
     assert motion.history[1] == "polarity reversed"
 
 
+@pytest.mark.parametrize("factor", [np.nan, np.inf, "two", None, [1.0, 2.0]])
+def test_unusable_factors_are_refused(factor):
+    with pytest.raises(InvalidMotion, match="factor must be a finite number"):
+        Motion.from_samples([0.0, 1.0], 1.0).scaled(factor)
+
+
 @pytest.mark.parametrize(
-    "arguments",
+    ("level", "measure"), [(0.0, "pga"), (-1.0, "pga"), (np.inf, "pgv"), (-1.0, Measure("sa", 1.0)), ("0.5", "pga")]
+)
+def test_unusable_levels_are_refused(level, measure):
+    with pytest.raises(InvalidMotion, match="level must be a positive number"):
+        Motion.from_samples([0.0, 1.0], 1.0).scaled_to(level, measure)
+
+
+@pytest.mark.parametrize("measure", ["sa", "pga_ratio", "strength", None, Measure("pgv_ratio")])
+def test_measures_of_no_motion_alone_are_refused(measure):
+    with pytest.raises(InvalidOption, match="measure"):
+        Motion.from_samples([0.0, 1.0], 1.0).scaled_to(1.0, measure)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "argument"),
     [
-        {},
-        {"factor": 1.0, "pga": 1.0},
-        {"factor": np.nan},
-        {"factor": "two"},
-        {"pga": 0.0},
-        {"pga": -1.0},
-        {"pgv": np.inf},
-        {"sa": 1.0},
-        {"period": 1.0, "pga": 1.0},
-        {"sa": 1.0, "period": 0.0},
-        {"sa": 1.0, "period": 1.0, "damping": 7.0},
-        {"pga": 1.0, "damping": 0.05},
-        {"factor": 2.0, "damping": 7.0},
-        {"factor": 2.0, "period": 1.0},
-        {"pga": "0.5"},
+        ({"name": "sa"}, "measure"),
+        ({"name": "pga", "period": 1.0}, "period"),
+        ({"name": "factor", "period": 1.0}, "period"),
+        ({"name": "sa", "period": 0.0}, "period"),
+        ({"name": "sa", "period": "1"}, "period"),
+        ({"name": "sa", "period": 1.0, "damping": 7.0}, "damping"),
+        ({"name": "pga", "damping": 0.1}, "damping"),
+        ({"name": "strength"}, "measure"),
     ],
 )
-def test_unusable_targets_are_refused(arguments):
-    with pytest.raises(InvalidMotion):
-        Motion.from_samples([0.0, 1.0], 1.0).scaled(**arguments)
+def test_unusable_measures_are_refused_by_the_name_of_the_argument(arguments, argument):
+    with pytest.raises(InvalidOption) as caught:
+        Measure(**arguments)
+    assert caught.value.argument == argument
 
 
 def test_a_zero_motion_cannot_be_scaled_to_a_target():
     with pytest.raises(InvalidMotion, match="zero throughout"):
-        Motion.from_samples([0.0, 0.0], 1.0).scaled(pga=1.0)
+        Motion.from_samples([0.0, 0.0], 1.0).scaled_to(1.0)
 
 
 @settings(deadline=None)
@@ -401,7 +416,7 @@ def test_pieces_may_be_short_but_not_steep_beyond_all_sense():
 def test_numbers_of_any_real_type_describe_a_motion(kind):
     motion = Motion.from_samples([kind(0), kind(2), kind(1)], kind(2), name="ramp")
     assert (motion.step, motion.pga, type(motion.step)) == (2.0, 2.0, float)
-    assert motion.scaled(pga=kind(4)).pga == 4.0
+    assert motion.scaled_to(kind(4)).pga == 4.0
     assert pulses.sine(kind(3), kind(1), cycles=kind(2)).duration == 2.0
     assert pulses.n_lobe(2.0, 1.0, lobes=np.int64(3)).duration == 1.5
     assert motion.processed(baseline=np.int64(0)).step == 2.0
@@ -479,7 +494,7 @@ def test_a_motion_draws_itself_into_given_axes():
 def test_motions_import_without_slow_libraries():
     code = (
         "import sys; import rocking.motion.motion, rocking.motion.pulses, rocking.motion.records as r;"
-        "r.load('el-centro-meloland-270').scaled(pga=1.0).pgv;"
+        "r.load('el-centro-meloland-270').scaled_to(1.0).pgv;"
         "print(sorted({'scipy', 'numba', 'xarray', 'matplotlib'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -125,17 +125,17 @@ def test_a_discrete_function_gives_the_probabilities_of_the_curve(result, tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("measure", "options", "imt", "unit"),
+    ("measure", "imt", "unit"),
     [
-        ("pga", {}, "PGA", 1.0 / G),
-        ("pgv", {}, "PGV", 100.0),
-        ("sa", {"period": 0.5}, "SA(0.5)", 1.0 / G),
-        ("pga_ratio", {}, "PGA", math.tan(0.2)),
-        ("pgv_ratio", {}, "PGV", 100.0 * G * math.tan(0.2) / 2.0),
+        ("pga", "PGA", 1.0 / G),
+        ("pgv", "PGV", 100.0),
+        (rocking.Measure("sa", period=0.5), "SA(0.5)", 1.0 / G),
+        ("pga_ratio", "PGA", math.tan(0.2)),
+        ("pgv_ratio", "PGV", 100.0 * G * math.tan(0.2) / 2.0),
     ],
 )
-def test_units_are_openquakes(tmp_path, measure, options, imt, unit):
-    fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [1, 4, 7, 9], trials=10, measure=measure, block=BLOCK, **options)
+def test_units_are_openquakes(tmp_path, measure, imt, unit):
+    fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [1, 4, 7, 9], trials=10, measure=measure, block=BLOCK)
     (function,) = check_shape(written(fitted, tmp_path / "model.xml"))
     imls, params = function
     assert imls.get("imt") == imt

@@ -14,7 +14,7 @@ import xarray as xr
 import rocking
 from rocking.analysis.survey import survey
 from rocking.kernels.trace import Trail
-from rocking.motion import catalogue, formats
+from rocking.motion import formats, named
 
 BLOCK = rocking.Block(width=0.24, height=1.1)
 RECORD = rocking.records.load("el-centro-meloland-270")
@@ -39,7 +39,7 @@ RESULTS = {
     "block": lambda path: BLOCK,
     "two-sided block": lambda path: rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4),
     "blocks": lambda path: rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.1, 0.2]),
-    "motion": lambda path: RECORD.scaled(pga=5.0).with_vertical(RECORD),
+    "motion": lambda path: RECORD.scaled_to(5.0).with_vertical(RECORD),
     "response": lambda path: rocking.simulate(BLOCK, RECORD),
     "fragility": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10),
     "bootstrapped fragility": lambda path: rocking.fit_fragility(
@@ -50,8 +50,8 @@ RESULTS = {
     "rule": lambda path: rocking.rules.west([BLOCK, rocking.Block(half_width=0.2, half_height=1.0)], RECORD),
     "check": lambda path: rocking.rules.check(BLOCK, {"one": RECORD}, rules=["west"]),
     "channel": lambda path: formats.channels(path)[0],
-    "contents": lambda path: catalogue.contents(path),
-    "shipped": lambda path: catalogue.shipped(),
+    "contents": lambda path: named.contents(path),
+    "shipped": lambda path: named.shipped(),
     "format": lambda path: formats.identify(path),
     "chattering": lambda path: rocking.chattering.chattering_report(1.03, 2.0, 0.92),
     "critical amplitude": lambda path: rocking.chattering.critical_report(2.0, 0.92),

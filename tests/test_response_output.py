@@ -279,7 +279,7 @@ def test_a_time_of_rest_is_told_no_better_than_the_motion_is_known(below, told):
 
 def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():
     """A motion that is known to a millionth leaves so much of the peak; here by scaling it by a hundred times that."""
-    motion = rocking.records.load("el-centro-meloland-270").scaled(pga=4.0)
+    motion = rocking.records.load("el-centro-meloland-270").scaled_to(4.0)
     block = Block(width=0.6, height=2.1)
     one, other = (simulate(block, motion.scaled(factor)) for factor in (1.0, 1.0 + 1e-4))
     decimals = len(digits.peak_time_text(one).partition(".")[2].removesuffix(" s"))

@@ -195,7 +195,7 @@ def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
     assert len(found.outcomes) == len(levels) * len(motions)
     for _, row in found.outcomes.iterrows():
         motion = motions[names.index(row.motion)]
-        response = rocking.simulate(BLOCK, motion.scaled(pga=row.pga_m_s2))
+        response = rocking.simulate(BLOCK, motion.scaled_to(row.pga_m_s2))
         assert response.overturned == row.overturned == row.exceeded_overturning
         assert response.peak_rotation == pytest.approx(row.peak_rotation_rad, abs=1e-9)
         assert math.isinf(row.peak_over_alpha) == row.overturned

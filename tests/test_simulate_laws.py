@@ -208,5 +208,5 @@ def test_ordinary_records_are_not_ambiguous(model: str) -> None:
         motion = Motion.from_samples(samples * (2.0 * 0.2 * GRAVITY / np.abs(samples).max()), 0.02)
         block = Block.from_parameters(p=rng.uniform(1.0, 4.0), alpha=0.2, restitution=rng.uniform(0.5, 0.9))
         count += simulate(block, motion, model=model).ambiguous
-        assert not simulate(block, motion.scaled(factor=0.4), model=model).ambiguous
+        assert not simulate(block, motion.scaled(0.4), model=model).ambiguous
     assert count <= 2

@@ -86,7 +86,7 @@ def test_free_rocking_is_stopped_where_the_block_still_moves(block):
 def test_an_ensemble_marks_what_was_stopped_as_single_simulations_do(model, record):
     blocks = Blocks.grid(p=[1.5, 3.0, 4.5], alpha=[0.1, 0.2, 0.3], restitution=[0.9])
     for duration in (None, 1.0, 5.0, 12.0, 45.0):
-        many = simulate_many(blocks, record, model=model, duration=duration, factor=[0.5, 1.0])
+        many = simulate_many(blocks, record, model=model, duration=duration, levels=[0.5, 1.0])
         single = [
             [simulate(block, record.scaled(factor), model=model, duration=duration).stopped for block in blocks]
             for factor in (0.5, 1.0)

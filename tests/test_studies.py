@@ -29,14 +29,15 @@ from rocking.studies.units import DamagedUnit, Grid, decoded, encoded, key_of, n
 
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.9)
 MOTIONS = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2.0)]
-OPTIONS = {"pga": [2.0, 4.0], "polarity": "both", "model": "linear", "unit_blocks": 512}
+OPTIONS = {"levels": [2.0, 4.0], "measure": "pga", "polarity": "both", "model": "linear", "unit_blocks": 512}
 
 SCRIPT = """
 import sys
 import numpy as np, rocking
 blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.9)
 motions = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2.0)]
-study = rocking.study(sys.argv[1], blocks, motions, pga=[2.0, 4.0], polarity="both", model="linear", unit_blocks=512)
+scales = {"levels": [2.0, 4.0], "measure": "pga", "polarity": "both"}
+study = rocking.study(sys.argv[1], blocks, motions, **scales, model="linear", unit_blocks=512)
 print("ready", flush=True)
 study.run(threads=int(sys.argv[2]))
 """
@@ -107,7 +108,7 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
 def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_path, blocks, motions, scales):
     pulses = [rocking.pulses.one_sine(4.0, frequency) for frequency in np.linspace(0.5, 2.0, motions)]
     many = rocking.Blocks(p=np.linspace(1.0, 6.0, blocks), alpha=0.2, restitution=0.9)
-    study = rocking.study(tmp_path, many, pulses, factor=np.linspace(0.5, 2.0, scales), model="linear")
+    study = rocking.study(tmp_path, many, pulses, levels=np.linspace(0.5, 2.0, scales), model="linear")
     assert 20 <= len(study.store.grid) <= 120
     sizes = list(map(study.store.grid.simulations, study.store.grid))
     assert sum(sizes) == blocks * motions * scales
@@ -241,7 +242,7 @@ def test_the_first_signal_is_taken_note_of_and_the_second_raises():
 def test_a_run_shows_its_rate_and_others_are_told_of_it(tmp_path):
     motion = rocking.records.load("el-centro-meloland-270")
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 2048), alpha=0.2, restitution=0.9)
-    study = rocking.study(tmp_path, blocks, motion, pga=np.linspace(2.0, 8.0, 200), unit_blocks=1024)
+    study = rocking.study(tmp_path, blocks, motion, levels=np.linspace(2.0, 8.0, 200), measure="pga", unit_blocks=1024)
     terminal, inner = os.openpty()
     os.set_inheritable(inner, True)
     command = [sys.executable, "-c", "from rocking.cli import main; main()", "study", "run", tmp_path, "--threads", "1"]
@@ -617,7 +618,9 @@ def test_a_study_is_exported(complete, tmp_path, reference):
 
 def test_a_study_is_exported_to_a_workbook_or_says_what_is_missing(tmp_path, monkeypatch):
     openpyxl = pytest.importorskip("openpyxl")
-    study = rocking.study(tmp_path / "study", BLOCKS.select(slice(0, 5)), MOTIONS, sa=[2.0, 3.0], period=1.0)
+    study = rocking.study(
+        tmp_path / "study", BLOCKS.select(slice(0, 5)), MOTIONS, levels=[2.0, 3.0], measure=rocking.Measure("sa", 1.0)
+    )
     study.export(tmp_path / "all.xlsx")
     header, *rows = openpyxl.load_workbook(tmp_path / "all.xlsx")["simulations"].iter_rows(values_only=True)
     assert header[:3] == ("motion", "sa_m_s2", "block")
@@ -654,7 +657,7 @@ def test_names_of_units_are_their_keys():
 def test_a_hundred_thousand_units_are_listed_in_a_second_and_opened_in_a_tenth(tmp_path):
     # Of processor time: others may use the machine.
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1000), alpha=0.2, restitution=0.9)
-    study = rocking.study(tmp_path, blocks, MOTIONS[0], factor=np.linspace(1.0, 2.0, 50_000), unit_blocks=512)
+    study = rocking.study(tmp_path, blocks, MOTIONS[0], levels=np.linspace(1.0, 2.0, 50_000), unit_blocks=512)
     for key in study.store.grid:
         (tmp_path / "result" / name_of(key)).touch()
     start = time.process_time()
@@ -699,9 +702,9 @@ def test_a_vertical_component_is_part_of_a_study(tmp_path):
 
 
 def test_what_would_be_ignored_of_a_study_that_is_there_is_refused(tmp_path):
-    rocking.study(tmp_path / "one", BLOCKS, MOTIONS, factor=[0.5, 1.0], unit_blocks=512)
-    with pytest.raises(rocking.errors.InvalidOption, match="pga belongs to blocks and motions"):
-        rocking.study(tmp_path / "one", pga=[1.0])
+    rocking.study(tmp_path / "one", BLOCKS, MOTIONS, levels=[0.5, 1.0], unit_blocks=512)
+    with pytest.raises(rocking.errors.InvalidOption, match="levels belongs to blocks and motions"):
+        rocking.study(tmp_path / "one", levels=[1.0], measure="pga")
     with pytest.raises(rocking.errors.InvalidOption, match="duration, outcomes belong to"):
         rocking.study(tmp_path / "one", duration=3.0, outcomes=["rests"])
     assert rocking.study(tmp_path / "one", refine=1e-2).status.refinement is not None

@@ -35,7 +35,7 @@ UNITS = 20
 def made(folder):
     """Make a study of 20 units of a few hundredths of a second."""
     motion = rocking.records.load("el-centro-meloland-270")
-    return rocking.study(folder, BLOCKS, motion, pga=np.linspace(2.0, 8.0, UNITS), unit_blocks=2048)
+    return rocking.study(folder, BLOCKS, motion, levels=np.linspace(2.0, 8.0, UNITS), measure="pga", unit_blocks=2048)
 
 
 def digest(folder):

@@ -173,9 +173,9 @@ def test_blocks_come_from_a_table_as_well(tmp_path, file):
         ('amplitude = ["0.3g", "0.5g"]', 'amplitude = "0.3h"', 11, "acceleration"),
         ("factor = [0.5, 1.0]", "factor = []", 15, "factor"),
         ("factor = [0.5, 1.0]", "factor = 1\npga = 2", 15, "one measure only"),
-        ("factor = [0.5, 1.0]", "sa = 2", 15, "sa= needs period="),
+        ("factor = [0.5, 1.0]", "sa = 2", 15, '"sa" needs period'),
         ("factor = [0.5, 1.0]", 'sa = 2\nperiod = "long"', 16, "period must be a positive number"),
-        ("factor = [0.5, 1.0]", "sa = 2\nperiod = 1\ndamping = 1.5", 17, "damping must be a number"),
+        ("factor = [0.5, 1.0]", "sa = 2\nperiod = 1\ndamping = 1.5", 17, "damping must be a fraction of critical"),
         ('polarity = "both"', 'polarity = "up"', 16, "polarity must be"),
         ('polarity = "both"', "polarity = 1", 16, "polarity must be text"),
         ('model = "linear"', 'model = "cubic"', 19, "model must be"),
@@ -247,7 +247,7 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
     assert sorted(record for record, _ in pairs) == ["", "", "", "", "el-centro-meloland-270"]
     product = read_study(file).product
     reference = rocking.simulate_many(
-        product.blocks, product.motions, factor=[0.5, 1.0], polarity="both", model="linear", chattering="certified=1e-9"
+        product.blocks, product.motions, levels=[0.5, 1.0], polarity="both", model="linear", chattering="certified=1e-9"
     )
     np.testing.assert_array_equal(rocking.study(folder).results().peak_rotation.values, reference.peak_rotation.values)
     unit = folder / "result" / "c.0.0.0.0.0"

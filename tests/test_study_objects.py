@@ -21,7 +21,7 @@ server = pytest.importorskip("moto.server")
 
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.9)
 MOTIONS = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0)]
-OPTIONS = {"pga": [2.0, 4.0], "model": "linear", "unit_blocks": 512}
+OPTIONS = {"levels": [2.0, 4.0], "measure": "pga", "model": "linear", "unit_blocks": 512}
 UNITS = 12
 
 

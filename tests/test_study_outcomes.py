@@ -18,7 +18,7 @@ from rocking.studies.units import Grid, Line
 BLOCKS = rocking.Blocks.grid(p=np.linspace(1.0, 6.0, 130), alpha=[0.1, 0.2, 0.25, 0.3], restitution=[0.85])
 MOTIONS = [rocking.pulses.one_sine(1.0, frequency) for frequency in (0.5, 1.0, 2.0)]
 LEVELS = [2.0, 4.0, 8.0]
-OPTIONS = {"pga": LEVELS, "polarity": "both", "model": "linear"}
+OPTIONS = {"levels": LEVELS, "measure": "pga", "polarity": "both", "model": "linear"}
 TWO = ["peak_rotation", "overturned"]
 KEPT = ["overturned", "peak_rotation", *DOUBTS]
 

@@ -23,7 +23,7 @@ TOLERANCE = 1e-3
 SCALES = np.linspace(4.0, 20.0, 9)
 MOTIONS = [rocking.pulses.one_sine(1.0, 5.0 / np.pi), rocking.pulses.one_sine(2.0, 0.8)]
 BLOCKS = rocking.Blocks(p=np.linspace(1.8, 3.0, 150), alpha=0.2, restitution=0.9)
-OPTIONS = {"pga": SCALES, "polarity": "both", "model": "linear"}
+OPTIONS = {"levels": SCALES, "measure": "pga", "polarity": "both", "model": "linear"}
 
 SCRIPT = """
 import sys
@@ -62,7 +62,7 @@ def digest(folder):
 
 
 def overturns(block, motion, pga, sign):
-    return rocking.simulate(BLOCKS[block], motion.scaled(pga=pga).scaled(sign), model="linear").overturned
+    return rocking.simulate(BLOCKS[block], motion.scaled_to(pga).scaled(sign), model="linear").overturned
 
 
 def bisected(verdict, low, high, tolerance):
@@ -179,7 +179,7 @@ def test_rounds_are_arrays_that_any_zarr_reader_opens(complete):
 
 def completes(block, motion, model, pga, sign):
     """Whether the motion is beyond the thresholds only once until the block rests, by one simulation."""
-    scaled = motion.scaled(pga=pga).scaled(sign)
+    scaled = motion.scaled_to(pga).scaled(sign)
     response = rocking.simulate(block, scaled, model=model)
     if not len(response.chattering):
         return False
@@ -192,7 +192,14 @@ def test_chattering_becomes_complete_and_stops_being_so_where_bisection_by_singl
     motions = [rocking.records.load("el-centro-meloland-270"), rocking.pulses.ricker(1.0, 0.9)]
     blocks, levels, signs = BLOCKS.select(slice(0, 150, 3)), np.linspace(1.5, 6.0, 13), {"+": 1, "-": -1}
     study = rocking.study(
-        tmp_path, blocks, motions, pga=levels, polarity="both", model=model, refine={"complete_chattering": 1e-5}
+        tmp_path,
+        blocks,
+        motions,
+        levels=levels,
+        measure="pga",
+        polarity="both",
+        model=model,
+        refine={"complete_chattering": 1e-5},
     )
     study.run()
     found, verdicts = study.critical_scales("complete_chattering"), study.results().complete_chattering.values
@@ -219,7 +226,8 @@ def test_under_a_sine_chattering_is_complete_from_the_uplift_to_the_critical_amp
         tmp_path,
         blocks,
         rocking.pulses.sine(1.0, 0.5, cycles=4),
-        pga=lifting * np.array([0.9, 1.01, 1.2]),
+        levels=lifting * np.array([0.9, 1.01, 1.2]),
+        measure="pga",
         model="linear",
         refine={"complete_chattering": 1e-9, "overturning": 0.1},
     )
@@ -303,8 +311,8 @@ def test_what_cannot_be_refined_is_refused(tmp_path):
         ({"refine": {"complete_chattering": 2.0}}, "refine must be a number from 1e-12 to 0.5"),
         ({"refine": {"falling": 0.1}}, "for overturning and complete_chattering, not 'falling'"),
         ({"refine": {}}, "for overturning and complete_chattering, none of which is given"),
-        ({"pga": [2.0]}, "two scales or more, in increasing order"),
-        ({"pga": [3.0, 2.0]}, "two scales or more, in increasing order"),
+        ({"levels": [2.0]}, "two scales or more, in increasing order"),
+        ({"levels": [3.0, 2.0]}, "two scales or more, in increasing order"),
     ):
         with pytest.raises(rocking.InvalidOption, match=sentence):
             rocking.study(tmp_path / "study", BLOCKS, MOTIONS, **(OPTIONS | {"refine": 0.1} | changes))

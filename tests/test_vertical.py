@@ -308,7 +308,7 @@ def test_the_command_takes_a_vertical_component_from_a_record_or_a_channel(run) 
     block, size = rocking.Block(width=0.5, height=2.0), ["--width", "0.5", "--height", "2.0", "--pga", "0.4g", "--json"]
     up = "el-centro-meloland-up"
     printed = json.loads(run("simulate", "el-centro-meloland-270", *size, "--vertical", up)[1])
-    both = rocking.records.load("el-centro-meloland-270").with_vertical(rocking.records.load(up)).scaled(pga=0.4 * G)
+    both = rocking.records.load("el-centro-meloland-270").with_vertical(rocking.records.load(up)).scaled_to(0.4 * G)
     response, alone = rocking.simulate(block, both), rocking.simulate(block, both.with_vertical(None))
     assert printed["motion"]["vertical"]["pga_m_s2"] == pytest.approx(both.vertical.pga)
     assert printed["overturn_time_s"] == pytest.approx(response.overturn_time)
@@ -432,7 +432,7 @@ def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_com
         found[part.points] = part.values[0]
 
     def at(p: float, pga: float) -> Case:
-        return Case(block_for(p, 0.2, 0.5), case.motion.scaled(pga=pga * G), case.model)
+        return Case(block_for(p, 0.2, 0.5), case.motion.scaled_to(pga * G), case.model)
 
     singly = chattering_map(at, {"p": grid.x.values, "pga": grid.y.values}).outcome.values
     assert np.array_equal(found.reshape(grid.shape), singly.T)

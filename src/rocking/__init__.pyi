@@ -21,6 +21,7 @@ from .errors import (
 from .explorer.notebook import explore
 from .motion import Motion, pulses, records
 from .motion.formats import read
+from .motion.scaling import Measure
 from .response import Response
 from .simulation import simulate
 from .studies import Study, study
@@ -41,6 +42,7 @@ __all__ = [
     "InvalidBlock",
     "InvalidMotion",
     "InvalidOption",
+    "Measure",
     "Motion",
     "OutputError",
     "Response",

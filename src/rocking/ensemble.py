@@ -13,8 +13,8 @@ from rocking import checks
 from rocking.block import Block, Blocks
 from rocking.engine import OUTCOME, cores, simulate_tasks
 from rocking.errors import InvalidOption
-from rocking.motion.accepted import several_motions
-from rocking.motion.motion import Motion
+from rocking.motion.arguments import Motions, several_motions
+from rocking.motion.scaling import Measure, MeasureName
 from rocking.product import VARIABLES, Polarity, Product, Scales
 from rocking.progress import Progress
 from rocking.treatment import Treatment, treatment
@@ -26,16 +26,12 @@ if TYPE_CHECKING:
 
 def simulate_many(
     blocks: Blocks | Block | Sequence[Block],
-    motions: Motion | Sequence[Motion],
+    motions: Motions,
     *,
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",
-    factor: ArrayLike | None = None,
-    pga: ArrayLike | None = None,
-    pgv: ArrayLike | None = None,
-    sa: ArrayLike | None = None,
-    period: float | None = None,
-    damping: float = 0.05,
+    levels: ArrayLike | None = None,
+    measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",
     duration: float | None = None,
     threads: int | None = None,
@@ -47,17 +43,15 @@ def simulate_many(
     ----------
     blocks : Blocks, Block or sequence of Block
         n blocks.
-    motions : Motion or sequence of Motion
-        m motions.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; a mapping gives them its names.
     model, chattering, duration
         As for `simulate`.
-    factor, pga, pgv, sa : array_like, optional
-        At most one: simulate every motion scaled by these factors, or to these peak accelerations (m/s^2), peak
-        velocities (m/s) or spectral accelerations (m/s^2, at `period` and `damping`). Adds the dimension ``scale``.
-    period : float, optional
-        Period for `sa`, s.
-    damping : float
-        Fraction of critical damping for `sa`.
+    levels : array_like, optional
+        Simulate every motion scaled to each of these levels of `measure`. Adds the dimension ``scale``.
+    measure : {"factor", "pga", "pgv"} or Measure
+        What levels are: factors on the motions, peak accelerations (m/s^2), peak velocities (m/s), or spectral
+        accelerations (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
     polarity : {"+", "-", "both"}
         Motions as they are, reversed, or both (adds the dimension ``polarity``).
     threads : int, optional
@@ -82,7 +76,7 @@ def simulate_many(
     Notes
     -----
     The same engine as `simulate`: every impact is located and chattering is proven. Under evenly sampled records the
-    blocks that rock step together through each sample, and only those with an event in it are played one by one. What
+    blocks that rock step together through each sample, and only those with an event in it are marched one by one. What
     becomes of a block depends on the block and the motion alone, bit for bit, whatever is simulated beside it.
 
     Examples
@@ -90,7 +84,7 @@ def simulate_many(
     >>> import rocking
     >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-    >>> result = rocking.simulate_many(blocks, motion, factor=[0.4, 1.0])
+    >>> result = rocking.simulate_many(blocks, motion, levels=[0.4, 1.0])
     >>> dict(result.sizes)
     {'motion': 1, 'scale': 2, 'block': 4}
     >>> result.overturned.sel(scale=0.4).values.tolist()
@@ -99,7 +93,7 @@ def simulate_many(
     product = Product(
         Blocks.of(blocks),
         tuple(several_motions(motions)),
-        Scales.of(factor=factor, pga=pga, pgv=pgv, sa=sa, period=period, damping=damping),
+        Scales.of(levels, measure),
         polarity,
         model,
         treatment(chattering),

@@ -11,7 +11,8 @@ import numpy as np
 from rocking.block import Block
 from rocking.block.body import bodies_of
 from rocking.constants import STANDARD_GRAVITY
-from rocking.motion import measures, records
+from rocking.motion import measures
+from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
 
 #: Peak accelerations of ground motions that were ever of interest, g.
@@ -33,24 +34,16 @@ _UNITLESS: Final = re.compile(r"[\d.+-]+(?:e[+-]?\d+)?", re.IGNORECASE)
 #: A restitution less certain than this is worth a note.
 _UNCERTAIN: Final = 0.01
 
-#: Larger blocks are no blocks, m.
+#: Largest plausible diagonal of a block, m.
 _LARGEST: Final = 30.0
 
-_CHANNEL: Final = re.compile(r"channel \d+ ['\"]([^'\"]*)['\"]|direction ([\w-]+)")
 _VERTICAL: Final = re.compile(r"(up|down|dn|dwn|ver|vert|vertical|u-?d|z|v|[a-z]{2}z)\b.*", re.IGNORECASE)
 _HORIZONTAL: Final = re.compile(
     r"(\d{2,3}|n|e|s|w|ns|ew|n-s|e-w|[ns] ?\d{1,2} ?[ew]|north|east|south|west|h[12]|[a-z]{2}[ne12])( deg.*)?",
     re.IGNORECASE,
 )
-#: What ends a record's description: event and station, where they are known, and the channel.
-_STATION: Final = re.compile(r".*, station (?!line |channel )(.*?), channel \d")
-_EVENT: Final = re.compile(r".*, event (.*?)(?:, station .*)?, channel \d")
-
 #: Components that start together last about as long: the shorter one at least this part of the longer one.
 _ALIKE: Final = 0.75
-
-_HEADING_UNITS: Final = re.compile(r"heading units (\S+?),")
-_UNITS: Final = re.compile(r"(?<!heading )units ([^\s,]+)")
 
 
 def motion_notes(motion: Motion) -> tuple[str, ...]:
@@ -73,7 +66,7 @@ def motion_notes(motion: Motion) -> tuple[str, ...]:
     ('the peak acceleration is 30.6 g, more than any ground motion has: are the units right?',)
     """
     notes = reading_notes(motion)
-    direction = _direction(motion)
+    direction = _origin(motion).channel
     if _VERTICAL.fullmatch(direction):
         notes += (f"the channel {direction!r} looks vertical, but it is taken for a horizontal motion",)
     return notes + vertical_notes(motion)
@@ -97,11 +90,11 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
     if _is_multiple(motion, vertical):
         return ("the vertical motion is the horizontal one itself: name its own channel or file",)
     notes = [f"the vertical motion: {sentence}" for sentence in reading_notes(vertical)]
-    direction = _direction(vertical)
+    direction = _origin(vertical).channel
     if _HORIZONTAL.fullmatch(direction):
         notes.append(f"the channel {direction!r} looks horizontal, but it is taken for the vertical motion")
-    for what, known in (("station", _station), ("event", _event)):
-        theirs, ours = known(vertical), known(motion)
+    for what in ("station", "event"):
+        theirs, ours = (getattr(_origin(each), what) for each in (vertical, motion))
         if theirs and ours and _spelled(theirs) != _spelled(ours):
             notes.append(f"the vertical motion is of the {what} {theirs!r}, the horizontal one of {ours!r}")
     return (*notes, *_timing_notes(motion, vertical))
@@ -122,10 +115,9 @@ def reading_notes(motion: Motion) -> tuple[str, ...]:
         notes.append(f"the sampling step is {step:.3g} s, too coarse for a record: are the times in seconds?")
     if motion.step is None and motion.description.family.endswith("record"):
         notes += _gap_notes(motion)
-    text = motion.description.text
-    heading, taken = _HEADING_UNITS.search(text), _UNITS.search(text)
-    if heading is not None and taken is not None and heading[1] != taken[1]:
-        notes.append(f"the file's heading says {heading[1]}, but the numbers are taken for {taken[1]}")
+    origin = _origin(motion)
+    if origin.heading_units and origin.heading_units != origin.units:
+        notes.append(f"the file's heading says {origin.heading_units}, but the numbers are taken for {origin.units}")
     return tuple(notes)
 
 
@@ -252,30 +244,9 @@ def _is_multiple(motion: Motion, other: Motion) -> bool:
     return bool(np.allclose(two, two[at] / one[at] * one, rtol=0.0, atol=1e-6 * abs(two[at])))
 
 
-def _station(motion: Motion) -> str:
-    """Return the station of a record, or an empty text."""
-    if motion.name in records.names():
-        return records.info(motion.name).station
-    return _found(_STATION, motion)
-
-
-def _event(motion: Motion) -> str:
-    """Return the earthquake of a record, or an empty text."""
-    if motion.name in records.names():
-        return records.info(motion.name).event
-    return _found(_EVENT, motion)
-
-
-def _found(pattern: re.Pattern[str], motion: Motion) -> str:
-    found = pattern.search(motion.description.text)
-    return found[1].strip() if found else ""
+def _origin(motion: Motion) -> Origin:
+    return motion.description.origin or Origin()
 
 
 def _spelled(text: str) -> str:
     return re.sub(r"\W+", " ", text).strip().casefold()
-
-
-def _direction(motion: Motion) -> str:
-    """Return the name of a record's channel or its direction, or an empty text."""
-    found = _CHANNEL.search(motion.description.text)
-    return (found[1] or found[2] or "").strip() if found else ""

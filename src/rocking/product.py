@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -16,10 +14,11 @@ from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.constants import VERSION
 from rocking.engine import Setup, Task, parts_of
-from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion import measures
-from rocking.motion.arguments import STRONGEST
+from rocking.errors import InvalidOption
+from rocking.motion.arguments import names_of
 from rocking.motion.motion import Motion
+from rocking.motion.piecewise import STRONGEST
+from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.problem import rules_of
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
@@ -55,52 +54,28 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """How motions are scaled: a measure and its values; without one, not at all.
+    """Levels of a measure that motions are scaled to; without a measure, motions as they are.
 
     Attributes
     ----------
-    measure : {"factor", "pga", "pgv", "sa"} or None
+    measure : Measure or None
         What `values` are: factors, peak accelerations (m/s^2), peak velocities (m/s), spectral accelerations (m/s^2).
     values : ndarray
-        Values of the measure.
-    options : mapping
-        period (s) and damping of "sa".
+        Levels of the measure.
     """
 
-    measure: str | None = None
+    measure: Measure | None = None
     values: Floats = field(default_factory=lambda: np.ones(1))
-    options: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, *, period: float | None, damping: float, **measures: ArrayLike | None) -> Scales:
-        """Scales from the one measure that is given.
-
-        Raises
-        ------
-        InvalidOption
-            If there are several, or an argument is out of place or range.
-        """
-        given = {name: values for name, values in measures.items() if values is not None}
-        if len(given) > 1:
-            raise InvalidOption(f"motions can be scaled to one measure only, not to {' and '.join(given)}")
-        if "sa" not in given and period is not None:
-            raise InvalidOption("period= belongs to sa=; give sa= as well, or neither")
-        if not given:
+    def of(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
+        """Scales from arguments."""
+        known = Measure.of(measure, among=SCALES)
+        if levels is None:
+            if known.name != "factor":
+                raise InvalidOption("{} says what {} are: give those as well", "measure", "levels")
             return cls()
-        ((name, target),) = given.items()
-        values = checks.positive_numbers(target, name, InvalidOption)
-        if name != "sa":
-            return cls(name, values)
-        if period is None:
-            raise InvalidOption("sa= needs period=, in s")
-        return cls(
-            name,
-            values,
-            {
-                "period": checks.positive(period, "period", InvalidOption, "s"),
-                "damping": checks.within(damping, "damping", InvalidOption, 0.0, math.nextafter(1.0, 0.0)),
-            },
-        )
+        return cls(known, checks.positive_numbers(levels, "levels", InvalidOption))
 
     @property
     def count(self) -> int:
@@ -108,18 +83,13 @@ class Scales:
         return len(self.values)
 
     @property
-    def units(self) -> str:
-        """Units of the values."""
-        return {"factor": "1", "pgv": "m/s"}.get(self.measure or "factor", "m/s^2")
+    def about(self) -> dict[str, Any]:
+        """Name of the measure, its units, and its period (s) and damping where it has them."""
+        measure = self.measure or FACTOR
+        return {"measure": measure.name, "units": measure.units, **measure.options()}
 
     def factors(self, motion: Motion) -> Floats:
-        """Factors that bring a motion to the values of the measure.
-
-        Raises
-        ------
-        InvalidMotion
-            If the motion is zero throughout, or would become stronger than any may be.
-        """
+        """Factors that bring a motion to the levels."""
         with np.errstate(over="ignore"):
             factors = self.values / self.now(motion)
         if not factors.max() * np.abs(motion.coefficients).max() <= STRONGEST:
@@ -127,19 +97,8 @@ class Scales:
         return factors
 
     def now(self, motion: Motion) -> float:
-        """Return what a motion measures as it is; 1 where scales are factors.
-
-        Raises
-        ------
-        InvalidMotion
-            If the motion is zero throughout.
-        """
-        if self.measure is None or self.measure == "factor":
-            return 1.0
-        now = measures.target(motion, self.measure, self.options.get("period"), self.options.get("damping", 0.0))
-        if now == 0.0:
-            raise InvalidMotion(f"{motion.name} is zero throughout and cannot be scaled to a {self.measure}")
-        return now
+        """Return what a motion measures as it is; 1 where scales are factors."""
+        return (self.measure or FACTOR).positive(motion, motion.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,11 +177,10 @@ class Product:
         return whole.isel({name: 0 for name, is_gone in gone.items() if is_gone}, drop=True)
 
     def _coordinates(self) -> dict[str, Any]:
-        about = {"measure": self.scales.measure or "factor", "units": self.scales.units, **self.scales.options}
         return {
             "motion": ("motion", names_of(self.motions)),
             **verticals_of(self.motions),
-            "scale": ("scale", self.scales.values, about),
+            "scale": ("scale", self.scales.values, self.scales.about),
             "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in self.signs]),
             **block_coordinates(self.blocks),
         }
@@ -243,17 +201,6 @@ def verticals_of(motions: Sequence[Motion]) -> dict[str, Any]:
     """Names of the vertical components, as a coordinate of the dimension ``motion``; none where no motion has one."""
     names = ["" if motion.vertical is None else motion.vertical.name for motion in motions]
     return {"vertical": ("motion", names)} if any(motion.vertical for motion in motions) else {}
-
-
-def names_of(motions: Sequence[Motion]) -> list[str]:
-    """Names of motions, numbered where several share one: a row of a table must say which it is."""
-    shared = {name for name, count in Counter(motion.name for motion in motions).items() if count > 1}
-    seen: Counter[str] = Counter()
-    names = []
-    for motion in motions:
-        seen[motion.name] += 1
-        names.append(f"{motion.name} #{seen[motion.name]}" if motion.name in shared else motion.name)
-    return names
 
 
 def block_coordinates(blocks: Blocks) -> dict[str, Any]:

@@ -9,9 +9,11 @@ from typing import Final
 
 import numpy as np
 
+from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.formats.units import find_unit
+from rocking.motion.scaling import FACTOR, Measure
 from rocking.tables import decimal
 
 #: What reads one number of an option: its text and the option's name, to SI units.
@@ -36,7 +38,7 @@ def number(text: str, option: str) -> float:
     """Return a number without a unit."""
     value, unit = _parts(text)
     if value is None or unit:
-        raise InvalidOption(f"{option} takes a number, not {text.strip()!r}")
+        raise InvalidOption(f"{{}} takes a number, not {text.strip()!r}", option)
     return value
 
 
@@ -45,7 +47,7 @@ def acceleration(text: str, option: str) -> float:
     value, spelling = _parts(text)
     unit = find_unit(spelling or "m/s2")
     if value is None or unit is None:
-        raise InvalidOption(f"{option} takes an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2), not {text.strip()!r}")
+        raise InvalidOption(f"{{}} takes an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2), not {text.strip()!r}", option)
     return value * unit.multiplier / unit.divisor
 
 
@@ -73,7 +75,7 @@ def length(text: str, option: str) -> float:
     """Return a positive length, m, from "0.2m", "20cm" or "0.2" (m)."""
     value = _in_units(_LENGTHS, text, option, "a length as 0.2, 0.2m or 20cm")
     if not value > 0.0:
-        raise InvalidOption(f"{option} must be a positive length, in m, not {text.strip()}")
+        raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", option)
     return value
 
 
@@ -84,16 +86,16 @@ def tilt(text: str, option: str) -> float:
         return value
     if abs(value) < 90.0 and not _parts(text)[1]:
         raise InvalidOption(
-            f"{option} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?"
+            f"{{}} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?", option
         )
-    raise InvalidOption(f"{option} must be below 90deg in size, not {text.strip()}")
+    raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", option)
 
 
 def sides(text: str, option: str, quantity: Quantity = number) -> float | list[float]:
     """Return one number, or a list of two: side + and side -."""
     found = [quantity(part, option) for part in text.split(",")]
     if len(found) > 2:
-        raise InvalidOption(f"{option} takes a number, or two with a comma between (side +, side -), not {text!r}")
+        raise InvalidOption(f"{{}} takes a number, or two with a comma between (side +, side -), not {text!r}", option)
     return found[0] if len(found) == 1 else found
 
 
@@ -102,8 +104,9 @@ def bounds(text: str, option: str, quantity: Quantity = number) -> float | tuple
     found = [quantity(part, option) for part in text.split(",")]
     if len(found) > 2:
         raise InvalidOption(
-            f"{option} takes a number, if it is known, or two with a comma between, the lowest and the highest "
-            f"thinkable, not {text!r}"
+            f"{{}} takes a number, if it is known, or two with a comma between, the lowest and the highest thinkable, "
+            f"not {text!r}",
+            option,
         )
     return found[0] if len(found) == 1 else tuple(found)
 
@@ -114,15 +117,51 @@ def values(text: str, option: str, quantity: Quantity = number) -> Floats:
     if len(parts) == 1:
         return np.array([quantity(part, option) for part in text.split(",")])
     if len(parts) not in (3, 4) or not parts[2].strip().isdecimal() or (len(parts) == 4 and parts[3] != "log"):
-        raise InvalidOption(f"{option} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}")
+        raise InvalidOption(f"{{}} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}", option)
     start, stop, count = quantity(parts[0], option), quantity(parts[1], option), int(parts[2])
     if not 2 <= count <= _MOST:
-        raise InvalidOption(f"{option} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}")
+        raise InvalidOption(f"{{}} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}", option)
     if len(parts) == 3:
         return _decimals(np.linspace(start, stop, count))
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
-        raise InvalidOption(f"{option}: a range with :log needs positive ends, not {text!r}")
+        raise InvalidOption(f"{{}}: a range with :log needs positive ends, not {text!r}", option)
     return _decimals(np.geomspace(start, stop, count))
+
+
+def scaling(given: Mapping[str, str | float | None], quantity: Quantity = acceleration) -> tuple[float, Measure] | None:
+    """Return the level that a motion is scaled to, and the measure that it is of; None where nothing is given.
+
+    Parameters
+    ----------
+    given : mapping
+        At most one of scale (a factor), pga, pgv (m/s) and sa ("0.4g@1.0", at a period, s), as texts or numbers.
+    quantity : callable
+        What reads accelerations.
+
+    Examples
+    --------
+    >>> scaling({"pga": "0.5g"})
+    (4.903325, Measure(name='pga', period=None, damping=0.05))
+    >>> scaling({"scale": "-2"})[0], scaling({"sa": "3@0.5"})[1].period, scaling({})
+    (-2.0, 0.5, None)
+    """
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if not chosen:
+        return None
+    if len(chosen) > 1:
+        raise InvalidOption(f"{' and '.join(['{}'] * len(chosen))} scale the same motion; give one of them", *chosen)
+    ((name, value),) = chosen.items()
+    if name == "pga":
+        return quantity(str(value), name), Measure("pga")
+    if name == "sa":
+        level, at, period = str(value).partition("@")
+        if not at:
+            raise InvalidOption(f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {value!r}", name)
+        return quantity(level, name), Measure("sa", number(period, name))
+    plain = number(value, name) if isinstance(value, str) else float(value)
+    if name == "scale":
+        return checks.finite(plain, name, InvalidOption), FACTOR
+    return checks.positive(plain, name, InvalidOption, "m/s"), Measure("pgv")
 
 
 def _decimals(numbers: Floats) -> Floats:
@@ -133,7 +172,7 @@ def _decimals(numbers: Floats) -> Floats:
 def _in_units(units: Mapping[str, float], text: str, option: str, wanted: str) -> float:
     value, unit = _parts(text)
     if value is None or unit.lower() not in units:
-        raise InvalidOption(f"{option} takes {wanted}, not {text.strip()!r}")
+        raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", option)
     return value * units[unit.lower()]
 
 

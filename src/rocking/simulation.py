@@ -12,7 +12,7 @@ from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
-from rocking.motion.accepted import one_motion
+from rocking.motion.arguments import one_motion
 from rocking.motion.motion import Motion
 from rocking.problem import ground_of, records_of, rules_of
 from rocking.response import Response

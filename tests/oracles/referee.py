@@ -50,13 +50,13 @@ class Batch:
 
     @property
     def options(self) -> dict[str, Any]:
-        scaled = {} if self.factor is None else {"factor": [self.factor]}
+        scaled = {} if self.factor is None else {"levels": [self.factor]}
         return {"model": self.model, "duration": self.duration, "polarity": self.polarity, **scaled}
 
     @property
     def motions(self) -> list[rocking.Motion]:
         """The motion as each polarity of the ensemble has it."""
-        scaled = self.motion if self.factor is None else self.motion.scaled(factor=self.factor)
+        scaled = self.motion if self.factor is None else self.motion.scaled(self.factor)
         return {"+": [scaled], "-": [-scaled], "both": [scaled, -scaled]}[self.polarity]
 
     def together(self, **options: Any) -> dict[str, NDArray[Any]]:
@@ -509,7 +509,7 @@ def _neighbours(given: Batch, sign: int, k: int) -> Iterator[Callable[[], rockin
 
     for ulps in (-4, -1, 1, 4):
         factor = 1.0 + ulps * ULP
-        yield simulated(block, motion.scaled(factor=factor))
+        yield simulated(block, motion.scaled(factor))
         slenderness = np.minimum(alpha[k] * factor, np.nextafter(0.5 * np.pi, 0.0))
         for values in (
             (p[k], slenderness, restitution[k]),

@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.intensity import Measure
-from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled
+from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled, units_of, values_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption
-from rocking.motion import accepted
-from rocking.motion.motion import Motion
+from rocking.motion.arguments import Motions, several_motions
+from rocking.motion.scaling import Measure
 from rocking.result import Result
 from rocking.tables import counted, text_table
 from rocking.treatment.base import Model
@@ -34,7 +33,7 @@ _CONFIDENCE: Final = 0.9
 
 def compare_measures(
     blocks: Blocks | Block | Sequence[Block],
-    motions: Motion | Sequence[Motion],
+    motions: Motions,
     *,
     periods: ArrayLike = (0.5, 1.0, 2.0),
     damping: float = 0.05,
@@ -102,7 +101,7 @@ def compare_measures(
     >>> [f"{name} {beta:.2f}" for name, beta in zip(found.measure.values, found.dispersion.values)]
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / (g tan α) 0.67', 'p PGV / (g tan α) 0.02']
     """
-    many, shaken = Blocks.of(blocks), accepted.several_motions(motions)
+    many, shaken = Blocks.of(blocks), several_motions(motions)
     shares = mean_one(weights, len(many))
     if len(shaken) < 2:
         raise InvalidOption("measures are compared by how motions scatter: give two motions or more, not one")
@@ -117,14 +116,11 @@ def compare_measures(
         Measure("pga_ratio"),
         Measure("pgv_ratio"),
     ]
-    lifting = Measure("pga_ratio").unit_of(many, model)
+    lifting = units_of(many, Measure("pga_ratio"), model)
     level = scaled.overturning_level.transpose("motion", "block").values
     factors = level * lifting / np.array([motion.pga for motion in shaken])[:, None]
     intensity = np.stack(
-        [
-            factors * np.array([measure.of(motion) for motion in shaken])[:, None] / measure.unit_of(many, model)
-            for measure in measures
-        ]
+        [factors * values_of(shaken, measure)[:, None] / units_of(many, measure, model) for measure in measures]
     )
     if np.any(np.isfinite(level).sum(axis=0) < 2):
         raise InvalidOption("fewer than two motions overturn a block, however strong; a dispersion needs more")

@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.intensity import Measure, intensities
 from rocking.arrays import Floats, as_asked
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
+from rocking.motion.scaling import IntensityName, Measure, intensities
 from rocking.tables import text_table
 
 if TYPE_CHECKING:
     from rocking.plot import HazardLine
 
 #: Headings of an intensity in a table, with its measure and the factor to SI units.
-HEADINGS: Final = {
+HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
     "pga_g": ("pga", STANDARD_GRAVITY),
     "pga_m_s2": ("pga", 1.0),
     "pgv_m_s": ("pgv", 1.0),
@@ -32,7 +32,11 @@ HEADINGS: Final = {
 }
 
 #: Names of intensities in OpenQuake's files, with the factor to SI units.
-_OPENQUAKE: Final = {"PGA": ("pga", STANDARD_GRAVITY), "PGV": ("pgv", 0.01), "SA": ("sa", STANDARD_GRAVITY)}
+_OPENQUAKE: Final[dict[str, tuple[IntensityName, float]]] = {
+    "PGA": ("pga", STANDARD_GRAVITY),
+    "PGV": ("pgv", 0.01),
+    "SA": ("sa", STANDARD_GRAVITY),
+}
 
 #: Rates that a figure's axis has room for.
 _DRAWN: Final = (1e-200, 1e200)
@@ -86,7 +90,7 @@ class HazardCurve:
         _check_order("intensities", intensity, 1.0)
         _check_order("rates", rate, -1.0)
         given: Any = self.measure
-        measure = given if isinstance(given, Measure) else Measure(given)
+        measure = Measure.of(given)
         if measure.units == "1":
             raise InvalidOption("a hazard curve is of pga, pgv or sa, which are of the site, not of a block")
         for name, value in (("intensity", intensity), ("rate", rate), ("measure", measure)):
@@ -224,8 +228,8 @@ def _from_table(lines: list[str], path: str, period: float | None) -> tuple[Floa
         except (ValueError, IndexError):
             raise InvalidOption(f"{path}, row {k}: {apart.join(row)} is not an intensity and a rate") from None
     if kind == "sa" and period is None:
-        raise InvalidOption(f"{path}: give period= (s) of its spectral acceleration")
-    measure = Measure("sa", period) if kind == "sa" else Measure(kind)  # type: ignore[arg-type]
+        raise InvalidOption("give {} (s) of its spectral acceleration", "period", path=path)
+    measure = Measure("sa", period) if kind == "sa" else Measure(kind)
     table = np.array(points, dtype=np.float64).reshape(-1, 2)
     return factor * table[:, 0], table[:, 1], measure
 
@@ -249,7 +253,7 @@ def _from_openquake(lines: list[str], path: str, site: int) -> tuple[Floats, Flo
     except (ValueError, IndexError) as error:
         raise InvalidOption(f"{path}, site {site}: {error}; it is not a whole hazard curve") from None
     measure_name, factor = _OPENQUAKE[kind]
-    measure = Measure("sa", float(rest.rstrip(")"))) if kind == "SA" else Measure(measure_name)  # type: ignore[arg-type]
+    measure = Measure("sa", float(rest.rstrip(")"))) if kind == "SA" else Measure(measure_name)
     # Probabilities that are printed as 0 or 1 say nothing of the rate.
     useful = (exceeded > 0.0) & (exceeded < 1.0)
     rate = -np.log1p(-exceeded[useful]) / years

@@ -14,15 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.analysis.bands import Levels
 from rocking.analysis.boundaries import Boundaries, boundaries
-from rocking.analysis.intensity import Measure, MeasureName
-from rocking.analysis.levels import REVERSED_TOO, described, several_motions, simulate_levels
+from rocking.analysis.levels import REVERSED_TOO, described, simulate_levels, units_of, values_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
+from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
+from rocking.motion.scaling import IntensityName, Measure
 from rocking.result import Result
 from rocking.tables import counted, named, text_table
 from rocking.treatment import Certified
@@ -46,11 +47,9 @@ _VERDICT: Final = Certified(tolerance=1.0)
 
 def incremental_dynamic_analysis(
     blocks: Blocks | Block | Sequence[Block],
-    motions: Motion | Sequence[Motion],
+    motions: Motions,
     *,
-    measure: MeasureName = "pga",
-    period: float | None = None,
-    damping: float = 0.05,
+    measure: IntensityName | Measure = "pga",
     levels: ArrayLike | None = None,
     model: Model = "nonlinear",
     tolerance: float = 1e-6,
@@ -66,13 +65,12 @@ def incremental_dynamic_analysis(
     ----------
     blocks : Blocks, Block or sequence of Block
         n blocks.
-    motions : Motion or sequence of Motion
-        m motions.
-    measure : {"pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
-        Intensity measure that motions are scaled to: peak acceleration (m/s^2), peak velocity (m/s), spectral
-        acceleration (m/s^2); or in each block's own units PGA/(g tan alpha) and p PGV/(g tan alpha).
-    period, damping : float
-        Oscillator of "sa": s, and fraction of critical.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; a mapping gives them its names.
+    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
+        Intensity measure that motions are scaled to: peak acceleration (m/s^2), peak velocity (m/s); in each block's
+        own units PGA/(g tan alpha) and p PGV/(g tan alpha); or spectral acceleration (m/s^2) as
+        ``rocking.Measure("sa", period=1.0)``.
     levels : array_like, optional
         Increasing levels of the measure. By default from the lowest that lifts a block, in steps of 5 %, to three
         times the level by which every motion has overturned every block, and at most to 490 times the first.
@@ -120,8 +118,8 @@ def incremental_dynamic_analysis(
     overturns from 2.9855 to 6.5019
     overturns from 7.2759 to nan
     """
-    many, how = Blocks.of(blocks), Measure(measure, period, damping)
-    shaken, values = several_motions(motions, how)
+    many, how, shaken = Blocks.of(blocks), Measure.of(measure), several_motions(motions)
+    values = values_of(shaken, how)
     if np.any(np.prod(many.restitution, axis=1) == 1.0):
         raise InvalidOption("a block with restitution 1 never comes to rest; scaling up needs one below 1")
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
@@ -134,7 +132,7 @@ def incremental_dynamic_analysis(
             many, shaken, how, checks.increasing_numbers(levels, "levels", InvalidOption), **options
         )
 
-    factors = how.unit_of(many, model)[None, :] / values[:, None]
+    factors = units_of(many, how, model)[None, :] / values[:, None]
 
     def overturned(column: Integers, level: Floats) -> Integers:
         verdicts = np.empty(column.size, dtype=np.int64)
@@ -309,7 +307,7 @@ def _lowest_uplift(blocks: Blocks, motions: Sequence[Motion], values: Floats, me
     """
     thresholds = np.array([block.uplift_thresholds(model) for block in blocks])
     factors = np.array([lifting_factors(motion, thresholds, blocks.gravity) for motion in motions])
-    lowest = float(np.min(factors * values[:, None] / measure.unit_of(blocks, model)))
+    lowest = float(np.min(factors * values[:, None] / units_of(blocks, measure, model)))
     if math.isinf(lowest):
         raise InvalidOption("no motion lifts a block at any level: none pushes towards a side as its weight allows")
     return lowest

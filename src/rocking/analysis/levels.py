@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.intensity import Measure
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
-from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion import accepted
+from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
+from rocking.motion.scaling import Measure
 from rocking.tables import counted
 from rocking.treatment.base import Model
 
@@ -46,13 +45,7 @@ def pooled(blocks: Blocks | Block | Sequence[Block], weights: ArrayLike | None) 
 
 
 def mean_one(weights: ArrayLike | None, count: int) -> Floats:
-    """Weights of blocks, one each and 1 in the mean; all 1 where none are given.
-
-    Raises
-    ------
-    InvalidOption
-        If they are not one finite number for each block, none of them negative, and not all 0.
-    """
+    """Weights of blocks, one each and 1 in the mean; all 1 where none are given."""
     if weights is None:
         return np.ones(count)
     given = checks.numbers(weights, "weights", InvalidOption)
@@ -73,21 +66,16 @@ def _pair(sides: Floats) -> str:
     return f"{sides[0]:.4g}" if sides[0] == sides[1] else f"({sides[0]:.4g}, {sides[1]:.4g})"
 
 
-def several_motions(motions: Motion | Sequence[Motion], measure: Measure) -> tuple[list[Motion], Floats]:
-    """Motions and their measures.
+def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
+    """Return what each motion alone measures, in SI units."""
+    return np.array([measure.positive(motion, motion.name) for motion in motions])
 
-    Raises
-    ------
-    InvalidOption
-        If there is none.
-    InvalidMotion
-        If one is no motion, or zero throughout.
-    """
-    shaken = accepted.several_motions(motions)
-    values = np.array([measure.of(motion) for motion in shaken])
-    if not np.all(values > 0.0):
-        raise InvalidMotion(f"{shaken[int(np.argmin(values))].name} is zero throughout and has no intensity")
-    return shaken, values
+
+def units_of(blocks: Blocks, measure: Measure, model: Model) -> Floats:
+    """Return what counts as 1 for each block, in SI units: the block's own unit, or 1."""
+    if not measure.in_block_units:
+        return np.ones(len(blocks))
+    return measure.unit(np.array([min(block.uplift_thresholds(model)) for block in blocks]), blocks.p.min(axis=1))
 
 
 def simulate_levels(
@@ -106,12 +94,12 @@ def simulate_levels(
     """
     import xarray as xr
 
-    units = measure.unit_of(blocks, model)
+    units = units_of(blocks, measure, model)
     groups = [np.flatnonzero(units == unit) for unit in np.unique(units)]
     parts = []
     for group in groups:
-        targets = {measure.of_motion: levels * units[group[0]], **measure.options()}
-        parts.append(simulate_many(blocks.select(group), motions, model=model, **targets, **options))
+        scaled = {"levels": levels * units[group[0]], "measure": measure.alone}
+        parts.append(simulate_many(blocks.select(group), motions, model=model, **scaled, **options))
         parts[-1] = parts[-1].assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units}))
     whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
     require_finished(whole.unfinished.values)

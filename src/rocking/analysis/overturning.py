@@ -348,7 +348,7 @@ def _unit_pulse(pulse: str | PulseFamily, frequency: float, parameters: dict[str
     if family.name not in _FAMILIES:
         raise InvalidOption(f"pulse must be one of {', '.join(_FAMILIES)}, or a function, not {pulse!r}")
     unit = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
-    return unit.scaled(pga=1.0) if family.make is pulses.mavroeidis_papageorgiou else unit
+    return unit.scaled_to(1.0) if family.make is pulses.mavroeidis_papageorgiou else unit
 
 
 def _resized(block: Block, ratios: Floats) -> Blocks:

@@ -19,9 +19,8 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.motion.accepted import several_motions
+from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
-from rocking.motion.motion import Motion
 from rocking.result import Result, table_of_some
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
@@ -43,7 +42,7 @@ _MOST_CURVES = 4
 
 
 def rocking_spectrum(
-    motions: Motion | Sequence[Motion],
+    motions: Motions,
     *,
     alpha: ArrayLike | None = None,
     p: ArrayLike | None = None,
@@ -62,8 +61,8 @@ def rocking_spectrum(
 
     Parameters
     ----------
-    motions : Motion or sequence of Motion
-        m motions.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; a mapping gives them its names.
     alpha : array_like, optional
         Slendernesses, rad; or give `blocks`.
     p : array_like
@@ -350,7 +349,7 @@ def _curve_name(one: xr.Dataset) -> str:
 def _ensemble_spectrum(
     blocks: Blocks,
     weights: ArrayLike | None,
-    motions: Motion | Sequence[Motion],
+    motions: Motions,
     p: ArrayLike | None,
     size: ArrayLike | None,
     shares: Floats,

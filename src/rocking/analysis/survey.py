@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from rocking import checks
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.contact import friction_coefficient
-from rocking.errors import InvalidOption
+from rocking.motion.arguments import Motions, motions_by_name, names_of
 from rocking.motion.motion import Motion
-from rocking.product import block_coordinates, names_of, verticals_of
+from rocking.product import block_coordinates, verticals_of
 from rocking.progress import Progress, note
 from rocking.response import Response
 from rocking.response.digits import ratio_text
@@ -146,7 +145,7 @@ class Survey:
 
 def survey(
     block: Block,
-    motions: Mapping[str, Motion],
+    motions: Motions,
     *,
     friction: float | None = None,
     progress: bool | None = None,
@@ -158,8 +157,8 @@ def survey(
     ----------
     block : Block
         What rocks.
-    motions : mapping of str to Motion
-        Motions by the names that the table shows.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; the table shows the names of a mapping, or else the motions' own.
     friction : float, optional
         Coefficient of friction at which to look for sliding.
     progress : bool, optional
@@ -185,16 +184,16 @@ def survey(
     >>> print(found.summary().splitlines()[0])
     rectangular block, 0.24 m x 1.1 m: 2 records, overturned by 1
     """
-    checks.mapping(motions, "motions", InvalidOption, "{name: motion}")
+    named_motions = motions_by_name(motions)
     if friction is not None:
         friction_coefficient(friction)
     responses = []
-    with Progress("simulating", total=len(motions), show=progress) as bar:
-        for motion in motions.values():
+    with Progress("simulating", total=len(named_motions), show=progress) as bar:
+        for motion in named_motions.values():
             responses.append(simulate(block, motion, **options))
             _row(responses[-1])  # what takes long in it, the response keeps: while the bar is there
             bar.advance()
-    return Survey(block, tuple(motions), tuple(responses), friction)
+    return Survey(block, tuple(named_motions), tuple(responses), friction)
 
 
 def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:

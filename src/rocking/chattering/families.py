@@ -73,7 +73,7 @@ def mavroeidis_papageorgiou(
 
     def case(a: float, omega: float) -> Case:
         pulse = pulses.mavroeidis_papageorgiou(1.0, _hertz(block, omega), phase=phase, gamma=gamma)
-        return Case(block, pulse.scaled(pga=a * scale), model)
+        return Case(block, pulse.scaled_to(a * scale), model)
 
     return case
 
@@ -88,7 +88,7 @@ def record(
 
     def case(a: float, p: float) -> Case:
         block = Block.from_parameters(p, alpha, restitution)
-        return Case(block, motion.scaled(pga=a * _threshold(block, model)), model)
+        return Case(block, motion.scaled_to(a * _threshold(block, model)), model)
 
     return case
 

@@ -14,7 +14,6 @@ from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.fragility.fit import fragility as run
 from rocking.analysis.fragility.observed import read_observed
 from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.intensity import Measure
 from rocking.cli import batch
 from rocking.cli.options import (
     BLOCK,
@@ -109,8 +108,7 @@ def fragility(
     with output.folder() as folder:
         read = None
         if outcomes is not None:
-            wanted = Measure(measure.measure, measure.period, measure.damping)
-            observed = read_observed(outcomes, wanted, channel=motion.channel, dt=motion.dt, units=motion.units)
+            observed = read_observed(outcomes, measure.wanted, channel=motion.channel, dt=motion.dt, units=motion.units)
             fitted = fit_fragility(**observed, **bands)
         else:
             read = motion.read_all(names)

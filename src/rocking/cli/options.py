@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple
 
 from cyclopts import Group, Parameter
 
-from rocking import checks
-from rocking.analysis.intensity import MeasureName
 from rocking.cli.wording import with_options
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, UnreadableRecord
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
+from rocking.motion.scaling import IntensityName, Measure
 from rocking.named_pulses import named_pulse
 from rocking.plausibility import block_notes, level_notes, motion_notes, vertical_notes
 from rocking.progress import Progress, note
-from rocking.quantities import Quantity, acceleration, length, number, sides, tilt, values, velocity
+from rocking.quantities import Quantity, acceleration, length, number, scaling, sides, tilt, values, velocity
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
@@ -235,9 +234,10 @@ class FileOptions:
         return motion
 
 
-def refusal(name: str, error: Exception) -> str:
+def refusal(name: str, error: RockingError) -> str:
     """Return why a record cannot be read, with its name, in the words of the command line."""
-    sentence = str(error) if name in str(error) else f"{name}: {error}"
+    spelled = error.text(lambda argument: f"--{argument}" if f"--{argument}" in _OF_FILES else argument)
+    sentence = spelled if name in spelled else f"{name}: {spelled}"
     return with_options(sentence, _OF_FILES, _OF_FILES)
 
 
@@ -303,33 +303,19 @@ class ScaledOptions(VerticalOptions):
 
     def finished(self, name: str, motion: Motion) -> Motion:
         """Return a motion with its vertical component, if one is asked for, scaled; with notes on that as well."""
-        target = self._target
         noted = super().finished(name, motion)
-        if not target:
+        if self._target is None:
             return noted
-        scaled = noted.scaled(**target)
+        scaled = noted.scaled_to(*self._target)
         for sentence in motion_notes(scaled):
             if sentence not in motion_notes(noted):
                 note(f"{name}, scaled: {sentence}")
         return scaled
 
     @functools.cached_property
-    def _target(self) -> dict[str, float]:
-        given = {"--scale": self.scale, "--pga": self.pga, "--pgv": self.pgv, "--sa": self.sa}
-        chosen = [option for option, value in given.items() if value is not None]
-        if len(chosen) > 1:
-            raise InvalidOption(f"{' and '.join(chosen)} scale the same motion; give one of them")
-        if self.scale is not None:
-            checks.finite(self.scale, "--scale", InvalidOption)
-        if self.pga is not None:
-            return {"pga": _acceleration(self.pga, "--pga")}
-        if self.sa is not None:
-            level, at, period = self.sa.partition("@")
-            if not at:
-                raise InvalidOption(f"--sa takes an acceleration at a period, as 0.4g@1.0, not {self.sa!r}")
-            return {"sa": _acceleration(level, "--sa"), "period": number(period, "--sa")}
-        plain = {"factor": self.scale, "pgv": self.pgv}
-        return {name: value for name, value in plain.items() if value is not None}
+    def _target(self) -> tuple[float, Measure] | None:
+        given = {"scale": self.scale, "pga": self.pga, "pgv": self.pgv, "sa": self.sa}
+        return scaling(given, lambda text, name: _acceleration(text, f"--{name}"))
 
 
 @dataclass(frozen=True)
@@ -433,7 +419,7 @@ class MeasureOptions:
     """How the intensity of motions is measured, and its levels."""
 
     measure: Annotated[
-        MeasureName,
+        IntensityName,
         _help(
             "Intensity: PGA, PGV, spectral acceleration, or in the block's own units PGA/(g tan alpha) and "
             "p PGV/(g tan alpha)."
@@ -452,7 +438,12 @@ class MeasureOptions:
     def chosen(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
         levels = None if self.levels is None else values(self.levels, "--levels", self._quantity())
-        return {"measure": self.measure, "period": self.period, "damping": self.damping, "levels": levels}
+        return {"measure": self.wanted, "levels": levels}
+
+    @property
+    def wanted(self) -> Measure:
+        """Measure of intensity."""
+        return Measure(self.measure, self.period, self.damping)
 
     def _quantity(self) -> Quantity:
         """Return what reads a level of the measure."""

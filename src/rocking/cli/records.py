@@ -7,8 +7,7 @@ from typing import Annotated, Final
 
 from rocking.cli.options import OUTPUT, RECORDS, FileOptions, Names, PrintOptions, refusal
 from rocking.errors import InvalidMotion, UnreadableRecord
-from rocking.motion.catalogue import Contents, contents, shipped
-from rocking.motion.named import STANDARD_INPUT, expanded, is_shipped, refuse_what_is_known
+from rocking.motion.named import STANDARD_INPUT, Contents, contents, expanded, is_shipped, refuse_what_is_known, shipped
 from rocking.plausibility import reading_notes
 from rocking.progress import Progress, note
 from rocking.tables import to_json

@@ -10,7 +10,7 @@ from typing import Final
 
 from cyclopts import App, Argument, CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError
 
-from rocking.errors import DamagedStudy, InvalidOption
+from rocking.errors import DamagedStudy, InvalidOption, RockingError, Spelling
 
 #: How alike two names must be for the one to be a slip of the other: a letter or two in a word of six.
 _ALIKE: Final = 0.8
@@ -26,7 +26,8 @@ _OPTION: Final = re.compile(r"--?[A-Za-z]")
 
 def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
     """Return an error as one line that names options."""
-    sentence = " ".join(str(error).split()).rstrip(".")
+    text = error.text(_spelling(app, arguments)) if isinstance(error, RockingError) else str(error)
+    sentence = " ".join(text.split()).rstrip(".")
     if isinstance(error, UnknownCommandError):
         return _unknown_command(called(app, arguments), (error.unused_tokens or arguments)[0])
     command = f"rocking{''.join(f' {name}' for name in _command(app, arguments))}"
@@ -39,6 +40,12 @@ def of(error: Exception, app: App, arguments: Sequence[str]) -> str:
     if isinstance(error, DamagedStudy):
         return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
     return in_options(sentence, app, arguments)
+
+
+def _spelling(app: App, arguments: Sequence[str]) -> Spelling:
+    """Return how to write the name of an argument: as its option, if the command has it."""
+    known = _options(app, arguments)
+    return lambda name: option if (option := f"--{name.replace('_', '-')}") in known else name
 
 
 def in_options(sentence: str, app: App, arguments: Sequence[str]) -> str:

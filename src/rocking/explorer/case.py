@@ -23,7 +23,8 @@ from rocking.explorer.pulses import is_pulse, pulse_as_python, pulse_as_text, pu
 from rocking.explorer.shelf import Shelf
 from rocking.motion import records
 from rocking.motion.motion import Motion
-from rocking.quantities import acceleration, angle, length, number, sides
+from rocking.motion.scaling import Measure
+from rocking.quantities import angle, length, number, scaling, sides
 from rocking.response import Response
 from rocking.simulation import simulate
 from rocking.treatment import Treatment, treatment
@@ -299,22 +300,28 @@ class _Found(NamedTuple):
 
 
 def _motion(given: Texts, shelf: Shelf) -> _Found:
-    target = _target(given)
+    target = scaling({name: given.get(name) for name in ("scale", "pga", "pgv", "sa")})
     found = _unscaled(given.get("motion", DEFAULT["motion"]), given, shelf)
     if "vertical" in given:
         found = _with_vertical(found, given, shelf)
-    if not target:
+    if target is None:
         return found
     if found.motion is None:
         raise InvalidOption("there is no motion to scale: choose one, or leave the scaling out")
-    written = ", ".join(f"{key}={value!r}" for key, value in target.items())
-    return _Found(_scaled(found.motion, **target), f"{found.python}.scaled({written})", found.words)
+    return _Found(_scaled(found.motion, *target), f"{found.python}.{_scaling_as_python(*target)}", found.words)
+
+
+def _scaling_as_python(level: float, measure: Measure) -> str:
+    if measure.name == "factor":
+        return f"scaled({level!r})"
+    kind = f'rocking.Measure("sa", period={measure.period!r})' if measure.name == "sa" else repr(measure.name)
+    return f"scaled_to({level!r}" + ("" if measure.name == "pga" else f", {kind}") + ")"
 
 
 @functools.lru_cache(maxsize=4)
-def _scaled(motion: Motion, **target: float) -> Motion:
+def _scaled(motion: Motion, level: float, measure: Measure) -> Motion:
     """Scaled motion, made once while only the block is changed."""
-    return motion.scaled(**target)
+    return motion.scaled_to(level, measure)
 
 
 def _with_vertical(found: _Found, given: Texts, shelf: Shelf) -> _Found:
@@ -376,24 +383,6 @@ def _told(given: Texts) -> dict[str, Any]:
     """Return what a file does not say by itself, as `rocking.read` takes it."""
     dt = None if "dt" not in given else number(given["dt"], "dt")
     return {"channel": given.get("channel"), "dt": dt, "units": given.get("units")}
-
-
-def _target(given: Texts) -> dict[str, float]:
-    """Arguments of `Motion.scaled`."""
-    chosen = [name for name in ("scale", "pga", "pgv", "sa") if name in given]
-    if len(chosen) > 1:
-        raise InvalidOption(f"{' and '.join(chosen)} scale the same motion; give one of them")
-    if not chosen:
-        return {}
-    (name,) = chosen
-    if name == "pga":
-        return {"pga": acceleration(given["pga"], "pga")}
-    if name == "sa":
-        level, at, period = given["sa"].partition("@")
-        if not at:
-            raise InvalidOption(f"sa takes an acceleration at a period, as 0.4g@1.0, not {given['sa']!r}")
-        return {"sa": acceleration(level, "sa"), "period": number(period, "sa")}
-    return {"factor" if name == "scale" else name: number(given[name], name)}
 
 
 def texts_of_motion(motion: Motion, shelf: Shelf) -> dict[str, str]:

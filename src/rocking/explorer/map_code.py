@@ -168,8 +168,8 @@ def _motion(grid: Grid) -> str:
         p = min(side.p for side in grid.case.block.sides)
         made = pulse_call(text, {**_written(text), "frequency": f"omega * {p!r} / (2.0 * math.pi)"})
     if "a" in names:
-        return f"{made}.scaled(pga=a * min(block.uplift_thresholds({grid.case.model!r})))"
-    return f"{made}.scaled(pga=pga * {STANDARD_GRAVITY!r})" if "pga" in names else made
+        return f"{made}.scaled_to(a * min(block.uplift_thresholds({grid.case.model!r})))"
+    return f"{made}.scaled_to(pga * {STANDARD_GRAVITY!r})" if "pga" in names else made
 
 
 def _written(text: str) -> dict[str, str]:

@@ -7,17 +7,17 @@ import math
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 
 import rocking
-from rocking.analysis.intensity import Measure, MeasureName
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption, StudyError
 from rocking.explorer.case import texts_of_motion
 from rocking.explorer.core import Payload
 from rocking.explorer.shelf import Shelf
+from rocking.motion.scaling import FACTOR
 from rocking.quantities import number
 
 #: Largest map, points.
@@ -225,11 +225,8 @@ class StudyView:
     def _label(self, name: str) -> tuple[str, str]:
         if name != "scale":
             return _LABELS[name]
-        scales = self.study.product.scales
-        if scales.measure in (None, "factor"):
-            return "Factor of the motion", ""
-        measure = Measure(cast(MeasureName, scales.measure), **scales.options)
-        return measure.quantity.capitalize(), measure.units
+        measure = self.study.product.scales.measure or FACTOR
+        return measure.quantity.capitalize(), "" if measure.units == "1" else measure.units
 
     def _described(self, name: str, axes: Mapping[str, Floats]) -> dict[str, Any]:
         label, unit = self._label(name)

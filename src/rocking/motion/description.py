@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final
@@ -12,6 +12,41 @@ from rocking import checks
 from rocking.errors import InvalidMotion
 
 _SCALED: Final = re.compile(r"(scaled by \S+) to .*")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a record file, or the catalogue of shipped records, says of a motion; empty where it says nothing.
+
+    Attributes
+    ----------
+    format : str
+        Format of the file.
+    file : str
+        Name of the file, without its folder.
+    event, station : str
+        Earthquake and place.
+    channel : str
+        Name of the component: "90 Deg", "Up", "HNE", ...
+    number : int or None
+        The channel's number in the file.
+    azimuth : float or None
+        Direction of positive acceleration, degrees clockwise from north; None if vertical or unknown.
+    units : str
+        Units of the numbers in the file, as it spells them.
+    heading_units : str
+        Units that the heading of a text table names, where it has one.
+    """
+
+    format: str = ""
+    file: str = ""
+    event: str = ""
+    station: str = ""
+    channel: str = ""
+    number: int | None = None
+    azimuth: float | None = None
+    units: str = ""
+    heading_units: str = ""
 
 
 @dataclass(frozen=True)
@@ -29,6 +64,8 @@ class Description:
         negative).
     text : str
         The formula, or the record's source and terms, in words.
+    origin : Origin, optional
+        What is known of a record, as data; `text` says it in words.
 
     Raises
     ------
@@ -45,6 +82,7 @@ class Description:
     family: str
     parameters: Mapping[str, float] = field(default_factory=dict)
     text: str = ""
+    origin: Origin | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         checks.text(self.family, "family of a description", InvalidMotion)
@@ -56,7 +94,7 @@ class Description:
         object.__setattr__(self, "parameters", MappingProxyType(numbers))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Description, (self.family, dict(self.parameters), self.text)
+        return Description, (self.family, dict(self.parameters), self.text, self.origin)
 
     def __repr__(self) -> str:
         return f"<Description: {', '.join(part for part in (self.family, self.numbers) if part)}>"
@@ -91,3 +129,19 @@ def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
     """
     both = f"{name} with vertical {vertical}" if vertical else name
     return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))
+
+
+def checked_description(given: Description) -> Description:
+    """Return the description, which must be one."""
+    if not isinstance(given, Description):
+        raise InvalidMotion(
+            f"the description of a motion must be a Description(family, parameters, text), not a {type(given).__name__}"
+        )
+    return given
+
+
+def checked_history(given: Iterable[str]) -> tuple[str, ...]:
+    """Sentences on what was done to a motion."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise InvalidMotion(f"the history of a motion must be a sequence of sentences, not {given!r}")
+    return tuple(checks.text(sentence, "sentence of a motion's history", InvalidMotion) for sentence in given)

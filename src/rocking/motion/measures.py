@@ -103,13 +103,6 @@ def spectral_acceleration(
     return result if result.ndim else float(result)
 
 
-def target(motion: Piecewise, what: str, period: float | None, damping: float) -> float:
-    """Present value of the measure `what` ("pga", "pgv", "sa") that the motion is to be scaled to."""
-    if what == "sa":
-        return float(spectral_acceleration(motion, checks.positive(period, "period", InvalidMotion, "s"), damping))
-    return peak_acceleration(motion) if what == "pga" else peak_velocity(motion)
-
-
 def table(motion: Piecewise, periods: Sequence[float]) -> dict[str, float]:
     """All measures by name, each name ending in its unit."""
     measures = {

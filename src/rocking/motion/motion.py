@@ -13,8 +13,9 @@ from rocking import checks, svg
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
-from rocking.motion import arguments, measures, piecewise, processing, scaling
-from rocking.motion.description import Description, labelled
+from rocking.motion import measures, piecewise, processing
+from rocking.motion.description import Description, checked_description, checked_history, labelled
+from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,19 +82,19 @@ class Motion:
     step: float | None = field(init=False)
 
     def __post_init__(self) -> None:
-        breakpoints, coefficients = arguments.pieces(self.breakpoints, self.coefficients)
+        breakpoints, coefficients = piecewise.checked_pieces(self.breakpoints, self.coefficients)
         held = {
             "breakpoints": breakpoints,
             "coefficients": coefficients,
             "name": checks.text(self.name, "name of a motion", InvalidMotion),
-            "description": arguments.description(self.description),
-            "history": arguments.history(self.history),
+            "description": checked_description(self.description),
+            "history": checked_history(self.history),
             "error": checks.within(
-                self.error, "approximation error of a motion", InvalidMotion, 0.0, arguments.STRONGEST
+                self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.STRONGEST
             ),
         }
         if self.vertical is not None:
-            held["vertical"] = arguments.vertical(self.vertical, Motion)
+            _check_vertical(self.vertical)
         for name, value in held.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "step", piecewise.even_step(self))
@@ -133,6 +134,10 @@ class Motion:
         description : Description, optional
             Where the samples come from.
 
+        Returns
+        -------
+        Motion
+
         Raises
         ------
         InvalidMotion
@@ -144,7 +149,7 @@ class Motion:
         >>> motion.duration, motion.pga
         (0.06, 2.0)
         """
-        samples, step = arguments.samples(acceleration), arguments.step(dt)
+        samples, step = piecewise.checked_samples(acceleration), piecewise.checked_step(dt)
         times = piecewise.even_times(len(samples), step)
         return cls(
             times,
@@ -177,6 +182,10 @@ class Motion:
         description : Description, optional
             Where the points come from.
 
+        Returns
+        -------
+        Motion
+
         Raises
         ------
         InvalidMotion
@@ -188,8 +197,8 @@ class Motion:
         >>> Motion.from_points([0.0, 1.0, 5.0], [0.0, 3.0, 0.0]).acceleration(3.0)
         1.5
         """
-        samples = arguments.samples(acceleration)
-        instants = arguments.instants(times, len(samples))
+        samples = piecewise.checked_samples(acceleration)
+        instants = piecewise.checked_times(times, len(samples))
         with np.errstate(over="ignore"):
             breakpoints = instants - instants[0]
         return cls(
@@ -225,7 +234,7 @@ class Motion:
         Examples
         --------
         >>> motion = Motion([0.0, 2.0], [[1.0]], name="step")
-        >>> motion.label, motion.scaled(pga=2.0).label, (-motion).delayed(1.0).label
+        >>> motion.label, motion.scaled_to(2.0).label, (-motion).delayed(1.0).label
         ('step', 'step, scaled by 2', 'step, polarity reversed, delayed by 1 s')
         """
         return labelled(self.name, self.history, "" if self.vertical is None else self.vertical.name)
@@ -272,7 +281,23 @@ class Motion:
     @overload
     def acceleration(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
     def acceleration(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground acceleration, m/s^2, at the times `t` (s) and shaped like it; zero outside the motion."""
+        """Ground acceleration, m/s^2, at the times `t` (s) and shaped like it; zero outside the motion.
+
+        Parameters
+        ----------
+        t : float or array_like
+            Times, s.
+
+        Returns
+        -------
+        float or ndarray
+            m/s^2, shaped like `t`.
+
+        Examples
+        --------
+        >>> Motion([0.0, 2.0], [[1.0]]).acceleration([1.0, 3.0])
+        array([1., 0.])
+        """
         time = checks.numbers(t, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self.coefficients, time)
         result = np.where((time < 0.0) | (time > self.duration), 0.0, result)
@@ -283,7 +308,23 @@ class Motion:
     @overload
     def velocity(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
     def velocity(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground velocity at the times `t` (s), m/s, from rest; constant after the end of the motion."""
+        """Ground velocity at the times `t` (s), m/s, from rest; constant after the end of the motion.
+
+        Parameters
+        ----------
+        t : float or array_like
+            Times, s.
+
+        Returns
+        -------
+        float or ndarray
+            m/s, shaped like `t`.
+
+        Examples
+        --------
+        >>> Motion([0.0, 2.0], [[1.0]]).velocity([1.0, 3.0])
+        array([1., 2.])
+        """
         time = checks.numbers(t, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, measures.velocity_pieces(self), time)
         return result if result.ndim else float(result)
@@ -293,7 +334,23 @@ class Motion:
     @overload
     def displacement(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
     def displacement(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground displacement at the times `t` (s), m, from rest; after the end at the last velocity."""
+        """Ground displacement at the times `t` (s), m, from rest; after the end at the last velocity.
+
+        Parameters
+        ----------
+        t : float or array_like
+            Times, s.
+
+        Returns
+        -------
+        float or ndarray
+            m, shaped like `t`.
+
+        Examples
+        --------
+        >>> Motion([0.0, 2.0], [[1.0]]).displacement([1.0, 3.0])
+        array([0.5, 4. ])
+        """
         time = checks.numbers(t, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, measures.displacement_pieces(self), time)
         result = result + self.velocity(self.duration) * np.maximum(time - self.duration, 0.0)
@@ -311,6 +368,10 @@ class Motion:
 
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
         """Time between the fractions `start` and `end` of the Arias intensity, s; NaN if that is zero.
+
+        Returns
+        -------
+        float
 
         Raises
         ------
@@ -344,6 +405,11 @@ class Motion:
         damping : float
             Fraction of critical damping, from 0 to below 1.
 
+        Returns
+        -------
+        float or ndarray
+            m/s^2, shaped like `period`.
+
         Raises
         ------
         InvalidMotion
@@ -364,50 +430,73 @@ class Motion:
 
         Spectral accelerations (5 % damping) at `periods` (s) are added under names as
         ``"spectral_acceleration_0.5s_m_s2"``.
+
+        Returns
+        -------
+        dict of str to float
         """
         return measures.table(self, periods)
 
-    def scaled(
-        self,
-        factor: float | None = None,
-        *,
-        pga: float | None = None,
-        pgv: float | None = None,
-        sa: float | None = None,
-        period: float | None = None,
-        damping: float | None = None,
-    ) -> Motion:
-        """Return the motion times a factor, or scaled to a target; give exactly one of the first four.
+    def scaled(self, factor: float) -> Motion:
+        """Return the motion times a factor.
 
         Parameters
         ----------
         factor : float
             Factor on the acceleration; a negative one reverses the polarity.
-        pga : float
-            Wanted peak ground acceleration, m/s^2, not g: half a g is ``pga=0.5 * 9.80665``. `history` says both.
-        pgv : float
-            Wanted peak ground velocity, m/s.
-        sa : float
-            Wanted spectral acceleration, m/s^2, at `period` and `damping`.
-        period : float
-            Period of the oscillator for `sa`, s.
-        damping : float
-            Its fraction of critical damping, 0.05 by default.
+
+        Returns
+        -------
+        Motion
 
         Raises
         ------
         InvalidMotion
-            If not exactly one target is given, a target is not positive, `period` or `damping` is given without `sa`,
-            or the motion is zero throughout.
+            If the factor is not a finite number, or the motion would become stronger than any may be.
 
         Examples
         --------
-        >>> half = Motion([0.0, 2.0], [[1.0]]).scaled(pga=0.5 * 9.80665)
+        >>> motion = Motion([0.0, 2.0], [[1.0]]).scaled(3.0)
+        >>> motion.pga, motion.history
+        (3.0, ('scaled by 3',))
+        """
+        by = checks.finite(factor, "factor", InvalidMotion)
+        return self._times(by, FACTOR.scaling(by, by))
+
+    def scaled_to(self, level: float, measure: MeasureName | Measure = "pga") -> Motion:
+        """Return the motion scaled to a level of an intensity measure.
+
+        Parameters
+        ----------
+        level : float
+            Wanted level, SI units: accelerations in m/s^2, not g; half a g is ``0.5 * 9.80665``. `history` says both.
+        measure : {"pga", "pgv", "factor"} or Measure
+            Peak acceleration (m/s^2), peak velocity (m/s), a factor on the motion as for `scaled`, or a spectral
+            acceleration (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
+
+        Returns
+        -------
+        Motion
+
+        Raises
+        ------
+        InvalidMotion
+            If `level` is not positive, the motion is zero throughout, or it would become stronger than any may be.
+        InvalidOption
+            If it is not a measure of a motion alone.
+
+        Examples
+        --------
+        >>> half = Motion([0.0, 2.0], [[1.0]]).scaled_to(0.5 * 9.80665)
         >>> half.coefficients.round(6), half.history
         (array([[4.903325]]), ('scaled by 4.90332 to a peak ground acceleration of 4.90332 m/s^2 (0.5 g)',))
         """
-        targets = {"factor": factor, "pga": pga, "pgv": pgv, "sa": sa}
-        return self._times(*scaling.factor_to(self, targets, period, damping))
+        wanted = Measure.of(measure, among=SCALES)
+        if wanted.name == "factor":
+            return self.scaled(level)
+        goal = checks.positive(level, "level", InvalidMotion, wanted.units)
+        factor = goal / wanted.positive(self, self.name)
+        return self._times(factor, wanted.scaling(goal, factor))
 
     def with_vertical(self, vertical: Motion | None) -> Motion:
         """Return the motion with a vertical component, which changes the weight of what stands on the ground.
@@ -419,6 +508,10 @@ class Motion:
         ----------
         vertical : Motion or None
             Vertical ground acceleration that starts at the same time, m/s^2, positive upwards; None for none.
+
+        Returns
+        -------
+        Motion
 
         Raises
         ------
@@ -438,6 +531,10 @@ class Motion:
 
     def delayed(self, delay: float) -> Motion:
         """Return the motion after `delay` seconds of no acceleration.
+
+        Returns
+        -------
+        Motion
 
         Raises
         ------
@@ -486,6 +583,10 @@ class Motion:
             New sampling step, s: the motion's values at its multiples, joined by straight lines; a jump becomes a
             slope of one step. To a coarser step, remove what lies above its Nyquist frequency with `band_pass`.
 
+        Returns
+        -------
+        Motion
+
         Raises
         ------
         InvalidMotion
@@ -502,20 +603,20 @@ class Motion:
         ('trimmed to 0.5-2 s', 'baseline of degree 0 removed')
         """
         steps: list[Callable[[piecewise.Piecewise], processing.Processed]] = []
-        kept = None if trim is None else processing.ends(self, *processing.pair(trim, "trim=(start, end)"))
+        kept = None if trim is None else processing.ends(self, *processing.pair(trim, "trim"))
         if baseline is not None:
             steps.append(lambda motion: processing.baseline(motion, baseline))
         if band_pass is not None:
-            low, high = processing.pair(band_pass, "band_pass=(low, high)")
+            low, high = processing.pair(band_pass, "band_pass")
             steps.append(lambda motion: processing.band_pass(motion, low, high, order=4 if order is None else order))
         elif order is not None:
-            raise InvalidMotion("order= belongs to band_pass=; give that as well, or neither")
+            raise InvalidMotion("{} belongs to {}; give that as well, or neither", "order", "band_pass")
         if resample is not None:
             steps.append(lambda motion: processing.resample(motion, resample))
         if kept is None and not steps:
             raise InvalidMotion("name what to do: trim, baseline, band_pass or resample")
         vertical = self.vertical
-        if vertical is not None and kept is not None and kept[0] > vertical.duration - arguments.SHORTEST:
+        if vertical is not None and kept is not None and kept[0] > vertical.duration - piecewise.SHORTEST:
             vertical = None  # it is over by then
         if vertical is not None:
             vertical = vertical._processed(kept, steps, self.step)
@@ -585,6 +686,11 @@ class Motion:
         """Return the ends of a stretch of time, breakpoints in it, and times between them where pieces are curved.
 
         The breakpoints are those of both components.
+
+        Returns
+        -------
+        ndarray
+            s.
         """
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:
@@ -656,3 +762,13 @@ class Motion:
 
 def _peak(motion: Motion) -> str:
     return f"peak {motion.pga:.5g} m/s^2 ({motion.pga / STANDARD_GRAVITY:.4g} g)"
+
+
+def _check_vertical(given: object) -> None:
+    if not isinstance(given, Motion):
+        raise InvalidMotion(
+            f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type(given).__name__}",
+            "vertical",
+        )
+    if given.vertical is not None:
+        raise InvalidMotion("{} must be a motion without a vertical component of its own", "vertical")

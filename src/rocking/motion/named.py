@@ -1,17 +1,22 @@
-"""Motions by name: of record files, of shipped records, of whole folders."""
+"""Motions by name, of record files, of shipped records, of whole folders; and tables of what records there are."""
 
 from __future__ import annotations
 
 import fnmatch
 import glob
+import os
 import sys
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, BinaryIO
 
+from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 from rocking.motion import formats, records
-from rocking.motion.formats.request import Request
+from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
+from rocking.tables import decimal, named, text_table
 
 #: The name of a record that is read from standard input.
 STANDARD_INPUT = "-"
@@ -39,11 +44,6 @@ def named_motion(
     several : bool
         Whether `dt`, `units` and `channel` are for several files, of which those that say their step and units keep
         them, and those that hold one channel are taken whatever its name.
-
-    Raises
-    ------
-    UnreadableRecord
-        If there is neither, or the file cannot be read.
     """
     if is_shipped(name):
         if not several:
@@ -72,11 +72,6 @@ def named_vertical(
         The channel that is the horizontal motion, where that file has several.
     dt, units
         As for `rocking.read`.
-
-    Raises
-    ------
-    UnreadableRecord
-        If there is no such file, record or channel.
     """
     if Path(name).is_file() or name in records.names():
         return named_motion(name, dt=dt, units=units, several=True)
@@ -90,35 +85,25 @@ def named_vertical(
 
 
 def refuse_what_is_known(name: str, **said: object) -> None:
-    """Check that nothing is said of a shipped record that it knows itself.
-
-    Raises
-    ------
-    UnreadableRecord
-        If its channel, step or units are given.
-    """
+    """Check that nothing is said of a shipped record that it knows itself."""
     for argument, value in said.items():
         if value is not None:
             raise UnreadableRecord(
-                f"{name}: a shipped record is one channel, with its step and units; leave {argument} out"
+                "a shipped record is one channel, with its step and units; leave {} out", argument, path=name
             )
 
 
 def is_shipped(name: str) -> bool:
-    """Whether a name is that of a shipped record, and not of a file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If it is neither, but close to the name of a shipped record.
-    """
+    """Whether a name is that of a shipped record, and not of a file."""
     if name == STANDARD_INPUT or Path(name).exists():
         return False
     if name in records.names():
         return True
     meant = records.meant(name)
     if meant and not Path(name).suffix:
-        raise UnreadableRecord(f"{name}: there is no such file or shipped record; did you mean {' or '.join(meant)}?")
+        raise UnreadableRecord(
+            f"there is no such file or shipped record; did you mean {' or '.join(meant)}?", path=name
+        )
     return False
 
 
@@ -127,11 +112,6 @@ def expanded(names: Iterable[str]) -> list[str]:
 
     A folder stands for the files in it, by name, hidden ones left out; a pattern for the files that match it, or where
     none does for the shipped records of such names.
-
-    Raises
-    ------
-    UnreadableRecord
-        If a folder holds no file, or nothing matches a pattern.
 
     Examples
     --------
@@ -148,7 +128,7 @@ def _files(name: str) -> list[str]:
     if Path(name).is_dir():
         files = sorted(str(path) for path in Path(name).iterdir() if path.is_file() and not path.name.startswith("."))
         if not files:
-            raise UnreadableRecord(f"{name}: this folder holds no file; name one that holds records")
+            raise UnreadableRecord("this folder holds no file; name one that holds records", path=name)
         return files
     if not glob.has_magic(name) or Path(name).exists():
         return [name]
@@ -156,6 +136,115 @@ def _files(name: str) -> list[str]:
     matching = matching or fnmatch.filter(records.names(), name)
     if not matching:
         raise UnreadableRecord(
-            f"{name}: no file or shipped record matches this pattern; check the folder and the pattern"
+            "no file or shipped record matches this pattern; check the folder and the pattern", path=name
         )
     return matching
+
+
+@dataclass(frozen=True)
+class Contents:
+    """A list of records or channels.
+
+    Attributes
+    ----------
+    title : str
+        What they are; empty if the list says it.
+    facts : dict
+        What holds for all of them.
+    kind : {"records", "channels"}
+        What is listed.
+    entries : list of dict
+        One for each, with the same names in the same order; units are in the names.
+    motions : tuple of Motion
+        Those of a file's channels.
+    """
+
+    title: str
+    facts: dict[str, Any]
+    kind: str
+    entries: list[dict[str, Any]]
+    motions: tuple[Motion, ...] = ()
+
+    def summary(self) -> str:
+        """Return the table for people."""
+        columns = list(self.entries[0])
+        # What has no value is the step of samples that are not evenly spaced.
+        rows = [["uneven" if entry[column] is None else entry[column] for column in columns] for entry in self.entries]
+        table = text_table(columns, rows)
+        return f"{self.title}\n\n{table}" if self.title else table
+
+    def __repr__(self) -> str:
+        names = ", ".join(str(entry["name"]) for entry in self.entries)
+        title = f"{self.title}; " if self.title else ""
+        kind = self.kind if len(self.entries) > 1 else self.kind.removesuffix("s")
+        return f"<Contents: {title}{len(self.entries)} {kind}: {names}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table for machines."""
+        return {**self.facts, self.kind: self.entries}
+
+
+def shipped(name: str | None = None) -> Contents:
+    """List the records that ship, or one of them.
+
+    Raises
+    ------
+    UnreadableRecord
+        If no record has that name.
+
+    Examples
+    --------
+    >>> [entry["name"] for entry in shipped().entries][:2]
+    ['ridgecrest-clc-090', 'ridgecrest-clc-360']
+    """
+    return Contents("", {}, "records", [_shipped(each) for each in (records.names() if name is None else [name])])
+
+
+def contents(
+    file: str | os.PathLike[str] | BinaryIO,
+    *,
+    channel: str | None = None,
+    dt: float | None = None,
+    units: str | None = None,
+    several: bool = False,
+) -> Contents:
+    """List the acceleration channels of a file, and say what it was taken for.
+
+    Parameters
+    ----------
+    file, channel, dt, units
+        As for `rocking.read`; without `channel`, all of them.
+    several
+        As for `named_motion`.
+
+    Raises
+    ------
+    UnreadableRecord, InvalidMotion
+        As for `rocking.read`.
+    """
+    request = Request.checked(dt, units, several=several)
+    identification, channels = formats.content_as(file, channel, request, optional=several)
+    motions = tuple(each.motion() for each in channels)
+    name = "standard input" if hasattr(file, "read") else os.fsdecode(file)
+    facts = {"file": name, "format": identification.format, "reason": identification.reason}
+    title = f"{name}: {identification.format}, since {identification.reason}"
+    entries = [
+        {"channel": each.number, "name": each.name, "units": each.units} | _measures(motion)
+        for each, motion in zip(channels, motions, strict=True)
+    ]
+    return Contents(title, facts, "channels", entries, motions)
+
+
+def _shipped(name: str) -> dict[str, Any]:
+    record = records.info(name)
+    known = {"name": name, "event": record.event, "station": record.station, "direction": record.direction}
+    return known | _measures(records.load(name)) | {"terms": record.terms}
+
+
+def _measures(motion: Motion) -> dict[str, Any]:
+    return {
+        named("step", "s"): motion.step,
+        named("duration", "s"): motion.duration,
+        named("pga", "g"): decimal(motion.pga / STANDARD_GRAVITY),
+        named("pgv", "m/s"): motion.pgv,
+    }

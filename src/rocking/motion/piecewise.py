@@ -1,4 +1,4 @@
-"""Algebra of piecewise polynomials, vectorised over the pieces.
+"""Algebra of piecewise polynomials, vectorised over the pieces; and the arrays that make them, checked.
 
 Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, x counted from the piece's start.
 """
@@ -8,13 +8,24 @@ import math
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from rocking import checks
 from rocking.arrays import Floats, Integers
+from rocking.constants import HIGHEST_DEGREE
+from rocking.errors import InvalidMotion
 
 #: Pieces that meet within this part of the largest value do not jump.
 _JUMP: Final = 1e-12
 #: Even breakpoints are off their grid by no more than this part of the duration, some units in its last place.
 _ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
+
+#: Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take.
+STRONGEST: Final = 1e50
+_LONGEST: Final = 1e15
+
+#: Far below any ground motion; pieces may be shorter, but must not change faster than over this time.
+SHORTEST: Final = 1e-9
 
 
 class Piecewise(Protocol):
@@ -237,3 +248,85 @@ def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
     pieces, spans = coefficients[may_exceed], widths[may_exceed]
     extrema = root_candidates(spans, derivative(pieces))
     return max(best, float(np.max(np.abs(value(pieces[:, np.newaxis, :], extrema)))))
+
+
+def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
+    """Breakpoints and coefficients of a motion as own, read-only arrays."""
+    ends = _finite(breakpoints, "breakpoints", 1)
+    rows = _finite(
+        coefficients, "coefficients", 2, ": of samples make a motion with Motion.from_samples(acceleration, dt)"
+    )
+    if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
+        raise InvalidMotion(
+            f"a motion of n pieces needs n + 1 breakpoints and coefficients of shape (n, degree + 1), "
+            f"not {ends.shape} and {rows.shape}"
+        )
+    if ends[0] != 0.0 or not np.all(np.diff(ends) > 0.0):
+        raise InvalidMotion("the breakpoints of a motion must start at 0 and increase strictly")
+    if rows.shape[1] > HIGHEST_DEGREE + 1:
+        raise InvalidMotion(
+            f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}: "
+            "split them into shorter ones of a lower degree"
+        )
+    if not SHORTEST <= ends[-1] <= _LONGEST:
+        raise InvalidMotion(
+            f"a motion must last from {SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
+        )
+    if not _stays_below(STRONGEST, rows, np.diff(ends)):
+        raise InvalidMotion(f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale")
+    if not _stays_below(STRONGEST, rows, np.maximum(np.diff(ends), SHORTEST)):
+        raise InvalidMotion(
+            f"a piece of a motion is too steep: shorter than {SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "
+            "within that time: check units and times"
+        )
+    for array in (ends, rows):
+        array.setflags(write=False)
+    return ends, rows
+
+
+def _stays_below(limit: float, rows: Floats, widths: Floats) -> bool:
+    with np.errstate(over="ignore"):
+        return bool(np.all(value(np.abs(rows), widths) <= limit))
+
+
+def checked_samples(acceleration: ArrayLike) -> Floats:
+    """Accelerations, at least two and all finite."""
+    values = _floats(acceleration, "accelerations", 1)
+    if len(values) < 2:
+        raise InvalidMotion(f"a motion needs at least two samples, not {len(values)}")
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        raise InvalidMotion(f"sample {bad[0]} of the motion is {values[bad[0]]}: every sample must be a finite number")
+    return values
+
+
+def checked_step(dt: float) -> float:
+    """Return a sampling step, s."""
+    if np.ndim(dt) != 0:
+        raise InvalidMotion("{} must be one number; for uneven times use Motion.from_points(times, acceleration)", "dt")
+    positive = checks.positive(dt, "dt", InvalidMotion, "s")
+    return checks.within(positive, "dt", InvalidMotion, SHORTEST, 1.0 / SHORTEST, "s: check its units")
+
+
+def checked_times(times: ArrayLike, count: int) -> Floats:
+    """Return the times of so many samples, s."""
+    values = _floats(times, "times", 1)
+    if len(values) != count:
+        raise InvalidMotion(f"there are {len(values)} times but {count} accelerations: give one for each")
+    if not np.all(np.isfinite(values)) or not np.all(np.diff(values) > 0.0):
+        raise InvalidMotion("the times of a motion must be finite and increase strictly")
+    return values
+
+
+def _floats(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Floats:
+    array = np.array(checks.numbers(values, f"{what} of a motion", InvalidMotion), order="C")
+    if array.ndim != dimensions:
+        raise InvalidMotion(f"the {what} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}")
+    return array
+
+
+def _finite(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Floats:
+    array = _floats(values, what, dimensions, hint)
+    if not np.all(np.isfinite(array)):
+        raise InvalidMotion(f"the {what} of a motion must be finite numbers")
+    return array

@@ -39,13 +39,7 @@ def pair(values: tuple[T, T], what: str) -> tuple[T, T]:
 
 
 def ends(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
-    """Return the ends (s) of the part to keep; those of even samples are moved to the nearest sample.
-
-    Raises
-    ------
-    InvalidMotion
-        If they are no part of the motion, or no two samples lie between them.
-    """
+    """Return the ends (s) of the part to keep; those of even samples are moved to the nearest sample."""
     first = checks.finite(start, "start of the part to keep", InvalidMotion)
     last = checks.finite(end, "end of the part to keep", InvalidMotion)
     duration = float(motion.breakpoints[-1])

@@ -18,7 +18,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.errors import UnreadableRecord
-from rocking.motion.description import Description
+from rocking.motion.description import Description, Origin
 from rocking.motion.formats.units import choose_unit
 from rocking.motion.motion import Motion
 
@@ -66,6 +66,10 @@ class Record:
 def names() -> tuple[str, ...]:
     """Return the names of the shipped records.
 
+    Returns
+    -------
+    tuple of str
+
     Examples
     --------
     >>> names()[:3]
@@ -76,6 +80,10 @@ def names() -> tuple[str, ...]:
 
 def info(name: str) -> Record:
     """Return what is known of a shipped record: event, station, direction, step, source and terms.
+
+    Returns
+    -------
+    Record
 
     Raises
     ------
@@ -128,6 +136,10 @@ def load(name: str) -> Motion:
     name : str
         One of `names`.
 
+    Returns
+    -------
+    Motion
+
     Raises
     ------
     UnreadableRecord
@@ -148,7 +160,11 @@ def load(name: str) -> Motion:
         choose_unit(record.units).to_si(published),
         record.step,
         name=name,
-        description=Description("record", text=f"{'; '.join(facts)}; terms: {record.terms}"),
+        description=Description(
+            "record",
+            text=f"{'; '.join(facts)}; terms: {record.terms}",
+            origin=Origin(event=record.event, station=record.station, channel=record.direction, units=record.units),
+        ),
     )
 
 

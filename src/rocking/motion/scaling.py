@@ -1,61 +1,234 @@
-"""Scaling a ground motion: by a factor, or to a measure of its intensity."""
+"""Intensity measures that motions are scaled to: what each one is of a motion, and the factor to a level of it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidMotion
+from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import measures
 from rocking.motion.piecewise import Piecewise
 
-#: What a motion is scaled to, in words, with its unit.
-_MEASURES: Final = {
-    "pga": ("peak ground acceleration", "m/s^2"),
-    "pgv": ("peak ground velocity", "m/s"),
-    "sa": ("spectral acceleration", "m/s^2"),
+#: What an analysis may count motions by.
+IntensityName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
+MeasureName = Literal["factor", "pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
+
+INTENSITIES: Final[Sequence[str]] = get_args(IntensityName)
+#: Those of a motion alone.
+SCALES: Final = ("factor", "pga", "pgv", "sa")
+
+#: Unit and name in words.
+_MEASURES: Final[dict[str, tuple[str, str]]] = {
+    "factor": ("1", "factor of the motion"),
+    "pga": ("m/s^2", "peak ground acceleration"),
+    "pgv": ("m/s", "peak ground velocity"),
+    "sa": ("m/s^2", "spectral acceleration"),
+    "pga_ratio": ("1", "PGA / (g tan α)"),
+    "pgv_ratio": ("1", "p PGV / (g tan α)"),
 }
 
 
-def factor_to(
-    motion: Piecewise,
-    targets: Mapping[str, float | None],
-    period: float | None,
-    damping: float | None,
-) -> tuple[float, str]:
-    """Factor that does what exactly one of the targets asks for, and the sentence for the motion's history.
+@dataclass(frozen=True)
+class Measure:
+    """How the intensity of a motion is measured.
 
     Parameters
     ----------
-    targets
-        "factor", "pga" (m/s^2), "pgv" (m/s), "sa" (m/s^2); None is not asked for.
-    period, damping
-        Oscillator of "sa", s and fraction of critical; both go with it alone.
+    name : {"factor", "pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
+        Factor on the motion as it is; peak acceleration (m/s^2), peak velocity (m/s), spectral acceleration (m/s^2); or
+        a block's own dimensionless ones: peak acceleration over the smallest that lifts it, PGA/(g tan alpha), and peak
+        velocity over that acceleration in the block's time, p PGV/(g tan alpha). In the linear model alpha stands for
+        tan alpha.
+    period : float, optional
+        Period of the oscillator of "sa", s.
+    damping : float
+        Its fraction of critical damping.
 
     Raises
     ------
-    InvalidMotion
-        If not exactly one is asked for, an argument is out of place or out of range, or the motion is zero throughout.
+    InvalidOption
+        If there is no such measure, or `period` or `damping` is missing, out of place or out of range.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> measure = Measure("sa", period=1.0)
+    >>> measure.label, measure.units
+    ('spectral acceleration at 1 s (g)', 'm/s^2')
+    >>> motion = rocking.records.load("el-centro-meloland-270")
+    >>> round(motion.scaled_to(4.0, measure).spectral_acceleration(1.0), 12)
+    4.0
     """
-    given = {what: value for what, value in targets.items() if value is not None}
-    if len(given) != 1:
-        raise InvalidMotion("scale a motion by exactly one of factor, pga, pgv and sa (with period)")
-    ((what, wanted),) = given.items()
-    if (what == "sa") != (period is not None):
-        raise InvalidMotion("period= (s) goes with sa=, and only with it")
-    if what != "sa" and damping is not None:
-        raise InvalidMotion(f"damping= belongs to sa= and period=, not to {what}=")
-    if what == "factor":
-        factor = checks.finite(wanted, "scale factor", InvalidMotion)
-        return factor, f"scaled by {factor:.6g}"
-    words, unit = _MEASURES[what]
-    ratio = measures.DAMPING if damping is None else damping
-    level = checks.positive(wanted, what, InvalidMotion, unit)
-    now = measures.target(motion, what, period, ratio)
-    if now == 0.0:
-        raise InvalidMotion(f"a motion that is zero throughout cannot be scaled to a {words}")
-    in_g = f" ({level / STANDARD_GRAVITY:.4g} g)" if unit == "m/s^2" else ""
-    oscillator = f" at {period:.6g} s, damping {ratio:.6g}" if what == "sa" else ""
-    return level / now, f"scaled by {level / now:.6g} to a {words} of {level:.6g} {unit}{in_g}{oscillator}"
+
+    name: MeasureName
+    period: float | None = None
+    damping: float = measures.DAMPING
+
+    def __post_init__(self) -> None:
+        checks.one_of(self.name, "measure", InvalidOption, get_args(MeasureName))
+        damping = checks.number(self.damping, "damping", InvalidOption)
+        if not 0.0 <= damping < 1.0:
+            raise InvalidOption(f"{{}} must be a fraction of critical from 0 to below 1, not {damping:g}", "damping")
+        object.__setattr__(self, "damping", damping)
+        if self.name == "sa":
+            if self.period is None:
+                raise InvalidOption('{} "sa" needs {}, in s: give Measure("sa", period=...)', "measure", "period")
+            object.__setattr__(self, "period", checks.positive(self.period, "period", InvalidOption, "s"))
+        elif self.period is not None:
+            raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', "period", "measure")
+        elif damping != measures.DAMPING:
+            raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', "damping", "measure")
+
+    @classmethod
+    def of(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
+        """Return a measure that is given by name or as it is, one of those that make sense.
+
+        Raises
+        ------
+        InvalidOption
+            If it is no measure, or none of them.
+
+        Examples
+        --------
+        >>> Measure.of("pgv")
+        Measure(name='pgv', period=None, damping=0.05)
+        """
+        if isinstance(measure, Measure):
+            checks.one_of(measure.name, "measure", InvalidOption, among)
+            return measure
+        checks.one_of(measure, "measure", InvalidOption, among)
+        return cls(measure)
+
+    @property
+    def units(self) -> str:
+        """Units of the measure; "1" if it has none."""
+        return _MEASURES[self.name][0]
+
+    @property
+    def column(self) -> str:
+        """Name with units for a table."""
+        return {"m/s^2": f"{self.name}_m_s2", "m/s": f"{self.name}_m_s"}.get(self.units, self.name)
+
+    @property
+    def scale(self) -> float:
+        """Factor from SI units to those for people: accelerations in g."""
+        return 1.0 / STANDARD_GRAVITY if self.units == "m/s^2" else 1.0
+
+    @property
+    def quantity(self) -> str:
+        """Name in words."""
+        return _MEASURES[self.name][1] + ("" if self.period is None else f" at {self.period:g} s")
+
+    @property
+    def label(self) -> str:
+        """Name and units for people."""
+        return self.quantity + (f" ({self.shown_in})" if self.shown_in else "")
+
+    @property
+    def shown_in(self) -> str:
+        """Units for people; nothing if it has none."""
+        return {"m/s^2": "g", "m/s": "m/s", "1": ""}[self.units]
+
+    def shown(self, value: float) -> str:
+        """Return a value, in SI units, with its unit; an acceleration in g, too.
+
+        Examples
+        --------
+        >>> Measure("pga").shown(4.903325)
+        '4.90332 m/s^2 (0.5 g)'
+        """
+        if self.units == "m/s^2":
+            return f"{value:.6g} m/s^2 ({value / STANDARD_GRAVITY:.4g} g)"
+        return f"{value:.6g}" if self.units == "1" else f"{value:.6g} {self.units}"
+
+    @property
+    def of_motion(self) -> Literal["factor", "pga", "pgv", "sa"]:
+        """Name of the measure of the motion alone that this one counts."""
+        if self.name == "pga_ratio":
+            return "pga"
+        return "pgv" if self.name == "pgv_ratio" else self.name
+
+    @property
+    def alone(self) -> Measure:
+        """Measure of the motion alone that this one counts."""
+        return Measure(self.of_motion, self.period, self.damping)
+
+    def value(self, motion: Piecewise) -> float:
+        """Return what the motion alone measures, in SI units; 1 where levels are factors.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> Measure("pga").value(rocking.Motion([0.0, 2.0], [[3.0]]))
+        3.0
+        """
+        if self.period is not None:
+            return float(measures.spectral_acceleration(motion, self.period, self.damping))
+        if self.of_motion == "factor":
+            return 1.0
+        return measures.peak_acceleration(motion) if self.of_motion == "pga" else measures.peak_velocity(motion)
+
+    def positive(self, motion: Piecewise, name: str) -> float:
+        """Return what the motion alone measures, as `value`, of a motion that can be scaled.
+
+        Raises
+        ------
+        InvalidMotion
+            If the motion, called `name`, is zero throughout.
+        """
+        value = self.value(motion)
+        if not value > 0.0:
+            raise InvalidMotion(f"{name} is zero throughout: it has no {self.quantity}, and cannot be scaled to one")
+        return value
+
+    @property
+    def in_block_units(self) -> bool:
+        """Whether each block has a unit of its own."""
+        return self.name in ("pga_ratio", "pgv_ratio")
+
+    def unit(self, lifting: Floats, p: Floats) -> Floats:
+        """Return what counts as 1 for each block, in SI units, where each has a unit of its own.
+
+        Parameters
+        ----------
+        lifting : ndarray, shape (n,)
+            Smallest acceleration that lifts each block, m/s^2.
+        p : ndarray, shape (n,)
+            Frequency parameter of each block, rad/s; the smaller one of two sides.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Accelerations (m/s^2) for "pga_ratio", velocities (m/s) for "pgv_ratio".
+        """
+        return lifting if self.name == "pga_ratio" else lifting / p
+
+    def options(self) -> dict[str, float]:
+        """Return period (s) and damping, where the measure has them."""
+        return {} if self.period is None else {"period": self.period, "damping": self.damping}
+
+    def scaling(self, level: float, factor: float) -> str:
+        """Return the sentence for the history of a motion that a factor brought to a level."""
+        if self.name == "factor":
+            return f"scaled by {factor:.6g}"
+        oscillator = "" if self.period is None else f" at {self.period:.6g} s, damping {self.damping:.6g}"
+        return f"scaled by {factor:.6g} to a {_MEASURES[self.name][1]} of {self.shown(level)}{oscillator}"
+
+
+#: Motions as they are, times a factor.
+FACTOR: Final = Measure("factor")
+
+
+def intensities(values: ArrayLike) -> Floats:
+    """Return intensities at which a curve is asked for, as an array of their shape."""
+    at = checks.numbers(values, "intensities", InvalidOption)
+    if not np.all(at >= 0.0):
+        raise InvalidOption("intensities must be numbers that are not negative")
+    return at

@@ -9,17 +9,18 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 
 from rocking import checks, quantities
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
-from rocking.errors import InvalidMotion, RockingError, StudyError, UnreadableRecord
-from rocking.motion.formats.request import Request
+from rocking.errors import InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
+from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
+from rocking.motion.scaling import SCALES, Measure, MeasureName
 from rocking.named_pulses import pulse_family
 from rocking.plausibility import vertical_notes
 from rocking.product import Product, Scales
@@ -218,9 +219,16 @@ class _Reader:
         given = {
             name: value for name, value in self.tables.get("scales", {}).items() if name not in ("polarity", "refine")
         }
-        measures = {name: self._numbers("scales", name, given[name]) for name in given if name not in _OSCILLATOR}
+        measures = {name: self._numbers("scales", name, given.pop(name)) for name in SCALES if name in given}
         with self._lines_told("scales"):
-            return Scales.of(period=given.get("period"), damping=given.get("damping", 0.05), **measures)
+            if len(measures) > 1:
+                raise InvalidOption(f"motions can be scaled to one measure only, not to {' and '.join(measures)}")
+            if not measures and given:
+                raise InvalidOption(f"{next(iter(given))} belongs to sa: give that as well, or neither")
+            name, levels = next(iter(measures.items()), ("factor", None))
+            if levels is not None:
+                checks.positive_numbers(levels, name, InvalidOption)
+            return Scales.of(levels, Measure(cast(MeasureName, name), **given))
 
     def _refine(self, product: Product, kept: tuple[str, ...]) -> Tolerances | None:
         refine = self.tables.get("scales", {}).get("refine")
@@ -449,9 +457,6 @@ class _Reader:
 
     def _wrong(self, table: str | None, key: str | None, sentence: str, occurrence: int = 0) -> StudyError:
         return StudyError(f"{self.file}, line {_line(self.text, table, key, occurrence)}: {sentence}")
-
-
-_OSCILLATOR: Final = ("period", "damping")
 
 
 def _scalable(motion: Motion, scales: Scales) -> Motion:

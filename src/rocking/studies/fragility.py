@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.analysis.fragility.curve import Fragility, FragilityCurve
 from rocking.analysis.fragility.fit import OVERTURNING, Bands, fit_fragility, fitted_curve, passed
-from rocking.analysis.intensity import Measure
-from rocking.analysis.levels import mean_one, only_block, pooled, several_motions
+from rocking.analysis.levels import mean_one, only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
+from rocking.motion.scaling import Measure
 from rocking.product import Product, block_coordinates
 from rocking.progress import Progress
 from rocking.result import Result, table_of_some
@@ -53,7 +53,7 @@ def pooled_fragility(
     require_limits(store.grid.outcomes, limits)
     product = store.product
     shares, bands = mean_one(weights, len(product.blocks)), Bands(confidence)
-    units, which = np.unique(measure.unit_of(product.blocks, product.model), return_inverse=True)
+    units, which = np.unique(units_of(product.blocks, measure, product.model), return_inverse=True)
     motions, scales, _, _ = product.shape
     counts = {name: np.zeros((motions, scales, len(units))) for name in limits}
     trials = np.zeros((motions, scales, len(units)))
@@ -97,11 +97,11 @@ def block_fragilities(
     kept = {name: np.full(shape, np.nan) for name in _KEPT}
     faults = np.full(shape, "", dtype=object)
     intensities = _intensities(store.product, measure).ravel()
-    units = measure.unit_of(store.product.blocks, store.product.model)
+    units = units_of(store.product.blocks, measure, store.product.model)
     options: dict[str, Any] = {
         "clusters": np.repeat(np.arange(motions), scales),
         "confidence": confidence,
-        **_words(measure),
+        "measure": measure,
     }
     with Progress("fitting", count * len(limits), show=progress) as bar:
         for blocks, ratios in peak_ratios(store):
@@ -227,10 +227,10 @@ def _numbers(curve: FragilityCurve) -> dict[str, float]:
 def _intensities(product: Product, measure: Measure) -> Floats:
     """Return what every motion measures at every scale, shape (motions, scales)."""
     scales = product.scales
-    motions, values = several_motions(product.motions, measure)
-    if (scales.measure, dict(scales.options)) == (measure.of_motion, measure.options()):
-        return np.tile(scales.values, (len(motions), 1))  # as they were given, to the last bit
-    factors = np.array([scales.factors(motion) for motion in motions])
+    values = values_of(product.motions, measure)
+    if scales.measure == measure.alone:
+        return np.tile(scales.values, (len(values), 1))  # as they were given, to the last bit
+    factors = np.array([scales.factors(motion) for motion in product.motions])
     return np.asarray(np.abs(factors) * values[:, None])
 
 

@@ -16,6 +16,7 @@ from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
+from rocking.motion.scaling import Measure
 from rocking.product import Product, Scales
 from rocking.treatment import treatment
 
@@ -29,7 +30,7 @@ def hashes(product: Product) -> dict[str, Any]:
     return {
         "blocks": _hash(_block_arrays(product.blocks).values()),
         "motions": [_hash(_motion_arrays(motion).values()) for motion in product.motions],
-        "scales": _hash([scales.values, _text(json.dumps([scales.measure, dict(scales.options)]))]),
+        "scales": _hash([scales.values, _text(json.dumps([*_measured(scales).values()]))]),
         "rules": _hash([_text(json.dumps(_rules(product)))]),
     }
 
@@ -40,8 +41,7 @@ def to_bytes(product: Product) -> bytes:
     for k, motion in enumerate(product.motions):
         arrays |= {f"motions/{k}/{name}": values for name, values in _motion_arrays(motion).items()}
     arrays["scales/values"] = product.scales.values
-    words = {"measure": product.scales.measure, "options": dict(product.scales.options)}
-    arrays["words"] = _text(json.dumps(words | {"motions": len(product.motions)} | _rules(product)))
+    arrays["words"] = _text(json.dumps(_measured(product.scales) | {"motions": len(product.motions)} | _rules(product)))
     return archive(arrays)
 
 
@@ -52,12 +52,22 @@ def from_bytes(data: bytes) -> Product:
         return Product(
             blocks=_blocks(arrays),
             motions=tuple(_motion(arrays, f"motions/{k}") for k in range(words["motions"])),
-            scales=Scales(words["measure"], arrays["scales/values"], words["options"]),
+            scales=Scales(
+                None if words["measure"] is None else Measure(words["measure"], **words["options"]),
+                arrays["scales/values"],
+            ),
             polarity=words["polarity"],
             model=words["model"],
             treatment=treatment(words["treatment"]),
             duration=words["duration"],
         )
+
+
+def _measured(scales: Scales) -> dict[str, Any]:
+    measure = scales.measure
+    return (
+        {"measure": None, "options": {}} if measure is None else {"measure": measure.name, "options": measure.options()}
+    )
 
 
 def _rules(product: Product) -> dict[str, Any]:

@@ -465,7 +465,7 @@ def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
     above, meaning = _ABOVE[verdict]
     product = store.product
     whole = product.dataset({})
-    about = {"units": product.scales.units}
+    about = {"units": product.scales.about["units"]}
     named: dict[str, Any] = {
         name: ("change", np.asarray(values)[brackets.block], attributes)
         for name, (_, values, attributes) in block_coordinates(product.blocks).items()
@@ -484,7 +484,7 @@ def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
             "block": ("change", brackets.block),
             **named,
         },
-        whole.attrs | {"measure": product.scales.measure or "factor", **product.scales.options},
+        whole.attrs | {name: value for name, value in product.scales.about.items() if name != "units"},
     )
 
 

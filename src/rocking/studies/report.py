@@ -10,8 +10,8 @@ from typing import Any, Literal, get_args
 from rocking import checks
 from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import OVERTURNING
-from rocking.analysis.intensity import Measure, MeasureName
 from rocking.errors import InvalidOption, StudyError
+from rocking.motion.scaling import IntensityName, Measure
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
 from rocking.studies.ratios import require_limits, require_ratios
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
@@ -46,7 +46,7 @@ class FragilityPlan:
         If one of them is out of its range.
     """
 
-    measure: MeasureName = "pga"
+    measure: IntensityName = "pga"
     period: float | None = None
     damping: float = 0.05
     limits: Mapping[str, float] = field(default_factory=lambda: dict(OVERTURNING))

@@ -44,7 +44,7 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES) -> Stud
         pooled = ratios.swapaxes(1, 2).reshape(-1, product.scales.count, ratios.shape[3])
         values[:, :, blocks] = fractiles_of(pooled, shares)
         overturned[:, blocks] = np.isinf(pooled).mean(axis=0)
-    about = {"measure": product.scales.measure or "factor", "units": product.scales.units}
+    about = {name: product.scales.about[name] for name in ("measure", "units")}
     words = "peak rotation over the slenderness, infinite where that share overturns"
     return StudySpectrum(
         xr.Dataset(

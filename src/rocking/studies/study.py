@@ -19,13 +19,12 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import OVERTURNING
-from rocking.analysis.intensity import Measure, MeasureName
 from rocking.block import Block, Blocks
 from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import DamagedStudy, InvalidOption, StudyError
-from rocking.motion.accepted import several_motions
-from rocking.motion.motion import Motion
-from rocking.product import Polarity, Product, Scales, names_of
+from rocking.motion.arguments import Motions, names_of, several_motions
+from rocking.motion.scaling import IntensityName, Measure, MeasureName
+from rocking.product import Polarity, Product, Scales
 from rocking.studies import store as stores
 from rocking.studies.export import export
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
@@ -391,9 +390,7 @@ class Study:
     def fragility(
         self,
         *,
-        measure: MeasureName = "pga",
-        period: float | None = None,
-        damping: float = 0.05,
+        measure: IntensityName | Measure = "pga",
         limits: Mapping[str, float] = OVERTURNING,
         confidence: float = 0.9,
         weights: ArrayLike | None = None,
@@ -402,7 +399,7 @@ class Study:
 
         Parameters
         ----------
-        measure, period, damping, limits, confidence, weights
+        measure, limits, confidence, weights
             As for `rocking.fragility`. What a motion measures at a scale is its intensity.
 
         Raises
@@ -412,14 +409,12 @@ class Study:
         InvalidOption
             If an argument is out of its range, the study does not keep what a limit needs, or no lognormal fits.
         """
-        return pooled_fragility(self.store, Measure(measure, period, damping), limits, confidence, weights)
+        return pooled_fragility(self.store, Measure.of(measure), limits, confidence, weights)
 
     def block_fragilities(
         self,
         *,
-        measure: MeasureName = "pga",
-        period: float | None = None,
-        damping: float = 0.05,
+        measure: IntensityName | Measure = "pga",
         limits: Mapping[str, float] = OVERTURNING,
         confidence: float = 0.9,
         progress: bool | None = None,
@@ -428,7 +423,7 @@ class Study:
 
         Parameters
         ----------
-        measure, period, damping, limits, confidence
+        measure, limits, confidence
             As for `rocking.fragility`. A curve takes some hundredths of a second where motions were scaled to the
             measure (stripes), and seconds where thousands of outcomes have an intensity each (a cloud).
         progress : bool, optional
@@ -442,7 +437,7 @@ class Study:
             If an argument is out of its range, or the study does not keep what a limit needs. A block that no lognormal
             fits has a sentence in place of a curve.
         """
-        return block_fragilities(self.store, Measure(measure, period, damping), limits, confidence, progress)
+        return block_fragilities(self.store, Measure.of(measure), limits, confidence, progress)
 
     def spectrum(self, fractiles: Sequence[float] = FRACTILES) -> StudySpectrum:
         """Fractiles over the motions of the peak rotation over slenderness, for each scale and block.
@@ -541,16 +536,12 @@ def _fault(part: Store | Round, key: Key) -> str:
 def study(
     folder: str | Path,
     blocks: Blocks | Block | Sequence[Block] | None = None,
-    motions: Motion | Sequence[Motion] | None = None,
+    motions: Motions | None = None,
     *,
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",
-    factor: ArrayLike | None = None,
-    pga: ArrayLike | None = None,
-    pgv: ArrayLike | None = None,
-    sa: ArrayLike | None = None,
-    period: float | None = None,
-    damping: float = 0.05,
+    levels: ArrayLike | None = None,
+    measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",
     duration: float | None = None,
     refine: float | Mapping[str, float] | None = None,
@@ -567,7 +558,7 @@ def study(
     blocks, motions
         As for `simulate_many`; without both, the study must be there, and needs no script nor any other argument
         (but `refine`).
-    model, chattering, factor, pga, pgv, sa, period, damping, polarity, duration
+    model, chattering, levels, measure, polarity, duration
         As for `simulate_many`.
     refine : float or mapping, optional
         Once the scales (two or more, increasing) are computed, halve the gap between neighbours of which one overturns
@@ -600,7 +591,7 @@ def study(
     >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
     >>> folder = tempfile.mkdtemp()
-    >>> first = study(folder, blocks, motion, factor=[0.4, 1.0], unit_blocks=512)
+    >>> first = study(folder, blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
     >>> _ = first.run()
     >>> study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
@@ -609,8 +600,7 @@ def study(
     if blocks is None or motions is None:
         if blocks is not None or motions is not None:
             raise InvalidOption("a new study needs blocks and motions; one that is there needs neither")
-        scaling = {"factor": factor, "pga": pga, "pgv": pgv, "sa": sa, "period": period}
-        _refuse_inputs({**scaling, "duration": duration, "outcomes": outcomes, "unit_blocks": unit_blocks})
+        _refuse_inputs({"levels": levels, "duration": duration, "outcomes": outcomes, "unit_blocks": unit_blocks})
         found = Study(place, Store.open(place))
         if refine is not None:
             keep_plan(found.store, tolerances_of(found.product, refine, found.store.grid.outcomes))
@@ -618,7 +608,7 @@ def study(
     product = Product(
         Blocks.of(blocks),
         tuple(several_motions(motions)),
-        Scales.of(factor=factor, pga=pga, pgv=pgv, sa=sa, period=period, damping=damping),
+        Scales.of(levels, measure),
         polarity,
         model,
         treatment(chattering),

@@ -20,14 +20,15 @@ from rocking.analysis.calibration.search import Problem, search
 from rocking.analysis.calibration.space import SIDED, Knowledge, Space, unit_of
 from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import OVERTURNING, fragility
-from rocking.analysis.intensity import MeasureName
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.motion.arguments import Motions
 from rocking.motion.motion import Motion
+from rocking.motion.scaling import IntensityName, Measure
 from rocking.tables import counted, named, text_table, write_text
 from rocking.treatment.base import Model
 
@@ -147,9 +148,7 @@ class Calibration:
         """Standard deviation of each parameter's logarithm from test to test."""
         return {name: estimate.dispersion for name, estimate in self.estimates.items()}
 
-    def predict(
-        self, motions: Motion | Sequence[Motion], *, threads: int | None = None, progress: bool | None = None
-    ) -> Floats:
+    def predict(self, motions: Motions, *, threads: int | None = None, progress: bool | None = None) -> Floats:
         """Probability that each motion overturns the specimen.
 
         Parameters
@@ -217,11 +216,9 @@ class Calibration:
 
     def fragility(
         self,
-        motions: Motion | Sequence[Motion],
+        motions: Motions,
         *,
-        measure: MeasureName = "pga",
-        period: float | None = None,
-        damping: float = 0.05,
+        measure: IntensityName | Measure = "pga",
         levels: ArrayLike | None = None,
         limits: Mapping[str, float] = OVERTURNING,
         model: Model | None = None,
@@ -231,7 +228,7 @@ class Calibration:
 
         Parameters
         ----------
-        motions, measure, period, damping, levels, limits
+        motions, measure, levels, limits
             As for `rocking.fragility`.
         model : {"linear", "nonlinear"}, optional
             Equation of motion, if not that of the calibration.
@@ -256,8 +253,6 @@ class Calibration:
             weights=self.weights,
             model=self.model if model is None else model,
             measure=measure,
-            period=period,
-            damping=damping,
             levels=levels,
             limits=limits,
             **options,
@@ -265,7 +260,7 @@ class Calibration:
 
     def spectrum(
         self,
-        motions: Motion | Sequence[Motion],
+        motions: Motions,
         *,
         p: ArrayLike | None = None,
         model: Model | None = None,
@@ -514,7 +509,7 @@ def calibrate(
 
 
 def _outcomes(
-    blocks: Blocks, motions: Motion | Sequence[Motion], model: Model, threads: int | None, progress: bool | None
+    blocks: Blocks, motions: Motions, model: Model, threads: int | None, progress: bool | None
 ) -> NDArray[np.float32]:
     """1 where a block overturns under a motion, else 0; shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)

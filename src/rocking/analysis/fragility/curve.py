@@ -17,11 +17,11 @@ from rocking import checks
 from rocking.analysis.fragility import lognormal, nrml
 from rocking.analysis.fragility.confidence import Confidence, Resamples
 from rocking.analysis.fragility.lognormal import Probit
-from rocking.analysis.intensity import Measure, intensities
 from rocking.arrays import Floats, as_asked
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
+from rocking.motion.scaling import Measure, intensities
 from rocking.progress import phrased
 from rocking.tables import counted, text_table, write_text
 from rocking.treatment.base import Model

@@ -14,14 +14,14 @@ from rocking import checks
 from rocking.analysis.fragility import lognormal
 from rocking.analysis.fragility.confidence import Confidence, LikelyRegion, Resamples
 from rocking.analysis.fragility.curve import Fragility, FragilityCurve
-from rocking.analysis.intensity import Measure, MeasureName
-from rocking.analysis.levels import mean_one, only_block, pooled, several_motions, simulate_levels
+from rocking.analysis.levels import mean_one, only_block, pooled, simulate_levels, units_of, values_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.motion.motion import Motion
+from rocking.motion.arguments import Motions, several_motions
+from rocking.motion.scaling import IntensityName, Measure
 from rocking.product import Polarity
 from rocking.tables import counted
 from rocking.treatment import Treatment
@@ -47,11 +47,9 @@ OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
 
 def fragility(
     blocks: Blocks | Block | Sequence[Block],
-    motions: Motion | Sequence[Motion],
+    motions: Motions,
     *,
-    measure: MeasureName = "pga",
-    period: float | None = None,
-    damping: float = 0.05,
+    measure: IntensityName | Measure = "pga",
     levels: ArrayLike | None = None,
     limits: Mapping[str, float] = OVERTURNING,
     model: Model = "nonlinear",
@@ -72,13 +70,11 @@ def fragility(
     blocks : Blocks, Block or sequence of Block
         One block; or several whose outcomes are pooled: against a measure in their own units, or of an ensemble that
         stands for one block that is not quite known, with `weights` (`Calibration.fragility` does so).
-    motions : Motion or sequence of Motion
-        m motions.
-    measure : {"pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
-        Intensity measure: peak acceleration (m/s^2), peak velocity (m/s), spectral acceleration (m/s^2); or in each
-        block's own units PGA/(g tan alpha) and p PGV/(g tan alpha).
-    period, damping : float
-        Oscillator of "sa": s, and fraction of critical.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; a mapping gives them its names.
+    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
+        Intensity measure: peak acceleration (m/s^2), peak velocity (m/s); in each block's own units PGA/(g tan alpha)
+        and p PGV/(g tan alpha); or spectral acceleration (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
     levels : array_like, optional
         Stripes: every motion scaled to each of these levels. Without them a cloud: every motion as it is.
     limits : mapping of str to float
@@ -114,12 +110,13 @@ def fragility(
     >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
     median 1.443, dispersion 0.524
     """
-    many, how = Blocks.of(blocks), Measure(measure, period, damping)
+    many, how = Blocks.of(blocks), Measure.of(measure)
     shares = mean_one(weights, len(many))
     mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
     bands = Bands(confidence, band, samples, seed)
     states = _limit_states(limits, "limits")
-    shaken, values = several_motions(motions, how)
+    shaken = several_motions(motions)
+    values = values_of(shaken, how)
     options: dict[str, Any] = {
         "chattering": chattering,
         "polarity": "+" if mirrored else polarity,
@@ -129,7 +126,7 @@ def fragility(
     if levels is None:
         table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
         require_finished(table.unfinished.values)
-        intensity = (values[:, None] / how.unit_of(many, model)[None, :])[None, :, :, None]
+        intensity = (values[:, None] / units_of(many, how, model)[None, :])[None, :, :, None]
     else:
         stripes = checks.increasing_numbers(levels, "levels", InvalidOption)
         table = simulate_levels(many, shaken, how, stripes, model=model, **options)
@@ -203,9 +200,7 @@ def fit_fragility(
     *,
     trials: ArrayLike = 1,
     clusters: ArrayLike | None = None,
-    measure: MeasureName = "pga",
-    period: float | None = None,
-    damping: float = 0.05,
+    measure: IntensityName | Measure = "pga",
     confidence: float = 0.9,
     band: Band = "likelihood",
     samples: int = 1000,
@@ -227,7 +222,7 @@ def fit_fragility(
     clusters : array_like of int, shape (n,), optional
         Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own. Fewer
         than three clusters of several outcomes bound nothing: then intervals go from 0 to infinity.
-    measure, period, damping
+    measure
         What the intensity is, as for `fragility`.
     confidence : float
         Probability of the intervals and bands.
@@ -271,7 +266,7 @@ def fit_fragility(
     >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
     median 3.1509 m/s^2, dispersion 0.3042
     """
-    how = Measure(measure, period, damping)
+    how = Measure.of(measure)
     x = checks.positive_numbers(intensity, "intensity", InvalidOption)
     if x.min() < _INTENSITIES[0] or x.max() > _INTENSITIES[1]:
         raise InvalidOption("intensity must be from {:g} to {:g}: check its units".format(*_INTENSITIES))

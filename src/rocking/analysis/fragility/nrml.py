@@ -17,10 +17,11 @@ from typing import Final, Literal, NamedTuple, get_args
 import numpy as np
 
 from rocking import checks
-from rocking.analysis.intensity import Measure
+from rocking.analysis.levels import units_of
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
+from rocking.motion.scaling import Measure
 from rocking.tables import write_text
 from rocking.treatment.base import Model
 
@@ -156,10 +157,10 @@ def scale_of(measure: Measure, block: Block | None, model: Model) -> Scale:
     InvalidOption
         If the measure counts in a block's own unit, and there is no block.
     """
-    if measure.units != "1":
+    if block is not None:
+        own = float(units_of(Blocks.of([block]), measure, model)[0])
+    elif not measure.in_block_units:
         own = 1.0
-    elif block is not None:
-        own = float(measure.unit_of(Blocks.of([block]), model)[0])
     else:
         raise InvalidOption(f"{measure.name} counts in a block's own unit; give block= to write it as PGA or PGV")
     if measure.of_motion == "pgv":

@@ -9,8 +9,8 @@ import numpy as np
 
 from rocking.analysis.calibration.tables import Table, outcomes_of, read_table
 from rocking.analysis.hazard import HEADINGS, heading_of
-from rocking.analysis.intensity import Measure
 from rocking.errors import InvalidOption, UnreadableRecord
+from rocking.motion.scaling import Measure
 from rocking.tables import counted
 
 
@@ -58,28 +58,25 @@ def read_observed(
 def _against_intensity(table: Table, names: dict[str, str], heading: str, measure: Measure) -> dict[str, Any]:
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
-        raise InvalidOption(f"{table.path}: give period= (s) of its spectral acceleration")
-    of = {"period": measure.period, "damping": measure.damping} if kind == "sa" else {}
+        raise InvalidOption("give {} (s) of its spectral acceleration", "period", path=str(table.path))
     counts = "trials" in names
     return {
         "intensity": factor * table.numbers(names[heading]),
         "exceeded": table.numbers(names["overturned"]) if counts else [*table.answers(names["overturned"])],
         "trials": table.numbers(names["trials"]) if counts else 1,
         "clusters": [row[names["group"]] for _, row in table.rows] if "group" in names else None,
-        "measure": kind,
-        **of,
+        "measure": measure if kind == "sa" else Measure(kind),
     }
 
 
 def _under_motions(table: Table, measure: Measure, **files: Any) -> dict[str, Any]:
-    if measure.units == "1":
+    if measure.in_block_units:
         raise InvalidOption(f"{measure.name} counts in a block's own unit, which outcomes do not tell: take pga")
     tests = outcomes_of(table, **files)
     return {
-        "intensity": [measure.of(motion) for motion in tests.motions],
+        "intensity": [measure.value(motion) for motion in tests.motions],
         "exceeded": [*tests.overturned],
         "trials": 1,
         "clusters": tests.groups or [row["motion"] for _, row in table.rows],
-        "measure": measure.name,
-        **measure.options(),
+        "measure": measure,
     }

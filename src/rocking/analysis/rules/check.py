@@ -15,6 +15,7 @@ from rocking.analysis.survey import block_columns, motion_of, record_columns
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
+from rocking.motion.arguments import Motions, motions_by_name
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response
@@ -171,7 +172,7 @@ class Check:
 
 def check(
     block: Block,
-    motions: Mapping[str, Motion],
+    motions: Motions,
     *,
     rules: Iterable[str] | None = None,
     model: Model = "nonlinear",
@@ -184,8 +185,8 @@ def check(
     ----------
     block : Block
         What rocks.
-    motions : mapping of str to Motion
-        Motions by the names that the table shows.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; the table shows the names of a mapping, or else the motions' own.
     rules : iterable of str, optional
         Names in `RULES`; by default all.
     model : {"nonlinear", "linear"}
@@ -220,17 +221,17 @@ def check(
     0.90 0.90 0.71 does not move
     0.93 0.93 0.64 does not move
     """
-    checks.mapping(motions, "motions", InvalidOption, "{name: motion}")
+    named_motions = motions_by_name(motions)
     names = None if rules is None else checks.several(rules, "rules", InvalidOption)
     responses, ratios, margins = [], [], []
-    with Progress("checking", total=len(motions), show=progress) as bar:
-        for motion in motions.values():
+    with Progress("checking", total=len(named_motions), show=progress) as bar:
+        for motion in named_motions.values():
             ratings = rate(block, motion, names)
             ratios.append({name: float(rating.ratio[0]) for name, rating in ratings.items()})
             responses.append(simulate(block, motion, model=model))
             margins.append(_margin(responses[-1], block, motion, model, threads))
             bar.advance()
-    return Check(block, tuple(motions), tuple(responses), tuple(ratios), tuple(margins))
+    return Check(block, tuple(named_motions), tuple(responses), tuple(ratios), tuple(margins))
 
 
 def _margin(response: Response, block: Block, motion: Motion, model: Model, threads: int | None) -> float:

@@ -17,7 +17,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidBlock, InvalidOption
-from rocking.motion.accepted import several_motions
+from rocking.motion.arguments import several_motions
 from rocking.motion.motion import Motion
 from rocking.tables import range_text
 

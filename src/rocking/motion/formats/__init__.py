@@ -1,6 +1,6 @@
 """Readers of strong-motion records: PEER AT2, CSMIP V1 and V2, COSMOS, SMC, K-NET, ESM, text, ObsPy's formats.
 
-The format is told from the content, never from the file's name. Numbers become m/s^2 (g = 9.80665 m/s^2); nothing
+The format is recognised from the content, never from the file's name. Numbers become m/s^2 (g = 9.80665 m/s^2); nothing
 else is done to them: no filter, no baseline, no offset removed.
 """
 
@@ -12,25 +12,23 @@ from collections.abc import Sequence
 from typing import BinaryIO, Protocol
 
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats import at2, cosmos, csmip_v1, csmip_v2, esm, knet, smc, table, through_obspy
+from rocking.motion.formats import at2, cosmos, csmip, esm, knet, smc, table, through_obspy
 from rocking.motion.formats.channel import Channel
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Source, open_source
+from rocking.motion.formats.source import Identification, Request, Source, open_source
 from rocking.motion.motion import Motion
 
 __all__ = ["Channel", "Identification", "channels", "content", "identify", "read"]
 
 
 class _Reader(Protocol):
-    """What the module of a format offers."""
+    """What the module of a format has: a test of the content, and a reader."""
 
     def recognise(self, source: Source) -> Identification | None: ...
     def read(self, source: Source, request: Request) -> list[Channel]: ...
 
 
 #: In the order in which they are asked; the last two take what no title claims.
-_READERS: tuple[_Reader, ...] = (at2, cosmos, csmip_v1, csmip_v2, smc, esm, knet, table, through_obspy)
+_READERS: tuple[_Reader, ...] = (at2, cosmos, csmip, smc, esm, knet, table, through_obspy)
 
 _LISTED = 30
 
@@ -58,7 +56,7 @@ def read(
     path : str, path or binary file
         A file in PEER AT2, CSMIP V1 or V2, COSMOS, USGS SMC, K-NET/KiK-net or ESM format, a text table of one
         column (accelerations), two (times, accelerations) or more that a heading names (times, then channels), or any
-        file that ObsPy reads if the `formats` extra is installed. The format is told from the content.
+        file that ObsPy reads if the `formats` extra is installed. The format is recognised from the content.
     channel : int or str, optional
         Number or name of the channel; needed only where the file holds several.
     dt : float, optional
@@ -78,7 +76,7 @@ def read(
     ------
     UnreadableRecord
         If the file is missing or unreadable, its format unknown, its content at odds with its header, a number
-        spoilt, the channel unknown or not chosen. The message names file, line and mend.
+        damaged, the channel unknown or not chosen. The message names file and line, and how to correct it.
     InvalidMotion
         If `dt` is not a positive number, or the samples do not make a motion.
 
@@ -118,7 +116,7 @@ def read_vertical(path: str | os.PathLike[str], name: str, horizontal: int | str
     Raises
     ------
     UnreadableRecord, InvalidMotion
-        As for `read`; the message offers the channels beside the horizontal one.
+        As for `read`; the message names the channels beside the horizontal one.
     """
     source = open_source(path)
     found = _recognise(source)[0].read(source, request)
@@ -147,6 +145,10 @@ def content(
     ----------
     path, channel, dt, units
         As for `read`.
+
+    Returns
+    -------
+    Identification, tuple of Channel
 
     Raises
     ------
@@ -191,6 +193,10 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
 
 def identify(path: str | os.PathLike[str]) -> Identification:
     r"""Return what format a file is taken for, and why.
+
+    Returns
+    -------
+    Identification
 
     Raises
     ------
@@ -250,7 +256,7 @@ def _listed(found: Sequence[Channel]) -> str:
 def _choose(source: Source, found: list[Channel], wanted: int | str | None) -> Channel:
     listed = _listed(found)
     if wanted is None and len(found) > 1:
-        raise source.error(f"the file holds {len(found)} channels; give channel= as one of {listed}")
+        raise source.error(f"the file holds {len(found)} channels; give {{}} as one of {listed}", None, "channel")
     matching = found if wanted is None else _matching(found, wanted)
     if not matching:
         raise source.error(f"there is no channel {wanted!r}; {_hint(found, wanted)}give one of {listed}")

@@ -9,13 +9,10 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from rocking.motion.formats.aligned import Layout
 from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Line, Source
+from rocking.motion.formats.source import Identification, Line, Request, Source
 from rocking.motion.formats.units import find_unit
-from rocking.motion.formats.values import NUMBER, parse, read_values
+from rocking.motion.formats.values import NUMBER, Layout, parse, read_values
 
 NAME = "PEER AT2"
 
@@ -46,13 +43,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If the file holds velocities or displacements, or more or fewer values than its NPTS.
-    """
+    """Return the one channel of the file."""
     header = _header(source)
     assert header is not None
     other = _other_quantity(header)

@@ -1,4 +1,4 @@
-"""One channel of a record file: its samples in m/s^2 and what the file says about them."""
+"""One channel of a record file: its samples in m/s^2, their times, and what the file says about them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,75 @@ from numpy.typing import NDArray
 
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, UnreadableRecord
-from rocking.motion.description import Description
+from rocking.motion.description import Description, Origin
 from rocking.motion.formats.source import Source
 from rocking.motion.formats.units import Unit
 from rocking.motion.motion import Motion
+
+#: Even times may be off their grid by this share of the step (or by what the printed decimals round away).
+_JITTER = 1e-6
+_MOST_DECIMALS = 9
+
+#: Rounded times leave the best even grid by one unit of their last decimal, and a little for that grid's own error.
+_SPREAD = 1.25
+
+#: Later times are mistakes, s (30,000 years).
+_LATEST = 1e12
+
+
+def first_fault(times: NDArray[np.float64]) -> int | None:
+    """Return the index of the first time that does not come after the one before it, or None."""
+    with np.errstate(over="ignore"):
+        fine = (np.diff(times) > 0.0) & (np.abs(times[1:]) <= _LATEST) & (np.abs(times[:-1]) <= _LATEST)
+    faults = np.flatnonzero(~fine)
+    return int(faults[0]) + 1 if len(faults) else None
+
+
+def even_step(times: NDArray[np.float64]) -> float | None:
+    """Return the step of increasing `times` (s) if they are even up to their printed decimals, else None.
+
+    Of all steps that fit, the one with the fewest digits is returned: times printed with three decimals at
+    200 samples per second give exactly 0.005.
+    """
+    intervals = len(times) - 1
+    mean = float(times[-1] - times[0]) / intervals
+    rounding = 4.0 * float(np.spacing(np.abs(times).max()))
+    resolution = _resolution(times, rounding)
+    multiple = round(mean / resolution) * resolution if resolution else 0.0
+    if abs(multiple - mean) <= (resolution + rounding) / intervals:
+        # The decimals can write this step, so nothing is rounded: a missing sample must not pass for rounding.
+        return _simplest_fit(times, multiple, rounding, _JITTER * mean + rounding)
+    if resolution > 0.5 * mean:
+        return None
+    allowed = max(_SPREAD * resolution, _JITTER * mean) + rounding
+    return _simplest_fit(times, _slope(times), (_SPREAD - 1.0) * resolution + rounding, allowed)
+
+
+def _resolution(times: NDArray[np.float64], rounding: float) -> float:
+    """Return the place of the last decimal that the times were printed with, s; 0 for all digits."""
+    for decimals in range(_MOST_DECIMALS + 1):
+        scaled = times * 10.0**decimals
+        if float(np.abs(scaled - np.rint(scaled)).max()) <= max(_JITTER, rounding * 10.0**decimals):
+            return 10.0**-decimals
+    return 0.0
+
+
+def _slope(times: NDArray[np.float64]) -> float:
+    """Return the least-squares step."""
+    index = np.arange(len(times)) - 0.5 * (len(times) - 1)
+    return float(index @ times / (index @ index))
+
+
+def _simplest_fit(times: NDArray[np.float64], step: float, drift: float, allowed: float) -> float | None:
+    """Return the step of fewest digits that stays within `drift` of `step`, s, over all the times.
+
+    None if the times leave its grid by more than `allowed`.
+    """
+    candidates = (float(f"{step:.{digits}g}") for digits in range(1, 18))
+    simplest = next((each for each in candidates if abs(each - step) * len(times) <= drift), step)
+    spread = float(np.ptp(times - simplest * np.arange(len(times))))
+    return simplest if spread <= allowed else None
+
 
 #: Numbers that files have where a value is missing: nines before and after the point, and the lowest of 16 bits.
 _MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(3, 9) for decimals in range(5)] + [32768.0]
@@ -107,11 +172,26 @@ class Channel:
             If there are fewer than two samples, or they are too large for a motion.
         """
         name = " ".join(part for part in (self.station, self.name) if part)
-        description = Description("record", text=self._facts())
+        description = Description("record", text=self._facts(), origin=self.origin)
         if self.times is not None:
             return Motion.from_points(self.times, self.acceleration, name=name, description=description)
         assert self.dt is not None
         return Motion.from_samples(self.acceleration, self.dt, name=name, description=description)
+
+    @property
+    def origin(self) -> Origin:
+        """What the file says of the channel."""
+        return Origin(
+            format=self.metadata.get("format", ""),
+            file=self.metadata.get("file", ""),
+            event=self.event,
+            station=self.station,
+            channel=self.name,
+            number=self.number,
+            azimuth=self.azimuth,
+            units=self.units,
+            heading_units=self.metadata.get("heading units", ""),
+        )
 
     def _facts(self) -> str:
         facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
@@ -129,11 +209,6 @@ def to_acceleration(
     """Return numbers in `unit`, which stand at the offset `at` of the file, in m/s^2.
 
     Where each has a row of its own, `row_at` gives its offset.
-
-    Raises
-    ------
-    UnreadableRecord
-        If there are fewer than two, one is too large, or one stands for a missing value.
     """
     if len(values) < 2:
         raise source.error(f"{len(values)} values are too few for a record; get the whole file", at)

@@ -13,9 +13,7 @@ from typing import NamedTuple
 from rocking.arrays import Floats
 from rocking.motion.formats import csmip
 from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Line, Source
+from rocking.motion.formats.source import Identification, Line, Request, Source
 from rocking.motion.formats.units import find_unit
 from rocking.motion.formats.values import expect, read_values
 
@@ -55,13 +53,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the accelerations in the file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If there is none, or a header and its data do not agree.
-    """
+    """Return the accelerations in the file."""
     found: list[Channel] = []
     others: list[str] = []
     title = source.first_line()
@@ -81,7 +73,9 @@ def read(source: Source, request: Request) -> list[Channel]:
 def _header(source: Source, title: Line) -> _CosmosHeader:
     stated = _TITLE.search(title.text)
     if stated is None:
-        raise source.error("a channel's title with '(Format v01.20 ...' should stand here; mend the file", title.start)
+        raise source.error(
+            "a channel's title with '(Format v01.20 ...' should stand here; correct the file", title.start
+        )
     text = source.lines(title.start, max(int(stated[1]), 1))
     _, after = _numbers(source, text[-1].next, "integer")
     reals, after = _numbers(source, after, "real")

@@ -6,9 +6,7 @@ import re
 from typing import NamedTuple
 
 from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Source
+from rocking.motion.formats.source import Identification, Request, Source
 from rocking.motion.formats.units import find_unit
 from rocking.motion.formats.values import parse, read_values
 
@@ -35,13 +33,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If the file holds anything but acceleration, or more or fewer values than its NDATA.
-    """
+    """Return the one channel of the file."""
     entries, start = _entries(source)
     kind = entries["DATA_TYPE"]
     if kind.value.upper() != "ACCELERATION":

@@ -12,13 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.motion.formats.aligned import Layout
 from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Line, Source
+from rocking.motion.formats.source import Identification, Line, Request, Source
 from rocking.motion.formats.units import find_unit
-from rocking.motion.formats.values import parse, read_values
+from rocking.motion.formats.values import Layout, parse, read_values
 
 NAME = "K-NET/KiK-net"
 
@@ -67,13 +64,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file, its offset kept.
-
-    Raises
-    ------
-    UnreadableRecord
-        If a header line is missing, or there are fewer counts than rate times duration, or a second's more.
-    """
+    """Return the one channel of the file, its offset kept."""
     entries, start = _entries(source)
     (rate,) = _positive(source, entries, "Sampling Freq", _RATE)
     gal, counts = _positive(source, entries, "Scale Factor", _SCALE)

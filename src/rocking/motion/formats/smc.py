@@ -12,14 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.motion.formats.aligned import Layout
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Line, Source
-from rocking.motion.formats.timing import even_step, first_fault
+from rocking.motion.formats.channel import Channel, even_step, first_fault, to_acceleration
+from rocking.motion.formats.source import Identification, Line, Request, Source
 from rocking.motion.formats.units import find_unit
-from rocking.motion.formats.values import expect, read_values
+from rocking.motion.formats.values import Layout, expect, read_values
 
 NAME = "USGS SMC"
 
@@ -62,13 +58,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file.
-
-    Raises
-    ------
-    UnreadableRecord
-        If the file holds anything but acceleration, or header and data do not agree.
-    """
+    """Return the one channel of the file."""
     title = source.first_line()
     kind = _TITLE.match(title.text) if title is not None else None
     assert title is not None and kind is not None

@@ -1,16 +1,22 @@
-"""A record file in memory: its text with line ends made uniform, its lines, and errors that name one of them."""
+"""A record file in memory, what it is taken for, and what the caller says about it.
+
+Its text has line ends made uniform; errors name one of its lines.
+"""
 
 from __future__ import annotations
 
 import difflib
+import math
 import os
 import re
 import stat
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
-from rocking.errors import UnreadableRecord
+from rocking import checks
+from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.motion.formats.units import CHOICES, Unit, choose_unit
 
 #: Largest file that is read, bytes; the longest strong-motion records are a hundred times smaller.
 SIZE_LIMIT = 512 * 2**20
@@ -99,37 +105,36 @@ class Source:
             return None
         return min(position for position in map(self.data.find, _each(_CONTROL)) if position >= 0)
 
-    def error(self, message: str, at: int | None = None) -> UnreadableRecord:
-        """Return the error that says `message` about this file, at the line that holds the offset `at`."""
-        if at is None:
-            return UnreadableRecord(f"{self.path}: {message}")
-        return UnreadableRecord(f"{self.path}, line {self.line_number(at)}: {message}")
+    def error(self, message: str, at: int | None = None, *arguments: str) -> UnreadableRecord:
+        """Return the error that says `message` about this file, at the line that holds the offset `at`.
+
+        Each "{}" in the message stands for one of the `arguments` of `rocking.read`; the first is what is missing
+        or wrong.
+        """
+        line = None if at is None else self.line_number(at)
+        return UnreadableRecord(message, *arguments, path=self.path, line=line)
 
 
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
-    """Read a file whole, or what is left of one that is open.
-
-    Raises
-    ------
-    UnreadableRecord
-        If it is missing, not a regular file, not readable, empty or larger than SIZE_LIMIT.
-    """
+    """Read a file whole, or what is left of one that is open."""
     read = getattr(path, "read", None)
     name = _name(path) if read is None else _stream_name(path)
     try:
         raw = _content(name) if read is None else read(SIZE_LIMIT + 1)
     except FileNotFoundError as error:
-        raise UnreadableRecord(f"{name}: there is no such file; {_hint(name)}") from error
+        raise UnreadableRecord(f"there is no such file; {_hint(name)}", path=name) from error
     except PermissionError as error:
-        raise UnreadableRecord(f"{name}: this file may not be read; ask for permission to read it") from error
+        raise UnreadableRecord("this file may not be read; ask for permission to read it", path=name) from error
     except (OSError, ValueError) as error:
-        raise UnreadableRecord(f"{name}: this file could not be read ({error}); check the name and the disk") from error
+        raise UnreadableRecord(
+            f"this file could not be read ({error}); check the name and the disk", path=name
+        ) from error
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
-        raise UnreadableRecord(f"{name}: this file is larger than {limit} MiB; cut the record into smaller files")
+        raise UnreadableRecord(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
     data = _text(raw)
     if not data.strip():
-        raise UnreadableRecord(f"{name}: this file is empty; get the record again")
+        raise UnreadableRecord("this file is empty; get the record again", path=name)
     return Source(name, raw, data)
 
 
@@ -163,9 +168,9 @@ def _stream_name(stream: Any) -> str:
 def _content(name: str) -> bytes:
     status = os.stat(name)  # noqa: PTH116 - Path() would turn an empty name into the current folder
     if stat.S_ISDIR(status.st_mode):
-        raise UnreadableRecord(f"{name}: this is a folder; name one record file in it")
+        raise UnreadableRecord("this is a folder; name one record file in it", path=name)
     if not stat.S_ISREG(status.st_mode):
-        raise UnreadableRecord(f"{name}: this is not a regular file; copy the record into one")
+        raise UnreadableRecord("this is not a regular file; copy the record into one", path=name)
     with open(name, "rb") as file:  # noqa: PTH123
         # A read sets aside as much memory as it is asked for.
         raw = file.read(min(status.st_size, SIZE_LIMIT) + 1)
@@ -189,3 +194,65 @@ def _text(raw: bytes) -> bytes:
 
 def _each(values: bytes) -> list[bytes]:
     return [bytes([value]) for value in values]
+
+
+class Identification(NamedTuple):
+    """A file's format, and what in its content says so."""
+
+    format: str
+    reason: str
+
+
+_SAME_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class Request:
+    """The arguments `dt` (s) and `units` of a read; None where the file should know.
+
+    Where they are given for several files at once they are for those that do not say; for one alone they must not
+    contradict it.
+    """
+
+    dt: float | None = None
+    unit: Unit | None = None
+    several: bool = False
+
+    @classmethod
+    def checked(cls, dt: float | None, units: str | None, *, several: bool = False) -> Request:
+        """Return the request."""
+        return cls(
+            None if dt is None else checks.positive(dt, "dt", InvalidMotion, "s"),
+            None if units is None else choose_unit(units),
+            several,
+        )
+
+    def step(self, source: Source, stated: float, at: int | None) -> float:
+        """Return the step (s) that the file states at the offset `at`."""
+        # No file holds more samples than bytes, so this also bounds the record's length.
+        if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
+            raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
+        if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=_SAME_STEP):
+            raise source.error(
+                f"the sampling step is {stated:g} s, not {{}} = {self.dt:g} s; leave {{}} out", at, "dt", "dt"
+            )
+        return stated
+
+    def units(self, source: Source, stated: Unit | None, at: int | None) -> Unit:
+        """Return the unit that the file states at the offset `at`, or else the one asked for."""
+        unit = stated or self.unit
+        if unit is None:
+            raise source.error(
+                f"the file does not say its units; give {{}} as one of {', '.join(CHOICES)}", at, "units"
+            )
+        if self.unit is not None and not self.several and unit != self.unit:
+            raise source.error(
+                f"the units are {unit.name}, not {{}} = {self.unit.name!r}; leave {{}} out", at, "units", "units"
+            )
+        return unit
+
+    def units_by_heading(self, source: Source, heading: Unit | None, at: int | None) -> Unit:
+        """Return the unit that a heading in the file's own words names, or the one asked for, which overrules it."""
+        if self.several and heading is not None:
+            return heading
+        return self.units(source, None if self.unit is not None else heading, at)

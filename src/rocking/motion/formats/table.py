@@ -1,7 +1,7 @@
 """Plain text and CSV: one column of accelerations with dt=, times and accelerations, or as many as a heading names.
 
 Columns and their units are what the heading says (`heading`), or units=; times are in seconds where it says nothing.
-Heading lines and comments (#, %, !, //) are passed over, but no line that looks like a spoilt row. The delimiter is a
+Heading lines and comments (#, %, !, //) are passed over, but no line that looks like a damaged row. The delimiter is a
 semicolon (a comma is then the decimal sign), a comma, or blanks; between blanks a comma within a number is the decimal
 sign. Numbers may be quoted, and exponents Fortran's (1.0D-3). Rows such as "1,5" in a file without any point, and
 without two names above them, may be one number or two: they are refused.
@@ -18,12 +18,9 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats.channel import Channel, gap_at, missing_value, to_acceleration
+from rocking.motion.formats.channel import Channel, even_step, first_fault, gap_at, missing_value, to_acceleration
 from rocking.motion.formats.heading import RULE, Column, Heading, heading_of, names_columns
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Line, Source
-from rocking.motion.formats.timing import even_step, first_fault
+from rocking.motion.formats.source import Identification, Line, Request, Source
 from rocking.motion.formats.units import CHOICES, Unit
 from rocking.motion.formats.values import convert, not_a_number, parse, rows_of_numbers
 
@@ -129,9 +126,9 @@ def refusal(source: Source) -> UnreadableRecord | None:
         return None
     rows = [_row(line, _delimiter(line)[0]) for line in _filled(source.lines(0, _HEADING_LINES))]
     for row, following in itertools.pairwise(rows):
-        spoilt = _spoilt_in(row.tokens)
-        if spoilt and len(row.tokens) == len(following.tokens) and _spoilt_in(following.tokens):
-            return _not_in_row(source, spoilt, row.at)
+        damaged = _damaged_in(row.tokens)
+        if damaged and len(row.tokens) == len(following.tokens) and _damaged_in(following.tokens):
+            return _not_in_row(source, damaged, row.at)
     return None
 
 
@@ -141,14 +138,7 @@ def is_foreign(source: Source) -> bool:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return the channels of the file: one, unless a heading names several.
-
-    Raises
-    ------
-    UnreadableRecord
-        If units are not known, or dt is not given where there are no times, or a row is not like the others, or times
-        do not increase, or a value is missing, or it cannot be told whether commas are decimal signs.
-    """
+    """Return the channels of the file: one, unless a heading names several."""
     shape = _shape(source)
     assert shape is not None
     if shape.fault is not None:
@@ -162,7 +152,7 @@ def read(source: Source, request: Request) -> list[Channel]:
     heading = shape.heading(source)
     held = _channels(source, heading)
     if not heading.places("time") and request.dt is None:
-        raise source.error("the file does not say its sampling step; give dt= in seconds", shape.start)
+        raise source.error("the file does not say its sampling step; give {} in seconds", shape.start, "dt")
     for place in heading.places("time"):
         _refuse_strange_times(source, heading, place)
     units = [_unit(source, request, heading, place, shape.start) for place in held]
@@ -208,9 +198,10 @@ def _unit(source: Source, request: Request, heading: Heading, place: int, at: in
         )
     if request.unit is None and column.strange:
         raise source.error(
-            f"the heading says {column.strange!r}, which is no unit of acceleration that is known here; give units= as "
+            f"the heading says {column.strange!r}, which is no unit of acceleration that is known here; give {{}} as "
             f"one of {', '.join(CHOICES)}",
             heading.at,
+            "units",
         )
     return request.units_by_heading(source, column.unit, at)
 
@@ -292,23 +283,23 @@ def _fault_before(source: Source, before: Sequence[Line], rows: list[_Row], shap
     fault = None
     for line in reversed(_filled(before)):
         tokens = _row(line, shape.translation).tokens
-        spoilt = (
-            _spoilt_in(tokens, shape.columns)
-            or _spoilt_before(tokens, rows, shape.columns)
-            or _spoilt_below_names(line, tokens, before, shape)
+        damaged = (
+            _damaged_in(tokens, shape.columns)
+            or _damaged_before(tokens, rows, shape.columns)
+            or _damaged_below_names(line, tokens, before, shape)
         )
-        if not spoilt:
+        if not damaged:
             break
-        fault = _not_in_row(source, spoilt, line.start)
+        fault = _not_in_row(source, damaged, line.start)
     return fault
 
 
-def _spoilt_in(tokens: list[bytes], columns: int = 0) -> bytes:
+def _damaged_in(tokens: list[bytes], columns: int = 0) -> bytes:
     """Return the first piece that is no number, of a line of numbers and what stands in place of some; or nothing."""
-    spoilt = [token for token in tokens if parse(token) is None]
-    numbers = len(tokens) - len(spoilt)
+    damaged = [token for token in tokens if parse(token) is None]
+    numbers = len(tokens) - len(damaged)
     fits = numbers > 0 or len(tokens) == columns
-    return spoilt[0] if spoilt and fits and all(map(_like_number, spoilt)) else b""
+    return damaged[0] if damaged and fits and all(map(_like_number, damaged)) else b""
 
 
 def _like_number(token: bytes) -> bool:
@@ -319,7 +310,7 @@ def _like_number(token: bytes) -> bool:
     return mistaken or _LIKE_NUMBER.fullmatch(text) is not None
 
 
-def _spoilt_before(tokens: list[bytes], rows: list[_Row], columns: int) -> bytes:
+def _damaged_before(tokens: list[bytes], rows: list[_Row], columns: int) -> bytes:
     """Return the first piece that is no number, of a line whose time is one step before that of the rows below it."""
     times = [
         time for each in (tokens, *(row.tokens for row in rows[:2])) if each and (time := parse(each[0])) is not None
@@ -331,7 +322,7 @@ def _spoilt_before(tokens: list[bytes], rows: list[_Row], columns: int) -> bytes
     return next((token for token in tokens if parse(token) is None), b"") if follows else b""
 
 
-def _spoilt_below_names(line: Line, tokens: list[bytes], before: Sequence[Line], shape: _Shape) -> bytes:
+def _damaged_below_names(line: Line, tokens: list[bytes], before: Sequence[Line], shape: _Shape) -> bytes:
     """Return the first piece that is no number, of a line with as many cells as columns, one of them a number.
 
     It is no heading if one stands above it; without one, if a number has a point and more than blanks are between them.
@@ -443,7 +434,7 @@ def _timing(
     fault = first_fault(times)
     if fault is not None:
         at = shape.row_at(source, fault)
-        raise source.error("the time does not increase from the row before; mend the column of times", at)
+        raise source.error("the time does not increase from the row before; correct the column of times", at)
     step = even_step(written) if len(written) > 1 else None
     if step is not None:
         return request.step(source, step * unit.multiplier / unit.divisor, shape.start), None

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 
 from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.identification import Identification
-from rocking.motion.formats.request import Request
-from rocking.motion.formats.source import Source
+from rocking.motion.formats.source import Identification, Request, Source
 from rocking.motion.formats.units import Unit
 
 #: PICKLE runs what a file tells it to; the other two open further files that a file names.
@@ -45,13 +43,7 @@ def recognise(source: Source) -> Identification | None:
 
 
 def read(source: Source, request: Request) -> list[Channel]:
-    """Return all traces of the file, times their calibration factor.
-
-    Raises
-    ------
-    UnreadableRecord
-        If ObsPy fails, a trace is not of finite numbers, or units are not given.
-    """
+    """Return all traces of the file, times their calibration factor."""
     identification = recognise(source)
     assert identification is not None
     unit = request.units(source, None, None)

@@ -90,14 +90,10 @@ def find_time_unit(spelling: str) -> Unit | None:
 
 
 def choose_unit(units: str) -> Unit:
-    """Return the unit that a user names.
-
-    Raises
-    ------
-    UnreadableRecord
-        If it is none of CHOICES.
-    """
+    """Return the unit that a user names."""
     unit = find_unit(units) if isinstance(units, str) else None
     if unit is None or unit.name not in CHOICES:
-        raise UnreadableRecord(f"the units {units!r} are not known; give one of {', '.join(CHOICES)}")
+        raise UnreadableRecord(
+            f"the {{}} {units!r} are not known; give one of {', '.join(CHOICES)}", "units", value=units
+        )
     return unit

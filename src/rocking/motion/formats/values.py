@@ -1,26 +1,220 @@
 """Numbers in bulk: blank-separated first, by Fortran columns where they touch, singly only to name a bad one.
 
-Numbers of one shape, which most are, take the short way of `aligned`, to the same result.
+Numbers of one shape, which most are, take a short way, in columns of bytes, to the same result.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rocking.arrays import Floats
+from rocking.arrays import Floats, Integers
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats.aligned import FORTRAN_EXPONENT, Layout, read_aligned, read_columns
 from rocking.motion.formats.source import Source
+
+#: Characters of one field: one row for each of its columns, one column for each line of the file.
+_Field = NDArray[np.uint8]
+
+#: Whole numbers and powers of ten up to these are doubles.
+_LARGEST_INTEGER: Final = 2**53
+_LARGEST_POWER: Final = 22
+_POWERS: Final = 10.0 ** np.arange(_LARGEST_POWER + 1)
+
+#: Digits that an integer of 64 bits holds.
+_MOST_DIGITS: Final = 18
+_SHORT_DIGITS: Final = 9
+
+#: Wider fields are not made of one number; they are left to be refused.
+_WIDEST: Final = 64
+
+_NEWLINE, _BLANK, _PLUS, _MINUS, _POINT, _ZERO = b"\n +-.0"
+#: What does not make the shape of a number: signs and blanks before it are as good as digits.
+_SHAPE: Final = bytes.maketrans(b" +-123456789", b"000000000000")
+
+#: Fortran writes double precision with a D.
+FORTRAN_EXPONENT: Final = bytes.maketrans(b"Dd", b"EE")
+
+_TOKEN: Final = re.compile(rb"[^ ]+")
+_EXPONENT: Final = re.compile(rb"[EeDd][+-]\d{1,3}$")
+
+
+class Layout(NamedTuple):
+    """Fortran columns such as 8F10.3: numbers per line and characters per number."""
+
+    per_line: int
+    width: int
+
+
+def read_aligned(block: bytes, layout: Layout | None = None) -> Floats | None:
+    """Return all numbers of lines that are written alike; the last line may be shorter.
+
+    Parameters
+    ----------
+    block : bytes
+        Lines of text.
+    layout : Layout, optional
+        Columns of the numbers, which may touch if each has a decimal point, for what touches then is no number by
+        itself. By default numbers end where those of the first line do, with blanks between them.
+
+    Returns
+    -------
+    ndarray or None
+        None if the lines are not written alike, or a number is not finite.
+    """
+    body, newline, last = block.rstrip().rpartition(b"\n")
+    parts = [_alike(lines, layout) for lines in (body + newline, last + b"\n") if lines]
+    numbers = [part for part in parts if part is not None]
+    return np.concatenate(numbers) if len(numbers) == len(parts) else None
+
+
+def read_columns(block: bytes, count: int) -> Floats | None:
+    """Return the numbers of lines of `count` numbers each, row by row; blanks between them may vary.
+
+    Returns
+    -------
+    ndarray or None
+        None if a line holds more or fewer pieces of text, or the numbers of a column do not have the same decimals.
+    """
+    text = np.frombuffer(b" " * (_WIDEST - 1) + b"\n" + block.rstrip() + b"\n", dtype=np.uint8)
+    line_ends = np.flatnonzero(text == _NEWLINE)
+    visible = text > _BLANK
+    changes = visible[1:] != visible[:-1]
+    if np.count_nonzero(changes) != 2 * count * (len(line_ends) - 1):
+        return None
+    edges = np.flatnonzero(changes) + 1
+    starts, ends = edges[0::2].reshape(-1, count), edges[1::2].reshape(-1, count)
+    if np.any(starts[:, 0] < line_ends[:-1]) or np.any(ends[:, -1] > line_ends[1:]):
+        return None
+    columns = [_right_aligned(text, starts[:, k], ends[:, k]) for k in range(count)]
+    numbers = [None if column is None else _numbers(column, column[:, 0].tobytes()) for column in columns]
+    found = [each for each in numbers if each is not None]
+    return np.column_stack(found).ravel() if len(found) == count else None
+
+
+def _right_aligned(text: NDArray[np.uint8], starts: Integers, ends: Integers) -> _Field | None:
+    """Pieces of text as one field, blanks before the shorter ones; None if one is too long."""
+    lengths = ends - starts
+    width = int(lengths.max())
+    if width > _WIDEST:
+        return None
+    rows = np.lib.stride_tricks.sliding_window_view(text, width)[ends - width]
+    field = np.ascontiguousarray(rows.T)
+    field[np.arange(width)[:, np.newaxis] < width - lengths] = _BLANK
+    return field
+
+
+def _alike(block: bytes, layout: Layout | None) -> Floats | None:
+    """Return the numbers on lines of equal length, or None if they are not written alike."""
+    length = block.find(b"\n") + 1
+    first = block[: length - 1].rstrip(b" ")
+    ends = [found.end() for found in _TOKEN.finditer(first)] if layout is None else _fixed_ends(first, layout)
+    if not ends or len(block) % length or max(np.diff(ends, prepend=0)) > _WIDEST:
+        return None
+    lines = np.frombuffer(block, dtype=np.uint8).reshape(-1, length)
+    starts = [0, *ends[:-1]]
+    gaps = [] if layout is not None else starts[1:]
+    if np.any(lines[:, -1] != _NEWLINE) or np.any(lines[:, [*gaps, *range(ends[-1], length - 1)]] != _BLANK):
+        return None
+    numbers = np.empty((len(lines), len(ends)))
+    for fields in _groups(starts, ends, first):
+        start, end = starts[fields[0]], ends[fields[0]]
+        rows = np.stack([lines[:, starts[k] : ends[k]] for k in fields], axis=1).reshape(-1, end - start)
+        values = _numbers(np.ascontiguousarray(rows.T), first[start:end])
+        if values is None:
+            return None
+        numbers[:, fields] = values.reshape(-1, len(fields))
+    return numbers.ravel()
+
+
+def _fixed_ends(first: bytes, layout: Layout) -> list[int]:
+    """Return where the fields end, if they fill the line and each has its point."""
+    count, rest = divmod(len(first), layout.width)
+    ends = [(k + 1) * layout.width for k in range(count)]
+    pointed = all(b"." in first[end - layout.width : end] for end in ends)
+    return ends if rest == 0 and count <= layout.per_line and pointed else []
+
+
+def _groups(starts: list[int], ends: list[int], first: bytes) -> list[list[int]]:
+    """Fields of the first line by their shape: width, and places of point and exponent."""
+    groups: dict[bytes, list[int]] = {}
+    for k, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        groups.setdefault(first[start:end].translate(_SHAPE), []).append(k)
+    return list(groups.values())
+
+
+def _numbers(field: _Field, pattern: bytes) -> Floats | None:
+    """Numbers of one field on all lines, if they are written like `pattern`: point and exponent in its columns."""
+    exponent = _EXPONENT.search(pattern)
+    stop = exponent.start() if exponent else len(pattern)
+    point = pattern.find(b".", 0, stop)
+    whole, fraction = (stop, stop) if point < 0 else (point, point + 1)
+    before, after, powers = _leading(field[:whole]), _digits(field[fraction:stop]), _powers(field[stop:])
+    if before is None or after is None or powers is None or np.any(field[whole:fraction] != _POINT):
+        return None
+    digits = np.concatenate([before, after])
+    # A field of blanks or a sign alone is no number; a digit after the point makes it one.
+    if len(digits) > _MOST_DIGITS or (fraction == stop and np.any(field[:whole][-1:] < _ZERO)):
+        return None
+    integers, powers = _integers(digits), powers - len(after)
+    factors = _POWERS[np.minimum(np.abs(powers), _LARGEST_POWER)]
+    magnitudes = np.where(powers < 0, integers / factors, integers * factors)
+    numbers = np.where(np.any(field[:whole] == _MINUS, axis=0), -magnitudes, magnitudes)
+    twice_rounded = (integers > _LARGEST_INTEGER) | (np.abs(powers) > _LARGEST_POWER)
+    numbers[twice_rounded] = [float(text.tobytes().translate(FORTRAN_EXPONENT)) for text in field.T[twice_rounded]]
+    return numbers if np.isfinite(numbers).all() else None
+
+
+def _leading(columns: _Field) -> NDArray[np.uint8] | None:
+    """Digits before the point, zero for blanks and a sign before them; None if anything else stands there."""
+    begun = np.zeros(columns.shape[1], dtype=np.bool_)
+    digits = np.zeros_like(columns)
+    for k, column in enumerate(columns):
+        is_digit = column - np.uint8(_ZERO) <= 9
+        before = (column == _BLANK) | (column == _PLUS) | (column == _MINUS)
+        if np.any(~is_digit & (begun | ~before)):
+            return None
+        begun |= column != _BLANK
+        digits[k] = (column - np.uint8(_ZERO)) * is_digit
+    return digits
+
+
+def _digits(columns: _Field) -> NDArray[np.uint8] | None:
+    digits = columns - np.uint8(_ZERO)
+    return None if np.any(digits > 9) else digits
+
+
+def _powers(columns: _Field) -> Integers | None:
+    """Powers of ten in the columns of an exponent: a letter, a sign, digits; zero where there are no columns."""
+    if not len(columns):
+        return np.zeros(1, dtype=np.int64)
+    letter, sign, digits = columns[0], columns[1], _digits(columns[2:])
+    if digits is None or np.any(letter != letter[0]) or np.any((sign != _PLUS) & (sign != _MINUS)):
+        return None
+    return np.where(sign == _MINUS, -1, 1) * _integers(digits)
+
+
+def _integers(digits: NDArray[np.uint8]) -> Integers:
+    """Whole numbers from their digits, nine of them at a time, which 32 bits hold."""
+    numbers = np.zeros(digits.shape[1], dtype=np.int64)
+    for begin in range(0, len(digits), _SHORT_DIGITS):
+        part = np.zeros(digits.shape[1], dtype=np.uint32)
+        for digit in digits[begin : begin + _SHORT_DIGITS]:
+            part *= np.uint32(10)
+            part += digit
+        numbers = numbers * 10 ** len(digits[begin : begin + _SHORT_DIGITS]) + part
+    return numbers
+
 
 #: A number in a header, as a regular expression.
 NUMBER = r"[+-]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[EeDd][+-]?\d{1,4})?"
 
 _NUMERIC = b"0123456789+-.eEdD"
-_BLANK = b" \t\n\v"
-_IS_OTHER = bytes(0 if c in _NUMERIC + _BLANK else 1 for c in range(256))
+_BLANKS = b" \t\n\v"
+_IS_OTHER = bytes(0 if c in _NUMERIC + _BLANKS else 1 for c in range(256))
 #: Bytes at once: the numbers in them take some fifty times the memory while they are converted.
 _CHUNK = 2**20
 _SPACE = re.compile(rb"\s")
@@ -57,11 +251,6 @@ def read_values(
 
     Numbers are taken as blank-separated; where that fails or does not give `count` of them, by the columns of
     `layout`, so that numbers which touch are split where the Fortran program that wrote them meant it.
-
-    Raises
-    ------
-    UnreadableRecord
-        Naming the line and the text that is not a finite number.
     """
     if layout is not None and count is not None:
         aligned = _read_aligned(source, start, end, layout)
@@ -97,13 +286,7 @@ def rows_of_numbers(source: Source, start: int, columns: int, translation: bytes
 
 
 def expect(source: Source, at: int, count: int, values: Floats) -> Floats:
-    """Return `values`, of which the header at the offset `at` says that there are `count`.
-
-    Raises
-    ------
-    UnreadableRecord
-        If there are more or fewer.
-    """
+    """Return `values`, of which the header at the offset `at` says that there are `count`."""
     if len(values) != count:
         raise source.error(f"the header says {count} values but {len(values)} follow; get the whole file again", at)
     return values

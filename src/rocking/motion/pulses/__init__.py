@@ -8,9 +8,17 @@ A new pulse goes where its like are: `sines`, `wavelets` (with an envelope), `sh
 are sums of sines or derivatives of a Gaussian, whose Taylor series are known (`series`).
 """
 
-from rocking.motion.pulses.shapes import rectangular, triangular
-from rocking.motion.pulses.sines import half_sine, n_lobe, one_cosine, one_sine, sine
-from rocking.motion.pulses.wavelets import mavroeidis_papageorgiou, ricker
+from rocking.motion.pulses.shapes import (
+    half_sine,
+    mavroeidis_papageorgiou,
+    n_lobe,
+    one_cosine,
+    one_sine,
+    rectangular,
+    ricker,
+    sine,
+    triangular,
+)
 
 __all__ = [
     "half_sine",

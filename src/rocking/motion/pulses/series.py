@@ -1,18 +1,76 @@
 """Formulas as piecewise polynomials: each piece is the Taylor series about its middle, moved to its start.
 
-The pieces are so short that the first term left out is below 1e-16 of the peak.
+The pieces are so short that the first term left out is below 1e-16 of the peak. Large angles are taken without their
+rounding: products and quotients with their errors, whole turns taken off exactly.
 """
 
+from __future__ import annotations
+
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.polynomial import hermite_e
 from numpy.typing import NDArray
 
+from rocking import checks
 from rocking.arrays import Floats
+from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.pulses.angles import Angle, exact_product, sine_and_cosine
+
+
+class Angle(NamedTuple):
+    """Angles by their sines and cosines."""
+
+    sine: Floats
+    cosine: Floats
+
+
+def sine_and_cosine(turns: Floats, rest: Floats, phase: float) -> Angle:
+    """Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle.
+
+    Whole quarter turns are taken off exactly, and the phase is added by the addition theorem.
+    """
+    within = (turns - np.rint(turns)) + rest
+    quarter = np.rint(4.0 * within)
+    angle = 2.0 * np.pi * (within - 0.25 * quarter)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    quadrant = quarter.astype(int) % 4
+    turned = Angle(
+        np.choose(quadrant, [sine, cosine, -sine, -cosine]),
+        np.choose(quadrant, [cosine, -sine, -cosine, sine]),
+    )
+    return sum_of_angles(turned, Angle(np.sin(phase), np.cos(phase)), 1.0)
+
+
+def sum_of_angles(one: Angle, other: Angle, sign: float) -> Angle:
+    """Sum of two angles, or their difference where the sign is -1."""
+    return Angle(
+        one.sine * other.cosine + sign * one.cosine * other.sine,
+        one.cosine * other.cosine - sign * one.sine * other.sine,
+    )
+
+
+def exact_product(a: float, b: Floats) -> tuple[Floats, Floats]:
+    """Product and its rounding error (Dekker 1971)."""
+    product = a * b
+    a_high, a_low = _halves(np.asarray(a))
+    b_high, b_low = _halves(b)
+    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+def exact_quotient(a: Floats, rest: Floats, divisor: float) -> tuple[Floats, Floats]:
+    """Quotient of ``a + rest``, and what it lacks."""
+    quotient = a / divisor
+    product, error = exact_product(divisor, quotient)
+    return quotient, ((a - product) - error + rest) / divisor
+
+
+def _halves(a: Floats) -> tuple[Floats, Floats]:
+    scaled = 134217729.0 * a
+    high = scaled - (scaled - a)
+    return high, a - high
+
 
 #: Relative to the peak; covers the terms left out and the rounding of the coefficients.
 ERROR: Final = 1e-15
@@ -71,3 +129,15 @@ def gaussian_derivative(order: int, times: Floats, rate: float) -> Floats:
 def _scaled_powers(rate: float, powers: NDArray[np.int_]) -> Floats:
     """Return ``rate**n / n!``."""
     return rate ** powers.astype(np.float64) / np.array([math.factorial(n) for n in powers], dtype=np.float64)
+
+
+MOST_CYCLES: Final = 100_000
+#: Far beyond any ground motion, Hz.
+_LOWEST: Final = 1e-9
+_HIGHEST: Final = 1e6
+
+
+def checked_frequency(frequency: float) -> float:
+    """Return a frequency, Hz, or raise InvalidMotion if it is no pulse's."""
+    checked = checks.positive(frequency, "frequency", InvalidMotion, "Hz")
+    return checks.within(checked, "frequency of a pulse", InvalidMotion, _LOWEST, _HIGHEST, "Hz")

@@ -1,4 +1,10 @@
-"""Shapes made of straight lines, which are exact."""
+"""Pulses: straight lines, which are exact, sines and sums of them, wavelets with an envelope."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, Literal
 
 import numpy as np
 
@@ -6,6 +12,23 @@ from rocking import checks
 from rocking.errors import InvalidMotion
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
+from rocking.motion.pulses.series import (
+    ERROR,
+    GAUSSIAN_PIECE,
+    MOST_CYCLES,
+    PIECES_PER_CYCLE,
+    about_starts,
+    checked_frequency,
+    exact_product,
+    exact_quotient,
+    gaussian_derivative,
+    middles,
+    sine_and_cosine,
+    sine_pieces,
+    sine_series,
+    sum_of_angles,
+    whole_pieces,
+)
 
 
 def rectangular(amplitude: float, duration: float) -> Motion:
@@ -17,6 +40,10 @@ def rectangular(amplitude: float, duration: float) -> Motion:
         m/s^2.
     duration : float
         s.
+
+    Returns
+    -------
+    Motion
 
     Raises
     ------
@@ -50,6 +77,10 @@ def triangular(amplitude: float, duration: float) -> Motion:
     duration : float
         s.
 
+    Returns
+    -------
+    Motion
+
     Raises
     ------
     InvalidMotion
@@ -74,3 +105,371 @@ def triangular(amplitude: float, duration: float) -> Motion:
             "linear from 0 to amplitude at duration/2 and back to 0",
         ),
     )
+
+
+def sine(amplitude: float, frequency: float, *, cycles: float, phase: float = 0.0) -> Motion:
+    """Return ``amplitude * sin(2 pi frequency t + phase)`` over a number of cycles.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    frequency : float
+        Hz.
+    cycles : float
+        Duration times frequency; need not be whole.
+    phase : float
+        rad.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InvalidMotion
+        If `frequency` or `cycles` is not positive, there are more than 100,000 cycles, or a number is not
+        finite.
+
+    Examples
+    --------
+    >>> motion = sine(3.0, 2.0, cycles=5)
+    >>> motion.duration, round(motion.pga, 12), round(motion.acceleration(0.0625), 9)
+    (2.5, 3.0, 2.121320344)
+    """
+    return _sine("sine", amplitude, frequency, cycles, phase)
+
+
+def half_sine(amplitude: float, frequency: float) -> Motion:
+    """Return one lobe, ``amplitude * sin(2 pi frequency t)`` for half a cycle.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    frequency : float
+        Hz, of the whole sine: the pulse lasts ``1 / (2 frequency)``.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InvalidMotion
+        As `sine`.
+
+    Examples
+    --------
+    >>> round(half_sine(2.0, 0.5).pgv * math.pi, 12)
+    4.0
+    """
+    return _sine("half sine", amplitude, frequency, 0.5, 0.0)
+
+
+def one_sine(amplitude: float, frequency: float) -> Motion:
+    """Return a one-sine acceleration pulse (Zhang and Makris 2001): one cycle of a sine.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    frequency : float
+        Hz.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InvalidMotion
+        As `sine`.
+
+    Examples
+    --------
+    >>> abs(one_sine(2.0, 0.5).velocity(2.0)) < 1e-15
+    True
+    """
+    return _sine("one-sine", amplitude, frequency, 1.0, 0.0)
+
+
+def one_cosine(amplitude: float, frequency: float) -> Motion:
+    """Return a one-cosine acceleration pulse (Zhang and Makris 2001): one cycle of a cosine, jumps included.
+
+    Parameters
+    ----------
+    amplitude : float
+        m/s^2.
+    frequency : float
+        Hz.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InvalidMotion
+        As `sine`.
+
+    Examples
+    --------
+    >>> round(one_cosine(2.0, 0.5).acceleration(0.0), 12)
+    2.0
+    """
+    return _sine("one-cosine", amplitude, frequency, 1.0, 0.5 * math.pi)
+
+
+def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int | None = None) -> Motion:
+    """Return half cycles of a sine, each with its own amplitude.
+
+    Lobe k (k = 0, 1, ...) is ``amplitude[k] * sin(2 pi frequency t)`` for ``k <= 2 frequency t <= k + 1``, so
+    equal amplitudes make a sine.
+
+    Parameters
+    ----------
+    amplitude : float or sequence of float
+        m/s^2; one for all lobes (then give `lobes`), or one for each.
+    frequency : float
+        Hz, of the sine: a lobe lasts ``1 / (2 frequency)``.
+    lobes : int, optional
+        Number of lobes, if `amplitude` is one number.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InvalidMotion
+        If there is no lobe, `lobes` contradicts the amplitudes, or a number is not usable.
+
+    Examples
+    --------
+    >>> motion = n_lobe([1.0, 3.0, 2.0], 0.5)
+    >>> motion.acceleration([0.5, 1.5, 2.5]).round(12)
+    array([ 1., -3.,  2.])
+    """
+    amplitudes = _lobe_amplitudes(amplitude, lobes)
+    frequency = checked_frequency(frequency)
+    per_lobe = PIECES_PER_CYCLE // 2
+    breakpoints = np.arange(len(amplitudes) * per_lobe + 1.0) / (PIECES_PER_CYCLE * frequency)
+    unit = sine_pieces(breakpoints, frequency, 0.0)
+    one = np.ndim(amplitude) == 0
+    numbers = {"amplitude" if one else f"amplitude_{k}": a for k, a in enumerate(amplitudes)}
+    return Motion(
+        breakpoints,
+        unit * np.repeat(amplitudes, per_lobe)[:, np.newaxis],
+        name=f"{len(amplitudes)} lobes",
+        description=Description(
+            "n-lobe",
+            numbers | {"frequency": frequency, "lobes": len(amplitudes)},
+            "amplitude sin(2 pi frequency t), an amplitude for each half cycle",
+        ),
+        error=ERROR * max(map(abs, amplitudes)),
+    )
+
+
+def _sine(family: str, amplitude: float, frequency: float, cycles: float, phase: float) -> Motion:
+    amplitude, phase = (
+        checks.finite(amplitude, "amplitude", InvalidMotion),
+        checks.finite(phase, "phase", InvalidMotion),
+    )
+    frequency, cycles = (
+        checked_frequency(frequency),
+        checks.positive(cycles, "number of cycles", InvalidMotion, "cycles"),
+    )
+    if cycles > MOST_CYCLES:
+        raise InvalidMotion(f"a sine may have at most {MOST_CYCLES} cycles, not {cycles:g}")
+    breakpoints = np.linspace(0.0, cycles / frequency, whole_pieces(PIECES_PER_CYCLE * cycles))
+    return Motion(
+        breakpoints,
+        amplitude * sine_pieces(breakpoints, frequency, phase),
+        name=family,
+        description=Description(
+            family,
+            {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase},
+            "amplitude sin(2 pi frequency t + phase) over the given cycles",
+        ),
+        error=ERROR * abs(amplitude),
+    )
+
+
+def _lobe_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> list[float]:
+    if np.ndim(amplitude) > 1:
+        raise InvalidMotion("the amplitudes of the lobes must be one number or a flat sequence of numbers")
+    given = [
+        checks.finite(a, "amplitude of a lobe", InvalidMotion)
+        for a in np.atleast_1d(np.asarray(amplitude, dtype=object))
+    ]
+    count = None if lobes is None else checks.whole(lobes, "number of lobes", InvalidMotion, 1, 2 * MOST_CYCLES)
+    if np.ndim(amplitude) == 0 and count is not None:
+        return given * count
+    if np.ndim(amplitude) == 0 or not given or count not in (None, len(given)):
+        raise InvalidMotion(
+            "give one amplitude and the number of lobes, or a sequence with one amplitude for each lobe"
+        )
+    return given
+
+
+# Where Ricker pulses fall below 1e-16 of their peak, in standard deviations of their Gaussian.
+_SYMMETRIC_REACH: Final = 9.1
+_ANTISYMMETRIC_REACH: Final = 9.3
+
+
+def ricker(
+    amplitude: float,
+    frequency: float,
+    *,
+    kind: Literal["symmetric", "antisymmetric"] = "symmetric",
+    duration: float | None = None,
+) -> Motion:
+    """Return a symmetric or antisymmetric Ricker pulse (Vassiliou and Makris 2011).
+
+    With t counted from the middle of the motion and f the frequency, the symmetric pulse is
+    ``amplitude (1 - x^2) exp(-x^2 / 2)``, ``x = sqrt(2) pi f t``, and the antisymmetric one
+    ``(amplitude / beta) (x^2 - 3) x exp(-x^2 / 2)``, ``x = 2 pi f t / sqrt(3)``, where beta = 1.3801... makes
+    its peak (before the middle) equal to `amplitude`.
+
+    Parameters
+    ----------
+    amplitude : float
+        Peak acceleration, m/s^2.
+    frequency : float
+        Dominant frequency 1/T_p, Hz.
+    kind : {"symmetric", "antisymmetric"}
+        Second or third derivative of a Gaussian.
+    duration : float, optional
+        Length of the motion, s, if the pulse is to be cut on both sides before it falls below 1e-16 of its
+        peak.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InvalidMotion
+        If a number is not finite, `frequency` or `duration` is not positive, `duration` is longer than the
+        pulse, or `kind` is neither.
+
+    References
+    ----------
+    Vassiliou, M. F. and Makris, N. (2011). Estimating time scales and length scales in pulselike earthquake
+    acceleration records with wavelet analysis. Bulletin of the Seismological Society of America 101(2),
+    596-618.
+
+    Examples
+    --------
+    >>> pulse = ricker(2.0, 1.0, kind="antisymmetric")
+    >>> round(pulse.pga, 12), abs(pulse.velocity(pulse.duration)) < 1e-15
+    (2.0, True)
+    """
+    amplitude, frequency = checks.finite(amplitude, "amplitude", InvalidMotion), checked_frequency(frequency)
+    kinds = ("symmetric", "antisymmetric")
+    symmetric = checks.one_of(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
+    rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
+    longest = 2.0 * (_SYMMETRIC_REACH if symmetric else _ANTISYMMETRIC_REACH) / rate
+    length = longest if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")
+    if length > longest:
+        raise InvalidMotion(f"a Ricker pulse of {frequency:.6g} Hz lasts only {longest:.6g} s: give no longer duration")
+    breakpoints = np.linspace(0.0, length, whole_pieces(rate * length / GAUSSIAN_PIECE))
+    series = -gaussian_derivative(2 if symmetric else 3, middles(breakpoints) - 0.5 * length, rate)
+    peak = 1.0 if symmetric else _antisymmetric_peak()
+    formula = (
+        "amplitude (1 - x^2) exp(-x^2/2), x = sqrt(2) pi frequency (t - duration/2)"
+        if symmetric
+        else "(amplitude/1.3801) (x^2 - 3) x exp(-x^2/2), x = 2 pi frequency (t - duration/2)/sqrt(3)"
+    )
+    parameters = {"amplitude": amplitude, "frequency": frequency, "duration": length}
+    return Motion(
+        breakpoints,
+        about_starts(breakpoints, series * (amplitude / peak)),
+        name=f"{kind} Ricker",
+        description=Description(f"{kind} Ricker", parameters, formula),
+        error=ERROR * abs(amplitude),
+    )
+
+
+def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float, gamma: float) -> Motion:
+    """Return the near-fault pulse of Mavroeidis and Papageorgiou (2003).
+
+    Its ground velocity is ``v(t) = (amplitude / 2) [1 + cos(2 pi f s / gamma)] cos(2 pi f s + phase)``, with
+    f the frequency and ``s = t - gamma / (2 f)`` counted from the middle; the motion is its derivative::
+
+        -(amplitude pi f / gamma) [ sin(2 pi f s / gamma) cos(2 pi f s + phase)
+                                    + gamma sin(2 pi f s + phase) (1 + cos(2 pi f s / gamma)) ].
+
+    Note that `amplitude` is a velocity; use ``.scaled_to(level)`` for a given acceleration. The
+    motion starts from rest, so its velocity equals v(t), which is zero at both ends.
+
+    Parameters
+    ----------
+    amplitude : float
+        Amplitude A of the velocity pulse, m/s.
+    frequency : float
+        Prevailing frequency f_p, Hz.
+    phase : float
+        Phase nu, rad: 0 gives a symmetric and pi/2 an antisymmetric velocity pulse.
+    gamma : float
+        Oscillatory character, at least 1: the motion lasts ``gamma / frequency``.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InvalidMotion
+        If a number is not finite, `frequency` is not positive, or `gamma` is not from 1 to 100,000.
+
+    References
+    ----------
+    Mavroeidis, G. P. and Papageorgiou, A. S. (2003). A mathematical representation of near-fault ground
+    motions. Bulletin of the Seismological Society of America 93(3), 1099-1131, Eqs 3 and 4.
+
+    Examples
+    --------
+    >>> pulse = mavroeidis_papageorgiou(0.8, 0.5, phase=0.0, gamma=2.0)
+    >>> pulse.duration, round(pulse.pgv, 12)
+    (4.0, 0.8)
+    """
+    amplitude, phase = (
+        checks.finite(amplitude, "amplitude", InvalidMotion),
+        checks.finite(phase, "phase", InvalidMotion),
+    )
+    frequency, gamma = checked_frequency(frequency), checks.positive(gamma, "gamma", InvalidMotion, "cycles")
+    if not 1.0 <= gamma <= MOST_CYCLES:
+        raise InvalidMotion(f"gamma of a Mavroeidis-Papageorgiou pulse must be from 1 to {MOST_CYCLES}, not {gamma}")
+    breakpoints = np.linspace(0.0, gamma / frequency, whole_pieces(PIECES_PER_CYCLE * (gamma + 1.0)))
+    turns, rest = exact_product(frequency, middles(breakpoints))
+    carrier = sine_and_cosine(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)
+    quotient, quotient_rest = exact_quotient(turns, rest, gamma)
+    envelope = sine_and_cosine(quotient, quotient_rest - 0.5, 0.0)
+    # The product of cosines is a sum of three; they have a half, a quarter and a quarter of the amplitude.
+    rate, shift = 2.0 * math.pi * frequency, 1.0 / gamma
+    series = (
+        0.5 * sine_series(carrier, rate)
+        + 0.25 * (1.0 + shift) * sine_series(sum_of_angles(carrier, envelope, 1.0), rate * (1.0 + shift))
+        + 0.25 * (1.0 - shift) * sine_series(sum_of_angles(carrier, envelope, -1.0), rate * (1.0 - shift))
+    )
+    peak = rate * amplitude
+    return Motion(
+        breakpoints,
+        about_starts(breakpoints, -peak * series),
+        name="Mavroeidis-Papageorgiou",
+        description=Description(
+            "Mavroeidis-Papageorgiou",
+            {"amplitude": amplitude, "frequency": frequency, "phase": phase, "gamma": gamma},
+            "derivative of amplitude/2 [1 + cos(2 pi frequency s/gamma)] cos(2 pi frequency s + phase), "
+            "s = t - gamma/(2 frequency); amplitude is a velocity, m/s",
+        ),
+        error=ERROR * abs(peak),
+    )
+
+
+def _antisymmetric_peak() -> float:
+    """Largest value of ``(x^2 - 3) x exp(-x^2 / 2)``, which is stationary where ``x^4 - 6 x^2 + 3 = 0``."""
+    squared = 3.0 - math.sqrt(6.0)
+    return (3.0 - squared) * math.sqrt(squared) * math.exp(-0.5 * squared)
