@@ -18,8 +18,8 @@ from rocking.analysis.calibration.posterior import posterior, systematic
 from rocking.analysis.calibration.scores import Scores
 from rocking.analysis.calibration.search import Problem, search
 from rocking.analysis.calibration.space import SIDED, Knowledge, Space, unit_of
-from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import OVERTURNING, fragility
+from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.intensity import MeasureName
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
