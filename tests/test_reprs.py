@@ -66,7 +66,7 @@ RESULTS = {
 
 def calibrated():
     overturned = [rocking.simulate(BLOCK, one, model="linear").overturned for one in MOTIONS]
-    return rocking.calibrate(MOTIONS, overturned, candidates=256, two_sided=False)
+    return rocking.calibrate(MOTIONS, overturned, model="linear", candidates=256, two_sided=False)
 
 
 def released():

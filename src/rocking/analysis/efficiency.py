@@ -14,6 +14,7 @@ from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.intensity import Measure
 from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled
+from rocking.analysis.report import Drawn
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption
@@ -25,7 +26,6 @@ from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Probability of the interval of a dispersion.
@@ -135,8 +135,10 @@ def compare_measures(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MeasureComparison(Result):
+class MeasureComparison(Drawn, Result):
     """Intensity measures side by side; from `compare_measures`.
+
+    Its figure has the dispersion of each measure with its interval, the most efficient first, as the summary.
 
     Attributes
     ----------
@@ -205,18 +207,7 @@ class MeasureComparison(Result):
             ],
         }
 
-    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the dispersion of each measure with its interval, the most efficient first, as in `summary`.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
-        title : str
-            Title; by default the blocks and the model.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-        """
+    def _figure(self, title: str, **place: Any) -> Figure:
         from rocking.plot import dispersions_figure
 
         data, order = self.data, self._order()
@@ -226,8 +217,7 @@ class MeasureComparison(Result):
             low=data.dispersion_low.values[order],
             high=data.dispersion_high.values[order],
             title=title or f"{data.blocks}, {data.model} model, {counted(data.sizes['motion'], 'motion')}",
-            ax=ax,
-            figsize=figsize,
+            **place,
         )
 
 

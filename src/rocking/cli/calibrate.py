@@ -14,7 +14,7 @@ from rocking.analysis.calibration.history import HistoryCalibration, calibrate_h
 from rocking.analysis.calibration.outcomes import Calibration, checked_outcomes
 from rocking.analysis.calibration.outcomes import calibrate as run
 from rocking.analysis.calibration.space import HOUSNER
-from rocking.analysis.calibration.tables import History, Outcomes, read
+from rocking.analysis.tables import History, Outcomes, read_calibration
 from rocking.cli import batch
 from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledPulseOptions
 from rocking.errors import InvalidOption, RockingError
@@ -27,7 +27,7 @@ from rocking.treatment.base import Model
 def calibrate(
     data: Path,
     *,
-    model: Model | None = None,
+    model: Model = "nonlinear",
     p: str | None = None,
     alpha: str | None = None,
     restitution: str | None = None,
@@ -53,7 +53,7 @@ def calibrate(
     data
         CSV table of outcomes or of a history.
     model
-        Equation of motion; by default linear for outcomes, nonlinear for a history.
+        Equation of motion; the linear one is faster, and serves slender specimens.
     p
         Lowest and highest thinkable frequency parameter, rad/s, with a comma between; or a known value.
     alpha
@@ -86,7 +86,7 @@ def calibrate(
     given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
     choices = {name: value for name, value in given.items() if value is not None}
     with output.folder() as folder:
-        table = read(data, channel=file.channel, dt=file.dt, units=file.units)
+        table = read_calibration(data, channel=file.channel, dt=file.dt, units=file.units)
         if not isinstance(table, History):
             _refuse("a history", motion=motion, initial_rotation=initial_rotation)
             others = {name: file.read(name) for name in predict} | file.pulses()
@@ -169,7 +169,7 @@ def _told_of(specimen: str) -> Iterator[None]:
 
 
 def _of_outcomes(table: Outcomes, how: _How) -> _Results:
-    found = run(table.motions, table.overturned, how.seed, **how.choices)
+    found = run(table.motions, table.overturned, seed=how.seed, **how.choices)
     predicted = dict(zip(how.others, found.predict([*how.others.values()]), strict=True))
     numbers = {**found.to_dict(), "predicted": predicted}
     parts = [found.summary()]

@@ -13,9 +13,9 @@ from rocking import checks
 from rocking.analysis.fragility.curve import Band
 from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.fragility.fit import fragility as run
-from rocking.analysis.fragility.observed import read_observed
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.intensity import Measure
+from rocking.analysis.tables import read_observed
 from rocking.cli import batch
 from rocking.cli.options import (
     BLOCK,

@@ -206,14 +206,14 @@ def known_value(value: object, name: str) -> float:
     """
     known = checks.positive(value, name, InvalidOption, unit_of(name))
     if known > HIGHEST[name]:
-        raise InvalidOption(f"{name} must be at most {HIGHEST[name]:g}, not {known:g}")
+        raise InvalidOption(f"{{}} must be at most {HIGHEST[name]:g}, not {known:g}", name, value=known)
     return known
 
 
 def _check_housner(name: str, given: str) -> None:
     if name != "restitution" or given != HOUSNER:
         wanted = "a value or a pair (lowest, highest)" + (f", or {HOUSNER!r}" if name == "restitution" else "")
-        raise InvalidOption(f"{name} must be {wanted}, not {given!r}")
+        raise InvalidOption(f"{{}} must be {wanted}, not {given!r}", name, value=given)
 
 
 def value_range(pair: Any, name: str, highest: float) -> Range:
@@ -227,10 +227,14 @@ def value_range(pair: Any, name: str, highest: float) -> Range:
     try:
         low, high = (checks.number(value, f"each of {name}", InvalidOption) for value in pair)
     except (TypeError, ValueError):
-        raise InvalidOption(f"{name} must be a pair (lowest, highest), not {pair!r}") from None
+        raise InvalidOption(f"{{}} must be a pair (lowest, highest), not {pair!r}", name, value=pair) from None
     if not 0.0 < low < high <= highest or math.isinf(high):
         limit = "" if math.isinf(highest) else f" and at most {highest:g}"
         hint = checks.hint_of_degrees(high) if name == "alpha" else ""
-        kind = "positive, increasing numbers"
-        raise InvalidOption(f"{name} must be a pair (lowest, highest) of {kind}{limit}, not {low:g}, {high:g}{hint}")
+        raise InvalidOption(
+            f"{{}} must be a pair (lowest, highest) of positive, increasing numbers{limit}, "
+            f"not {low:g}, {high:g}{hint}",
+            name,
+            value=pair,
+        )
     return low, high
