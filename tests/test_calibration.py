@@ -1,7 +1,9 @@
 """Calibration: hidden blocks are found again from outcomes and from histories, and what they will do is predicted."""
 
 import csv
+import inspect
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -477,6 +479,27 @@ def test_tests_that_are_left_out_do_not_count(threshold_evidence):
     flipped = Evidence(evidence.candidates, np.where(some, evidence.observed, ~evidence.observed), evidence.lapse)
     first, second = (posterior(one.of_tests(some), 64, 2, np.random.default_rng(2)) for one in (evidence, flipped))
     np.testing.assert_array_equal(first, second)
+
+
+def test_the_number_of_threads_changes_no_bit(threshold_evidence):
+    evidence, _ = threshold_evidence
+    points = evidence.candidates.points[:100]
+    populations = np.hstack([points, np.full_like(points, -2.0)])
+    found = [replace(evidence, threads=threads).probabilities(populations) for threads in (1, 2, 5)]
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[0], found[2])
+
+
+def test_both_calibrations_share_names_order_and_defaults_of_their_arguments():
+    outcomes, history = (
+        {name: one.default for name, one in inspect.signature(function).parameters.items() if name != "motion"}
+        for function in (rocking.calibrate, rocking.calibrate_history)
+    )
+    shared = [name for name in outcomes if name in history]
+    assert shared == [name for name in history if name in outcomes]
+    assert shared == ["model", "p", "alpha", "restitution", "two_sided", "seed", "progress"]
+    for name in shared:
+        assert name == "two_sided" or outcomes[name] == history[name]
 
 
 def test_one_candidate_predicts_no_certainty(threshold_evidence):

@@ -1,4 +1,4 @@
-"""Efficiency of intensity measures: which one tells best from what strength on motions overturn a block."""
+"""Efficiency of intensity measures: which one predicts best when motions overturn a block."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Probability of the interval of a dispersion.
@@ -181,9 +182,9 @@ class MeasureComparison(Drawn, Result):
         head = f"{data.blocks}, {data.model} model: intensities at which {count} overturn"
         columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if several else [])]
         text = [head, "", text_table([*columns, "over the best"], rows)]
-        spared = int(np.sum(np.isnan(data.intensity.values[0])))
-        if spared:
-            pairs = "1 pair" if spared == 1 else f"{spared} pairs"
+        missing = int(np.sum(np.isnan(data.intensity.values[0])))
+        if missing:
+            pairs = "1 pair" if missing == 1 else f"{missing} pairs"
             text.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
         return "\n".join(text + ([f"note: {REVERSED_TOO}"] if data.sides_differ else []))
 
@@ -207,7 +208,7 @@ class MeasureComparison(Drawn, Result):
             ],
         }
 
-    def _figure(self, title: str, **place: Any) -> Figure:
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import dispersions_figure
 
         data, order = self.data, self._order()
@@ -217,7 +218,8 @@ class MeasureComparison(Drawn, Result):
             low=data.dispersion_low.values[order],
             high=data.dispersion_high.values[order],
             title=title or f"{data.blocks}, {data.model} model, {counted(data.sizes['motion'], 'motion')}",
-            **place,
+            ax=ax,
+            figsize=figsize,
         )
 
 

@@ -129,9 +129,8 @@ class HazardCurve:
                 raise InvalidOption("a table of two columns is of one site; leave {} out", "site")
             return cls(*_from_table(lines, period), file.stem)
         except InvalidOption as error:
-            raise InvalidOption(
-                error.message.template, *error.message.arguments, path=str(file), line=error.line, value=error.value
-            ) from None
+            error.path = str(file)
+            raise
 
     def rate_of(self, intensity: ArrayLike) -> Floats:
         """Annual rate of exceeding intensities, shaped like them; infinite at 0.

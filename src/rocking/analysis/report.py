@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Drawn(ABC):
-    """What draws itself; `_figure` says how."""
+    """What draws itself; `_draw` says how."""
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw what was found.
@@ -41,11 +41,11 @@ class Drawn(ABC):
         InvalidOption
             If the size is not two positive numbers, or `ax` is no axes.
         """
-        return self._figure(title, ax=ax, figsize=figsize)
+        return self._draw(ax, title, figsize)
 
     @abstractmethod
-    def _figure(self, title: str, **place: Any) -> Figure:
-        """Draw under a title (its own where that is empty) in the place that `plot` is given: ax and figsize."""
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
+        """Draw what was found; an empty title stands for the default one."""
 
 
 class Report(Drawn):

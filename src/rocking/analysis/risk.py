@@ -20,6 +20,7 @@ from rocking.errors import InvalidOption
 from rocking.tables import counted, known_digits, text_table
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Relative change by which a rate's slope is taken.
@@ -28,7 +29,7 @@ _STEP: Final = 1e-5
 #: A figure shows what is between quantiles of a rate, and so many times as far beyond them.
 _BEYOND: Final = 2.0
 
-#: Parts of the risk that are told apart by intensity: what a standard deviation leaves on either side, and half.
+#: Shares of the risk up to an intensity: what a standard deviation leaves on either side, and half.
 _QUANTILES: Final = (0.16, 0.5, 0.84)
 
 _ROOT: Final = math.sqrt(0.5)
@@ -229,7 +230,7 @@ class Risk(Report):
             ],
         }
 
-    def _figure(self, title: str, **place: Any) -> Figure:
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import RiskLine, risk_figure
 
         scale, at = self.hazard.measure.scale, self._shown()
@@ -242,7 +243,8 @@ class Risk(Report):
             ],
             intensity_label=self.hazard.measure.label,
             title=title or self.description,
-            **place,
+            ax=ax,
+            figsize=figsize,
         )
 
     def _shown(self) -> Floats:

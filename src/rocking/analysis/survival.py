@@ -19,6 +19,7 @@ from rocking.errors import InvalidOption
 from rocking.tables import counted, known_digits, text_table
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Probabilities of exceedance of the intensities in the table.
@@ -163,7 +164,7 @@ class Survival(Report):
             "contradicts": self.contradicts,
         }
 
-    def _figure(self, title: str, **place: Any) -> Figure:
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import survival_figure
 
         ends = [self.curve.intensity_of(chance) for chance in _SHOWN]
@@ -179,7 +180,8 @@ class Survival(Report):
             hazard=None if self.hazard is None else self.hazard.line(at),
             intensity_label=self.measure.label,
             title=title or self.description,
-            **place,
+            ax=ax,
+            figsize=figsize,
         )
 
     def __repr__(self) -> str:

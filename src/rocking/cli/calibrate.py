@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -146,11 +146,11 @@ def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
 def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None) -> _Results:
     """Calibrate each specimen by itself, and write each as soon as it is done."""
     for name, table in tables.items():
-        with _told_of(name):
+        with _naming(name):
             checked_outcomes(table.overturned, len(table.overturned))
     results = {}
     for name, table in tables.items():
-        with _told_of(name):
+        with _naming(name):
             results[name] = _of_outcomes(table, how)
         if folder is not None:
             (folder / name).mkdir(exist_ok=True)
@@ -160,12 +160,13 @@ def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None
 
 
 @contextlib.contextmanager
-def _told_of(specimen: str) -> Iterator[None]:
-    """Say of which specimen an error is."""
+def _naming(specimen: str) -> Iterator[None]:
+    """Add the specimen's name to an error."""
     try:
         yield
     except RockingError as error:
-        raise type(error)(f"specimen {specimen}: {error}") from error
+        error.message = replace(error.message, template=f"specimen {specimen}: {error.message.template}")
+        raise
 
 
 def _of_outcomes(table: Outcomes, how: _How) -> _Results:

@@ -25,7 +25,7 @@ from rocking.tables import counted
 _OUTERMOST: Final = 0.05
 _LEANING: Final = 0.05
 
-#: Fewer effective candidates than these do not tell what a population does.
+#: Fewer effective candidates than these do not show what a population does.
 _FEW: Final = 20.0
 
 
@@ -113,7 +113,7 @@ class Leaning:
     share: float
 
     def __str__(self) -> str:
-        """Say so, and how to mend it."""
+        """Say so, and how to correct it."""
         unit = unit_of(self.name)
         bound = f"{self.bound:g}" + ("" if unit == "1" else f" {unit}")
         return (

@@ -33,6 +33,7 @@ from rocking.tables import counted, text_table
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Blocks that the search starts from.
@@ -133,7 +134,7 @@ class HistoryCalibration(Report):
             "misfit_rad": self.misfit,
         }
 
-    def _figure(self, title: str, **place: Any) -> Figure:
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import measured_figure
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
@@ -146,7 +147,8 @@ class HistoryCalibration(Report):
             fitted_time=between,
             fitted=self.response.rotation(between),
             title=title or self._estimates_text(),
-            **place,
+            ax=ax,
+            figsize=figsize,
         )
 
     def _estimates_text(self) -> str:

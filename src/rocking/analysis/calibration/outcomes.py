@@ -31,6 +31,7 @@ from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rocking.plot import Parameter
@@ -279,12 +280,7 @@ class Calibration(Tabled):
         )
 
     def spectrum(
-        self,
-        motions: Motion | Sequence[Motion],
-        *,
-        p: ArrayLike | None = None,
-        model: Model | None = None,
-        **options: Any,
+        self, motions: Motion | Sequence[Motion], *, model: Model | None = None, **options: Any
     ) -> RockingSpectrum:
         """Peak rotation of the specimen, and of larger and smaller ones of its shape, with the ensemble's weights.
 
@@ -292,12 +288,11 @@ class Calibration(Tabled):
         ----------
         motions : Motion or sequence of Motion
             m motions.
-        p : array_like, optional
-            Frequency parameters, rad/s, that the ensemble's median is moved to; by default half to twice its own.
         model : {"linear", "nonlinear"}, optional
             Equation of motion, if not that of the calibration.
         **options
-            Further arguments of `rocking.rocking_spectrum`: size (in place of p), fractiles, ...
+            Further arguments of `rocking.rocking_spectrum`: p (rad/s, to which the ensemble's median is moved; by
+            default half to twice its own) or size, fractiles, ...
 
         Returns
         -------
@@ -308,16 +303,9 @@ class Calibration(Tabled):
         InvalidOption, InvalidMotion
             As `rocking.rocking_spectrum`.
         """
-        return rocking_spectrum(
-            motions,
-            blocks=self.blocks,
-            weights=self.weights,
-            p=p,
-            model=self.model if model is None else model,
-            **options,
-        )
+        chosen = self.model if model is None else model
+        return rocking_spectrum(motions, blocks=self.blocks, weights=self.weights, model=chosen, **options)
 
-    @property
     def _headline(self) -> str:
         overturned = int(self.observed.sum())
         return f"{counted(len(self.observed), 'motion')}, {overturned} overturned the specimen; {self.model} model"
@@ -330,7 +318,7 @@ class Calibration(Tabled):
         ]
         alike = 1.0 / float((self.weights**2).sum())
         lines = [
-            self._headline,
+            self._headline(),
             "",
             text_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows),
             "",
@@ -362,7 +350,7 @@ class Calibration(Tabled):
         }
         return pd.DataFrame({**columns, "weight": self.weights, "model": self.model})
 
-    def _figure(self, title: str, **place: Any) -> Figure:
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import outcomes_figure
 
         return outcomes_figure(
@@ -370,8 +358,9 @@ class Calibration(Tabled):
             overturned=self.observed,
             parameters=[self._parameter(name) for name in self._evidence.candidates.space.unknown],
             weights=self.weights,
-            title=title or self._headline,
-            **place,
+            title=title or self._headline(),
+            ax=ax,
+            figsize=figsize,
         )
 
     def _parameter(self, name: str) -> Parameter:
@@ -386,7 +375,7 @@ class Calibration(Tabled):
         return Parameter({"p": "p (rad/s)", "alpha": "alpha (rad)"}.get(name, name), values, ends, (low, high))
 
     def __repr__(self) -> str:
-        return f"<Calibration: {self._headline}; fitted: {self.scores}>"
+        return f"<Calibration: {self._headline()}; fitted: {self.scores}>"
 
 
 def calibrate(

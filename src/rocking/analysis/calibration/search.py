@@ -265,12 +265,12 @@ class _Particles:
             new = _Particles.at(self.evidence, self.exponent, populations[movers] + changes)
             with np.errstate(invalid="ignore"):
                 gain = (1.0 - done) * (new.start - start[movers]) + done * (new.posterior - posterior[movers])
-            taken = np.log(rng.random(len(movers))) < gain
-            there = movers[taken]
+            accepted = np.log(rng.random(len(movers))) < gain
+            there = movers[accepted]
             populations[there], start[there], posterior[there] = (
-                new.populations[taken],
-                new.start[taken],
-                new.posterior[taken],
+                new.populations[accepted],
+                new.start[accepted],
+                new.posterior[accepted],
             )
         return replace(self, populations=populations, start=start, posterior=posterior)
 

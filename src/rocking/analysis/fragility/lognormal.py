@@ -20,7 +20,7 @@ _ITERATIONS: Final = 100
 #: The likelihood is at its maximum when the parameters move by less than this part of themselves.
 _CONVERGED: Final = 1e-11
 
-#: Outcomes that overlap by less than this part of the intensities' range are separated, to all that can be told.
+#: Outcomes that overlap by less than this part of the intensities' range count as separated.
 _NARROW: Final = 1e-6
 
 #: Slope that stands for a step.

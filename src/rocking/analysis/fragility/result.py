@@ -30,6 +30,7 @@ from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Points of a curve in a table or a figure.
@@ -318,17 +319,17 @@ class Fragility(Tabled):
         is written as the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
         """
         chosen = self.block if block is None else block
-        lognormals = [nrml.Lognormal(one.limit_state, one.median, one.dispersion) for one in self.curves]
         scale = nrml.scale_of(self.measure, chosen, self.model)
         lifting = None
         is_horizontal = self.outcomes is None or "vertical" not in self.outcomes
         if chosen is not None and scale.imt == "PGA" and is_horizontal:
             lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
-        function = nrml.fragility_function(lognormals, scale, self.range, lifting, taxonomy, format)
+        function = nrml.fragility_function(self.curves, scale, self.range, lifting, taxonomy, format)
         states = [curve.limit_state for curve in self.curves]
-        nrml.write(path, function, states, nrml.Header(model_id, asset_category, loss_category, self.description))
+        about = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
+        nrml.write(path, function, states, self.description, **about)
 
-    def _figure(self, title: str, **place: Any) -> Figure:
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import FragilityLine, fragility_figure
 
         first = self.curves[0]
@@ -353,7 +354,8 @@ class Fragility(Tabled):
             band_label=band_text,
             probability_label=_probability_of([curve.limit_state for curve in self.curves]),
             title=title or self.description,
-            **place,
+            ax=ax,
+            figsize=figsize,
         )
 
 
