@@ -264,7 +264,7 @@ def test_openquake_probabilities_become_rates(tmp_path: Path) -> None:
         ("pga_g,annual_rate\n0.1,0.01\n0.2,0.02\n", "decrease"),
         ("pga_g,annual_rate\n0.2,0.01\n0.1,0.001\n", "increase"),
         ("pga_g,annual_rate\n0.1,nan\n0.2,0.001\n", "positive"),
-        ("sa_g,annual_rate\n0.1,0.01\n0.2,0.001\n", "give period, in s"),
+        ("sa_g,annual_rate\n0.1,0.01\n0.2,0.001\n", "period must be given, in s"),
         ("#,\"investigation_time=50.0, imt='IA'\"\nlon,lat,poe-0.1\n1,2,0.5\n", "IA"),
     ],
 )

@@ -106,7 +106,7 @@ def compare_measures(
     many, shaken = Blocks.of(blocks), accepted.several_motions(motions)
     shares = mean_one(weights, len(many))
     if len(shaken) < 2:
-        raise InvalidOption("measures are compared by how motions scatter: give two motions or more, not one")
+        raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
     times = checks.positive_numbers(periods, "periods", InvalidOption)
     scaled = incremental_dynamic_analysis(
         many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress

@@ -220,7 +220,7 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
         except (ValueError, IndexError):
             raise InvalidOption(f"{','.join(row)} is not an intensity and a rate", line=line) from None
     if kind == "sa" and period is None:
-        raise InvalidOption("give {}, in s, of its spectral acceleration", "period")
+        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)  # type: ignore[arg-type]
     return factor * intensity, rate, measure
 

@@ -250,7 +250,7 @@ def read_observed(
 def _against_intensity(table: Table, names: dict[str, str], heading: str, measure: Measure) -> dict[str, Any]:
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
-        raise InvalidOption("give {}, in s, of its spectral acceleration", "period", path=str(table.path))
+        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period", path=str(table.path))
     of = {"period": measure.period, "damping": measure.damping} if kind == "sa" else {}
     counts = "trials" in names
     return {

@@ -72,7 +72,7 @@ class Scores:
         if given.shape != seen.shape or not given.size:
             raise InvalidOption(f"there must be one probability for each outcome, not {given.shape} and {seen.shape}")
         if not np.all((given >= 0.0) & (given <= 1.0)):
-            raise InvalidOption("probabilities must lie between 0 and 1")
+            raise InvalidOption("{} must lie between 0 and 1", "probabilities")
         with np.errstate(divide="ignore"):
             losses = -np.log(np.where(seen, given, 1.0 - given))
         return cls(

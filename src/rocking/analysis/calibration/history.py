@@ -430,7 +430,7 @@ def _covariance(problem: _HistoryProblem, logs: Floats, residuals: Floats) -> Fl
     _, values, right = np.linalg.svd(slopes / sizes, full_matrices=False)
     if values[-1] <= _INSENSITIVE * values[0]:
         names = ", ".join(one.name for one in problem.unknowns)
-        raise InvalidOption(f"the history does not tell {names} apart: give one of them a value")
+        raise InvalidOption(f"the history does not distinguish {names}: give one of them a value")
     return np.asarray(variance * (right.T / values**2) @ right / np.outer(sizes, sizes))
 
 

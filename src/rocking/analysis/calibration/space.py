@@ -99,7 +99,9 @@ class Space:
             raise InvalidOption(EVERYTHING_IS_KNOWN)
         steepest = bounds.get("alpha", (0.0, known.get("alpha", 0.0)))[1]
         if "restitution" not in {*bounds, *known} and steepest >= _HOUSNER_ENDS:
-            raise InvalidOption(f"Housner's restitution is positive for alpha below {_HOUSNER_ENDS:.4f} rad only")
+            raise InvalidOption(
+                f"Housner's restitution is positive for {{}} below {_HOUSNER_ENDS:.4f} rad only", "alpha"
+            )
         lower, upper = np.log(list(bounds.values())).T
         ratio = 0.0
         if two_sided and SIDED in bounds:
