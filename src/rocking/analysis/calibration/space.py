@@ -153,8 +153,8 @@ class Space:
         inside = np.all((logs >= self.lower) & (logs <= self.upper), axis=(1, 2))
         return np.asarray(inside & np.all((points >= low) & (points <= high), axis=1))
 
-    def sides(self, points: Floats) -> Floats:
-        """Values of p, alpha and restitution on each side, shape (n, 2, 3)."""
+    def sides(self, points: Floats) -> dict[str, Floats]:
+        """Values of p, alpha and restitution by name, of side + and side -; shape (n, 2) each."""
         found = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
         values = found | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
         if "restitution" not in values and self.two_sided:
@@ -162,7 +162,7 @@ class Space:
             values["p"] = values["p"] * factors
         elif "restitution" not in values:
             values["restitution"] = np.vectorize(housner_restitution)(values["alpha"])
-        return np.stack([values[name] for name in PARAMETERS], axis=2)
+        return values
 
     def named(self, points: Floats) -> dict[str, Floats]:
         """Values of the unknown parameters by name, of each side where they differ; shape (n,) each."""
@@ -177,7 +177,7 @@ class Space:
         """Blocks at points."""
         sides = self.sides(points)
         # exp(log(1)) may be one unit in the last place above 1.
-        return Blocks(sides[:, :, 0], sides[:, :, 1], np.minimum(sides[:, :, 2], 1.0))
+        return Blocks(sides["p"], sides["alpha"], np.minimum(sides["restitution"], 1.0))
 
     def _log_sides(self, points: Floats) -> Floats:
         """Logarithms of the unknown parameters on each side, shape (n, 2, f)."""
