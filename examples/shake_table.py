@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import rocking
-from rocking.analysis.calibration.scores import Scores
+from rocking.analysis.calibration import Scores
 from rocking.constants import STANDARD_GRAVITY
 
 Floats = NDArray[np.float64]
@@ -45,7 +45,7 @@ def main() -> None:
         elements = np.array([test[f"dem_best_specimen_{specimen}"] == "1" for test in tests])
         print(f"\nSpecimen {specimen}")
         start, worked = time.perf_counter(), time.process_time()
-        calibration = rocking.calibrate(motions, overturned, seed=0)
+        calibration = rocking.calibrate(motions, overturned, model="linear", alpha=(0.02, 0.5), restitution=(0.3, 0.99))
         print(calibration.summary())
         print(f"calibrated in {time.perf_counter() - start:.0f} s ({time.process_time() - worked:.0f} s of CPU time)")
         print(f"\n{'':<44}accuracy  log loss  Brier")

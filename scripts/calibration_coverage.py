@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from scipy.stats import binom
 
 import rocking
-from rocking.analysis.calibration import population
+from rocking.analysis.calibration import evidence as population
 from rocking.analysis.calibration.space import Space
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -92,7 +92,8 @@ def ranks(given: DataSet) -> dict[str, float]:
     found = rocking.calibrate(
         given.motions,
         given.overturned,
-        given.seed,
+        model="linear",
+        seed=given.seed,
         p=BOUNDS["p"],
         alpha=BOUNDS["alpha"],
         restitution=BOUNDS["restitution"],

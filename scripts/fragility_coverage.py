@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from rocking import InvalidOption, fit_fragility
+from rocking.analysis.fragility import Band
 
 TABLE = Path(__file__).resolve().parents[1] / "docs" / "_tables" / "fragility-coverage.txt"
 DATA_SETS = 500
@@ -47,7 +48,7 @@ def coverage(data, count, band, data_sets):
     for seed in range(data_sets):
         intensity, exceeded, motion = data(np.random.default_rng([seed, count]), count)
         try:
-            curve = fit_fragility(intensity, exceeded, clusters=motion, band=band, samples=400).curves[0]
+            curve = fit_fragility(intensity, exceeded, clusters=motion, band=Band(band, samples=400)).curves[0]
         except InvalidOption:
             continue
         used += 1

@@ -23,7 +23,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 import rocking
 from rocking import overturning_map
-from rocking.analysis.calibration.scores import Scores
+from rocking.analysis.calibration import Scores
 from rocking.constants import STANDARD_GRAVITY
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -47,6 +47,9 @@ SMALL_ALPHA = (0.005, 0.6)
 
 #: Its p by the mesh, rad/s: the geometric mean of those about its two axes.
 MESH_P = 10.69
+
+#: What the calibrations of the validation are of.
+LINEAR = {"model": "linear", "restitution": (0.3, 0.99)}
 SEEDS = (0, 1, 2)
 
 
@@ -416,7 +419,7 @@ def shake_tables(folder):
         elements = np.array([test[f"dem_best_specimen_{specimen}"] == "1" for test in tests])
         tuned = Scores.of(as_sure_as_right(elements, overturned), overturned)
         rows.append(score_row(specimen, "distinct elements, tuned by their authors on all", tuned))
-        blocks = {"rocking blocks": rocking.calibrate(motions, overturned, seed=0)}
+        blocks = {"rocking blocks": rocking.calibrate(motions, overturned, alpha=(0.02, 0.5), **LINEAR)}
         rows += left_out_rows(specimen, motions, overturned, groups, blocks)
     return {"validation-shake-table.txt": markdown(SCORE_HEADING, rows)}
 
@@ -431,9 +434,11 @@ def small_tables(file):
         chosen = [test for test in tests if test["set"] == series]
         motions = [commanded(test) for test in chosen]
         overturned = np.array([test["overturned"] == "1" for test in chosen])
-        calibrated = [rocking.calibrate(motions, overturned, seed, p=SMALL_P, alpha=SMALL_ALPHA) for seed in SEEDS]
+        calibrated = [
+            rocking.calibrate(motions, overturned, seed=seed, p=SMALL_P, alpha=SMALL_ALPHA, **LINEAR) for seed in SEEDS
+        ]
         groups = [test["pgv_over_pga_s"] for test in chosen]
-        known = rocking.calibrate(motions, overturned, SEEDS[0], p=MESH_P, alpha=SMALL_ALPHA)
+        known = rocking.calibrate(motions, overturned, seed=SEEDS[0], p=MESH_P, alpha=SMALL_ALPHA, **LINEAR)
         blocks = {"rocking blocks": calibrated[0], "rocking blocks, p from the mesh": known}
         scores += left_out_rows(series, motions, overturned, groups, blocks)
         found += [estimate_row(series, one) for one in calibrated]

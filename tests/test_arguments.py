@@ -7,6 +7,7 @@ import pytest
 
 import rocking
 from rocking import Block, Blocks, InvalidBlock, InvalidMotion, InvalidOption
+from rocking.analysis.fragility import Band
 from rocking.analysis.survey import survey
 from rocking.named_pulses import named_pulse
 
@@ -151,6 +152,7 @@ TAKES_ONE_THING = {
     "polarity": lambda value: rocking.fragility(BLOCK, [MOTION], polarity=value),
     "polarity of an ensemble": lambda value: rocking.simulate_many(BLOCK, MOTION, polarity=value),
     "band": lambda value: rocking.fit_fragility([2.0, 3.0], [1, 2], trials=3, band=value),
+    "kind of a band": Band,
     "hazard curve": FITTED.annual_rate,
     "limit state": FITTED.curve,
     "intensity of a probability": FITTED.curves[0].probability,

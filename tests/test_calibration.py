@@ -1,7 +1,9 @@
 """Calibration: hidden blocks are found again from outcomes and from histories, and what they will do is predicted."""
 
 import csv
+import inspect
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,16 +11,13 @@ from matplotlib.figure import Figure
 from scipy.stats import norm
 
 import rocking
-from rocking.analysis.calibration import population
-from rocking.analysis.calibration.candidates import WIDENED, Candidates
-from rocking.analysis.calibration.diagnostics import leaning
-from rocking.analysis.calibration.evidence import Evidence
+from rocking.analysis.calibration import evidence as population
+from rocking.analysis.calibration.diagnostics import Scores, leaning
+from rocking.analysis.calibration.evidence import WIDENED, Candidates, Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
-from rocking.analysis.calibration.posterior import posterior
-from rocking.analysis.calibration.scores import Scores
-from rocking.analysis.calibration.search import AGREEMENT, Problem, r_hat, search
+from rocking.analysis.calibration.search import AGREEMENT, Problem, posterior, r_hat, search
 from rocking.analysis.calibration.space import Space
-from rocking.analysis.calibration.tables import read_ensemble
+from rocking.analysis.tables import read_ensemble
 
 HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
 STEP = 0.02
@@ -51,7 +50,7 @@ def shaken():
 
 @pytest.fixture(scope="module")
 def found(shaken):
-    return rocking.calibrate(*shaken, candidates=1024)
+    return rocking.calibrate(*shaken, candidates=1024, model="linear")
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +117,9 @@ def test_fitted_probabilities_are_those_of_the_ensemble(found, shaken):
 
 def test_the_same_seed_gives_the_same_calibration(shaken):
     motions, overturned = shaken[0][:20], shaken[1][:20]
-    first, second, other = (rocking.calibrate(motions, overturned, seed, candidates=128) for seed in (5, 5, 6))
+    first, second, other = (
+        rocking.calibrate(motions, overturned, seed=seed, candidates=128, model="linear") for seed in (5, 5, 6)
+    )
     assert np.array_equal(first.blocks.alpha, second.blocks.alpha)
     assert np.array_equal(first.weights, second.weights)
     assert not np.array_equal(first.blocks.alpha, other.blocks.alpha)
@@ -140,7 +141,7 @@ def test_a_group_is_left_out_as_a_whole():
     # Each motion comes twice, with opposite outcomes: whoever saw the twin would predict the wrong outcome.
     motions = bursts(12, seed=4)
     overturned = np.arange(24) < 12
-    found = rocking.calibrate(motions * 2, overturned, candidates=128)
+    found = rocking.calibrate(motions * 2, overturned, candidates=128, model="linear")
     validation = found.cross_validate(groups=[*range(12)] * 2, folds=4)
     first, second = validation.probabilities[0, :12], validation.probabilities[0, 12:]
     # Twins differ by the order of single-precision sums.
@@ -151,7 +152,7 @@ def test_a_group_is_left_out_as_a_whole():
 def test_random_outcomes_are_not_predicted_with_confidence():
     motions = bursts(60, seed=7)
     overturned = np.random.default_rng(0).random(60) < 0.5
-    found = rocking.calibrate(motions, overturned, candidates=1024)
+    found = rocking.calibrate(motions, overturned, candidates=1024, model="linear")
     assert found.cross_validate(folds=6).scores.log_loss < 1.5 * math.log(2.0)
 
 
@@ -163,21 +164,27 @@ def test_dispersion_from_test_to_test_is_measured():
     for deviation in (0.0, 0.4):
         factors = np.exp(deviation * rng.standard_normal(len(motions)))
         fallen = outcomes([motion.scaled(factor) for motion, factor in zip(motions, factors, strict=True)])
-        found = rocking.calibrate(motions, fallen, candidates=1024, two_sided=False)
+        found = rocking.calibrate(motions, fallen, candidates=1024, two_sided=False, model="linear")
         dispersions.append(found.dispersion["alpha"])
     # No dispersion at all cannot be told from one as wide as the candidates are apart.
     assert dispersions[1] > 1.5 * dispersions[0]
 
 
 def test_symmetric_blocks_can_be_asked_for(shaken):
-    found = rocking.calibrate(shaken[0][:30], shaken[1][:30], candidates=256, two_sided=False)
+    found = rocking.calibrate(shaken[0][:30], shaken[1][:30], candidates=256, two_sided=False, model="linear")
     assert found.blocks.is_symmetric
     assert set(found.estimates) == {"p", "alpha", "restitution"}
 
 
 def test_blocks_keep_to_the_bounds(shaken):
     found = rocking.calibrate(
-        shaken[0][:30], shaken[1][:30], candidates=512, p=(2.0, 3.0), alpha=(0.1, 0.2), restitution=(0.7, 1.0)
+        shaken[0][:30],
+        shaken[1][:30],
+        candidates=512,
+        p=(2.0, 3.0),
+        alpha=(0.1, 0.2),
+        restitution=(0.7, 1.0),
+        model="linear",
     )
     assert np.all((found.blocks.p >= 2.0 - 1e-12) & (found.blocks.p <= 3.0 + 1e-12))
     assert np.all((found.blocks.alpha >= 0.1 - 1e-12) & (found.blocks.alpha <= 0.2 + 1e-12))
@@ -194,7 +201,7 @@ def test_the_nonlinear_model_calibrates_too():
 
 def test_what_is_known_has_no_estimate_and_stays(shaken):
     known = {"p": 3.55, "restitution": 0.81}
-    found = rocking.calibrate(shaken[0][:40], shaken[1][:40], candidates=256, **known)
+    found = rocking.calibrate(shaken[0][:40], shaken[1][:40], candidates=256, **known, model="linear")
     assert set(found.estimates) == {"alpha_plus", "alpha_minus"}
     assert np.all(found.blocks.p == 3.55) and np.all(found.blocks.restitution == 0.81)
     assert len(found.plot().axes) == 2
@@ -206,7 +213,13 @@ def test_one_unknown_angle_is_found_from_forty_tests():
     size = rocking.Block(width=0.4, height=2.0)
     motions = bursts(40, seed=11)
     found = rocking.calibrate(
-        motions, outcomes(motions, size), candidates=256, p=size.p, restitution="housner", two_sided=False
+        motions,
+        outcomes(motions, size),
+        candidates=256,
+        p=size.p,
+        restitution="housner",
+        two_sided=False,
+        model="linear",
     )
     assert set(found.estimates) == {"alpha"}
     angle = found.estimates["alpha"]
@@ -216,7 +229,7 @@ def test_one_unknown_angle_is_found_from_forty_tests():
 
 
 def test_a_posterior_that_leans_on_a_bound_is_told_with_the_mend(shaken):
-    found = rocking.calibrate(*shaken, candidates=256, p=(1.0, 2.5), two_sided=False)
+    found = rocking.calibrate(*shaken, candidates=256, p=(1.0, 2.5), two_sided=False, model="linear")
     ends = {(one.name, one.end) for one in found.diagnostics.leaning}
     assert ("p", "upper") in ends
     assert "p leans on its upper bound of 2.5 rad/s" in found.summary()
@@ -243,7 +256,9 @@ def test_any_seed_finds_the_p_that_the_mesh_of_a_rock_tells(shared):
     ]
     overturned = [test["overturned"] == "1" for test in tests]
     for seed in (0, 1, 2):
-        found = rocking.calibrate(motions, overturned, seed, p=(3.0, 40.0), alpha=(0.005, 0.6), candidates=4096)
+        found = rocking.calibrate(
+            motions, overturned, seed=seed, p=(3.0, 40.0), alpha=(0.005, 0.6), candidates=4096, model="linear"
+        )
         estimate = found.estimates["p"]
         assert estimate.lower < 10.7 < estimate.upper
         assert 9.5 < estimate.median < 12.5
@@ -252,7 +267,7 @@ def test_any_seed_finds_the_p_that_the_mesh_of_a_rock_tells(shared):
 
 def test_few_candidates_are_told():
     motions = bursts(40, seed=9)
-    found = rocking.calibrate(motions, outcomes(motions), candidates=128)
+    found = rocking.calibrate(motions, outcomes(motions), candidates=128, model="linear")
     assert found.diagnostics.effective < 20.0
     assert any("candidates can tell what a typical population does" in note for note in found.diagnostics.notes)
 
@@ -325,7 +340,8 @@ def test_even_points_fill_the_space_evenly():
 def test_the_slenderness_of_a_side_is_the_mean_times_or_over_the_root_of_the_ratio():
     space = Space.of((1.0, 9.0), (0.01, 1.0), (0.1, 1.0), two_sided=True)
     point = np.log([[3.0, 0.1, 0.5, 4.0]])
-    np.testing.assert_allclose(space.sides(point)[0], [[3.0, 0.2, 0.5], [3.0, 0.05, 0.5]], rtol=1e-12)
+    for name, expected in (("p", [3.0, 3.0]), ("alpha", [0.2, 0.05]), ("restitution", [0.5, 0.5])):
+        np.testing.assert_allclose(space.sides(point)[name][0], expected, rtol=1e-12)
     assert list(space.named(point)) == ["p", "alpha_plus", "alpha_minus", "restitution"]
 
 
@@ -333,7 +349,8 @@ def test_a_known_slenderness_leaves_nothing_in_which_the_sides_differ():
     space = Space.of((1.0, 9.0), 0.2, (0.1, 1.0), two_sided=True)
     assert not space.two_sided
     assert list(space.named(np.log([[3.0, 0.5]]))) == ["p", "restitution"]
-    np.testing.assert_allclose(space.sides(np.log([[3.0, 0.5]]))[0], [[3.0, 0.2, 0.5]] * 2, rtol=1e-12)
+    for name, expected in (("p", 3.0), ("alpha", 0.2), ("restitution", 0.5)):
+        np.testing.assert_allclose(space.sides(np.log([[3.0, 0.5]]))[name][0], expected, rtol=1e-12)
 
 
 def test_the_sides_of_a_rigid_body_share_p_and_restitution_to_second_order_in_slenderness():
@@ -453,7 +470,7 @@ def test_a_motion_that_is_given_twice_is_simulated_once(monkeypatch):
     monkeypatch.setattr("rocking.analysis.calibration.outcomes.simulate_many", spy)
     twice = motions + [rocking.Motion(one.breakpoints, one.coefficients, name="again") for one in motions]
     observed = outcomes(twice)
-    found = rocking.calibrate(twice, observed, candidates=128, two_sided=False)
+    found = rocking.calibrate(twice, observed, candidates=128, two_sided=False, model="linear")
     assert set(counted) == {12}
     np.testing.assert_allclose(found.probabilities[:12], found.probabilities[12:], rtol=1e-12)
 
@@ -464,6 +481,27 @@ def test_tests_that_are_left_out_do_not_count(threshold_evidence):
     flipped = Evidence(evidence.candidates, np.where(some, evidence.observed, ~evidence.observed), evidence.lapse)
     first, second = (posterior(one.of_tests(some), 64, 2, np.random.default_rng(2)) for one in (evidence, flipped))
     np.testing.assert_array_equal(first, second)
+
+
+def test_the_number_of_threads_changes_no_bit(threshold_evidence):
+    evidence, _ = threshold_evidence
+    points = evidence.candidates.points[:100]
+    populations = np.hstack([points, np.full_like(points, -2.0)])
+    found = [replace(evidence, threads=threads).probabilities(populations) for threads in (1, 2, 5)]
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[0], found[2])
+
+
+def test_both_calibrations_share_names_order_and_defaults_of_their_arguments():
+    outcomes, history = (
+        {name: one.default for name, one in inspect.signature(function).parameters.items() if name != "motion"}
+        for function in (rocking.calibrate, rocking.calibrate_history)
+    )
+    shared = [name for name in outcomes if name in history]
+    assert shared == [name for name in history if name in outcomes]
+    assert shared == ["model", "p", "alpha", "restitution", "two_sided", "seed", "progress"]
+    for name in shared:
+        assert name == "two_sided" or outcomes[name] == history[name]
 
 
 def test_one_candidate_predicts_no_certainty(threshold_evidence):
@@ -649,7 +687,7 @@ def test_correlated_noise_widens_the_errors():
         ({"rotation": np.full(len(TIMES), math.nan)}, "finite"),
         ({"rotation": np.zeros(len(TIMES))}, "zero throughout"),
         ({"rotation": np.full(len(TIMES), 10.0)}, "rad"),
-        ({"rotation": np.roll(released(), 1) * (TIMES > 0.0)}, "initial_rotation="),
+        ({"rotation": np.roll(released(), 1) * (TIMES > 0.0)}, "give initial_rotation"),
         ({"rotation": ["a"] * len(TIMES)}, "numbers"),
         ({"times": TIMES[:6], "rotation": released()[:6]}, "6 samples"),
         pytest.param(
@@ -715,7 +753,7 @@ def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(
     space = Space.of((3.0, 3.0), (0.1, 0.2), (0.9, 0.9), two_sided=False)
     assert space.known == {"p": 3.0, "restitution": 0.9}
     with pytest.raises(rocking.InvalidOption, match=r"by simulate, .* by fragility"):
-        rocking.calibrate(*shaken, p=(3.0, 3.0), alpha=0.2, restitution=(0.9, 0.9))
+        rocking.calibrate(*shaken, p=(3.0, 3.0), alpha=0.2, restitution=(0.9, 0.9), model="linear")
     with pytest.raises(rocking.InvalidOption, match=r"by simulate, .* by fragility"):
         rocking.calibrate_history([0.0, 0.1], [0.1, 0.1], p=3.0, alpha=0.2, restitution=0.9, initial_rotation=0.1)
 

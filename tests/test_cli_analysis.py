@@ -8,6 +8,7 @@ import pytest
 
 import rocking
 from rocking import fragility, incremental_dynamic_analysis, overturning_map, quantities, rocking_spectrum
+from rocking.analysis.fragility import Band
 from rocking.tables import to_json
 
 RECORD = "el-centro-meloland-270"
@@ -112,7 +113,7 @@ def test_fragility_json_is_the_fit(run):
     result = json.loads(out)
     motions = [rocking.records.load(name) for name in (RECORD, OTHER, "ridgecrest-clc-090")]
     options = {"measure": "pgv", "levels": np.linspace(0.4, 1.2, 9), "polarity": "both"}
-    fitted = fragility(rocking.Block(width=0.24, height=1.1), motions, band="bootstrap", samples=50, **options)
+    fitted = fragility(rocking.Block(width=0.24, height=1.1), motions, band=Band("bootstrap", samples=50), **options)
     assert result["curves"][0]["median"] == fitted.curves[0].median
     assert result["curves"][0]["median_interval"] == list(fitted.curves[0].median_interval)
     assert result["measure"] == {"name": "pgv", "units": "m/s"}

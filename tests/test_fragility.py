@@ -14,6 +14,7 @@ from scipy.optimize import minimize
 
 import rocking
 from rocking import InvalidOption, fit_fragility, fragility
+from rocking.analysis.fragility import Band
 from rocking.block import Blocks
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "fragility.py"
@@ -106,7 +107,7 @@ def test_fishers_covariance_is_the_inverse_of_the_expected_curvature():
 def test_ninety_per_cent_intervals_hold_the_truth_nine_times_in_ten(band, share, repeats):
     held = np.zeros(2)
     for seed in range(repeats):
-        curve = fit_fragility(*outcomes(seed, 120), band=band, samples=200).curves[0]
+        curve = fit_fragility(*outcomes(seed, 120), band=Band(band, samples=200)).curves[0]
         for k, (truth, (low, high)) in enumerate(((3.0, curve.median_interval), (0.4, curve.dispersion_interval))):
             held[k] += low <= truth <= high
     # Three standard deviations of a binomial share.
@@ -178,7 +179,7 @@ def test_any_outcomes_give_a_rising_curve_or_are_refused(data, exponent):
     intensity = 10.0**exponent * np.array([level for level, _ in data])
     try:
         results = [
-            fit_fragility(intensity, [fell for _, fell in data], band=band, samples=40).curves[0]
+            fit_fragility(intensity, [fell for _, fell in data], band=Band(band, samples=40)).curves[0]
             for band in ("likelihood", "bootstrap")
         ]
     except rocking.InvalidOption as error:
@@ -197,7 +198,7 @@ def test_any_outcomes_give_a_rising_curve_or_are_refused(data, exponent):
 def test_bands_hold_the_curve_and_agree_with_each_other():
     intensity, exceeded = outcomes(3, 400)
     at = np.linspace(0.0, 10.0, 41)
-    results = [fit_fragility(intensity, exceeded, band=band).curves[0] for band in ("likelihood", "bootstrap")]
+    results = [fit_fragility(intensity, exceeded, band=Band(band)).curves[0] for band in ("likelihood", "bootstrap")]
     bands = [curve.band(at) for curve in results]
     for curve, (low, high) in zip(results, bands, strict=True):
         assert np.all(low <= curve.probability(at))
@@ -208,7 +209,7 @@ def test_bands_hold_the_curve_and_agree_with_each_other():
 def test_the_bootstrap_is_reproducible():
     data = outcomes(1, 60)
     first, again, other = (
-        fit_fragility(*data, band="bootstrap", samples=100, seed=seed).curves[0] for seed in (7, 7, 8)
+        fit_fragility(*data, band=Band("bootstrap", samples=100, seed=seed)).curves[0] for seed in (7, 7, 8)
     )
     assert first.median_interval == again.median_interval
     assert first.median_interval != other.median_interval
@@ -217,17 +218,17 @@ def test_the_bootstrap_is_reproducible():
 def test_the_bootstrap_draws_whole_clusters():
     # Ten copies of every outcome are no more data than one.
     intensity, exceeded = outcomes(2, 60)
-    single = fit_fragility(intensity, exceeded, band="bootstrap").curves[0]
+    single = fit_fragility(intensity, exceeded, band=Band("bootstrap")).curves[0]
     copies = np.repeat(intensity, 10), np.repeat(exceeded, 10)
     clusters = np.repeat(np.arange(60), 10)
-    kept = fit_fragility(*copies, clusters=clusters, band="bootstrap").curves[0]
+    kept = fit_fragility(*copies, clusters=clusters, band=Band("bootstrap")).curves[0]
     np.testing.assert_allclose(kept.median_interval, single.median_interval, rtol=1e-6)
-    apart = fit_fragility(*copies, band="bootstrap").curves[0]
+    apart = fit_fragility(*copies, band=Band("bootstrap")).curves[0]
     assert np.diff(apart.median_interval) < 0.5 * np.diff(kept.median_interval)
 
 
 def test_resampled_outcomes_that_are_separated_count_as_steps():
-    curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 0, 1], band="bootstrap", samples=500).curves[0]
+    curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 0, 1], band=Band("bootstrap", samples=500)).curves[0]
     assert 0.5 < curve.degenerate < 1.0
     low, high = curve.band([0.5, 2.5, 9.0])
     assert np.all((low >= 0.0) & (high <= 1.0))
@@ -382,10 +383,7 @@ def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity
         ({"exceeded": [0.5, 1, 1]}, "whole"),
         ({"trials": 0}, "trials"),
         ({"clusters": [1, 2]}, "clusters"),
-        ({"confidence": 1.0}, "confidence"),
         ({"band": "exact"}, "band"),
-        ({"samples": 0, "band": "bootstrap"}, "samples"),
-        ({"seed": -1}, "seed"),
         ({"measure": "pgd"}, "measure"),
         ({"measure": "sa"}, "period"),
     ],
@@ -394,6 +392,24 @@ def test_data_that_cannot_be_fitted_are_refused(changes, word):
     arguments = {"intensity": [1.0, 2.0, 3.0], "exceeded": [1, 0, 1]} | changes
     with pytest.raises(rocking.InvalidOption, match=word):
         fit_fragility(arguments.pop("intensity"), arguments.pop("exceeded"), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        ({"kind": "exact"}, "kind"),
+        ({"confidence": 1.0}, "confidence"),
+        ({"confidence": "0.9"}, "confidence"),
+        ({"confidence": True}, "confidence"),
+        ({"kind": "bootstrap", "samples": 0}, "samples"),
+        ({"samples": 10.5}, "samples"),
+        ({"seed": -1}, "seed"),
+        ({"seed": True}, "seed"),
+    ],
+)
+def test_a_band_that_cannot_be_made_is_refused(arguments, word):
+    with pytest.raises(rocking.InvalidOption, match=word):
+        Band(**arguments)
 
 
 @pytest.mark.parametrize(
@@ -440,14 +456,12 @@ def test_text_truth_values_and_senseless_numbers_are_refused(arguments, word):
 
 
 def test_numbers_of_any_real_type_are_taken():
-    plain = fit_fragility([1.0, 2.0, 3.0], [0, 1, 3], trials=4, confidence=0.5, samples=9, band="bootstrap").curves[0]
+    plain = fit_fragility([1.0, 2.0, 3.0], [0, 1, 3], trials=4, band=Band("bootstrap", 0.5, 9)).curves[0]
     other = fit_fragility(
         np.array([1, 2, 3]),
         np.array([0, 1, 3], dtype=np.int8),
         trials=np.int64(4),
-        confidence=np.float32(0.5),
-        samples=np.int64(9),
-        band="bootstrap",
+        band=Band("bootstrap", np.float32(0.5), np.int64(9)),
     ).curves[0]
     assert other.to_dict() == plain.to_dict()
 
@@ -484,7 +498,7 @@ def test_a_block_of_weight_two_counts_as_two_blocks():
     by_block = weighted.outcomes.groupby("block").weight.unique()
     assert [weights.tolist() for weights in by_block] == [pytest.approx([4 / 3]), pytest.approx([2 / 3])]
     for band in ("likelihood", "bootstrap"):
-        options = {"levels": levels, "band": band, "samples": 50}
+        options = {"levels": levels, "band": Band(band, samples=50)}
         one, other = (fragility([a, b], motions, weights=[w, 3.0 * w], **options).curves[0] for w in (1.0, 1e-6))
         assert one.median_interval == pytest.approx(other.median_interval, rel=1e-9)
 

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 import rocking
+from rocking.analysis.fragility import Band
 from rocking.analysis.survey import survey
 from rocking.kernels.trace import Trail
 from rocking.motion import formats, named
@@ -43,7 +44,7 @@ RESULTS = {
     "response": lambda path: rocking.simulate(BLOCK, RECORD),
     "fragility": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10),
     "bootstrapped fragility": lambda path: rocking.fit_fragility(
-        [2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10, band="bootstrap", samples=50
+        [2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10, band=Band("bootstrap", samples=50)
     ),
     "risk": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10).annual_rate(SITE),
     "survey": lambda path: survey(BLOCK, {"one": RECORD, "two": -RECORD}),
@@ -65,7 +66,7 @@ RESULTS = {
 
 def calibrated():
     overturned = [rocking.simulate(BLOCK, one, model="linear").overturned for one in MOTIONS]
-    return rocking.calibrate(MOTIONS, overturned, candidates=256, two_sided=False)
+    return rocking.calibrate(MOTIONS, overturned, model="linear", candidates=256, two_sided=False)
 
 
 def released():

@@ -199,12 +199,12 @@ def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
         assert response.overturned == row.overturned == row.exceeded_overturning
         assert response.peak_rotation == pytest.approx(row.peak_rotation_rad, abs=1e-9)
         assert math.isinf(row.peak_over_alpha) == row.overturned
-    found.outcomes_to_csv(tmp_path / "outcomes.csv")
+    found.to_csv(tmp_path / "outcomes.csv", "outcomes")
     header = (tmp_path / "outcomes.csv").read_text().splitlines()[0]
     assert header.startswith("motion,block,polarity,pga_m_s2,peak_rotation_rad,peak_over_alpha,overturned")
     given = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
     with pytest.raises(rocking.InvalidOption, match="no simulations"):
-        given.outcomes_to_csv(tmp_path / "none.csv")
+        given.to_csv(tmp_path / "none.csv", "outcomes")
 
 
 def test_the_nonlinear_critical_amplitude_is_not_read_off_an_unfinished_simulation(monkeypatch):

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking import HazardCurve, InvalidOption
-from rocking.analysis.fragility.observed import read_observed
+from rocking.analysis.tables import read_observed
 from rocking.motion.scaling import Measure
 
 G = 9.80665
@@ -259,12 +259,12 @@ def test_openquake_probabilities_become_rates(tmp_path: Path) -> None:
     [
         ("", "heading"),
         ("pga,rate\n0.1,0.01\n", "pga_g"),
-        ("pga_g,annual_rate\n0.1,often\n", "row 2"),
+        ("pga_g,annual_rate\n0.1,often\n", "line 2"),
         ("pga_g,annual_rate\n0.1,0.01\n", "two points"),
         ("pga_g,annual_rate\n0.1,0.01\n0.2,0.02\n", "decrease"),
         ("pga_g,annual_rate\n0.2,0.01\n0.1,0.001\n", "increase"),
         ("pga_g,annual_rate\n0.1,nan\n0.2,0.001\n", "positive"),
-        ("sa_g,annual_rate\n0.1,0.01\n0.2,0.001\n", "period"),
+        ("sa_g,annual_rate\n0.1,0.01\n0.2,0.001\n", "period must be given, in s"),
         ("#,\"investigation_time=50.0, imt='IA'\"\nlon,lat,poe-0.1\n1,2,0.5\n", "IA"),
     ],
 )

@@ -110,7 +110,7 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     ground, block, rules, _ = trail
     table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))
     scratch = state.new_scratch()
-    ending = state.Ending.PAUSED
+    ending: int = state.Ending.PAUSED
     for _ in range(slices(ground)):
         start["budget"] = SLICE
         ending = march(ground, block, rules, table, scratch, start)

@@ -1,4 +1,4 @@
-"""Efficiency of intensity measures: which one tells best from what strength on motions overturn a block."""
+"""Efficiency of intensity measures: which one predicts best when motions overturn a block."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled, units_of, values_of
+from rocking.analysis.report import Drawn
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption
@@ -104,7 +105,7 @@ def compare_measures(
     many, shaken = Blocks.of(blocks), several_motions(motions)
     shares = mean_one(weights, len(many))
     if len(shaken) < 2:
-        raise InvalidOption("measures are compared by how motions scatter: give two motions or more, not one")
+        raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
     times = checks.positive_numbers(periods, "periods", InvalidOption)
     scaled = incremental_dynamic_analysis(
         many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress
@@ -131,8 +132,10 @@ def compare_measures(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MeasureComparison(Result):
+class MeasureComparison(Drawn, Result):
     """Intensity measures side by side; from `compare_measures`.
+
+    Its figure has the dispersion of each measure with its interval, the most efficient first, as the summary.
 
     Attributes
     ----------
@@ -175,9 +178,9 @@ class MeasureComparison(Result):
         head = f"{data.blocks}, {data.model} model: intensities at which {count} overturn"
         columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if several else [])]
         text = [head, "", text_table([*columns, "over the best"], rows)]
-        spared = int(np.sum(np.isnan(data.intensity.values[0])))
-        if spared:
-            pairs = "1 pair" if spared == 1 else f"{spared} pairs"
+        missing = int(np.sum(np.isnan(data.intensity.values[0])))
+        if missing:
+            pairs = "1 pair" if missing == 1 else f"{missing} pairs"
             text.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
         return "\n".join(text + ([f"note: {REVERSED_TOO}"] if data.sides_differ else []))
 
@@ -201,18 +204,7 @@ class MeasureComparison(Result):
             ],
         }
 
-    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the dispersion of each measure with its interval, the most efficient first, as in `summary`.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
-        title : str
-            Title; by default the blocks and the model.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-        """
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import dispersions_figure
 
         data, order = self.data, self._order()

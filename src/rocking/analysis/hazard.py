@@ -16,7 +16,7 @@ from rocking.arrays import Floats, as_asked
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import IntensityName, Measure, intensities
-from rocking.tables import text_table
+from rocking.tables import csv_rows, text_table
 
 if TYPE_CHECKING:
     from rocking.plot import HazardLine
@@ -125,12 +125,16 @@ class HazardCurve:
             lines = file.read_text(encoding="utf-8-sig").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is no text"
-            raise InvalidOption(f"{file} cannot be read: {reason}") from error
-        if lines and "investigation_time" in lines[0]:
-            return _of_file(file, *_from_openquake(lines, str(file), site))
-        if site:
-            raise InvalidOption(f"{file}: a table of two columns is of one site; leave site out")
-        return _of_file(file, *_from_table(lines, str(file), period))
+            raise InvalidOption(f"it cannot be read: {reason}", path=str(file)) from error
+        try:
+            if lines and "investigation_time" in lines[0]:
+                return cls(*_from_openquake(lines, site), file.stem)
+            if site:
+                raise InvalidOption("a table of two columns is of one site; leave {} out", "site")
+            return cls(*_from_table(lines, period), file.stem)
+        except InvalidOption as error:
+            error.path = str(file)
+            raise
 
     def rate_of(self, intensity: ArrayLike) -> Floats:
         """Annual rate of exceeding intensities, shaped like them; infinite at 0.
@@ -195,63 +199,53 @@ def _check_order(what: str, values: Floats, way: float) -> None:
         )
 
 
-def _of_file(file: Path, intensity: Floats, rate: Floats, measure: Measure) -> HazardCurve:
-    try:
-        return HazardCurve(intensity, rate, measure, file.stem)
-    except InvalidOption as error:
-        raise InvalidOption(f"{file}: {error}") from None
-
-
 def heading_of(cell: str) -> str:
     """Name of a column as it is known here: "PGA (m/s^2)" is pga_m_s2."""
     return re.sub(r"[^a-z0-9]+", "_", cell.lower().replace("^", "")).strip("_")
 
 
-def _from_table(lines: list[str], path: str, period: float | None) -> tuple[Floats, Floats, Measure]:
-    told = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    # Where semicolons are between the columns, a comma is the decimal sign.
-    apart, decimal = (";", ",") if told and ";" in told[0] else (",", ".")
-    rows = list(csv.reader(told, delimiter=apart))
-    heading = [heading_of(cell) for cell in rows[0]] if rows else []
+def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats, Measure]:
+    """Intensities (SI), annual rates and measure of a table of two columns; lines that begin with # are remarks."""
+    (_, header), *rows = csv_rows("\n".join("" if line.lstrip().startswith("#") else line for line in lines)) or [
+        (1, [])
+    ]
+    heading = [heading_of(cell) for cell in header]
     found = [cell for cell in heading if cell in HEADINGS]
     if len(found) != 1 or "annual_rate" not in heading:
         raise InvalidOption(
-            f"{path}: a hazard curve needs a heading with annual_rate and one of {', '.join(HEADINGS)}, "
-            f"not {', '.join(rows[0]) if rows else 'nothing'}"
+            f"a hazard curve needs a heading with annual_rate and one of {', '.join(HEADINGS)}, "
+            f"not {', '.join(header) or 'nothing'}"
         )
     kind, factor = HEADINGS[found[0]]
-    columns = [heading.index(found[0]), heading.index("annual_rate")]
-    points = []
-    for k, row in enumerate(rows[1:], start=2):
+    intensity, rate = np.empty(len(rows)), np.empty(len(rows))
+    for k, (line, row) in enumerate(rows):
         try:
-            points.append([float(row[column].replace(decimal, ".")) for column in columns])
+            intensity[k], rate[k] = (float(row[heading.index(name)]) for name in (found[0], "annual_rate"))
         except (ValueError, IndexError):
-            raise InvalidOption(f"{path}, row {k}: {apart.join(row)} is not an intensity and a rate") from None
+            raise InvalidOption(f"{','.join(row)} is not an intensity and a rate", line=line) from None
     if kind == "sa" and period is None:
-        raise InvalidOption("give {} (s) of its spectral acceleration", "period", path=path)
+        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
-    table = np.array(points, dtype=np.float64).reshape(-1, 2)
-    return factor * table[:, 0], table[:, 1], measure
+    return factor * intensity, rate, measure
 
 
-def _from_openquake(lines: list[str], path: str, site: int) -> tuple[Floats, Floats, Measure]:
+def _from_openquake(lines: list[str], site: int) -> tuple[Floats, Floats, Measure]:
+    """Intensities (SI), annual rates and measure of a site in a file of OpenQuake's."""
     said = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
     kind, _, rest = said.get("imt", "").partition("(")
     rows = list(csv.reader(lines[1:]))
     levels = [_POE.fullmatch(cell.strip()) for cell in rows[0]] if rows else []
     if kind not in _OPENQUAKE or not any(levels):
-        raise InvalidOption(
-            f"{path}: no hazard curve of {', '.join(_OPENQUAKE)}: imt is {said.get('imt', 'not given')}"
-        )
+        raise InvalidOption(f"no hazard curve of {', '.join(_OPENQUAKE)}: imt is {said.get('imt', 'not given')}")
     if not 0 <= site < len(rows) - 1:
-        raise InvalidOption(f"{path}: there is no site {site}; it holds {len(rows) - 1}, counted from 0")
+        raise InvalidOption(f"there is no site {site}; it holds {len(rows) - 1}, counted from 0")
     columns = [k for k, level in enumerate(levels) if level]
     intensity = np.array([float(level[1]) for level in levels if level])
     try:
         exceeded = np.array([float(rows[1 + site][k]) for k in columns])
         years = float(said["investigation_time"])
     except (ValueError, IndexError) as error:
-        raise InvalidOption(f"{path}, site {site}: {error}; it is not a whole hazard curve") from None
+        raise InvalidOption(f"site {site}: {error}; it is not a whole hazard curve") from None
     measure_name, factor = _OPENQUAKE[kind]
     measure = Measure("sa", float(rest.rstrip(")"))) if kind == "SA" else Measure(measure_name)
     # Probabilities that are printed as 0 or 1 say nothing of the rate.

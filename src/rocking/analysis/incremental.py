@@ -6,13 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.bands import Levels
 from rocking.analysis.boundaries import Boundaries, boundaries
 from rocking.analysis.levels import REVERSED_TOO, described, simulate_levels, units_of, values_of
 from rocking.arrays import Floats, Integers
@@ -121,7 +120,7 @@ def incremental_dynamic_analysis(
     many, how, shaken = Blocks.of(blocks), Measure.of(measure), several_motions(motions)
     values = values_of(shaken, how)
     if np.any(np.prod(many.restitution, axis=1) == 1.0):
-        raise InvalidOption("a block with restitution 1 never comes to rest; scaling up needs one below 1")
+        raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model, "threads": threads, "progress": progress}
     first = _lowest_uplift(many, shaken, values, how, model)
@@ -148,7 +147,7 @@ def incremental_dynamic_analysis(
     grid = table.overturned.transpose("level", "motion", "block").values
     flat = grid.reshape(len(grid), -1).astype(np.int64)
     edges = boundaries(table.level.values, flat, overturned, tolerance=width, progress=progress)
-    found = _dataset(table, _bands(flat, edges), many, how)
+    found = _dataset(table, _Bands.of(flat, edges), many, how)
     about = {"blocks": described(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
     return IncrementalDynamicAnalysis(found.assign_attrs(about))
 
@@ -188,12 +187,17 @@ class IncrementalDynamicAnalysis(Result):
         return part[[]].assign(labels | {"block": block, "band_start": part.band_start, "band_end": part.band_end})
 
     def bands(self, motion: int, block: int = 0) -> list[tuple[float, float]]:
-        """Return the bands of levels that overturn a block under a motion, both by position.
+        """Return the bands of levels that overturn a block under a motion.
+
+        Parameters
+        ----------
+        motion, block : int
+            Positions of both.
 
         Returns
         -------
         list of (float, float)
-            Start and end; NaN where the band goes on below or above the levels.
+            Start and end, in SI units or the block's own; NaN where the band goes on below or above the levels.
         """
         mine = (self.data.band_motion.values == motion) & (self.data.band_block.values == block)
         starts, ends = self.data.band_start.values[mine], self.data.band_end.values[mine]
@@ -203,7 +207,7 @@ class IncrementalDynamicAnalysis(Result):
         """Levels that overturn each block under each motion, and which levels were looked at."""
         data = self.data
         many = data.sizes["block"] > 1
-        looked_at = Levels.of(data)
+        looked_at = _Levels.of(data)
         what = "record" if "record" in data.coords else "motion"
         rows = [
             [
@@ -332,25 +336,34 @@ def _until_overturned(
     return table.isel(level=slice(0, beyond[0] + 1 if beyond.size else None))
 
 
-def _bands(flat: Integers, edges: Boundaries) -> NDArray[np.float64]:
-    """Bands that overturn, one row each: column, start, end; NaN where the grid begins or ends inside one."""
-    rows = []
-    for column in range(flat.shape[1]):
-        mine = edges.column == column
-        above, level = edges.above[mine] == 1, edges.level[mine]
-        starts = [*([np.nan] if flat[0, column] else []), *level[above]]
-        ends = [*level[~above], *([np.nan] if flat[-1, column] else [])]
-        rows += [(column, start, end) for start, end in zip(starts, ends, strict=True)]
-    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+class _Bands(NamedTuple):
+    """Bands that overturn: column of the grid, start and end; NaN where the grid begins or ends inside one."""
+
+    column: Integers
+    start: Floats
+    end: Floats
+
+    @classmethod
+    def of(cls, flat: Integers, edges: Boundaries) -> _Bands:
+        """Pair the levels at which verdicts of a grid of (level, column) change."""
+        columns: list[int] = []
+        starts: list[float] = []
+        ends: list[float] = []
+        for column in range(flat.shape[1]):
+            mine = edges.column == column
+            above, level = edges.above[mine] == 1, edges.level[mine]
+            starts += [*([np.nan] if flat[0, column] else []), *level[above]]
+            ends += [*level[~above], *([np.nan] if flat[-1, column] else [])]
+            columns += [column] * (len(starts) - len(columns))
+        return cls(np.array(columns, dtype=np.int64), np.array(starts, dtype=float), np.array(ends, dtype=float))
 
 
-def _dataset(table: xr.Dataset, bands: NDArray[np.float64], blocks: Blocks, measure: Measure) -> xr.Dataset:
+def _dataset(table: xr.Dataset, bands: _Bands, blocks: Blocks, measure: Measure) -> xr.Dataset:
     import xarray as xr
 
-    column, start, end = bands.T
-    motion, block = np.divmod(column.astype(np.int64), len(blocks))
+    motion, block = np.divmod(bands.column, len(blocks))
     lowest = np.full((table.sizes["motion"], len(blocks)), np.inf)
-    np.minimum.at(lowest, (motion, block), start)
+    np.minimum.at(lowest, (motion, block), bands.start)
     lowest[np.isinf(lowest)] = np.nan
     level = {"units": measure.units, "long_name": measure.quantity, "label": measure.label, "scale": measure.scale}
     table = table.assign_coords(level=("level", table.level.values, level))
@@ -361,6 +374,71 @@ def _dataset(table: xr.Dataset, bands: NDArray[np.float64], blocks: Blocks, meas
         overturning_level=(("motion", "block"), lowest, level),
         band_motion=("band", motion, {"units": "1", "long_name": "position of the motion"}),
         band_block=("band", block, {"units": "1", "long_name": "position of the block"}),
-        band_start=("band", start, level),
-        band_end=("band", end, level),
+        band_start=("band", bands.start, level),
+        band_end=("band", bands.end, level),
     )
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Levels that motions were scaled to, and bands of them, in words: never more than was looked at.
+
+    Attributes
+    ----------
+    at : ndarray
+        Levels as people read them: accelerations in g.
+    unit : str
+        Their unit, after a blank; empty if they have none.
+    scale : float
+        Factor from SI units.
+    """
+
+    at: Floats
+    unit: str
+    scale: float
+
+    @classmethod
+    def of(cls, data: xr.Dataset) -> _Levels:
+        """Levels of an incremental dynamic analysis."""
+        level = data.level
+        unit = {"m/s^2": " g", "m/s": " m/s", "1": ""}[level.units]
+        return cls(level.scale * level.values, unit, level.scale)
+
+    def summary(self, lowest_uplift: float) -> str:
+        """Say what was looked at, and whether it is all below the level (SI) from which on a motion lifts a block."""
+        count = f"{len(self.at)} levels" if len(self.at) > 1 else "1 level"
+        text = f"looked at: {count}, {self._range(self.at[0], self.at[-1])}{self._step()}"
+        lifting = self.scale * lowest_uplift
+        if self.at[-1] < lifting:
+            text += f"\nnone of them lifts a block; that begins at {lifting:.5g}{self.unit}: are the levels right?"
+        return text
+
+    def overturning(self, bands: Sequence[tuple[float, float]]) -> str:
+        """Bands that overturn (SI); beyond the levels nothing is known of them, which is NaN."""
+        if not bands:
+            return f"at no level looked at, {self._range(self.at[0], self.at[-1])}"
+        return "; ".join(self._band(self.scale * low, self.scale * high) for low, high in bands)
+
+    def _band(self, low: float, high: float) -> str:
+        if not (math.isnan(low) or math.isnan(high)):
+            return f"{low:.5g} to {high:.5g}"
+        if math.isnan(low) and math.isnan(high):
+            return f"at every level looked at, {self._range(self.at[0], self.at[-1])}"
+        open_end = f"up to {high:.5g}{self.unit}" if math.isnan(low) else f"from {low:.5g}{self.unit} on"
+        return f"at all levels looked at {open_end}"
+
+    def _range(self, low: float, high: float) -> str:
+        return f"{low:.5g}{self.unit}" if low == high else f"{low:.5g} to {high:.5g}{self.unit}"
+
+    def _step(self) -> str:
+        """How far neighbouring levels are apart; what lies between two of the same verdict is not seen."""
+        if len(self.at) == 1:
+            return ""
+        steps, ratios = np.diff(self.at), self.at[1:] / self.at[:-1]
+        if np.allclose(steps, steps[0], rtol=1e-6):
+            apart = f"{steps[0]:.5g}{self.unit} apart"
+        elif np.allclose(ratios, ratios[0], rtol=1e-6):
+            apart = f"{100.0 * (ratios[0] - 1.0):.3g} % apart"
+        else:
+            apart = f"up to {steps.max():.5g}{self.unit} apart"
+        return f", {apart}; bands and gaps that lie between two of them are not seen"

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from rocking import checks
+from rocking.analysis.fragility.curve import FragilityCurve
 from rocking.analysis.fragility.lognormal import Probit
 from rocking.analysis.hazard import HazardCurve
+from rocking.analysis.report import Report
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
+from rocking.motion.scaling import Measure
 from rocking.tables import counted, known_digits, text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from rocking.analysis.fragility.curve import Fragility, FragilityCurve
 
 #: Relative change by which a rate's slope is taken.
 _STEP: Final = 1e-5
@@ -27,7 +29,7 @@ _STEP: Final = 1e-5
 #: A figure shows what is between quantiles of a rate, and so many times as far beyond them.
 _BEYOND: Final = 2.0
 
-#: Parts of the risk that are told apart by intensity: what a standard deviation leaves on either side, and half.
+#: Shares of the risk up to an intensity: what a standard deviation leaves on either side, and half.
 _QUANTILES: Final = (0.16, 0.5, 0.84)
 
 _ROOT: Final = math.sqrt(0.5)
@@ -78,11 +80,22 @@ class Rate:
         return f"once in {period} year{'' if period == '1' else 's'} ({between})"
 
     def probability(self, years: float) -> float:
-        """Probability of at least one exceedance in some years, for exceedances that do not depend on one another."""
+        """Probability of at least one exceedance in some years, for exceedances that do not depend on one another.
+
+        Parameters
+        ----------
+        years : float
+            Time, above 0.
+
+        Raises
+        ------
+        InvalidOption
+            If it is no positive number.
+        """
         return -math.expm1(-self.annual_rate * checks.positive(years, "years", InvalidOption))
 
     def survival(self, years: float) -> float:
-        """Probability of no exceedance in some years: of standing, for overturning."""
+        """Probability of no exceedance in some years: of standing, for overturning; as `probability`."""
         return math.exp(-self.annual_rate * checks.positive(years, "years", InvalidOption))
 
     @property
@@ -103,38 +116,68 @@ def _period(rate: float) -> float:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Risk:
-    """Annual rates of all limit states of a fragility under a hazard curve.
+class Risk(Report):
+    """Annual rates of all limit states of a fragility under a hazard curve; from `Fragility.annual_rate`.
+
+    Its figure has the hazard curve, and below it for each limit state which intensities its rate comes from.
 
     Attributes
     ----------
     rates : tuple of Rate
         One for each limit state.
-    fragility : Fragility
-        Probabilities of exceedance.
+    curves : tuple of FragilityCurve
+        Probabilities of exceedance, in the same order.
     hazard : HazardCurve
         Annual rates of intensities.
+    description : str
+        What was simulated or observed.
     """
 
     rates: tuple[Rate, ...]
-    fragility: Fragility
+    curves: tuple[FragilityCurve, ...]
     hazard: HazardCurve
+    description: str
+
+    @classmethod
+    def of(cls, curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Measure, description: str) -> Risk:
+        """Integrate curves against a measure over a hazard curve; see `Fragility.annual_rate`."""
+        if not isinstance(hazard, HazardCurve):
+            raise InvalidOption(
+                f"a HazardCurve is needed, not a {type(hazard).__name__}: make one with HazardCurve(intensity, rate), "
+                "or read one with HazardCurve.read(path)",
+                value=hazard,
+            )
+        if measure != hazard.measure:
+            raise InvalidOption(
+                f"the fragility is against {measure.label}, the hazard curve of {hazard.measure.label}; "
+                "fit the one against the other's measure"
+            )
+        return cls(tuple(_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
 
     def rate(self, limit_state: str) -> Rate:
         """Return the rate of a limit state.
+
+        Parameters
+        ----------
+        limit_state : str
+            Its name.
+
+        Returns
+        -------
+        Rate
 
         Raises
         ------
         InvalidOption
             If there is none of that name.
         """
-        self.fragility.curve(limit_state)
-        return next(one for one in self.rates if one.limit_state == limit_state)
+        rates = {one.limit_state: one for one in self.rates}
+        return rates[checks.one_of(limit_state, "limit_state", InvalidOption, [*rates])]
 
     def summary(self, years: float = 50.0) -> str:
-        """Rates, return periods and probabilities in some years, in a table."""
+        """Return rates, return periods and probabilities in some years, in a table."""
         years = checks.positive(years, "years", InvalidOption)
-        scale, confidence = self.hazard.measure.scale, 100 * self.fragility.curves[0].confidence
+        scale, confidence = self.hazard.measure.scale, 100 * self.curves[0].confidence
         rows = []
         for one in self.rates:
             chances = [-math.expm1(-rate * years) for rate in (one.annual_rate, *one.interval)]
@@ -165,9 +208,9 @@ class Risk:
         return "\n".join([text_table(header, rows), *notes])
 
     def to_dict(self, years: float = 50.0) -> dict[str, Any]:
-        """Rates by name, and the hazard curve."""
+        """Return rates, and probabilities in some years, by name, and the hazard curve."""
         return {
-            "description": self.fragility.description,
+            "description": self.description,
             "hazard": self.hazard.to_dict(),
             "years": years,
             "rates": [
@@ -175,7 +218,7 @@ class Risk:
                     "limit_state": one.limit_state,
                     "annual_rate": one.annual_rate,
                     "annual_rate_interval": list(one.interval),
-                    "confidence": self.fragility.curves[0].confidence,
+                    "confidence": self.curves[0].confidence,
                     "return_period_years": one.return_period,
                     "return_period_interval_years": list(one.return_interval),
                     "probability": one.probability(years),
@@ -187,16 +230,7 @@ class Risk:
             ],
         }
 
-    def plot(self, ax: Axes | None = None, *, figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the hazard curve, and below it for each limit state which intensities its rate comes from.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Draw the shares of the rates here, without the hazard curve; by default in a new figure.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-        """
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import RiskLine, risk_figure
 
         scale, at = self.hazard.measure.scale, self._shown()
@@ -205,10 +239,10 @@ class Risk:
             hazard=self.hazard.line(at),
             lines=[
                 RiskLine(f"{one.limit_state}: {one.in_words()}", _share_density(curve.fitted, self.hazard, at))
-                for one, curve in zip(self.rates, self.fragility.curves, strict=True)
+                for one, curve in zip(self.rates, self.curves, strict=True)
             ],
             intensity_label=self.hazard.measure.label,
-            title=self.fragility.description,
+            title=title or self.description,
             ax=ax,
             figsize=figsize,
         )
@@ -225,22 +259,7 @@ class Risk:
 
     def __repr__(self) -> str:
         rates = ", ".join(f"{one.limit_state}: {one.in_words()}" for one in self.rates)
-        return f"<Risk: {self.fragility.description}; {self.hazard.name}; {rates}>"
-
-
-def risk(fragility: Fragility, hazard: HazardCurve) -> Risk:
-    """Annual rates of a fragility's limit states under a hazard curve; see `Fragility.annual_rate`."""
-    if not isinstance(hazard, HazardCurve):
-        raise InvalidOption(
-            f"a HazardCurve is needed, not a {type(hazard).__name__}: make one with HazardCurve(intensity, rate), or "
-            "read one with HazardCurve.read(path)"
-        )
-    if fragility.measure != hazard.measure:
-        raise InvalidOption(
-            f"the fragility is against {fragility.measure.label}, the hazard curve of {hazard.measure.label}; "
-            "fit the one against the other's measure"
-        )
-    return Risk(tuple(_rate(curve, hazard) for curve in fragility.curves), fragility, hazard)
+        return f"<Risk: {self.description}; {self.hazard.name}; {rates}>"
 
 
 def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:

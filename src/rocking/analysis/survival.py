@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking import checks
+from rocking.analysis.fragility.curve import FragilityCurve, in_units
 from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.risk import Rate, risk
+from rocking.analysis.report import Report
+from rocking.analysis.risk import Rate
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
+from rocking.motion.scaling import Measure
 from rocking.tables import counted, known_digits, text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from rocking.analysis.fragility.curve import Fragility, FragilityCurve
 
 #: Probabilities of exceedance of the intensities in the table.
 _CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
@@ -30,15 +31,19 @@ _POINTS: Final = 200
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Survival:
+class Survival(Report):
     """A limit state that was not exceeded in a time, and what that says of the shaking; from `Fragility.survival`.
+
+    Its figure has the largest rates that fit with the survival, and the hazard curve beside them.
 
     Attributes
     ----------
-    fragility : Fragility
-        Probabilities of exceedance.
     curve : FragilityCurve
-        That of the limit state.
+        Probabilities that the limit is exceeded.
+    measure : Measure
+        What its intensity is.
+    description : str
+        What was simulated or observed.
     years : float
         For how long it was not exceeded.
     confidence : float
@@ -49,12 +54,17 @@ class Survival:
         Annual rate of the limit state under that hazard curve.
     """
 
-    fragility: Fragility
     curve: FragilityCurve
+    measure: Measure
+    description: str
     years: float
     confidence: float
     hazard: HazardCurve | None
     rate: Rate | None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "years", checks.positive(self.years, "years", InvalidOption))
+        checks.share(self.confidence, "confidence", InvalidOption)
 
     @property
     def intensity(self) -> Floats:
@@ -91,7 +101,7 @@ class Survival:
 
     def summary(self) -> str:
         """Return what was most likely never met, the largest rates, and how a hazard curve fits with them."""
-        measure, share = self.fragility.measure, f"{100.0 * self.confidence:g} %"
+        measure, share = self.measure, f"{100.0 * self.confidence:g} %"
         header = [measure.label, "probability", "at most a year", "at most once in (years)"]
         columns: list[list[Any]] = [
             [measure.scale * x for x in self.intensity],
@@ -106,7 +116,7 @@ class Survival:
         return "\n".join(
             [
                 f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; intensity: {measure.label}",
-                f"most likely no motion reached {self.fragility.in_units(self.unlikely)}: one that did would have "
+                f"most likely no motion reached {in_units(self.unlikely, self.measure)}: one that did would have "
                 f"exceeded the limit with {share}",
                 f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
                 f"exceeded with {share}",
@@ -135,7 +145,7 @@ class Survival:
 
     def to_dict(self) -> dict[str, Any]:
         """Rates, intensities and probabilities by name; intensities in SI units."""
-        column = self.fragility.measure.column
+        column = self.measure.column
         found = {
             "limit_state": self.curve.limit_state,
             "years": self.years,
@@ -154,18 +164,7 @@ class Survival:
             "contradicts": self.contradicts,
         }
 
-    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the largest rates that fit with the survival, and the hazard curve beside them.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
-        title : str
-            Title; by default what was simulated or observed.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-        """
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import survival_figure
 
         ends = [self.curve.intensity_of(chance) for chance in _SHOWN]
@@ -173,31 +172,18 @@ class Survival:
             ends += self.hazard.intensity[[0, -1]].tolist()
         at = np.geomspace(min(ends), max(ends), _POINTS)
         at = at[self.curve.probability(at) > _SHOWN[0] * 0.1]
-        measure = self.fragility.measure
         return survival_figure(
-            intensity=measure.scale * at,
+            intensity=self.measure.scale * at,
             largest=self.curve.largest_rate(at, self.years, self.confidence),
             largest_label=f"at most, with {counted(self.years, 'year')} without {self.curve.limit_state} "
             f"({100.0 * self.confidence:g} %)",
             hazard=None if self.hazard is None else self.hazard.line(at),
-            intensity_label=measure.label,
-            title=title or self.fragility.description,
+            intensity_label=self.measure.label,
+            title=title or self.description,
             ax=ax,
             figsize=figsize,
         )
 
     def __repr__(self) -> str:
-        never = self.fragility.in_units(self.unlikely)
-        time = counted(self.years, "year")
+        time, never = counted(self.years, "year"), in_units(self.unlikely, self.measure)
         return f"<Survival: {self.curve.limit_state}: not in {time}; most likely never {never} or more>"
-
-
-def survival(
-    fragility: Fragility, years: float, hazard: HazardCurve | None, confidence: float, limit_state: str
-) -> Survival:
-    """Say what follows for past shaking where a limit state was not exceeded; see `Fragility.survival`."""
-    curve = fragility.curve(limit_state)
-    time = checks.positive(years, "years", InvalidOption)
-    share = checks.share(confidence, "confidence", InvalidOption)
-    rate = None if hazard is None else risk(fragility, hazard).rate(limit_state)
-    return Survival(fragility, curve, time, share, hazard, rate)

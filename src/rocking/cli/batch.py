@@ -13,7 +13,7 @@ from rocking.tables import to_json, write_figure, write_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rocking.analysis.fragility.curve import Fragility
+    from rocking.analysis.fragility.result import Fragility
     from rocking.cli.options import Records
 
 #: Resolution of figures as PNG.

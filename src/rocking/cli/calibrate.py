@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +14,7 @@ from rocking.analysis.calibration.history import HistoryCalibration, calibrate_h
 from rocking.analysis.calibration.outcomes import Calibration, checked_outcomes
 from rocking.analysis.calibration.outcomes import calibrate as run
 from rocking.analysis.calibration.space import HOUSNER
-from rocking.analysis.calibration.tables import History, Outcomes, read
+from rocking.analysis.tables import History, Outcomes, read_calibration
 from rocking.cli import batch
 from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledPulseOptions
 from rocking.errors import InvalidOption, RockingError
@@ -27,7 +27,7 @@ from rocking.treatment.base import Model
 def calibrate(
     data: Path,
     *,
-    model: Model | None = None,
+    model: Model = "nonlinear",
     p: str | None = None,
     alpha: str | None = None,
     restitution: str | None = None,
@@ -53,7 +53,7 @@ def calibrate(
     data
         CSV table of outcomes or of a history.
     model
-        Equation of motion; by default linear for outcomes, nonlinear for a history.
+        Equation of motion; the linear one is faster, and serves slender specimens.
     p
         Lowest and highest thinkable frequency parameter, rad/s, with a comma between; or a known value.
     alpha
@@ -86,7 +86,7 @@ def calibrate(
     given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
     choices = {name: value for name, value in given.items() if value is not None}
     with output.folder() as folder:
-        table = read(data, channel=file.channel, dt=file.dt, units=file.units)
+        table = read_calibration(data, channel=file.channel, dt=file.dt, units=file.units)
         if not isinstance(table, History):
             _refuse("a history", motion=motion, initial_rotation=initial_rotation)
             others = {name: file.read(name) for name in predict} | file.pulses()
@@ -146,11 +146,11 @@ def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
 def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None) -> _Results:
     """Calibrate each specimen by itself, and write each as soon as it is done."""
     for name, table in tables.items():
-        with _told_of(name):
+        with _naming(name):
             checked_outcomes(table.overturned, len(table.overturned))
     results = {}
     for name, table in tables.items():
-        with _told_of(name):
+        with _naming(name):
             results[name] = _of_outcomes(table, how)
         if folder is not None:
             (folder / name).mkdir(exist_ok=True)
@@ -160,16 +160,17 @@ def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None
 
 
 @contextlib.contextmanager
-def _told_of(specimen: str) -> Iterator[None]:
-    """Say of which specimen an error is."""
+def _naming(specimen: str) -> Iterator[None]:
+    """Add the specimen's name to an error."""
     try:
         yield
     except RockingError as error:
-        raise type(error)(f"specimen {specimen}: {error}") from error
+        error.message = replace(error.message, template=f"specimen {specimen}: {error.message.template}")
+        raise
 
 
 def _of_outcomes(table: Outcomes, how: _How) -> _Results:
-    found = run(table.motions, table.overturned, how.seed, **how.choices)
+    found = run(table.motions, table.overturned, seed=how.seed, **how.choices)
     predicted = dict(zip(how.others, found.predict([*how.others.values()]), strict=True))
     numbers = {**found.to_dict(), "predicted": predicted}
     parts = [found.summary()]

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from rocking import checks
+from rocking.analysis.fragility.curve import Band
 from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.fragility.fit import fragility as run
-from rocking.analysis.fragility.observed import read_observed
 from rocking.analysis.hazard import HazardCurve
+from rocking.analysis.tables import read_observed
 from rocking.cli import batch
 from rocking.cli.options import (
     BLOCK,
@@ -99,17 +100,12 @@ def fragility(
     checks.positive(years, "years", InvalidOption)
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
-    bands: dict[str, Any] = {
-        "confidence": confidence,
-        "band": "bootstrap" if bootstrap != 0 else "likelihood",
-        "samples": bootstrap or 1,
-        "seed": seed,
-    }
+    band = Band("bootstrap" if bootstrap != 0 else "likelihood", confidence, samples=bootstrap or 1, seed=seed)
     with output.folder() as folder:
         read = None
         if outcomes is not None:
             observed = read_observed(outcomes, measure.wanted, channel=motion.channel, dt=motion.dt, units=motion.units)
-            fitted = fit_fragility(**observed, **bands)
+            fitted = fit_fragility(**observed, band=band)
         else:
             read = motion.read_all(names)
             fitted = run(
@@ -118,7 +114,7 @@ def fragility(
                 **model.chosen() | bodies,
                 limits=_limits(limits),
                 polarity=polarity,
-                **bands,
+                band=band,
             )
         found, text = fitted.to_dict() | ({} if read is None else read.to_dict()), [fitted.summary()]
         figures: dict[str, Callable[[], Figure]] = {"fragility": fitted.plot}
@@ -136,7 +132,7 @@ def fragility(
             fitted.to_csv(folder / "fragility.csv")
             if fitted.outcomes is not None:
                 together = fitted if read is None else batch.with_records(fitted, read)
-                together.outcomes_to_csv(folder / "outcomes.csv")
+                together.to_csv(folder / "outcomes.csv", "outcomes")
             batch.write(folder, figures={name: draw() for name, draw in figures.items()}, result=found)
         batch.show(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
 

@@ -1,4 +1,4 @@
-"""`rocking measures`: which intensity measure tells best when motions overturn a block."""
+"""`rocking measures`: which intensity measure predicts best when motions overturn a block."""
 
 from __future__ import annotations
 

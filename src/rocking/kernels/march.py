@@ -53,7 +53,7 @@ def march(ground: Ground, block: Record, rules: Record, table: Records, scratch:
 
 
 @inlined
-def march_step(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
+def march_step(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> Ending:
     """One iteration of a march: to the next uplift of a block at rest, or along an arc to its first event."""
     write_node(ground, rules, table, state)
     if state.side == AT_REST:

@@ -3,9 +3,8 @@
 from rocking.plot.amplitudes import contour_figure, duration_figure, frequency_figure, surface_figure
 from rocking.plot.blocks import blocks_figure
 from rocking.plot.calibration import Parameter, measured_figure, outcomes_figure
-from rocking.plot.dispersions import dispersions_figure
 from rocking.plot.flowchart import Box, Flowchart, Way, flowchart_figure
-from rocking.plot.fragility import FragilityLine, fragility_figure
+from rocking.plot.fragility import FragilityLine, dispersions_figure, fragility_figure
 from rocking.plot.histories import Detail, Mark, excitation_figure, history_figure
 from rocking.plot.ida import ScaledMotion, ida_figure
 from rocking.plot.intervals import intervals_figure

@@ -47,10 +47,8 @@ def blocks_figure(
         Values by the name of the panel; where one is not finite, the block has a cross.
     value_label, missing_label, title : str
         Texts; `missing_label` says what a cross means.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw, if there is one panel.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches; by default by the number of panels.
+    ax, figsize
+        As for `figure_for`. In `ax` there is room for one panel.
 
     Raises
     ------

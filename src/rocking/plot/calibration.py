@@ -56,12 +56,8 @@ def outcomes_figure(
         One panel each.
     weights : ndarray, shape (blocks,)
         Weights of the blocks.
-    title : str
-        Title of the figure.
-    ax : matplotlib.axes.Axes, optional
-        Draw the tests here, without the blocks.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches; by default 7 by 4.6.
+    title, ax, figsize
+        As for `figure_for` and `add_title`. In `ax`, the tests are drawn without the blocks.
 
     Examples
     --------
@@ -103,12 +99,8 @@ def measured_figure(
         Times (s), measured rotation and measured less fitted rotation (rad).
     fitted_time, fitted : ndarray, shape (k,)
         Times (s) and rotation (rad) of the fitted block.
-    title : str
-        Title of the figure.
-    ax : matplotlib.axes.Axes, optional
-        Draw the histories here, without the residuals.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches; by default 7 by 4.
+    title, ax, figsize
+        As for `figure_for` and `add_title`. In `ax`, the histories are drawn without the residuals.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Fragility curves: probability of exceeding a limit state against the intensity of the motion."""
+"""Fragility curves, and dispersions of intensity measures side by side."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled
-from rocking.plot.style import CURVES, GROUND
+from rocking.plot.style import CURVES, GROUND, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,12 +51,8 @@ def fragility_figure(
         One for every limit state.
     intensity_label, band_label, probability_label : str
         Texts; `band_label` says what the bands are, or why there is none, `probability_label` what is probable.
-    title : str
-        Title of the figure.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches; by default 5.6 by 4.2.
+    title, ax, figsize
+        As for `figure_for` and `add_title`.
 
     Examples
     --------
@@ -95,6 +91,41 @@ def fragility_figure(
         add_labels(axes, intensity_label, probability_label)
         add_title(figure, ax, title)
         add_legend(figure, ax, labelled(axes))
+    return figure
+
+
+def dispersions_figure(
+    *,
+    names: Sequence[str],
+    dispersion: Floats,
+    low: Floats,
+    high: Floats,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw a dispersion with its interval for each measure, one below the other.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Measures.
+    dispersion, low, high : ndarray, shape (n,)
+        Standard deviation of the logarithm of the intensity at overturning, and the ends of its interval.
+    title, ax, figsize
+        As for `figure_for` and `add_title`.
+    """
+    with figure_for(ax, (5.6, 0.8 + 0.32 * len(names)), figsize) as figure:
+        axes = ax or figure.add_subplot()
+        row = np.arange(len(names))
+        axes.hlines(row, low, high, color=INK, linewidth=1.0)
+        axes.plot(dispersion, row, color=INK, linestyle="none", marker="o", markersize=4.5)
+        axes.set_yticks(row, list(names))
+        axes.set_ylim(len(names) - 0.5, -0.5)
+        axes.set_xlim(left=0.0)
+        axes.grid(axis="x", linewidth=0.4, color="0.85")
+        add_labels(axes, "dispersion of the intensity at overturning (90 % interval)", "")
+        add_title(figure, ax, title)
     return figure
 
 

@@ -73,12 +73,8 @@ def ida_figure(
         are drawn alike, with the fractiles (16, 50, 84 %) of the lowest level at which each reaches a peak rotation.
     level_label : str
         Measure of intensity and its units.
-    title : str
-        Title of the figure.
-    ax : matplotlib.axes.Axes, optional
-        Draw the curves here, without the levels that overturn.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches; by default 7 by 4.2.
+    title, ax, figsize
+        As for `figure_for` and `add_title`. In `ax`, the curves are drawn without the levels that overturn.
 
     Examples
     --------

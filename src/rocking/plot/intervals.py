@@ -39,12 +39,8 @@ def intervals_figure(
         Dimensionless time to each impact from the one before it, the first from the uplift; there may be none.
     eta : float
         Coefficient of restitution: the ratios of a complete sequence tend to its square.
-    title : str
-        Title of the figure.
-    ax : matplotlib.axes.Axes, optional
-        Draw the intervals here, without the ratios.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches; by default 7 by 3.2.
+    title, ax, figsize
+        As for `figure_for` and `add_title`. In `ax`, the intervals are drawn without the ratios.
 
     Returns
     -------

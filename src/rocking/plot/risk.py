@@ -58,10 +58,8 @@ def risk_figure(
         One for every limit state.
     intensity_label, title : str
         Texts.
-    ax : matplotlib.axes.Axes, optional
-        Draw the shares of the rates here, without the hazard curve.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches.
+    ax, figsize
+        As for `figure_for`. In `ax`, the shares of the rates are drawn without the hazard curve.
 
     Examples
     --------
@@ -119,10 +117,8 @@ def survival_figure(
         Annual rates of a hazard curve at these intensities.
     intensity_label, title : str
         Texts.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches.
+    ax, figsize
+        As for `figure_for`.
 
     Examples
     --------

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.analysis.fragility.curve import Fragility, FragilityCurve
-from rocking.analysis.fragility.fit import OVERTURNING, Bands, fit_fragility, fitted_curve, passed
+from rocking.analysis.fragility.curve import Band, FragilityCurve, fitted_curve, passed
+from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility
+from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.levels import mean_one, only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
 from rocking.block import Blocks
@@ -52,8 +53,8 @@ def pooled_fragility(
     """Fit one curve to the outcomes of all blocks, each of which may have a weight."""
     require_limits(store.grid.outcomes, limits)
     product = store.product
-    shares, bands = mean_one(weights, len(product.blocks)), Bands(confidence)
     units, which = np.unique(units_of(product.blocks, measure, product.model), return_inverse=True)
+    shares, band = mean_one(weights, len(product.blocks)), Band(confidence=confidence)
     motions, scales, _, _ = product.shape
     counts = {name: np.zeros((motions, scales, len(units))) for name in limits}
     trials = np.zeros((motions, scales, len(units)))
@@ -67,7 +68,12 @@ def pooled_fragility(
     clusters = np.broadcast_to(np.arange(motions)[:, None, None], x.shape).ravel()[found]
     curves = [
         fitted_curve(
-            name, x.ravel()[found], count.ravel()[found], trials.ravel()[found], clusters, bands, measure, limits[name]
+            name,
+            (x.ravel()[found], count.ravel()[found], trials.ravel()[found]),
+            clusters,
+            band,
+            measure,
+            limits[name],
         )
         for name, count in counts.items()
     ]
@@ -100,8 +106,8 @@ def block_fragilities(
     units = units_of(store.product.blocks, measure, store.product.model)
     options: dict[str, Any] = {
         "clusters": np.repeat(np.arange(motions), scales),
-        "confidence": confidence,
         "measure": measure,
+        "band": Band(confidence=confidence),
     }
     with Progress("fitting", count * len(limits), show=progress) as bar:
         for blocks, ratios in peak_ratios(store):

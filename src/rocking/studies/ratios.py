@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from rocking.analysis.fragility.fit import checked_limit
+from rocking.analysis.fragility.curve import checked_limit
 from rocking.arrays import Floats
 from rocking.engine import require_finished
 from rocking.errors import StudyError

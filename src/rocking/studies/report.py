@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
 from rocking import checks
-from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import OVERTURNING
+from rocking.analysis.fragility.result import Fragility
 from rocking.errors import InvalidOption, StudyError
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility

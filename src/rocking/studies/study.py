@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import OVERTURNING
+from rocking.analysis.fragility.result import Fragility
 from rocking.block import Block, Blocks
 from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import DamagedStudy, InvalidOption, StudyError

@@ -1,7 +1,6 @@
-from .diagnostics import Diagnostics, Leaning
+from .diagnostics import Diagnostics, Leaning, Scores
 from .history import HistoryCalibration, Measured, calibrate_history
 from .outcomes import Calibration, Estimate, Validation, calibrate
-from .scores import Scores
 
 __all__ = [
     "Calibration",

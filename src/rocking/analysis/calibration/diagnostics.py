@@ -1,18 +1,23 @@
-"""What a calibration does not know: too few candidates, runs that disagree, a posterior that leans on a bound."""
+"""How good a calibration is: scores of its predictions, and what it does not know.
+
+It does not know enough where candidates are few, where runs disagree, and where a posterior leans on a bound.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, astuple, dataclass
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rocking.analysis.calibration import population
+from rocking.analysis.calibration.evidence import unpacked
 from rocking.analysis.calibration.search import AGREEMENT, RUNS, Search
 from rocking.analysis.calibration.space import HIGHEST, Space, unit_of
 from rocking.arrays import Floats
+from rocking.errors import InvalidOption
 from rocking.tables import counted
 
 #: A posterior leans on a bound if more than this share of it, what lies beyond one end of an estimate's interval, is
@@ -20,8 +25,67 @@ from rocking.tables import counted
 _OUTERMOST: Final = 0.05
 _LEANING: Final = 0.05
 
-#: Fewer effective candidates than these do not tell what a population does.
+#: Fewer effective candidates than these do not show what a population does.
 _FEW: Final = 20.0
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Measures of predicted probabilities against outcomes.
+
+    Attributes
+    ----------
+    accuracy : float
+        Share of outcomes on the side of 1/2 that was predicted.
+    log_loss : float
+        Mean of -log of the probability that was given to the outcome; infinite after a certainty that failed.
+    brier : float
+        Mean squared difference between probability and outcome (Brier 1950).
+    """
+
+    accuracy: float
+    log_loss: float
+    brier: float
+
+    def __str__(self) -> str:
+        """Write the three in one line."""
+        return f"accuracy {100 * self.accuracy:.1f} %, log loss {self.log_loss:.3f}, Brier score {self.brier:.3f}"
+
+    def __repr__(self) -> str:
+        return f"<Scores: {self}>"
+
+    @classmethod
+    def of(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
+        """Measure probabilities against outcomes of the same number.
+
+        Raises
+        ------
+        InvalidOption
+            If the shapes differ, there is nothing to measure, or a probability is not between 0 and 1.
+
+        Examples
+        --------
+        >>> Scores.of([0.9, 0.2, 0.6], [True, False, False])
+        <Scores: accuracy 66.7 %, log loss 0.415, Brier score 0.137>
+        """
+        given, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
+        if given.shape != seen.shape or not given.size:
+            raise InvalidOption(f"there must be one probability for each outcome, not {given.shape} and {seen.shape}")
+        if not np.all((given >= 0.0) & (given <= 1.0)):
+            raise InvalidOption("{} must lie between 0 and 1", "probabilities")
+        with np.errstate(divide="ignore"):
+            losses = -np.log(np.where(seen, given, 1.0 - given))
+        return cls(
+            accuracy=float(np.mean((given > 0.5) == seen)),
+            log_loss=float(losses.mean()),
+            brier=float(np.mean((given - seen) ** 2)),
+        )
+
+    @classmethod
+    def mean(cls, scores: Sequence[Scores]) -> Scores:
+        """Mean of each measure."""
+        table = np.array([astuple(one) for one in scores])
+        return cls(*(float(value) for value in table.mean(axis=0)))
 
 
 @dataclass(frozen=True)
@@ -49,7 +113,7 @@ class Leaning:
     share: float
 
     def __str__(self) -> str:
-        """Say so, and how to mend it."""
+        """Say so, and how to correct it."""
         unit = unit_of(self.name)
         bound = f"{self.bound:g}" + ("" if unit == "1" else f" {unit}")
         return (
@@ -89,7 +153,7 @@ class Diagnostics:
             len(found.evidence.candidates.points),
             float(np.median(found.evidence.effective(posterior))),
             found.agreement,
-            leaning(space, population.unpacked(posterior)[0]),
+            leaning(space, unpacked(posterior)[0]),
         )
 
     @property

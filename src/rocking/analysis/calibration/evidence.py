@@ -1,25 +1,142 @@
-"""How probable the outcomes are for a population of blocks.
+"""How probable outcomes are for a population of blocks: populations, candidates that were tried, and what they tell.
 
-The chance that a test overturns the specimen is the share of the population that overturns under its motion, and that
-share is a weighted mean over candidate blocks that were simulated once, whatever the population.
+A specimen is never twice the same block: it is set back by hand, its pivots wear, a rock rolls out of its plane. So
+each test has its own block, drawn from a population that is normal in the logarithmic coordinates of `Space`. Several
+populations are an array of shape (c, 2 k): centres, then logarithms of the dispersions, along each coordinate. The
+chance that a test overturns the specimen is the share of the population that overturns under its motion, and that share
+is a weighted mean over candidate blocks that were simulated once, whatever the population.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.analysis.calibration.candidates import Candidates
-from rocking.analysis.calibration.population import batches, unpacked
+from rocking.analysis.calibration.space import Space
 from rocking.arrays import Flags, Floats
-from rocking.kernels.population import shares
+from rocking.engine import cores
+from rocking.kernels import population as kernel
+
+#: Prior of the logarithm of a dispersion from test to test: its standard deviation.
+_DISPERSION_LOG_DEVIATION: Final = 0.6
+
+#: Populations that are weighed at once: bounds the memory.
+_BATCH: Final = 64
+
+#: Populations that are worth a thread of their own.
+_LEAST: Final = 16
+
+#: Blocks are drawn from a guide with its dispersions wider by a factor.
+WIDENED: Final = 1.2
 
 #: A share that n simulated blocks estimate is itself uncertain: Jeffreys' prior, Beta(1/2, 1/2).
 _JEFFREYS: Final = 0.5
+
+
+def unpacked(populations: Floats) -> tuple[Floats, Floats]:
+    """Centres and dispersions, shape (c, k) each."""
+    k = populations.shape[1] // 2
+    return populations[:, :k], np.exp(populations[:, k:])
+
+
+def with_dispersions(space: Space, centres: Floats, rng: np.random.Generator) -> Floats:
+    """Give each centre dispersions from their prior."""
+    scores = rng.standard_normal(centres.shape)
+    return np.hstack([centres, np.log(space.dispersions) + _DISPERSION_LOG_DEVIATION * scores])
+
+
+def log_prior_of_dispersions(space: Space, populations: Floats) -> Floats:
+    """Logarithm of the prior of the dispersions, up to a constant, shape (c,)."""
+    k = populations.shape[1] // 2
+    scores = (populations[:, k:] - np.log(space.dispersions)) / _DISPERSION_LOG_DEVIATION
+    return np.asarray(-0.5 * (scores**2).sum(axis=1))
+
+
+def drawn(populations: Floats, widened: float, count: int, rng: np.random.Generator) -> Floats:
+    """Draw points from populations in turn, their dispersion times `widened`; shape (count, k)."""
+    centre, dispersion = unpacked(populations[np.arange(count) % len(populations)])
+    return centre + widened * dispersion * rng.standard_normal(centre.shape)
+
+
+def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
+    """Logarithm of the density at points of what `drawn` draws, shape (n,)."""
+    centre, dispersion = unpacked(populations)
+    middle = centre.mean(axis=0)
+    centre, from_middle = centre - middle, points - middle
+    precision = (widened * dispersion) ** -2
+    constant = 0.5 * (np.log(precision / (2.0 * np.pi)) - precision * centre**2).sum(axis=1)
+    powers = np.vstack([(precision * centre).T, -0.5 * precision.T, constant])
+    factors = np.hstack([from_middle, from_middle**2, np.ones((len(points), 1))])
+    found = np.empty(len(points))
+    kernel.log_density(factors, powers, np.empty(len(populations)), found)
+    return np.asarray(found - np.log(len(populations)))
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Blocks that were tried.
+
+    Attributes
+    ----------
+    space : Space
+        Where they are from.
+    points : ndarray, shape (n, k)
+        Their coordinates.
+    overturned : ndarray, shape (n, m)
+        1 where a block overturned under a motion, else 0.
+    evenly : int
+        How many of them fill the space evenly.
+    guides : tuple of (int, ndarray)
+        How many were drawn from which populations, those outside the space included.
+    """
+
+    space: Space
+    points: Floats
+    overturned: NDArray[np.float32]
+    evenly: int
+    guides: tuple[tuple[int, Floats], ...] = ()
+
+    @classmethod
+    def pooled(cls, runs: Sequence[Candidates]) -> Candidates:
+        """Put the candidates of several runs together."""
+        return cls(
+            runs[0].space,
+            np.concatenate([run.points for run in runs]),
+            np.concatenate([run.overturned for run in runs]),
+            sum(run.evenly for run in runs),
+            tuple(guide for run in runs for guide in run.guides),
+        )
+
+    def joined(self, guide: tuple[int, Floats], points: Floats, overturned: NDArray[np.float32]) -> Candidates:
+        """Add others that were drawn from populations."""
+        return Candidates(
+            self.space,
+            np.concatenate([self.points, points]),
+            np.concatenate([self.overturned, overturned]),
+            self.evenly,
+            (*self.guides, guide),
+        )
+
+    def of_tests(self, tests: Flags) -> Candidates:
+        """Return the same blocks under some of the motions."""
+        return replace(self, overturned=np.ascontiguousarray(self.overturned[:, tests]))
+
+    @cached_property
+    def log_weights(self) -> Floats:
+        """Logarithm of how much of the space each stands for: dense regions weigh less (Owen and Zhou 2000)."""
+        return -self.log_density(self.points)
+
+    def log_density(self, points: Floats) -> Floats:
+        """Logarithm of the number of candidates per volume at points in the space, shape (c,)."""
+        parts = [np.full(len(points), np.log(self.evenly / self.space.volume))]
+        parts += [np.log(count) + log_density(guide, WIDENED, points) for count, guide in self.guides]
+        return np.asarray(np.logaddexp.reduce(parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +151,18 @@ class Evidence:
         Whether the specimen overturned.
     lapse : float
         Chance that an outcome is not that of a rocking block at all.
+    threads : int or None
+        Number of threads; by default one for every core.
     """
 
     candidates: Candidates
     observed: Flags
     lapse: float
+    threads: int | None = None
 
     def of_tests(self, tests: Flags) -> Evidence:
         """Evidence of some of the tests alone."""
-        return Evidence(self.candidates.of_tests(tests), self.observed[tests], self.lapse)
+        return replace(self, candidates=self.candidates.of_tests(tests), observed=self.observed[tests])
 
     def weights(self, populations: Floats) -> NDArray[np.float32]:
         """Share of each population that each candidate stands for, shape (c, n); rows sum to 1."""
@@ -54,7 +174,8 @@ class Evidence:
 
     def mean_weights(self, populations: Floats) -> Floats:
         """Weights of the candidates, shape (n,), averaged over populations."""
-        parts = [self.weights(part).sum(axis=0, dtype=np.float64) for part in batches(populations)]
+        batches = np.split(populations, range(_BATCH, len(populations), _BATCH))
+        parts = [self.weights(batch).sum(axis=0, dtype=np.float64) for batch in batches]
         return np.asarray(np.sum(parts, axis=0) / len(populations))
 
     def probabilities(self, populations: Floats) -> Floats:
@@ -75,11 +196,18 @@ class Evidence:
 
     def _shares(self, populations: Floats) -> tuple[Floats, Floats]:
         """Share of each population that overturns, shape (c, m), and the effective number of candidates behind it."""
-        overturned, powers = self.candidates.overturned, self._powers
+        overturned, powers, factors = self.candidates.overturned, self._powers, self._factors(populations)
         found = np.empty((len(populations), overturned.shape[1]), np.float32)
         effective = np.empty(len(populations))
-        room = np.empty(powers.shape[1], np.float32)
-        shares(self._factors(populations), powers, overturned, room, found, effective)
+
+        def weigh(start: int, end: int) -> None:
+            exponents = np.empty(powers.shape[1], np.float32)
+            kernel.shares(factors[start:end], powers, overturned, exponents, found[start:end], effective[start:end])
+
+        each = max(-(-len(populations) // (self.threads or cores())), _LEAST)
+        starts = range(0, len(populations), each)
+        with ThreadPoolExecutor(max(len(starts), 1)) as pool:
+            list(pool.map(weigh, starts, (start + each for start in starts)))
         # Rounding may take a share of all just above 1.
         return np.minimum(found, 1.0, dtype=np.float64), effective
 

@@ -20,10 +20,12 @@ from rocking.analysis.calibration.space import (
     unit_of,
     value_range,
 )
+from rocking.analysis.report import Report
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
+from rocking.progress import Progress
 from rocking.response import Response
 from rocking.response.figure import drawing_times
 from rocking.simulation import simulate
@@ -57,9 +59,6 @@ _STEP: Final = 1e-5
 _LARGEST_STEP: Final = 0.05
 _REFINED: Final = 4
 
-#: Units of the estimates, by the first word of their names, for people.
-_UNITS: Final = {"p": " rad/s", "alpha": " rad", "restitution": "", "initial": " rad"}
-
 #: Nearer to a bound than this, in the logarithm, counts as at it.
 _AT_BOUND: Final = 1e-6
 
@@ -84,10 +83,10 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HistoryCalibration:
+class HistoryCalibration(Report):
     """The block that explains a rotation history best.
 
-    Made by `calibrate_history`.
+    Made by `calibrate_history`. Its figure has the measured rotation, that of the fitted block, and the residuals.
 
     Attributes
     ----------
@@ -119,13 +118,7 @@ class HistoryCalibration:
     def summary(self) -> str:
         """Return the estimates as a table for people."""
         rows = [
-            [
-                name,
-                one.value,
-                float(f"{one.deviation:.2g}"),
-                unit_of(name),
-                "at its bound" if one.at_bound else "",
-            ]
+            [name, one.value, float(f"{one.deviation:.2g}"), unit_of(name), "at its bound" if one.at_bound else ""]
             for name, one in self.estimates.items()
         ]
         table = text_table(["parameter", "value", "std. error", "unit", ""], rows)
@@ -141,18 +134,7 @@ class HistoryCalibration:
             "misfit_rad": self.misfit,
         }
 
-    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the measured rotation, that of the fitted block, and the residuals.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Draw the rotations here, without the residuals; by default in a new figure.
-        title : str
-            Title; by default the estimates.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-        """
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import measured_figure
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
@@ -170,10 +152,8 @@ class HistoryCalibration:
         )
 
     def _estimates_text(self) -> str:
-        return ", ".join(
-            f"{name.replace('_', ' ')} = {one.value:.4g}{_UNITS[name.partition('_')[0]]}"
-            for name, one in self.estimates.items()
-        )
+        texts = (f"{name.replace('_', ' ')} = {one.value:.4g} {unit_of(name)}" for name, one in self.estimates.items())
+        return ", ".join(text.removesuffix(" 1") for text in texts)
 
     def __repr__(self) -> str:
         return f"<HistoryCalibration: {self._estimates_text()}; {self._misfit_text()}>"
@@ -194,6 +174,7 @@ def calibrate_history(
     two_sided: bool = False,
     initial_rotation: float | None = None,
     seed: int = 0,
+    progress: bool | None = None,
 ) -> HistoryCalibration:
     """Find the block that explains a measured rotation history, free or forced.
 
@@ -208,13 +189,16 @@ def calibrate_history(
     model : {"nonlinear", "linear"}
         Equation of motion.
     p, alpha, restitution : float or pair of float
-        A number is known and kept; a pair is the lowest and highest value that is thinkable.
+        A number is known and kept; a pair is the lowest and highest value that is thinkable (rad/s; rad; -).
     two_sided : bool
-        Whether what is not known may differ between the sides.
+        Whether what is not known may differ between the sides. By default it may not, other than in `calibrate`: a
+        history shows by its residuals where one number for both sides is too few.
     initial_rotation : float, optional
         Rotation at time 0, rad, where the block is held. By default fitted in a release test, and 0 under a motion.
     seed : int
         The same seed gives the same result.
+    progress : bool, optional
+        Whether to draw a progress bar; by default on a terminal, from a second on.
 
     Returns
     -------
@@ -261,7 +245,8 @@ def calibrate_history(
             f"{counted(len(history.times), 'sample')} cannot determine {counted(len(unknowns), 'parameter')}: give more"
         )
     problem = _HistoryProblem(history, settled, tuple(unknowns))
-    return _result(problem, _best(problem, np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))))
+    rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
+    return _result(problem, _best(problem, rng, progress))
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,11 +265,11 @@ class _History:
         if at.ndim != 1 or at.shape != measured.shape:
             raise InvalidOption(f"there must be one rotation for each time, not {at.shape} and {measured.shape}")
         if not (np.all(np.isfinite(at)) and np.all(np.isfinite(measured))):
-            raise InvalidOption("times and rotation must be finite: leave out samples that are missing")
+            raise InvalidOption("{} and {} must be finite: leave out samples that are missing", "times", "rotation")
         if not len(at) or at[0] < 0.0 or not np.all(np.diff(at) > 0.0):
-            raise InvalidOption("times must start at 0 or later and increase from sample to sample")
+            raise InvalidOption("{} must start at 0 or later and increase from sample to sample", "times")
         if not np.any(measured) or np.abs(measured).max() >= 0.5 * math.pi:
-            raise InvalidOption("rotation must be in rad, below pi/2 in size, and not zero throughout")
+            raise InvalidOption("{} must be in rad, below pi/2 in size, and not zero throughout", "rotation")
         return cls(at, measured, motion, model)
 
     def first(self, share: float) -> int:
@@ -362,25 +347,31 @@ def _released_from(history: _History) -> _Unknown:
     """Rotation at the release, near that of the first sample."""
     first = float(history.rotation[0])
     if abs(first) < _RELEASED * np.abs(history.rotation).max():
-        raise InvalidOption("a release test must start at the rotation it is released from; give initial_rotation=")
+        text = "a release test must start at the rotation it is released from; give {}"
+        raise InvalidOption(text, "initial_rotation")
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
 
 
-def _best(problem: _HistoryProblem, rng: np.random.Generator) -> Floats:
+def _best(problem: _HistoryProblem, rng: np.random.Generator, progress: bool | None) -> Floats:
     """Logarithms of the unknowns at the least sum of squares over the whole history."""
     from scipy.stats import qmc
 
     low, high = problem.bounds
     survivors = qmc.scale(qmc.Halton(len(low), rng=rng).random(_CANDIDATES), low, high)
-    for share, kept in _STAGES:
-        count = min(max(problem.history.first(share), 2 * len(low)), len(problem.history.times))
-        errors = [problem.error(one, count) for one in survivors]
-        best = survivors[np.argsort(errors, kind="stable")[:kept]]
-        survivors = np.array([_descended(problem, one, count) for one in best])
     whole = len(problem.history.times)
-    found = min(survivors, key=lambda one: problem.error(one, whole))
-    for width in _WIDTHS:
-        found = _shaken(problem, found, width, rng)
+    with Progress("fitting", sum(kept for _, kept in _STAGES) + len(_WIDTHS), show=progress) as bar:
+        for share, kept in _STAGES:
+            count = min(max(problem.history.first(share), 2 * len(low)), whole)
+            errors = [problem.error(one, count) for one in survivors]
+            descended = []
+            for one in survivors[np.argsort(errors, kind="stable")[:kept]]:
+                descended.append(_descended(problem, one, count))
+                bar.advance(1)
+            survivors = np.array(descended)
+        found = min(survivors, key=lambda one: problem.error(one, whole))
+        for width in _WIDTHS:
+            found = _shaken(problem, found, width, rng)
+            bar.advance(1)
     return np.asarray(found, dtype=np.float64)
 
 
@@ -439,7 +430,7 @@ def _covariance(problem: _HistoryProblem, logs: Floats, residuals: Floats) -> Fl
     _, values, right = np.linalg.svd(slopes / sizes, full_matrices=False)
     if values[-1] <= _INSENSITIVE * values[0]:
         names = ", ".join(one.name for one in problem.unknowns)
-        raise InvalidOption(f"the history does not tell {names} apart: give one of them a value")
+        raise InvalidOption(f"the history does not distinguish {names}: give one of them a value")
     return np.asarray(variance * (right.T / values**2) @ right / np.outer(sizes, sizes))
 
 

@@ -3,36 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.analysis.calibration import population
-from rocking.analysis.calibration.diagnostics import Diagnostics
-from rocking.analysis.calibration.evidence import Evidence, blurred, expected_share
-from rocking.analysis.calibration.posterior import posterior, systematic
-from rocking.analysis.calibration.scores import Scores
-from rocking.analysis.calibration.search import Problem, search
+from rocking.analysis.calibration.diagnostics import Diagnostics, Scores
+from rocking.analysis.calibration.evidence import Evidence, blurred, expected_share, unpacked
+from rocking.analysis.calibration.search import Problem, posterior, search, systematic
 from rocking.analysis.calibration.space import SIDED, Knowledge, Space, unit_of
-from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import OVERTURNING, fragility
+from rocking.analysis.fragility.result import Fragility
+from rocking.analysis.report import Tabled
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.motion.arguments import Motions
+from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.tables import counted, named, text_table, write_text
+from rocking.tables import counted, named, text_table
 from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -95,10 +93,12 @@ class Validation:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration:
+class Calibration(Tabled):
     """Blocks that explain which motions overturned a specimen, and what they predict.
 
-    Made by `calibrate`.
+    Made by `calibrate`. Its table "ensemble" has a row for each block: parameters of both sides, weight, and the
+    equation of motion; `rocking fragility --ensemble` and its like read it. Its figure has what happened against the
+    fitted probability of every test, and the ensemble of blocks.
 
     Attributes
     ----------
@@ -125,6 +125,8 @@ class Calibration:
         How far this can be trusted: effective candidates, agreement of runs, bounds that the posterior
         leans on. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
     """
+
+    TABLES = ("ensemble",)
 
     blocks: Blocks
     weights: Floats
@@ -162,6 +164,11 @@ class Calibration:
         -------
         ndarray, shape (m,)
             Weighted share of the ensemble that overturns, within the lapse of 0 and 1.
+
+        Raises
+        ------
+        InvalidMotion
+            If one is no motion.
         """
         if not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
@@ -175,6 +182,7 @@ class Calibration:
         folds: int = 10,
         repeats: int = 1,
         seed: int = 0,
+        threads: int | None = None,
         progress: bool | None = None,
     ) -> Validation:
         """Predict every test from fits without it.
@@ -190,8 +198,13 @@ class Calibration:
             Number of parts, and of random divisions into parts.
         seed : int
             Seeds the divisions.
-        progress : bool, optional
-            As for `simulate_many`.
+        threads, progress
+            As for `simulate_many`; the number of threads changes no result.
+
+        Returns
+        -------
+        Validation
+            Probabilities of all tests in each division, and their scores.
 
         Raises
         ------
@@ -204,12 +217,14 @@ class Calibration:
         """
         labels = _labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
-        probabilities = np.empty((repeats, len(self.observed)))
+        count = None if threads is None else checks.whole(threads, "threads", InvalidOption, 1)
+        evidence = replace(self._evidence, threads=count)
+        probabilities = np.empty((checks.whole(repeats, "repeats", InvalidOption, 1), len(self.observed)))
         for row in probabilities:
             parts = rng.permutation(np.arange(labels.max() + 1) % folds)[labels]
             for part in range(folds):
                 left_out = parts == part
-                kept, wanted = self._evidence.of_tests(~left_out), self._evidence.of_tests(left_out)
+                kept, wanted = evidence.of_tests(~left_out), evidence.of_tests(left_out)
                 drawn = posterior(kept, _FOLD_DRAWS, _ROUNDS, rng, progress=progress)
                 row[left_out] = wanted.probabilities(drawn).mean(axis=0)
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
@@ -233,7 +248,7 @@ class Calibration:
         model : {"linear", "nonlinear"}, optional
             Equation of motion, if not that of the calibration.
         **options
-            Further arguments of `rocking.fragility`: polarity, confidence, band, ...
+            Further arguments of `rocking.fragility`: polarity, band, ...
 
         Returns
         -------
@@ -262,7 +277,6 @@ class Calibration:
         self,
         motions: Motions,
         *,
-        p: ArrayLike | None = None,
         model: Model | None = None,
         **options: Any,
     ) -> RockingSpectrum:
@@ -272,26 +286,27 @@ class Calibration:
         ----------
         motions : Motion or sequence of Motion
             m motions.
-        p : array_like, optional
-            Frequency parameters, rad/s, that the ensemble's median is moved to; by default half to twice its own.
         model : {"linear", "nonlinear"}, optional
             Equation of motion, if not that of the calibration.
         **options
-            Further arguments of `rocking.rocking_spectrum`: size (in place of p), fractiles, ...
+            Further arguments of `rocking.rocking_spectrum`: p (rad/s, to which the ensemble's median is moved; by
+            default half to twice its own) or size, fractiles, ...
+
+        Returns
+        -------
+        RockingSpectrum
 
         Raises
         ------
         InvalidOption, InvalidMotion
             As `rocking.rocking_spectrum`.
         """
-        return rocking_spectrum(
-            motions,
-            blocks=self.blocks,
-            weights=self.weights,
-            p=p,
-            model=self.model if model is None else model,
-            **options,
-        )
+        chosen = self.model if model is None else model
+        return rocking_spectrum(motions, blocks=self.blocks, weights=self.weights, model=chosen, **options)
+
+    def _headline(self) -> str:
+        overturned = int(self.observed.sum())
+        return f"{counted(len(self.observed), 'motion')}, {overturned} overturned the specimen; {self.model} model"
 
     def summary(self) -> str:
         """Return the estimates and scores as a table for people."""
@@ -299,9 +314,9 @@ class Calibration:
             [name, one.median, one.lower, one.upper, f"{100 * one.dispersion:.0f} %", unit_of(name)]
             for name, one in self.estimates.items()
         ]
-        motions, alike = counted(len(self.observed), "motion"), 1.0 / float((self.weights**2).sum())
+        alike = 1.0 / float((self.weights**2).sum())
         lines = [
-            f"{motions}, {int(self.observed.sum())} overturned the specimen; {self.model} model",
+            self._headline(),
             "",
             text_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows),
             "",
@@ -323,35 +338,17 @@ class Calibration:
             "probabilities": self.probabilities,
         }
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write the ensemble, one row for each block: parameters of both sides, weight, and the equation of motion.
+    def _frame(self, table: str) -> pd.DataFrame:
+        import pandas as pd
 
-        `rocking fragility --ensemble` and its like read it.
+        columns = {
+            named(f"{name}_{side}", unit): getattr(self.blocks, name)[:, k]
+            for name, unit in (("p", "rad/s"), ("alpha", "rad"), ("restitution", "1"))
+            for k, side in enumerate(("plus", "minus"))
+        }
+        return pd.DataFrame({**columns, "weight": self.weights, "model": self.model})
 
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        """
-        names = [f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus")]
-        units = ["rad/s", "rad/s", "rad", "rad", "1", "1"]
-        columns = [named(name, unit) for name, unit in zip(names, units, strict=True)]
-        table = np.hstack([self.blocks.p, self.blocks.alpha, self.blocks.restitution, self.weights[:, None]])
-        rows = [",".join([*(f"{value:.10g}" for value in row), self.model]) for row in table]
-        write_text(path, "\n".join([",".join([*columns, "weight", "model"]), *rows]) + "\n")
-
-    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw what happened against the fitted probability of every test, and the ensemble of blocks.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Draw the tests here, without the blocks; by default in a new figure.
-        title : str
-            Title; by default the number of motions and the model.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-        """
+    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
         from rocking.plot import outcomes_figure
 
         return outcomes_figure(
@@ -359,7 +356,7 @@ class Calibration:
             overturned=self.observed,
             parameters=[self._parameter(name) for name in self._evidence.candidates.space.unknown],
             weights=self.weights,
-            title=title or self.summary().splitlines()[0],
+            title=title or self._headline(),
             ax=ax,
             figsize=figsize,
         )
@@ -376,22 +373,22 @@ class Calibration:
         return Parameter({"p": "p (rad/s)", "alpha": "alpha (rad)"}.get(name, name), values, ends, (low, high))
 
     def __repr__(self) -> str:
-        return f"<Calibration: {self.summary().splitlines()[0]}; fitted: {self.scores}>"
+        return f"<Calibration: {self._headline()}; fitted: {self.scores}>"
 
 
 def calibrate(
-    motions: Sequence[Motion],
+    motions: Sequence[Motion] | Mapping[str, Motion],
     overturned: ArrayLike,
-    seed: int = 0,
     *,
-    model: Model = "linear",
+    model: Model = "nonlinear",
     p: Knowledge = (1.0, 10.0),
-    alpha: Knowledge = (0.02, 0.5),
-    restitution: Knowledge = (0.3, 0.99),
+    alpha: Knowledge = (0.02, 0.6),
+    restitution: Knowledge = (0.3, 0.999),
     two_sided: bool = True,
     lapse: float = _LAPSE,
     candidates: int = 8192,
     ensemble: int = 1000,
+    seed: int = 0,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Calibration:
@@ -399,13 +396,11 @@ def calibrate(
 
     Parameters
     ----------
-    motions : sequence of Motion
+    motions : sequence of Motion or mapping of str to Motion
         m motions, each of which the specimen met at rest.
     overturned : array_like of bool, shape (m,)
         Whether it overturned.
-    seed : int
-        The same seed gives the same result.
-    model : {"linear", "nonlinear"}
+    model : {"nonlinear", "linear"}
         Equation of motion; the linear one is faster and serves slender specimens.
     p, alpha, restitution : float or pair of float
         A number, or a pair of equal ones, is known and kept, on both sides and in every test; a pair is the lowest and
@@ -415,7 +410,8 @@ def calibrate(
         whose centre of mass is off the middle, whose p is that of the rectangle.
     two_sided : bool
         Whether the slendernesses of the two sides may differ, by a factor of 3 at most. p and restitution of a rigid
-        body's sides differ by terms of second order in the slenderness only.
+        body's sides differ by terms of second order in the slenderness only. By default they may, other than in
+        `calibrate_history`: hardly any specimen leans alike to both sides, and outcomes alone would not show it.
     lapse : float
         Chance that an outcome is not that of a rocking block at all.
     candidates : int
@@ -423,6 +419,8 @@ def calibrate(
         them tell what a typical population does. A motion that is given several times is simulated once.
     ensemble : int
         Most blocks that are kept for predictions.
+    seed : int
+        The same seed gives the same result.
     threads, progress
         As for `simulate_many`.
 
@@ -466,29 +464,31 @@ def calibrate(
     >>> times = np.arange(0.0, 3.0, 0.02)
     >>> motions = [rocking.Motion.from_samples(one.acceleration(times), 0.02) for one in pulses]
     >>> overturned = [rocking.simulate(hidden, one, model="linear").overturned for one in motions]
-    >>> found = rocking.calibrate(motions, overturned, candidates=512, two_sided=False)
+    >>> found = rocking.calibrate(motions, overturned, model="linear", candidates=512, two_sided=False)
     >>> bool(np.mean((found.predict(motions) > 0.5) == overturned) > 0.9)
     True
 
     Where p and the restitution are known, the same tests tell the one angle that is not:
 
-    >>> found = rocking.calibrate(motions, overturned, p=3.0, restitution=0.9, candidates=512, two_sided=False)
+    >>> found = rocking.calibrate(
+    ...     motions, overturned, model="linear", p=3.0, restitution=0.9, candidates=512, two_sided=False)
     >>> angle = found.estimates["alpha"]
     >>> angle.lower < hidden.alpha < angle.upper, angle.upper / angle.lower < 1.3
     (True, True)
     """
-    tested = list(motions)
+    tested = several_motions(motions)
     observed = checked_outcomes(overturned, len(tested))
     space = Space.of(p, alpha, restitution, two_sided=two_sided)
-    _check(seed, lapse, candidates, ensemble)
-    rng = np.random.default_rng(seed)
-
+    checks.share(lapse, "lapse", InvalidOption, below=0.5)
+    checks.whole(candidates, "candidates", InvalidOption, 128)
+    checks.whole(ensemble, "ensemble", InvalidOption, 1)
+    rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
     distinct, which = _distinct(tested)
 
     def tried(points: Floats) -> NDArray[np.float32]:
         return _outcomes(space.blocks(points), distinct, model, threads, progress)[:, which]
 
-    found = search(Problem(space, observed, lapse, tried), candidates, rng)
+    found = search(Problem(space, observed, lapse, tried, threads), candidates, rng)
     evidence = found.evidence
     final = posterior(evidence, _DRAWS, _ROUNDS, rng, progress=progress)
     weights = evidence.mean_weights(final)
@@ -497,7 +497,7 @@ def calibrate(
         blocks=space.blocks(evidence.candidates.points[kept]),
         weights=times / ensemble,
         estimates=_estimates(space, final),
-        draws=space.named(population.unpacked(final)[0]),
+        draws=space.named(unpacked(final)[0]),
         probabilities=evidence.probabilities(final).mean(axis=0),
         observed=observed,
         model=model,
@@ -536,7 +536,7 @@ def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
     dispersion = _side_dispersions(space, populations).mean(axis=0)
     tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
     estimates = {}
-    for name, values in space.named(population.unpacked(populations)[0]).items():
+    for name, values in space.named(unpacked(populations)[0]).items():
         median, lower, upper = (float(value) for value in np.quantile(values, tails))
         estimates[name] = Estimate(median, lower, upper, float(dispersion[space.unknown.index(name.partition("_")[0])]))
     return estimates
@@ -544,7 +544,7 @@ def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
 
 def _side_dispersions(space: Space, populations: Floats) -> Floats:
     """Return standard deviations of the logarithm of each unknown parameter on either side, shape (c, f)."""
-    dispersion = population.unpacked(populations)[1]
+    dispersion = unpacked(populations)[1]
     sides = dispersion[:, : len(space.unknown)].copy()
     if space.two_sided:
         # The side's logarithm is that of the mean plus or minus half that of the ratio.
@@ -563,9 +563,11 @@ def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
     """
     values = np.asarray(overturned)
     if values.shape != (count,):
-        raise InvalidOption(f"overturned must hold one outcome for each of the {count} motions, not {values.shape}")
+        raise InvalidOption(
+            f"{{}} must hold one outcome for each of the {count} motions, not {values.shape}", "overturned"
+        )
     if not np.all(np.isin(values, (0, 1))):
-        raise InvalidOption("overturned must hold True or False (or 1 or 0) for each motion")
+        raise InvalidOption("{} must hold True or False (or 1 or 0) for each motion", "overturned")
     observed = values.astype(bool)
     if observed.all() or not observed.any():
         raise InvalidOption(
@@ -575,18 +577,11 @@ def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
     return observed
 
 
-def _check(seed: int, lapse: float, candidates: int, ensemble: int) -> None:
-    checks.whole(seed, "seed", InvalidOption, 0)
-    checks.share(lapse, "lapse", InvalidOption, below=0.5)
-    checks.whole(candidates, "candidates", InvalidOption, 128)
-    checks.whole(ensemble, "ensemble", InvalidOption, 1)
-
-
 def _labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
     """Give each group a number from 0; without groups each motion is its own."""
     names = [str(label) for label in (range(count) if groups is None else groups)]
     if len(names) != count:
-        raise InvalidOption(f"groups must hold one label for each of the {count} motions, not {len(names)}")
+        raise InvalidOption(f"{{}} must hold one label for each of the {count} motions, not {len(names)}", "groups")
     labels = np.unique(names, return_inverse=True)[1]
     checks.whole(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return np.asarray(labels, dtype=np.int64)

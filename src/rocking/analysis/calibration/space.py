@@ -99,7 +99,9 @@ class Space:
             raise InvalidOption(EVERYTHING_IS_KNOWN)
         steepest = bounds.get("alpha", (0.0, known.get("alpha", 0.0)))[1]
         if "restitution" not in {*bounds, *known} and steepest >= _HOUSNER_ENDS:
-            raise InvalidOption(f"Housner's restitution is positive for alpha below {_HOUSNER_ENDS:.4f} rad only")
+            raise InvalidOption(
+                f"Housner's restitution is positive for {{}} below {_HOUSNER_ENDS:.4f} rad only", "alpha"
+            )
         lower, upper = np.log(list(bounds.values())).T
         ratio = 0.0
         if two_sided and SIDED in bounds:
@@ -151,8 +153,8 @@ class Space:
         inside = np.all((logs >= self.lower) & (logs <= self.upper), axis=(1, 2))
         return np.asarray(inside & np.all((points >= low) & (points <= high), axis=1))
 
-    def sides(self, points: Floats) -> Floats:
-        """Values of p, alpha and restitution on each side, shape (n, 2, 3)."""
+    def sides(self, points: Floats) -> dict[str, Floats]:
+        """Values of p, alpha and restitution by name, of side + and side -; shape (n, 2) each."""
         found = dict(zip(self.unknown, np.moveaxis(np.exp(self._log_sides(points)), 2, 0), strict=True))
         values = found | {name: np.full((len(points), 2), value) for name, value in self.known.items()}
         if "restitution" not in values and self.two_sided:
@@ -160,7 +162,7 @@ class Space:
             values["p"] = values["p"] * factors
         elif "restitution" not in values:
             values["restitution"] = np.vectorize(housner_restitution)(values["alpha"])
-        return np.stack([values[name] for name in PARAMETERS], axis=2)
+        return values
 
     def named(self, points: Floats) -> dict[str, Floats]:
         """Values of the unknown parameters by name, of each side where they differ; shape (n,) each."""
@@ -175,7 +177,7 @@ class Space:
         """Blocks at points."""
         sides = self.sides(points)
         # exp(log(1)) may be one unit in the last place above 1.
-        return Blocks(sides[:, :, 0], sides[:, :, 1], np.minimum(sides[:, :, 2], 1.0))
+        return Blocks(sides["p"], sides["alpha"], np.minimum(sides["restitution"], 1.0))
 
     def _log_sides(self, points: Floats) -> Floats:
         """Logarithms of the unknown parameters on each side, shape (n, 2, f)."""
@@ -206,14 +208,14 @@ def known_value(value: object, name: str) -> float:
     """
     known = checks.positive(value, name, InvalidOption, unit_of(name))
     if known > HIGHEST[name]:
-        raise InvalidOption(f"{name} must be at most {HIGHEST[name]:g}, not {known:g}")
+        raise InvalidOption(f"{{}} must be at most {HIGHEST[name]:g}, not {known:g}", name, value=known)
     return known
 
 
 def _check_housner(name: str, given: str) -> None:
     if name != "restitution" or given != HOUSNER:
         wanted = "a value or a pair (lowest, highest)" + (f", or {HOUSNER!r}" if name == "restitution" else "")
-        raise InvalidOption(f"{name} must be {wanted}, not {given!r}")
+        raise InvalidOption(f"{{}} must be {wanted}, not {given!r}", name, value=given)
 
 
 def value_range(pair: Any, name: str, highest: float) -> Range:
@@ -227,10 +229,14 @@ def value_range(pair: Any, name: str, highest: float) -> Range:
     try:
         low, high = (checks.number(value, f"each of {name}", InvalidOption) for value in pair)
     except (TypeError, ValueError):
-        raise InvalidOption(f"{name} must be a pair (lowest, highest), not {pair!r}") from None
+        raise InvalidOption(f"{{}} must be a pair (lowest, highest), not {pair!r}", name, value=pair) from None
     if not 0.0 < low < high <= highest or math.isinf(high):
         limit = "" if math.isinf(highest) else f" and at most {highest:g}"
         hint = checks.hint_of_degrees(high) if name == "alpha" else ""
-        kind = "positive, increasing numbers"
-        raise InvalidOption(f"{name} must be a pair (lowest, highest) of {kind}{limit}, not {low:g}, {high:g}{hint}")
+        raise InvalidOption(
+            f"{{}} must be a pair (lowest, highest) of positive, increasing numbers{limit}, "
+            f"not {low:g}, {high:g}{hint}",
+            name,
+            value=pair,
+        )
     return low, high

@@ -1,4 +1,5 @@
-from .curve import Fragility, FragilityCurve
+from .curve import Band, FragilityCurve
 from .fit import fit_fragility, fragility
+from .result import Fragility
 
-__all__ = ["Fragility", "FragilityCurve", "fit_fragility", "fragility"]
+__all__ = ["Band", "Fragility", "FragilityCurve", "fit_fragility", "fragility"]

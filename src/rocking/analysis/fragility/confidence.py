@@ -12,8 +12,18 @@ from typing import Final
 
 import numpy as np
 
-from rocking.analysis.fragility import lognormal
-from rocking.analysis.fragility.lognormal import Probit
+from rocking.analysis.fragility.lognormal import (
+    STEEP,
+    Outcomes,
+    Probit,
+    covariance,
+    fit,
+    likelihood,
+    limits,
+    logarithms,
+    scores,
+    solved,
+)
 from rocking.arrays import Floats, Integers
 
 #: Directions in which a region is measured: between them 4e-5 of an interval's width is lost.
@@ -26,14 +36,11 @@ _FEWEST: Final = 3
 _LEVERAGE: Final = 0.9
 
 #: Level curves at 0 and 1, and steps at intensities below and above all that there are.
-_STEPS_AT: Final = 1000.0 * lognormal.STEEP
-_WHOLE_PLANE: Final = Probit(
-    np.array([-np.inf, np.inf, _STEPS_AT, -_STEPS_AT]), np.array([0.0, 0.0, lognormal.STEEP, lognormal.STEEP])
-)
+_STEPS_AT: Final = 1000.0 * STEEP
+_WHOLE_PLANE: Final = Probit(np.array([-np.inf, np.inf, _STEPS_AT, -_STEPS_AT]), np.array([0.0, 0.0, STEEP, STEEP]))
 
 Quantity = Callable[[Probit], Floats]
 Ends = tuple[Floats, Floats]
-_Data = tuple[Floats, Floats, Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,44 +55,42 @@ class LikelyRegion:
 
     Attributes
     ----------
-    rim : Probit
+    boundary : Probit
         Intercepts and slopes all around.
     """
 
-    rim: Probit
+    boundary: Probit
 
     def __repr__(self) -> str:
-        return f"<LikelyRegion: {len(self.rim.slope)} fits on its rim>"
+        return f"<LikelyRegion: {len(self.boundary.slope)} fits on its boundary>"
 
     @property
     def bounded(self) -> bool:
         """Whether the data bound anything at all."""
-        return bool(np.all(np.isfinite(self.rim.intercept)))
+        return bool(np.all(np.isfinite(self.boundary.intercept)))
 
     @classmethod
-    def of(
-        cls, z: Floats, exceeded: Floats, trials: Floats, clusters: Integers | None, fitted: Probit, confidence: float
-    ) -> LikelyRegion:
+    def of(cls, data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> LikelyRegion:
         """Measure the region from the maximum outwards; without clusters every outcome is on its own."""
         from scipy.special import chdtri, stdtrit
 
-        centre, spread = z.mean(), z.std()
-        data = (z - centre) / spread, exceeded, trials
+        centre, spread = data.z.mean(), data.z.std()
+        scaled = data._replace(z=(data.z - centre) / spread)
         best = Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread)
         if clusters is None:
-            rim = _rim(data, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
+            around = _around(scaled, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
         elif (count := int(clusters.max()) + 1) < _FEWEST:
             return cls(_WHOLE_PLANE)
         else:
-            rim = _rim(data, best, 0.5 * float(stdtrit(count - 1.0, 0.5 + 0.5 * confidence)) ** 2)
-            rim = np.column_stack(best) + (rim - np.column_stack(best)) @ _stretch(data, clusters, best).T
-        intercepts, slopes = _rising(rim).T
+            around = _around(scaled, best, 0.5 * float(stdtrit(count - 1.0, 0.5 + 0.5 * confidence)) ** 2)
+            around = np.column_stack(best) + (around - np.column_stack(best)) @ _stretch(scaled, clusters, best).T
+        intercepts, slopes = _cut_where_level(around).T
         slopes = slopes / spread
         return cls(Probit(intercepts - slopes * centre, slopes))
 
     def interval(self, quantity: Quantity, estimate: Floats, gradient: Floats, confidence: float) -> Ends:
         """Extremes of a quantity."""
-        values = quantity(self.rim)
+        values = quantity(self.boundary)
         return values.min(axis=0), values.max(axis=0)
 
 
@@ -111,30 +116,20 @@ class Resamples:
         return f"<Resamples: {len(self.fits.slope)} fits, {100 * self.degenerate:.3g} % of them degenerate>"
 
     @classmethod
-    def of(
-        cls,
-        z: Floats,
-        exceeded: Floats,
-        trials: Floats,
-        fitted: Probit,
-        clusters: Integers,
-        samples: int,
-        seed: int,
-    ) -> Resamples:
+    def of(cls, data: Outcomes, fitted: Probit, clusters: Integers, samples: int, seed: int) -> Resamples:
         """Draw and fit."""
-        order = np.argsort(z, kind="stable")
-        starts = np.flatnonzero(np.diff(z[order], prepend=-np.inf))
+        order = np.argsort(data.z, kind="stable")
+        starts = np.flatnonzero(np.diff(data.z[order], prepend=-np.inf))
         count = int(clusters.max()) + 1
         drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=samples)
         weights = drawn[:, clusters[order]]
-        levels = z[order][starts]
-        yes, all_of = (np.add.reduceat(weights * values[order], starts, axis=1) for values in (exceeded, trials))
-        fits, regular = lognormal.limits(levels, yes, all_of)
+        yes, trials = (np.add.reduceat(weights * values[order], starts, axis=1) for values in data[1:])
+        anew = Outcomes(data.z[order][starts], yes, trials)
+        fits, regular = limits(anew)
         if regular.any():
-            found = lognormal.fit(levels, yes[regular], all_of[regular])
+            found = fit(anew.of(regular))
             fits.intercept[regular], fits.slope[regular] = found.intercept, found.slope
-        influence = _influences(z, exceeded, trials, clusters, fitted)
-        return cls(fits, 1.0 - float(regular.mean()), influence)
+        return cls(fits, 1.0 - float(regular.mean()), _influences(data, clusters, fitted))
 
     def interval(self, quantity: Quantity, estimate: Floats, gradient: Floats, confidence: float) -> Ends:
         """Percentiles of a quantity, corrected for its bias and its skewness.
@@ -172,80 +167,78 @@ class Resamples:
 Confidence = LikelyRegion | Resamples
 
 
-def _rim(data: _Data, best: Probit, drop: float) -> Floats:
+def _around(data: Outcomes, best: Probit, drop: float) -> Floats:
     """Points all around the maximum where the logarithm of the likelihood is lower by `drop`, shape (rays, 2)."""
-    where, exceeded, trials = data
-    z, level = np.unique(where, return_inverse=True)
-    shape = _RAYS, z.size
-    yes, all_of = (
-        np.broadcast_to(np.bincount(level, counts).astype(np.float64), shape) for counts in (exceeded, trials)
+    z, level = np.unique(data.z, return_inverse=True)
+    yes, trials = (
+        np.broadcast_to(np.bincount(level, counts).astype(np.float64), (_RAYS, z.size)) for counts in data[1:]
     )
+    rays = Outcomes(z, yes, trials)
     top = np.column_stack(best)
-    floor = lognormal.likelihood(z, yes[:1], all_of[:1], top)[0] - drop
+    floor = likelihood(Outcomes(z, yes[:1], trials[:1]), top)[0] - drop
     angle = np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False)
-    wide = np.linalg.cholesky(np.asarray(lognormal.covariance(z, all_of[0], best)))
+    wide = np.linalg.cholesky(covariance(Outcomes(z, yes[0], trials[0]), best))
     directions = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ wide.T
     reach = np.ones(_RAYS)
     for _ in range(_DOUBLINGS):
-        short = lognormal.likelihood(z, yes, all_of, top + reach[:, None] * directions) > floor
+        short = likelihood(rays, top + reach[:, None] * directions) > floor
         if not short.any():
             break
         reach[short] *= 2.0
     # From beyond, Newton's rule does not overshoot the root of a concave function.
     for _ in range(_NEWTON):
         here = top + reach[:, None] * directions
-        above = lognormal.likelihood(z, yes, all_of, here) - floor
+        above = likelihood(rays, here) - floor
         with np.errstate(over="ignore", invalid="ignore"):
-            fall = -np.sum(lognormal.scores(z, yes, all_of, here)[0] * directions, axis=1)
+            fall = -np.sum(scores(rays, here)[0] * directions, axis=1)
         beyond = (above < 0.0) & (fall > 0.0)
         reach[beyond] += above[beyond] / fall[beyond]
     return np.asarray(top + reach[:, None] * directions)
 
 
-def _rising(rim: Floats) -> Floats:
+def _cut_where_level(around: Floats) -> Floats:
     """Cut the region off where the slope is 0."""
-    after = np.roll(rim, -1, axis=0)
-    up = rim[:, 1] >= 0.0
-    cut = up != (after[:, 1] >= 0.0)
-    share = rim[cut, 1] / (rim[cut, 1] - after[cut, 1])
-    corners = np.column_stack([rim[cut, 0] + share * (after[cut, 0] - rim[cut, 0]), np.zeros(share.size)])
-    return np.vstack([rim[up], corners])
+    after = np.roll(around, -1, axis=0)
+    (intercept, slope), (next_intercept, next_slope) = around.T, after.T
+    up = slope >= 0.0
+    cut = up != (next_slope >= 0.0)
+    share = slope[cut] / (slope[cut] - next_slope[cut])
+    corners = intercept[cut] + share * (next_intercept[cut] - intercept[cut])
+    return np.vstack([around[up], np.column_stack([corners, np.zeros(share.size)])])
 
 
-def _stretch(data: _Data, clusters: Integers, best: Probit) -> Floats:
+def _stretch(data: Outcomes, clusters: Integers, best: Probit) -> Floats:
     """Map from the likelihood's covariance to that which the clusters show."""
-    scores, bends = _by_cluster(data, clusters, best)
-    count = len(scores)
+    pulls, bends = _by_cluster(data, clusters, best)
+    count = len(pulls)
     root = np.linalg.cholesky(np.linalg.inv(bends.sum(axis=0)))
     # Without the cluster the information is less by its leverage, so that its score moves the parameters further.
     leverage, axes = np.linalg.eigh(root.T @ bends @ root)
     freed = np.einsum("cij,cj,ckj->cik", axes, 1.0 / (1.0 - np.minimum(leverage, _LEVERAGE)), axes)
-    moved = np.einsum("cij,cj->ci", freed, scores @ root)
+    moved = np.einsum("cij,cj->ci", freed, pulls @ root)
     variance, axis = np.linalg.eigh(moved.T @ moved * (count - 1.0) / count)
     wide = axis * np.sqrt(np.maximum(variance, 0.0)) @ axis.T
     return np.asarray(root @ wide @ np.linalg.inv(root))
 
 
-def _influences(z: Floats, exceeded: Floats, trials: Floats, clusters: Integers, fitted: Probit) -> Floats:
+def _influences(data: Outcomes, clusters: Integers, fitted: Probit) -> Floats:
     """Score of each cluster over the observed information: what an infinitesimal jackknife leaves."""
-    centre = z.mean()
+    centre = data.z.mean()
     best = Probit(fitted.intercept + fitted.slope * centre, fitted.slope)
-    scores, bends = _by_cluster((z - centre, exceeded, trials), clusters, best)
-    moved = lognormal.solved(bends.sum(axis=0, keepdims=True), scores)
-    return np.stack([moved[:, 0] - moved[:, 1] * centre, moved[:, 1]], axis=1)
+    pulls, bends = _by_cluster(data._replace(z=data.z - centre), clusters, best)
+    intercept, slope = solved(bends.sum(axis=0, keepdims=True), pulls).T
+    return np.stack([intercept - slope * centre, slope], axis=1)
 
 
-def _by_cluster(data: _Data, clusters: Integers, fitted: Probit) -> tuple[Floats, Floats]:
+def _by_cluster(data: Outcomes, clusters: Integers, fitted: Probit) -> tuple[Floats, Floats]:
     """Score and observed information of each cluster, shapes (clusters, 2) and (clusters, 2, 2)."""
-    from scipy.special import log_ndtr
-
     z, exceeded, trials = data
     at = fitted.intercept + fitted.slope * z
-    density, below, above = -0.5 * at * at - 0.5 * math.log(2.0 * math.pi), log_ndtr(at), log_ndtr(-at)
+    density, below, above = logarithms(at)
     up, down = np.exp(density - below), np.exp(density - above)
     pull = exceeded * up - (trials - exceeded) * down
     bend = exceeded * up * (up + at) + (trials - exceeded) * down * (down - at)
-    scores = np.stack([np.bincount(clusters, pull * power) for power in (np.ones_like(z), z)], axis=1)
-    sums = [np.bincount(clusters, bend * power) for power in (np.ones_like(z), z, z * z)]
-    bends = np.stack([sums[0], sums[1], sums[1], sums[2]], axis=1).reshape(-1, 2, 2)
-    return np.asarray(scores, dtype=np.float64), np.asarray(bends, dtype=np.float64)
+    pulls = np.stack([np.bincount(clusters, pull * power) for power in (np.ones_like(z), z)], axis=1)
+    level, mixed, square = (np.bincount(clusters, bend * power) for power in (np.ones_like(z), z, z * z))
+    bends = np.stack([level, mixed, mixed, square], axis=1).reshape(-1, 2, 2)
+    return np.asarray(pulls, dtype=np.float64), np.asarray(bends, dtype=np.float64)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.analysis.fragility import lognormal
-from rocking.analysis.fragility.confidence import Confidence, LikelyRegion, Resamples
-from rocking.analysis.fragility.curve import Fragility, FragilityCurve
+from rocking.analysis.fragility.curve import Band, fitted_curve, passed
+from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.levels import mean_one, only_block, pooled, simulate_levels, units_of, values_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
@@ -31,13 +29,10 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-Band = Literal["likelihood", "bootstrap"]
-
 #: Intensities, in SI units, far beyond any motion; whole numbers that double precision counts exactly.
 _INTENSITIES: Final = (1e-50, 1e50)
 _MOST_TRIALS: Final = 2.0**53
-#: Logarithm of how far beyond the data a median is still believed.
-_BEYOND: Final = math.log(1000.0)
+_LIKELIHOOD: Final = Band()
 
 _IN_BOTH: Final = ", one polarity, since a symmetric block does the same in both"
 
@@ -56,10 +51,7 @@ def fragility(
     chattering: str | Treatment = "certified",
     polarity: Polarity = "+",
     weights: ArrayLike | None = None,
-    confidence: float = 0.9,
-    band: Band = "likelihood",
-    samples: int = 1000,
-    seed: int = 0,
+    band: Band = _LIKELIHOOD,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Fragility:
@@ -85,12 +77,13 @@ def fragility(
         the same under a motion and its mirror image, which is no second outcome.
     weights : array_like, optional
         How much the outcomes of each block count, one number for each; by default all alike.
-    confidence, band, samples, seed
-        As for `fit_fragility`, whose clusters are the motions, each with all its outcomes.
+    band : Band
+        How intervals and bands are made; the clusters are the motions, each with all its outcomes.
 
     Returns
     -------
     Fragility
+        Curves, and all outcomes.
 
     Raises
     ------
@@ -113,7 +106,7 @@ def fragility(
     many, how = Blocks.of(blocks), Measure.of(measure)
     shares = mean_one(weights, len(many))
     mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
-    bands = Bands(confidence, band, samples, seed)
+    _check_band(band)
     states = _limit_states(limits, "limits")
     shaken = several_motions(motions)
     values = values_of(shaken, how)
@@ -139,7 +132,7 @@ def fragility(
     clusters = np.broadcast_to(np.arange(len(shaken))[None, :, None, None], ratio.shape)
     x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
     curves = [
-        fitted_curve(name, x, trials * passed(ratio, limit, name).ravel(), trials, clusters.ravel(), bands, how, limit)
+        fitted_curve(name, (x, trials * passed(ratio, limit, name).ravel(), trials), clusters.ravel(), band, how, limit)
         for name, limit in states.items()
     ]
     kind = "cloud" if levels is None else counted(len(intensity), "stripe")
@@ -164,34 +157,24 @@ def _outcomes(
     """Every simulation: motion, block, polarity, intensity, peak and what it exceeded."""
     import pandas as pd
 
-    motion, block, polarity = (np.broadcast_to(axis, ratio.shape).ravel() for axis in _axes(table))
-    exceeded = {f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()}
+    def along(values: NDArray[Any]) -> NDArray[Any]:
+        return np.broadcast_to(values, ratio.shape).ravel()  # of (level, motion, block, polarity)
+
+    signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
+    verticals = {"vertical": along(table.vertical.values[:, None, None])} if "vertical" in table.coords else {}
     return pd.DataFrame(
         {
-            "motion": motion,
-            **_verticals(table, ratio.shape),
-            "block": block,
-            "polarity": polarity,
+            "motion": along(table.motion.values[:, None, None]),
+            **verticals,
+            "block": along(np.arange(table.sizes["block"])[:, None]),
+            "polarity": along(signs),
             measure.column: intensity,
             "peak_rotation_rad": table.peak_rotation.values.ravel(),
             "peak_over_alpha": ratio.ravel(),
             "overturned": table.overturned.values.ravel(),
-            **exceeded,
+            **{f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()},
         }
     )
-
-
-def _verticals(table: xr.Dataset, shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:
-    """Names of the vertical components, if there are any."""
-    if "vertical" not in table.coords:
-        return {}
-    return {"vertical": np.broadcast_to(table.vertical.values[:, None, None], shape).ravel()}
-
-
-def _axes(table: xr.Dataset) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Motions, blocks and polarities along their axes of (level, motion, block, polarity)."""
-    signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
-    return table.motion.values[:, None, None], np.arange(table.sizes["block"])[:, None], signs
 
 
 def fit_fragility(
@@ -201,10 +184,7 @@ def fit_fragility(
     trials: ArrayLike = 1,
     clusters: ArrayLike | None = None,
     measure: IntensityName | Measure = "pga",
-    confidence: float = 0.9,
-    band: Band = "likelihood",
-    samples: int = 1000,
-    seed: int = 0,
+    band: Band = _LIKELIHOOD,
     block: Block | None = None,
     description: str = "observed outcomes",
 ) -> Fragility:
@@ -224,17 +204,17 @@ def fit_fragility(
         than three clusters of several outcomes bound nothing: then intervals go from 0 to infinity.
     measure
         What the intensity is, as for `fragility`.
-    confidence : float
-        Probability of the intervals and bands.
-    band : {"likelihood", "bootstrap"}
-        Whether they come from the profile likelihood, adjusted to the differences between clusters where these hold
-        several outcomes (Chandler and Bate 2007); or from fits to clusters drawn with replacement (BCa, Efron 1987).
-    samples, seed : int
-        How many times the bootstrap draws, and the seed of its random numbers.
+    band : Band
+        How intervals and bands are made.
     block : Block, optional
         What was tested, for the units of `Fragility.to_nrml`.
     description : str
         What was observed.
+
+    Returns
+    -------
+    Fragility
+        A curve for each limit state.
 
     Raises
     ------
@@ -269,99 +249,24 @@ def fit_fragility(
     how = Measure.of(measure)
     x = checks.positive_numbers(intensity, "intensity", InvalidOption)
     if x.min() < _INTENSITIES[0] or x.max() > _INTENSITIES[1]:
-        raise InvalidOption("intensity must be from {:g} to {:g}: check its units".format(*_INTENSITIES))
+        low, high = _INTENSITIES
+        raise InvalidOption(f"{{}} must be from {low:g} to {high:g}: check its units", "intensity", value=intensity)
     count = _whole(trials, "trials", x.size, 1.0, _MOST_TRIALS)
     outcomes = _limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
     groups = None if clusters is None else _clusters(clusters, x.size)
-    bands = Bands(confidence, band, samples, seed)
+    _check_band(band)
     curves = [
-        fitted_curve(name, x, _whole(values, "exceeded", x.size, 0.0, count), count, groups, bands, how)
+        fitted_curve(name, (x, _whole(values, "exceeded", x.size, 0.0, count), count), groups, band, how)
         for name, values in outcomes.items()
     ]
     return Fragility(tuple(curves), how, description, block, "nonlinear", None, source="cluster")
 
 
-@dataclass(frozen=True)
-class Bands:
-    """How intervals and bands are made."""
-
-    confidence: float
-    kind: Band = "likelihood"
-    samples: int = 1
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        checks.share(self.confidence, "confidence", InvalidOption)
-        checks.one_of(self.kind, "band", InvalidOption, get_args(Band))
-        checks.whole(self.samples, "samples", InvalidOption, 1)
-        checks.whole(self.seed, "seed", InvalidOption, 0)
-
-
-def fitted_curve(
-    name: str,
-    intensity: Floats,
-    exceeded: Floats,
-    trials: Floats,
-    clusters: Integers | None,
-    bands: Bands,
-    measure: Measure,
-    limit: float | None = None,
-) -> FragilityCurve:
-    """Curve of a limit state; outcomes may count in parts, as those of blocks with weights do.
-
-    Without clusters every trial is on its own, also where several are at one intensity.
-    """
-    z = np.log(intensity)
-    fault = lognormal.unidentified(z, exceeded, trials, measure.shown)
-    if fault is not None:
-        raise InvalidOption(f"no lognormal can be fitted to {name!r}: {fault}")
-    fitted = lognormal.fit(z, exceeded[None, :], trials[None, :])
-    middle = float(-fitted.intercept[0] / fitted.slope[0])
-    if not z.min() - _BEYOND <= middle <= z.max() + _BEYOND:
+def _check_band(band: object) -> None:
+    if not isinstance(band, Band):
         raise InvalidOption(
-            f"no lognormal can be fitted to {name!r}: the outcomes hardly depend on the intensity, and put the median "
-            f"{'above' if middle > z.max() else 'below'} all intensities by a factor of more than 1000: motions nearer "
-            "to it, or another measure, are needed"
+            f'{{}} must be a Band, as Band("bootstrap", samples=500), not {checks.shown(band)}', "band", value=band
         )
-    groups = np.arange(z.size) if clusters is None else clusters
-    count = int(groups.max()) + 1
-    independent = clusters is None or (count == z.size and bool(np.all(trials <= 1.0)))
-    uncertainty: Confidence
-    if bands.kind == "bootstrap":
-        uncertainty = Resamples.of(z, exceeded, trials, fitted, groups, bands.samples, bands.seed)
-    else:
-        together = None if independent else groups
-        uncertainty = LikelyRegion.of(z, exceeded, trials, together, fitted, bands.confidence)
-    return FragilityCurve(
-        limit_state=name,
-        limit=limit,
-        intensity=intensity,
-        exceeded=exceeded,
-        trials=trials,
-        fitted=fitted,
-        covariance=lognormal.covariance(z, trials, fitted),
-        uncertainty=uncertainty,
-        confidence=bands.confidence,
-        clusters=count,
-        independent=independent,
-        likelihood=lognormal.gain(z, exceeded, trials, fitted, independent=independent),
-        goodness=lognormal.goodness(z, exceeded, trials, fitted, independent=independent),
-    )
-
-
-def passed(ratio: Floats, limit: float, name: str) -> Floats:
-    """Whether peak rotation over slenderness passes a limit: 1 or 0; infinite is overturning."""
-    limit = checked_limit(limit, name)
-    return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
-
-
-def checked_limit(limit: float, name: str) -> float:
-    """Return a limit of peak rotation over slenderness, checked."""
-    what = f"the limit {name!r} (rotation over slenderness)"
-    least = checks.number(limit, what, InvalidOption)
-    if not least >= 0.0:
-        raise InvalidOption(f"{what} must be 0 or more, not {limit!r}")
-    return least
 
 
 def _limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -378,15 +283,16 @@ def _whole(values: ArrayLike, name: str, size: int, least: float, most: ArrayLik
     try:
         numbers = np.broadcast_to(given, size)
     except ValueError:
-        raise InvalidOption(f"{name} must hold one number for each of the {size} intensities") from None
+        raise InvalidOption(f"{{}} must hold one number for each of the {size} intensities", name) from None
     if not np.all((numbers >= least) & (numbers <= np.asarray(most)) & (numbers == np.floor(numbers))):
         bound = f"{most:g}" if isinstance(most, float) else "the trials"
-        raise InvalidOption(f"{name} must be whole numbers, at least {least:g} and no more than {bound}")
+        raise InvalidOption(f"{{}} must be whole numbers, at least {least:g} and no more than {bound}", name)
     return numbers
 
 
 def _clusters(clusters: ArrayLike, size: int) -> Integers:
+    """Return the number of each label, one for each intensity."""
     labels = np.asarray(clusters)
     if labels.shape != (size,):
-        raise InvalidOption(f"clusters must hold one label for each of the {size} intensities")
+        raise InvalidOption(f"{{}} must hold one label for each of the {size} intensities", "clusters")
     return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)

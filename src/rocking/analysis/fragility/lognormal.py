@@ -1,7 +1,8 @@
-"""Maximum likelihood for a lognormal fragility: probability Phi(ln(x/median)/dispersion) of exceedance at intensity x.
+"""Maximum likelihood for a lognormal fragility.
 
-In z = ln x it is a probit, Phi(a + b z) with b = 1/dispersion and a = -b ln(median), whose likelihood is concave: it
-has one maximum, or none where the outcomes are separated.
+The probability of exceedance at intensity x is Phi(ln(x/median)/dispersion). In z = ln x it is a probit, Phi(a + b z)
+with b = 1/dispersion and a = -b ln(median), whose likelihood is concave: it has one maximum, or none where the outcomes
+are separated.
 """
 
 from __future__ import annotations
@@ -12,24 +13,46 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Flags, Floats, Integers
 
 _ITERATIONS: Final = 100
 #: The likelihood is at its maximum when the parameters move by less than this part of themselves.
 _CONVERGED: Final = 1e-11
 
-#: Outcomes that overlap by less than this part of the intensities' range are separated, to all that can be told.
+#: Outcomes that overlap by less than this part of the intensities' range count as separated.
 _NARROW: Final = 1e-6
 
 #: Slope that stands for a step.
 STEEP: Final = 1e9
 
-#: Outcomes in a group of the test of fit, at least.
+#: Outcomes in a group of the test of fit, at least; and groups of binary outcomes, at most (Hosmer and Lemeshow).
 _GROUP: Final = 5
-#: Groups that binary outcomes are put in, at most (Hosmer and Lemeshow).
 _GROUPS: Final = 10
+
+
+class Outcomes(NamedTuple):
+    """Outcomes of one data set, or of several at the same intensities.
+
+    Attributes
+    ----------
+    z : ndarray, shape (n,)
+        Logarithms of the intensity.
+    exceeded, trials : ndarray, shape (n,) or (sets, n)
+        Outcomes that exceeded, of how many, at each.
+    """
+
+    z: Floats
+    exceeded: Floats
+    trials: Floats
+
+    def alone(self) -> Outcomes:
+        """Return one data set as several, of which there is one."""
+        return Outcomes(self.z, self.exceeded[None, :], self.trials[None, :])
+
+    def of(self, sets: Flags) -> Outcomes:
+        """Return some of several data sets."""
+        return Outcomes(self.z, self.exceeded[sets], self.trials[sets])
 
 
 class Probit(NamedTuple):
@@ -97,18 +120,9 @@ class Goodness:
     p_value: float
 
 
-def unidentified(z: Floats, exceeded: Floats, trials: Floats, shown: Callable[[float], str]) -> str | None:
-    """Say why no rising lognormal fits best; None where one does.
-
-    Parameters
-    ----------
-    z : ndarray, shape (n,)
-        Logarithms of the intensity.
-    exceeded, trials : ndarray, shape (n,)
-        Outcomes that exceeded, of how many, at each.
-    shown : callable
-        Writes an intensity with its unit.
-    """
+def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:
+    """Say why no rising lognormal fits a data set best, intensities as `shown` writes them; None where one does."""
+    z, exceeded, trials = data
     yes, no, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
     if not yes.size:
         which = "the only outcome does not exceed" if count == 1 else f"none of the {count} outcomes exceeds"
@@ -129,7 +143,7 @@ def unidentified(z: Floats, exceeded: Floats, trials: Floats, shown: Callable[[f
             f"the outcomes are separated, none exceeds the limit {where}: the fragility is a step there, and motions "
             "near it are needed"
         )
-    if not _rising(z, exceeded[None, :], trials[None, :])[0]:
+    if not _rises(data.alone())[0]:
         return (
             "the outcomes contradict a curve that rises, the limit is exceeded no more often at higher intensities: "
             "another measure or more motions are needed"
@@ -137,31 +151,22 @@ def unidentified(z: Floats, exceeded: Floats, trials: Floats, shown: Callable[[f
     return None
 
 
-def fit(z: Floats, exceeded: Floats, trials: Floats) -> Probit:
-    """Fit many data sets by maximum likelihood, by Fisher's scoring.
-
-    Parameters
-    ----------
-    z : ndarray, shape (n,)
-        Logarithms of the intensity.
-    exceeded, trials : ndarray, shape (fits, n)
-        Outcomes that exceeded, of how many, at each; not `unidentified`.
-    """
-    centre = z.mean()
-    spread = z.std()
-    zero_one = (z - centre) / spread
-    beta = np.zeros((len(trials), 2))
-    now = likelihood(zero_one, exceeded, trials, beta)
-    powers = np.stack([np.ones_like(zero_one), zero_one])
-    most = np.einsum("fn,jn,kn->fjk", trials, powers, powers)
+def fit(data: Outcomes) -> Probit:
+    """Fit several data sets, none of them `unidentified`, by maximum likelihood (Fisher's scoring)."""
+    centre, spread = data.z.mean(), data.z.std()
+    scaled = data._replace(z=(data.z - centre) / spread)
+    beta = np.zeros((len(data.trials), 2))
+    now = likelihood(scaled, beta)
+    powers = np.stack([np.ones_like(scaled.z), scaled.z])
+    most = np.einsum("fn,jn,kn->fjk", data.trials, powers, powers)
     for _ in range(_ITERATIONS):
         with np.errstate(all="ignore"):
-            gradient, information = scores(zero_one, exceeded, trials, beta)
+            gradient, information = scores(scaled, beta)
             step = solved(information, gradient)
         # Far from the maximum the information may vanish to rounding; the complete data's (EM) still leads uphill.
         lost = ~np.isfinite(step).all(axis=1)
         step[lost] = solved(most[lost], gradient[lost])
-        step, then = _uphill(zero_one, exceeded, trials, beta, step, now)
+        step, then = _uphill(scaled, beta, step, now)
         beta, now = beta + step, then
         if np.all(np.abs(step) <= _CONVERGED * np.abs(beta).max(axis=1, keepdims=True)):
             break
@@ -169,10 +174,11 @@ def fit(z: Floats, exceeded: Floats, trials: Floats) -> Probit:
     return Probit(beta[:, 0] - slope * centre, slope)
 
 
-def likelihood(z: Floats, exceeded: Floats, trials: Floats, beta: Floats) -> Floats:
+def likelihood(data: Outcomes, beta: Floats) -> Floats:
     """Logarithm of the likelihood of parameters (fits, 2), without binomial coefficients."""
     from scipy.special import log_ndtr
 
+    z, exceeded, trials = data
     at = beta[:, :1] + beta[:, 1:] * z
     terms = np.where(exceeded > 0, exceeded * log_ndtr(at), 0.0)
     terms += np.where(exceeded < trials, (trials - exceeded) * log_ndtr(-at), 0.0)
@@ -180,19 +186,18 @@ def likelihood(z: Floats, exceeded: Floats, trials: Floats, beta: Floats) -> Flo
     return total
 
 
-def covariance(z: Floats, trials: Floats, fitted: Probit) -> Floats:
+def covariance(data: Outcomes, fitted: Probit) -> Floats:
     """Inverse of Fisher's expected information of intercept and slope, shape (2, 2), of one fit."""
-    beta = np.column_stack([fitted.intercept, fitted.slope])
-    information = scores(z, np.zeros_like(trials), trials, beta)[1][0]
-    return np.asarray(np.linalg.inv(information), dtype=np.float64)
+    counts = Outcomes(data.z, np.zeros_like(data.trials), data.trials)
+    return np.asarray(np.linalg.inv(scores(counts, np.column_stack(fitted))[1][0]), dtype=np.float64)
 
 
-def gain(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit, *, independent: bool) -> Likelihood:
+def gain(data: Outcomes, fitted: Probit, *, independent: bool) -> Likelihood:
     """Likelihood of one fit, and its gain over one probability for all intensities."""
     from scipy.special import gammaincc, xlogy
 
-    here = likelihood(z, exceeded[None, :], trials[None, :], np.column_stack([fitted.intercept, fitted.slope]))
-    yes, total = exceeded.sum(), trials.sum()
+    here = likelihood(data.alone(), np.column_stack(fitted))
+    yes, total = data.exceeded.sum(), data.trials.sum()
     without = xlogy(yes, yes / total) + xlogy(total - yes, 1.0 - yes / total)
     ratio = max(0.0, 2.0 * float(here[0] - without))
     return Likelihood(float(here[0]), ratio, float(gammaincc(0.5, 0.5 * ratio)) if independent else math.nan)
@@ -210,14 +215,14 @@ def groups(z: Floats, trials: Floats) -> Integers:
     return np.asarray(group[level], dtype=np.int64)
 
 
-def goodness(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit, *, independent: bool) -> Goodness:
+def goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
     """Test the fit in its `groups`."""
     from scipy.special import gammaincc
 
-    group = groups(z, trials)
-    chance = fitted.probability(z)[0]
-    expected, variance = (np.bincount(group, trials * terms) for terms in (chance, chance * (1.0 - chance)))
-    seen = np.bincount(group, exceeded)
+    group = groups(data.z, data.trials)
+    chance = fitted.probability(data.z)[0]
+    expected, variance = (np.bincount(group, data.trials * terms) for terms in (chance, chance * (1.0 - chance)))
+    seen = np.bincount(group, data.exceeded)
     freedom = len(seen) - 2
     if freedom < 1:
         return Goodness(math.nan, max(freedom, 0), math.nan)
@@ -228,10 +233,11 @@ def goodness(z: Floats, exceeded: Floats, trials: Floats, fitted: Probit, *, ind
     return Goodness(statistic, freedom, chance_of_more)
 
 
-def limits(z: Floats, exceeded: Floats, trials: Floats) -> tuple[Probit, NDArray[np.bool_]]:
+def limits(data: Outcomes) -> tuple[Probit, Flags]:
     """Limits that likelihoods of rising curves without a maximum tend to, and which of the fits have a maximum."""
     from scipy.special import ndtri
 
+    z, exceeded, trials = data
     yes, no = exceeded > 0, exceeded < trials
     lowest_yes, highest_no = np.where(yes, z, np.inf).min(axis=1), np.where(no, z, -np.inf).max(axis=1)
     never, always = ~yes.any(axis=1), ~no.any(axis=1)
@@ -240,7 +246,7 @@ def limits(z: Floats, exceeded: Floats, trials: Floats) -> tuple[Probit, NDArray
     # A curve that would fall is level at best: one probability, 0 or 1 without either kind of outcome.
     intercept = ndtri(exceeded.sum(axis=1) / trials.sum(axis=1))
     intercept[step] = -0.5 * STEEP * (highest_no + lowest_yes)[step]
-    return Probit(intercept, slope), ~step & _rising(z, exceeded, trials)
+    return Probit(intercept, slope), ~step & _rises(data)
 
 
 def _overlap(z: Floats) -> float:
@@ -248,8 +254,9 @@ def _overlap(z: Floats) -> float:
     return _NARROW * float(z.max() - z.min())
 
 
-def _rising(z: Floats, exceeded: Floats, trials: Floats) -> NDArray[np.bool_]:
+def _rises(data: Outcomes) -> Flags:
     """Whether the likelihood of each data set grows as the level curve begins to rise."""
+    z, exceeded, trials = data
     centred = z - z.mean()
     share = exceeded.sum(axis=1, keepdims=True) / trials.sum(axis=1, keepdims=True)
     pull = np.sum((exceeded - trials * share) * centred, axis=1)
@@ -264,28 +271,30 @@ def solved(matrix: Floats, right: Floats) -> Floats:
     return np.stack([right[:, 0] / a - ratio * second, second], axis=1)
 
 
-def scores(z: Floats, exceeded: Floats, trials: Floats, beta: Floats) -> tuple[Floats, Floats]:
+def scores(data: Outcomes, beta: Floats) -> tuple[Floats, Floats]:
     """Gradient of the likelihood and Fisher's expected information, shapes (fits, 2) and (fits, 2, 2)."""
-    from scipy.special import log_ndtr
-
-    at = beta[:, :1] + beta[:, 1:] * z
-    density, below, above = -0.5 * at * at - 0.5 * math.log(2.0 * math.pi), log_ndtr(at), log_ndtr(-at)
+    z, exceeded, trials = data
+    density, below, above = logarithms(beta[:, :1] + beta[:, 1:] * z)
     pull = exceeded * np.exp(density - below) - (trials - exceeded) * np.exp(density - above)
     weight = trials * np.exp(2.0 * density - below - above)
     powers = np.stack([np.ones_like(z), z])
-    gradient = np.einsum("fn,jn->fj", pull, powers)
-    return gradient, np.einsum("fn,jn,kn->fjk", weight, powers, powers)
+    return np.einsum("fn,jn->fj", pull, powers), np.einsum("fn,jn,kn->fjk", weight, powers, powers)
 
 
-def _uphill(
-    z: Floats, exceeded: Floats, trials: Floats, beta: Floats, step: Floats, now: Floats
-) -> tuple[Floats, Floats]:
+def logarithms(at: Floats) -> tuple[Floats, Floats, Floats]:
+    """Logarithms of the normal density, and of the probabilities below and above."""
+    from scipy.special import log_ndtr
+
+    return -0.5 * at * at - 0.5 * math.log(2.0 * math.pi), log_ndtr(at), log_ndtr(-at)
+
+
+def _uphill(data: Outcomes, beta: Floats, step: Floats, now: Floats) -> tuple[Floats, Floats]:
     """Halve steps until the likelihood does not fall; return them and the likelihoods there."""
-    then = likelihood(z, exceeded, trials, beta + step)
+    then = likelihood(data, beta + step)
     for _ in range(_ITERATIONS):
         falling = ~(then >= now - 1e-12 * np.abs(now))
         if not falling.any():
             break
         step[falling] *= 0.5
-        then[falling] = likelihood(z, exceeded[falling], trials[falling], (beta + step)[falling])
+        then[falling] = likelihood(data.of(falling), (beta + step)[falling])
     return step, then

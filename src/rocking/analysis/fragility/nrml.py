@@ -17,7 +17,9 @@ from typing import Final, Literal, NamedTuple, get_args
 import numpy as np
 
 from rocking import checks
+from rocking.analysis.fragility.curve import FragilityCurve
 from rocking.analysis.levels import units_of
+from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
@@ -37,23 +39,6 @@ _LEVELS: Final = 40
 _NARROWEST: Final = 1e-5
 
 
-class Header(NamedTuple):
-    """What a fragility model says about itself."""
-
-    model_id: str
-    asset_category: str
-    loss_category: LossCategory
-    description: str
-
-
-class Lognormal(NamedTuple):
-    """A limit state's curve: median, in the measure's units, and dispersion."""
-
-    limit_state: str
-    median: float
-    dispersion: float
-
-
 class Scale(NamedTuple):
     """An intensity measure type of OpenQuake, and what to multiply a measure by to get it."""
 
@@ -61,8 +46,8 @@ class Scale(NamedTuple):
     factor: float
 
 
-def write(path: str | Path, function: ET.Element, limit_states: Sequence[str], header: Header) -> None:
-    """Write a model with one fragility function.
+def write(path: str | Path, function: ET.Element, limit_states: Sequence[str], description: str, **model: str) -> None:
+    """Write a model with one fragility function; `model` holds its id, assetCategory and lossCategory.
 
     Raises
     ------
@@ -71,49 +56,26 @@ def write(path: str | Path, function: ET.Element, limit_states: Sequence[str], h
     OutputError
         If the file cannot be written.
     """
-    checks.one_of(header.loss_category, "loss_category", InvalidOption, get_args(LossCategory))
+    checks.one_of(model["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
     root = ET.Element("nrml", {"xmlns": NAMESPACE})
-    model = ET.SubElement(
-        root,
-        "fragilityModel",
-        {
-            "id": _name(header.model_id, "model_id"),
-            "assetCategory": header.asset_category,
-            "lossCategory": header.loss_category,
-        },
-    )
+    element = ET.SubElement(root, "fragilityModel", model | {"id": _name(model["id"], "model_id")})
     # The manual asks for a brief string in ASCII.
-    ET.SubElement(model, "description").text = header.description.encode("ascii", "replace").decode("ascii")
-    ET.SubElement(model, "limitStates").text = " ".join(_name(state, "a limit state") for state in limit_states)
-    model.append(function)
+    ET.SubElement(element, "description").text = description.encode("ascii", "replace").decode("ascii")
+    ET.SubElement(element, "limitStates").text = " ".join(_name(state, "a limit state") for state in limit_states)
+    element.append(function)
     ET.indent(root)
     write_text(path, f"<?xml version='1.0' encoding='UTF-8'?>\n{ET.tostring(root, encoding='unicode')}\n")
 
 
 def fragility_function(
-    curves: Sequence[Lognormal],
+    curves: Sequence[FragilityCurve],
     scale: Scale,
     valid: tuple[float, float],
     no_damage: float | None,
     taxonomy: str,
     kind: Format,
 ) -> ET.Element:
-    """Fragility function, all intensities in OpenQuake's units.
-
-    Parameters
-    ----------
-    curves : sequence of Lognormal
-        One for each limit state.
-    scale : Scale
-        From `scale_of`.
-    valid : (float, float)
-        Range of intensities, in SI units, that the data cover.
-    no_damage : float or None
-        Intensity, in OpenQuake's units, below which nothing can happen.
-    taxonomy : str
-        Identifier.
-    kind : {"continuous", "discrete"}
-        Format.
+    """Fragility function; `valid` is the range (SI) of the data, below `no_damage` (OpenQuake's unit) nothing happens.
 
     Raises
     ------
@@ -162,7 +124,9 @@ def scale_of(measure: Measure, block: Block | None, model: Model) -> Scale:
     elif not measure.in_block_units:
         own = 1.0
     else:
-        raise InvalidOption(f"{measure.name} counts in a block's own unit; give block= to write it as PGA or PGV")
+        raise InvalidOption(
+            f"{measure.name} counts in a block's own unit; give {{}} to write it as PGA or PGV", "block"
+        )
     if measure.of_motion == "pgv":
         return Scale("PGV", 100.0 * own)
     imt = "PGA" if measure.of_motion == "pga" else f"SA({measure.period:g})"
@@ -178,18 +142,21 @@ def _moments(median: float, dispersion: float) -> tuple[float, float]:
         deviation = math.inf
     if not math.isfinite(deviation):
         raise InvalidOption(
-            f'a dispersion of {dispersion:.3g} is too wide for the mean and stddev of NRML; use format="discrete"'
+            f'a dispersion of {dispersion:.3g} is too wide for the mean and stddev of NRML; set {{}} to "discrete"',
+            "format",
         )
     return mean, deviation
 
 
-def _listed(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+def _listed(values: Floats) -> str:
     return " ".join(f"{value:.8g}" for value in values)
 
 
 def _name(text: str, what: str) -> str:
     if not _NAME.fullmatch(checks.text(text, what, InvalidOption)):
         raise InvalidOption(
-            f"{what} of NRML may have letters, digits, dashes and underscores, and 100 of them at most, not {text!r}"
+            f"{{}} of NRML may have letters, digits, dashes and underscores, and 100 of them at most, not {text!r}",
+            what,
+            value=text,
         )
     return text

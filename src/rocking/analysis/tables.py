@@ -1,4 +1,4 @@
-"""What `rocking calibrate` reads: a CSV table of outcomes, or of a measured rotation history."""
+"""Tables that analyses read: outcomes that were observed, measured rotation histories, ensembles of blocks."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 import numpy as np
 
+from rocking.analysis.hazard import HEADINGS, heading_of
 from rocking.arrays import Floats
 from rocking.block import Blocks
-from rocking.errors import RockingError, UnreadableRecord
+from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
+from rocking.motion.scaling import Measure
 from rocking.tables import counted, csv_rows, named
 from rocking.treatment.base import Model
 
@@ -34,7 +36,7 @@ class Outcomes:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Measured rotation: times (s) and rotations (rad)."""
+    """Measured rotation: times (s) and rotations (rad), shape (n,) each."""
 
     times: Floats
     rotation: Floats
@@ -81,10 +83,14 @@ class Table:
         try:
             return how(text)
         except (ValueError, KeyError):
-            raise UnreadableRecord(f"{self.path}, line {line}: {text!r} is not {what}; correct it") from None
+            raise self.error(f"{text!r} is not {what}; correct it", line, value=text) from None
+
+    def error(self, message: str, line: int | None = 1, **about: Any) -> UnreadableRecord:
+        """Return an error about a line of the table, by default its header."""
+        return UnreadableRecord(message, path=str(self.path), line=line, **about)
 
 
-def read(
+def read_calibration(
     path: Path, *, channel: str | None, dt: float | None, units: str | None
 ) -> Outcomes | dict[str, Outcomes] | History:
     """Read a table; its columns say what it is.
@@ -107,9 +113,8 @@ def read(
     for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
         if {"time_s", column} <= set(table.columns):
             return History(table.numbers("time_s"), unit * table.numbers(column))
-    raise UnreadableRecord(
-        f"{path}, line 1: the columns must be motion,overturned (outcomes) or time_s,rotation_rad or "
-        "time_s,rotation_deg (a history), "
+    raise table.error(
+        "the columns must be motion,overturned (outcomes) or time_s,rotation_rad or time_s,rotation_deg (a history), "
         f"not {','.join(table.columns)}"
     )
 
@@ -131,22 +136,16 @@ def read_ensemble(path: Path) -> Ensemble:
     ]
     missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
     if missing:
-        raise UnreadableRecord(
-            f"{path}, line 1: no ensemble of a calibration, whose ensemble.csv has {' and '.join(missing)}"
-        )
-    models = {table.convert(line, row["model"], _model, "linear or nonlinear") for line, row in table.rows}
+        raise table.error(f"no ensemble of a calibration, whose ensemble.csv has {' and '.join(missing)}")
+    known: dict[str, Model] = {name: name for name in get_args(Model)}
+    models = {table.convert(line, row["model"], known.__getitem__, "linear or nonlinear") for line, row in table.rows}
     if len(models) > 1:
-        raise UnreadableRecord(f"{path}: an ensemble has one model, not both; correct the column model")
+        raise table.error("an ensemble has one model, not both; correct the column model", None)
     try:
         blocks = Blocks(*(np.column_stack([table.numbers(side) for side in sides]) for sides in columns))
     except RockingError as error:
-        raise type(error)(f"{path}, whose block 0 is in line 2: {error}") from None
+        raise type(error)(f"block 0 is in line 2: {error}", path=str(path)) from None
     return Ensemble(blocks, table.numbers("weight"), models.pop())
-
-
-def _model(text: str) -> Model:
-    models: dict[str, Model] = {"linear": "linear", "nonlinear": "nonlinear"}
-    return models[text]
 
 
 def read_table(path: Path) -> Table:
@@ -160,20 +159,18 @@ def read_table(path: Path) -> Table:
     try:
         text = path.read_text("utf-8-sig")
     except OSError as error:
-        raise UnreadableRecord(f"{path} cannot be read: {error.strerror}") from None
+        raise UnreadableRecord(f"it cannot be read: {error.strerror}", path=str(path)) from None
     except UnicodeDecodeError:
-        raise UnreadableRecord(f"{path} is no text table; save it as CSV") from None
+        raise UnreadableRecord("it is no text table; save it as CSV", path=str(path)) from None
     cells = csv_rows(text)
     if len(cells) < 2:
-        raise UnreadableRecord(f"{path} holds no rows below its header")
+        raise UnreadableRecord("it holds no rows below its header", path=str(path))
     (_, columns), *rows = cells
     for line, row in rows:
         if len(row) != len(columns):
-            raise UnreadableRecord(
-                f"{path}, line {line}: {counted(len(row), 'cell')} under {counted(len(columns), 'column')}; correct it"
-            )
-    by_name = tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows)
-    return Table(path, tuple(columns), by_name)
+            found = f"{counted(len(row), 'cell')} under {counted(len(columns), 'column')}"
+            raise UnreadableRecord(f"{found}; correct it", path=str(path), line=line)
+    return Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
 
 def _by_specimen(table: Table) -> dict[str, Table]:
@@ -198,17 +195,80 @@ def outcomes_of(table: Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
     several = len({row["motion"] for _, row in table.rows}) > 1
     for line, row in table.rows:
         scale = table.convert(line, row.get("scale") or "1", float, "a number")
-        name = _file_or_name(row["motion"], table.path.parent)
+        beside = table.path.parent / row["motion"]
+        name = str(beside) if beside.exists() else row["motion"]
         own = row.get("channel")
         about = {"channel": own or channel, "dt": dt, "units": units}
         try:
             motions.append(named_motion(name, **about, scale=scale, several=several and not own))
         except RockingError as error:
-            raise UnreadableRecord(f"{table.path}, line {line}: {error}") from error
+            raise table.error(str(error), line) from error
     groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None
     return Outcomes(tuple(motions), overturned, groups)
 
 
-def _file_or_name(name: str, folder: Path) -> str:
-    beside = folder / name
-    return str(beside) if beside.exists() else name
+def read_observed(
+    path: Path, measure: Measure, *, channel: str | None = None, dt: float | None = None, units: str | None = None
+) -> dict[str, Any]:
+    """Read a table of observed outcomes as arguments of `fit_fragility`.
+
+    Parameters
+    ----------
+    path : Path
+        CSV table with a column overturned (1 or 0, yes or no; with a column trials, how many of them), and either an
+        intensity (pga_g, pga_m_s2, pgv_m_s, pgv_cm_s, sa_g or sa_m_s2; "PGA (g)" is pga_g as well) or a motion (a
+        record file, or a shipped record; with columns scale and channel where wanted). A column group holds labels of
+        outcomes that belong together, as those of one earthquake; tests under one motion do in any case.
+    measure : Measure
+        What is taken of motions; the period and damping of a spectral acceleration in the table.
+    channel, dt, units
+        What record files do not say.
+
+    Raises
+    ------
+    UnreadableRecord
+        If it is no such table, or a cell or a record cannot be read; the message has the line.
+    InvalidOption
+        If the measure counts in a block's own unit, or a spectral acceleration has no period.
+    """
+    table = read_table(path)
+    names = {heading_of(cell): cell for cell in table.columns}
+    found = [name for name in names if name in HEADINGS]
+    if "overturned" not in names or len(found) + ("motion" in names) != 1:
+        raise table.error(
+            f"the columns must be overturned and either motion or one of {', '.join(HEADINGS)}, "
+            f"not {','.join(table.columns)}"
+        )
+    if found:
+        observed = _against_intensity(table, names, found[0], measure)
+    else:
+        observed = _under_motions(table, measure, channel=channel, dt=dt, units=units)
+    outcomes = round(float(np.sum(np.broadcast_to(observed["trials"], len(table.rows)))))
+    return observed | {"description": f"{counted(outcomes, 'observed outcome')} in {path.name}"}
+
+
+def _against_intensity(table: Table, names: dict[str, str], heading: str, measure: Measure) -> dict[str, Any]:
+    kind, factor = HEADINGS[heading]
+    if kind == "sa" and measure.period is None:
+        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period", path=str(table.path))
+    counts = "trials" in names
+    return {
+        "intensity": factor * table.numbers(names[heading]),
+        "exceeded": table.numbers(names["overturned"]) if counts else [*table.answers(names["overturned"])],
+        "trials": table.numbers(names["trials"]) if counts else 1,
+        "clusters": [row[names["group"]] for _, row in table.rows] if "group" in names else None,
+        "measure": measure if kind == "sa" else Measure(kind),
+    }
+
+
+def _under_motions(table: Table, measure: Measure, **files: Any) -> dict[str, Any]:
+    if measure.in_block_units:
+        raise InvalidOption(f"{measure.name} counts in a block's own unit, which outcomes do not tell: take pga")
+    tests = outcomes_of(table, **files)
+    return {
+        "intensity": [measure.value(motion) for motion in tests.motions],
+        "exceeded": [*tests.overturned],
+        "trials": 1,
+        "clusters": tests.groups or [row["motion"] for _, row in table.rows],
+        "measure": measure,
+    }
