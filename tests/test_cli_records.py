@@ -532,8 +532,9 @@ def test_every_command_in_the_documentation_has_the_options_that_it_shows():
     assert len(commands) > 20
     for line in commands:
         arguments = shlex.split(line, comments=True)
-        wording.refuse_unknown_options(app, arguments)
-        assert app.parse_args(arguments, exit_on_error=False, print_error=False)[0] is not None
+        command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
+        wording.refuse_unknown_options(bound.args, app, arguments)
+        assert command is not None
 
 
 def test_a_history_s_motion_may_be_scaled(run, tmp_path):

@@ -375,11 +375,11 @@ def test_an_eccentric_block_is_that_of_python(run, options, block):
         (["--pivots", "0.2,0.1", "--height-of-mass", "1", "--gyration", "0"], "--gyration must be a positive length"),
         (["--pivots", "0.2,0.1", "--width", "1"], "--width and --pivots belong to different descriptions"),
         (["--width", "0.3", "--height", "1", "--offset", "0.2"], "--offset must be at most a quarter of the width"),
-        (["--p", "3,3.1", "--alpha", "0.2"], "no rigid body has --p 3 and 3.1 rad/s on sides of one slenderness"),
+        (["--p", "3,3.1", "--alpha", "0.2"], "no rigid body has p = 3 and 3.1 rad/s on sides of one slenderness"),
         (["--width", "0.24", "--height", "1.1", "--friction", "30"], "--friction must be a coefficient"),
     ],
 )
-def test_a_block_that_is_none_is_refused_in_options(run, options, words):
+def test_an_impossible_block_is_refused_with_the_names_of_its_options(run, options, words):
     code, out, err = run("simulate", RECORD, *options)
     assert (code, out) == (2, "")
     assert words in err and err.count("\n") == 1
@@ -402,7 +402,7 @@ def test_a_map_takes_a_block_as_the_other_commands_do(run):
     sided = run("map", "one-sine", *ECCENTRIC, *grid)
     assert json.loads(sided[1])["restitution"] == pytest.approx([0.950255, 0.913887], abs=1e-6)
     code, _, err = run("map", "one-sine", "--alpha", "0.27417,0.155", *grid)
-    assert code == 2 and "follows from p and alpha of both: give p, too" in err
+    assert code == 2 and "follows from --p and --alpha of both: give --p, too" in err
 
 
 def test_a_calibration_says_that_its_pairs_are_bounds(run, tmp_path):
@@ -429,4 +429,4 @@ def test_a_fragility_names_the_options_and_counts_the_years(run, tmp_path):
     assert "--standing must be a positive number, not -1" in err
     stripes = [RECORD, "ridgecrest-clc-090", "--width", "0.24", "--height", "1.1", "--offset", "0.03"]
     out = run("fragility", *stripes, "--measure", "pgv", "--levels", "0.4:1.2:9")[1]
-    assert "give another curve; --polarity both counts both" in out
+    assert 'give another curve; --polarity "both" counts both' in out

@@ -1,8 +1,8 @@
-"""What the commands share: whether there is one record, and delivering what came out."""
+"""What the commands share: writing what came out into a folder, and printing it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -20,27 +20,8 @@ if TYPE_CHECKING:
 _DOTS_PER_INCH: Final = 160
 
 
-def is_single(names: Sequence[str], records: Sized) -> bool:
-    """Whether one record or pulse is named by itself, and no folder or pattern that happens to hold one."""
-    return (
-        len(names) == len(records) == 1 and not any(sign in names[0] for sign in "*?[") and not Path(names[0]).is_dir()
-    )
-
-
-def write(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, Any]) -> None:
-    """Write figures by name (PNG and PDF) and a result (JSON) into a folder.
-
-    Raises
-    ------
-    OutputError
-        If one of them cannot be written.
-    """
-    write_figures(folder, figures)
-    write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
-
-
-def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
-    """Write figures by name (PNG and PDF) into a folder.
+def write(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, Any] | None = None) -> None:
+    """Write figures by name (PNG and PDF) and, if there is one, a result (JSON) into a folder.
 
     Raises
     ------
@@ -50,6 +31,8 @@ def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
     for stem, figure in figures.items():
         write_figure(folder / f"{stem}.png", figure, dpi=_DOTS_PER_INCH)
         write_figure(folder / f"{stem}.pdf", figure)
+    if result is not None:
+        write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
 
 
 def deliver(

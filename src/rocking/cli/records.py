@@ -1,20 +1,23 @@
-"""`rocking records`: the shipped records, or what a record file holds."""
+"""`rocking records` and `rocking pulses`: what may shake a block."""
 
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from rocking.cli.options import OUTPUT, RECORDS, FileOptions, Names, PrintOptions, refusal
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion.catalogue import Contents, contents, shipped
 from rocking.motion.named import STANDARD_INPUT, expanded, is_shipped, refuse_what_is_known
+from rocking.named_pulses import FAMILIES, Family
 from rocking.plausibility import reading_notes
 from rocking.progress import Progress, note
-from rocking.tables import to_json
+from rocking.tables import text_table, to_json
 
 #: Names of files in one sentence.
 _SHOWN: Final = 5
+
+_EXAMPLE = "rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1"
 
 
 def records(
@@ -61,3 +64,36 @@ def _contents(name: str, file: FileOptions, *, several: bool) -> Contents:
         for sentence in reading_notes(motion):
             note(f"{name}, channel {entry['channel']}: {sentence}")
     return found
+
+
+def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
+    """List the pulses that --pulse takes, with their parameters and, where they need not be given, their defaults."""
+    if output.as_json:
+        print(to_json({"pulses": [_entry(family) for family in FAMILIES.values()]}))
+        return
+    rows = [(family.name, _needed(family), _optional(family)) for family in FAMILIES.values()]
+    print(text_table(["pulse", "needs", "takes"], rows))
+    print(f"\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:\n{_EXAMPLE}")
+
+
+def _entry(family: Family) -> dict[str, Any]:
+    units = {name: family.unit(name) for name in (*family.needed, *family.optional)}
+    return {"name": family.name, "needs": family.needed, "takes": family.optional, "units": units}
+
+
+def _needed(family: Family) -> str:
+    return ", ".join(f"{name}{_in(family.unit(name))}" for name in family.needed)
+
+
+def _optional(family: Family) -> str:
+    return ", ".join(
+        f"{name}{_in(family.unit(name))}{_by_default(default)}" for name, default in family.optional.items()
+    )
+
+
+def _by_default(default: Any) -> str:
+    return "" if default is None else f" = {default:g}" if isinstance(default, float) else f" = {default}"
+
+
+def _in(unit: str) -> str:
+    return f" ({unit})" if unit else ""

@@ -150,8 +150,8 @@ class Shelf:
                 identification, channels = formats.content(_Named(upload.data, upload.name), **told)
                 break
             except (UnreadableRecord, InvalidMotion) as error:
-                need = _needed(str(error))
-                if need is None or told[need] is not None:
+                need = error.argument
+                if need is None or need not in _STAND_IN or told[need] is not None:
                     raise
                 missing.append(need)
                 told[need] = _STAND_IN[need]
@@ -182,11 +182,6 @@ def bare_name(name: str) -> str:
     last = PurePosixPath(PureWindowsPath(name).name).name
     shown = "".join(letter for letter in last if letter.isprintable()).strip()
     return shown[-_NAME:] or "record"
-
-
-def _needed(message: str) -> str | None:
-    """Return the argument that a reader's message asks for."""
-    return next((name for name in _STAND_IN if f"give {name}=" in message), None)
 
 
 def _notes(channel: Any) -> list[str]:

@@ -99,9 +99,8 @@ def refuse_what_is_known(name: str, **said: object) -> None:
     """
     for argument, value in said.items():
         if value is not None:
-            raise UnreadableRecord(
-                f"{name}: a shipped record is one channel, with its step and units; leave {argument} out"
-            )
+            sentence = "a shipped record is one channel, with its step and units; leave {} out"
+            raise UnreadableRecord(sentence, argument, path=name)
 
 
 def is_shipped(name: str) -> bool:

@@ -21,8 +21,8 @@ from rocking.analysis.intensity import Measure, intensities
 from rocking.arrays import Floats, as_asked
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption
-from rocking.progress import phrased
+from rocking.errors import InvalidOption, Message
+from rocking.progress import spelled
 from rocking.tables import counted, text_table, write_text
 from rocking.treatment.base import Model
 
@@ -296,7 +296,7 @@ class Fragility:
         if self.one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
-                + phrased('polarity="both" counts both')
+                + spelled(Message('{} "both" counts both', ("polarity",)))
             )
         if not self.curves[0].bounded:
             notes.append(f"intervals and bands go from 0 to infinity: {self._too_few()}")

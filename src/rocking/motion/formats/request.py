@@ -54,7 +54,8 @@ class Request:
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
             raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=_SAME_STEP):
-            raise source.error(f"the sampling step is {stated:g} s, not dt = {self.dt:g} s; leave dt out", at)
+            sentence = f"the sampling step is {stated:g} s, not {{}} {self.dt:g} s; leave {{}} out"
+            raise source.error(sentence, at, "dt", "dt")
         return stated
 
     def units(self, source: Source, stated: Unit | None, at: int | None) -> Unit:
@@ -67,9 +68,11 @@ class Request:
         """
         unit = stated or self.unit
         if unit is None:
-            raise source.error(f"the file does not say its units; give units= as one of {', '.join(CHOICES)}", at)
+            sentence = f"the file does not say its units; give {{}} as one of {', '.join(CHOICES)}"
+            raise source.error(sentence, at, "units")
         if self.unit is not None and not self.several and unit != self.unit:
-            raise source.error(f"the units are {unit.name}, not units = {self.unit.name!r}; leave units out", at)
+            sentence = f"the units are {unit.name}, not {{}} {self.unit.name!r}; leave {{}} out"
+            raise source.error(sentence, at, "units", "units")
         return unit
 
     def units_by_heading(self, source: Source, heading: Unit | None, at: int | None) -> Unit:
