@@ -152,7 +152,7 @@ def test_what_a_rule_cannot_take_is_told_in_one_sentence(record):
         rules.rate(TOMBSTONE, record, ["wst"])
     with pytest.raises(rocking.InvalidMotion, match="a Motion is needed, not None"):
         rules.west(TOMBSTONE, None)
-    with pytest.raises(rocking.InvalidOption, match="motions must be a mapping with one entry or more"):
+    with pytest.raises(rocking.InvalidOption, match="motions must hold at least one motion"):
         rules.check(TOMBSTONE, {})
 
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from rocking import checks
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.contact import friction_coefficient
-from rocking.errors import InvalidOption
+from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
 from rocking.product import block_coordinates, names_of, verticals_of
 from rocking.progress import Progress, note
@@ -39,8 +39,8 @@ _SLIDING: Final = named("sliding_time", "s")
 
 
 @dataclass(frozen=True, eq=False)
-class Survey:
-    """Responses of a block to several motions.
+class BlockUnderRecords(ABC):
+    """One block under several motions: a table with a row for each.
 
     Attributes
     ----------
@@ -50,8 +50,6 @@ class Survey:
         Name of each motion.
     responses : tuple of Response
         Response to each.
-    friction : float or None
-        Coefficient of friction at which sliding is looked for.
     skipped : mapping of str to str
         Records that could not be read, and why.
     """
@@ -59,19 +57,75 @@ class Survey:
     block: Block
     records: tuple[str, ...]
     responses: tuple[Response, ...]
-    friction: float | None = None
-    skipped: Mapping[str, str] = field(default_factory=dict)
+    skipped: Mapping[str, str] = field(default_factory=dict, kw_only=True)
 
+    @abstractmethod
     def rows(self) -> list[dict[str, Any]]:
         """Return what became of the block under each record; units are in the names."""
-        labels = record_columns(self.records, [motion_of(response) for response in self.responses])
-        block = block_columns(self.block)
-        each = zip(labels, self.responses, strict=True)
-        return [label | block | _row(response) | self._sliding(response) for label, response in each]
+
+    @abstractmethod
+    def summary(self) -> str:
+        """Return the table for people."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table for machines."""
+        return {"block": str(self.block), "records": self.rows(), "skipped": dict(self.skipped)}
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the table as a data frame, with a row for each record that could not be read."""
         return frame_of(self.rows(), self.skipped)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the table as text columns with a header.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        frame = self.to_dataframe()
+        write_text(path, frame.to_csv(index=False, float_format="%.15g", lineterminator="\n"))
+
+    def _labels(self) -> list[dict[str, Any]]:
+        """First columns of each row: the record, its motion, the block."""
+        block = block_columns(self.block)
+        return [label | block for label in record_columns(self.records, [motion_of(one) for one in self.responses])]
+
+    def _count(self) -> str:
+        """Say under how many records the block overturns."""
+        overturned = sum(response.overturned for response in self.responses)
+        return f"{self.block.description}: {counted(len(self.records), 'record')}, overturned by {overturned}"
+
+
+@dataclass(frozen=True, eq=False)
+class Survey(BlockUnderRecords):
+    """Responses of a block to several motions; from `survey`.
+
+    Attributes
+    ----------
+    friction : float or None
+        Coefficient of friction at which sliding is looked for.
+    block, records, responses, skipped
+        As in `BlockUnderRecords`.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> survey(rocking.Block(width=0.24, height=1.1), [rocking.records.load("ridgecrest-clc-090")])
+    <Survey: rectangular block, 0.24 m x 1.1 m: 1 record, overturned by 0>
+    """
+
+    friction: float | None = None
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return what became of the block under each record; units are in the names."""
+        each = zip(self._labels(), self.responses, strict=True)
+        return [label | _row(response) | self._sliding(response) for label, response in each]
 
     def summary(self) -> str:
         """Return the table for people."""
@@ -86,13 +140,10 @@ class Survey:
         return f"{self._count()}\n\n{table}"
 
     def _count(self) -> str:
-        """Say under how many records the block overturns."""
-        overturned = sum(response.overturned for response in self.responses)
         undecided = sum(response.stopped or response.unfinished for response in self.responses)
-        count = "1 record" if len(self.records) == 1 else f"{len(self.records)} records"
         known = f", not decided under {undecided}" if undecided else ""
         unread = f"; {counted(len(self.skipped), 'record')} skipped" if self.skipped else ""
-        return f"{self.block.description}: {count}, overturned by {overturned}{known}{unread}"
+        return super()._count() + known + unread
 
     def __repr__(self) -> str:
         return f"<Survey: {self._count()}>"
@@ -132,12 +183,11 @@ class Survey:
         OutputError
             If they cannot be written.
         """
-        frame = self.to_dataframe()
-        digits: dict[str, Any] = {"index": False, "float_format": "%.15g"}
-        write_text(folder / "summary.csv", frame.to_csv(lineterminator="\n", **digits))
+        self.to_csv(folder / "summary.csv")
         try:
             workbook = io.BytesIO()
-            frame.to_excel(workbook, sheet_name="summary", freeze_panes=(1, 0), **digits)
+            table = self.to_dataframe()
+            table.to_excel(workbook, sheet_name="summary", freeze_panes=(1, 0), index=False, float_format="%.15g")
             write_bytes(folder / "summary.xlsx", workbook.getvalue())
         except ImportError:
             note("no summary.xlsx: install rocking[excel] for a workbook; summary.csv holds the same table")
@@ -146,7 +196,7 @@ class Survey:
 
 def survey(
     block: Block,
-    motions: Mapping[str, Motion],
+    motions: Mapping[str, Motion] | Iterable[Motion],
     *,
     friction: float | None = None,
     progress: bool | None = None,
@@ -158,8 +208,8 @@ def survey(
     ----------
     block : Block
         What rocks.
-    motions : mapping of str to Motion
-        Motions by the names that the table shows.
+    motions : mapping of str to Motion, or iterable of Motion
+        Motions, by the names that the table shows; without such names each has its own.
     friction : float, optional
         Coefficient of friction at which to look for sliding.
     progress : bool, optional
@@ -174,7 +224,9 @@ def survey(
     Raises
     ------
     InvalidOption
-        As for `rocking.simulate`.
+        As for `rocking.simulate`, or if there is no motion.
+    InvalidMotion
+        If a motion is anything else.
 
     Examples
     --------
@@ -185,16 +237,31 @@ def survey(
     >>> print(found.summary().splitlines()[0])
     rectangular block, 0.24 m x 1.1 m: 2 records, overturned by 1
     """
-    checks.mapping(motions, "motions", InvalidOption, "{name: motion}")
     if friction is not None:
         friction_coefficient(friction)
+    shaking = by_name(motions)
     responses = []
-    with Progress("simulating", total=len(motions), show=progress) as bar:
-        for motion in motions.values():
+    with Progress("simulating", total=len(shaking), show=progress) as bar:
+        for motion in shaking.values():
             responses.append(simulate(block, motion, **options))
             _row(responses[-1])  # what takes long in it, the response keeps: while the bar is there
             bar.advance()
-    return Survey(block, tuple(motions), tuple(responses), friction)
+    return Survey(block, tuple(shaking), tuple(responses), friction)
+
+
+def by_name(motions: Mapping[str, Motion] | Iterable[Motion]) -> dict[str, Motion]:
+    """Return motions by the names that are given to them, or else by their own.
+
+    Raises
+    ------
+    InvalidOption
+        If there is none.
+    InvalidMotion
+        If one of them is anything else.
+    """
+    several = several_motions(motions.values() if isinstance(motions, Mapping) else motions)
+    names = [*motions] if isinstance(motions, Mapping) else names_of(several)
+    return dict(zip(names, several, strict=True))
 
 
 def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
