@@ -53,7 +53,7 @@ SIZES = ["--width", "0.24", "--height", "1.1"]
         ),
     ],
 )
-def test_a_mistake_is_told_in_the_words_of_the_command_line(run, tmp_path, monkeypatch, arguments, sentence):
+def test_a_mistake_is_reported_in_the_words_of_the_command_line(run, tmp_path, monkeypatch, arguments, sentence):
     monkeypatch.chdir(tmp_path)
     code, out, err = run(*arguments.split())
     assert (code, out, err) == (2, "", f"rocking: {sentence}\n")
@@ -163,7 +163,7 @@ def test_a_calibration_takes_semicolons_and_gives_units(run, history):
     assert run("calibrate", history(";", "."))[1] == plain
 
 
-def test_a_calibration_tells_all_columns_and_answers_that_it_takes(run, tmp_path):
+def test_a_calibration_names_all_columns_and_answers_that_it_takes(run, tmp_path):
     table = tmp_path / "table.csv"
     table.write_text("a,b\n1,2\n")
     assert "time_s,rotation_rad or time_s,rotation_deg" in run("calibrate", table)[2]
@@ -176,7 +176,7 @@ def test_the_height_of_a_centre_of_mass_is_called_so():
     assert block.description == "body on pivots 0.1 m and 0.2 m from its centre of mass, which is 0.6 m high"
 
 
-def test_a_motion_that_was_scaled_is_told_from_the_record(run):
+def test_a_scaled_motion_is_distinguished_from_the_record(run):
     record = rocking.records.load(RECORD)
     scaled = record.scaled(2.0)
     assert (record.label, scaled.label) == (RECORD, f"{RECORD}, scaled by 2")
@@ -204,7 +204,7 @@ def test_a_motion_times_a_number_is_scaled():
         motion * "2"
 
 
-def test_python_is_told_what_is_meant(tmp_path):
+def test_messages_in_python_say_what_is_meant(tmp_path):
     response = rocking.simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
     with pytest.raises(RockingError, match=rf"it is a shipped record: load it with rocking.records.load\('{RECORD}'\)"):
         rocking.read(RECORD)
@@ -219,7 +219,7 @@ def test_python_is_told_what_is_meant(tmp_path):
             written.to_netcdf(tmp_path / "nowhere" / "x.nc")
 
 
-def test_the_command_line_is_not_told_of_what_only_python_can_give(run):
+def test_the_command_line_does_not_mention_what_only_python_can_give(run):
     _, _, err = run("simulate", RECORD, *SIZES, "--chattering", "foo")
     assert err.strip().endswith("--chattering must be one of time, certified, velocity, interval, not 'foo'")
     with pytest.raises(RockingError, match="interval or a treatment, not 3"):
@@ -326,7 +326,7 @@ def test_formulas_that_mean_nothing_for_a_strong_sine_say_so(run):
     assert "-1.34" not in out
 
 
-def test_large_sizes_are_told_in_whole_metres(run):
+def test_large_sizes_are_shown_in_whole_metres(run):
     _, _, err = run("simulate", RECORD, "--width", "600", "--height", "2100")
     assert "the diagonal of the block is 2184 m" in err
 

@@ -26,11 +26,11 @@ Audience = Literal["terminal", "everybody", "nobody"]
 
 @dataclass(frozen=True)
 class _Listener:
-    """Who reads notes, how names of arguments are written for them, and what they have been told, if it is kept."""
+    """Who reads notes, how names of arguments are written for them, and which notes they have seen."""
 
     audience: Audience = "terminal"
     spelling: Spelling = as_argument
-    told: set[Message] | None = None
+    seen: set[Message] | None = None
 
 
 _listener = _Listener()
@@ -56,10 +56,10 @@ def note(message: Message | str) -> None:
     """
     # The template of a sentence in which no argument is named has no places to fill.
     whole = message if isinstance(message, Message) else Message(message)
-    if _listener.told is not None:
-        if whole in _listener.told:
+    if _listener.seen is not None:
+        if whole in _listener.seen:
             return
-        _listener.told.add(whole)
+        _listener.seen.add(whole)
     if _listener.audience == "everybody" or (_listener.audience == "terminal" and sys.stderr.isatty()):
         print(f"rocking: note: {spelled(whole)}", file=sys.stderr)
 

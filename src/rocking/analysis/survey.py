@@ -63,10 +63,6 @@ class BlockUnderRecords(ABC):
     def rows(self) -> list[dict[str, Any]]:
         """Return what became of the block under each record; units are in the names."""
 
-    @abstractmethod
-    def summary(self) -> str:
-        """Return the table for people."""
-
     def to_dict(self) -> dict[str, Any]:
         """Return the table for machines."""
         return {"block": str(self.block), "records": self.rows(), "skipped": dict(self.skipped)}
@@ -78,11 +74,6 @@ class BlockUnderRecords(ABC):
     def to_csv(self, path: str | Path) -> None:
         """Write the table as text columns with a header.
 
-        Parameters
-        ----------
-        path : str or Path
-            File to write.
-
         Raises
         ------
         OutputError
@@ -93,8 +84,10 @@ class BlockUnderRecords(ABC):
 
     def _labels(self) -> list[dict[str, Any]]:
         """First columns of each row: the record, its motion, the block."""
-        block = block_columns(self.block)
-        return [label | block for label in record_columns(self.records, [motion_of(one) for one in self.responses])]
+        columns = block_coordinates(Blocks.of(self.block))
+        numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
+        labels = record_columns(self.records, [motion_of(response) for response in self.responses])
+        return [{**label, "block": self.block.description, **numbers} for label in labels]
 
     def _count(self) -> str:
         """Say under how many records the block overturns."""
@@ -113,11 +106,6 @@ class Survey(BlockUnderRecords):
     block, records, responses, skipped
         As in `BlockUnderRecords`.
 
-    Examples
-    --------
-    >>> import rocking
-    >>> survey(rocking.Block(width=0.24, height=1.1), [rocking.records.load("ridgecrest-clc-090")])
-    <Survey: rectangular block, 0.24 m x 1.1 m: 1 record, overturned by 0>
     """
 
     friction: float | None = None
@@ -271,13 +259,6 @@ def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[di
         {"record": record, "motion": names[k], **{name: column[1][k] for name, column in verticals.items()}}
         for k, record in enumerate(records)
     ]
-
-
-def block_columns(block: Block) -> dict[str, Any]:
-    """Describe a block in the columns of a table."""
-    columns = block_coordinates(Blocks.of(block))
-    numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
-    return {"block": block.description, **numbers}
 
 
 def motion_of(response: Response) -> Motion:

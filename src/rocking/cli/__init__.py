@@ -34,7 +34,7 @@ for _command, (_module, _help) in {
     "map": ("map", "Map what a pulse does to a block, over amplitude and frequency."),
     "ida": ("ida", "Scale motions up until the block overturns and beyond (incremental dynamic analysis)."),
     "fragility": ("fragility", "Fit the probability that a block overturns against the intensity of the motions."),
-    "measures": ("measures", "Compare intensity measures: which tells best when motions overturn a block."),
+    "measures": ("measures", "Compare intensity measures: which predicts best when motions overturn a block."),
     "check": ("simulate", "Say what rules of thumb make of a block, beside the exact answer."),
     "calibrate": ("calibrate", "Find the block behind observed outcomes, or behind a measured rotation history."),
     "explore": ("explore", "Open a page on which a block is seen to rock, chatter, rest and fall."),

@@ -1,12 +1,15 @@
-"""What the commands share: writing what came out into a folder, and printing it."""
+"""What the commands share: a folder for what came out, writing into it, and printing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from rocking.errors import OutputError
+from rocking.progress import note
 from rocking.result import Result
 from rocking.tables import to_json, write_figure, write_text
 
@@ -72,3 +75,41 @@ def show(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | 
     print(text)
     if folder is not None:
         print(f"\nwritten to {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+
+
+@contextmanager
+def output_folder(folder: Path) -> Iterator[Path]:
+    """Make a folder for results, and note which files were replaced; on failure, remove what was made and is empty.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made or written to.
+    """
+    made = [each for each in (folder, *folder.parents) if not each.exists()]
+    before = _written_at(folder)
+    probe = folder / ".rocking-can-write"
+    try:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            probe.touch()
+            probe.unlink()
+        except OSError as error:
+            sentence = f"this folder cannot be written to: {error.strerror}; choose another {{}}"
+            raise OutputError(sentence, "out", path=str(folder)) from error
+        yield folder
+        now = _written_at(folder)
+        replaced = [name for name, time in before.items() if now.get(name, time) != time]
+        if replaced:
+            note(f"replaced in {folder}: {', '.join(replaced)}")
+    except BaseException:
+        with suppress(OSError):
+            for each in made:
+                each.rmdir()
+        raise
+
+
+def _written_at(folder: Path) -> dict[str, int]:
+    """Return the times, ns, at which the files in a folder and below it were written, by their names in it."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else []
+    return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in files}

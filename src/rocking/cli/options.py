@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -14,8 +14,9 @@ from cyclopts import Group, Parameter
 
 from rocking import checks
 from rocking.analysis.intensity import MeasureName
+from rocking.cli.batch import output_folder
 from rocking.cli.wording import option_of
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, RockingError, UnreadableRecord
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.named_pulses import named_pulse
@@ -59,7 +60,7 @@ Names = Annotated[
         name="RECORDS",
         allow_leading_hyphen=True,
         help="Record files, folders, patterns (*.AT2), names of shipped records (see rocking records), or - for "
-        "standard input. A file's format is told from its content.",
+        "standard input. A file's format is recognised by its content.",
     ),
 ]
 
@@ -382,7 +383,8 @@ class RecordOptions(PulseOptions):
         records = expanded(names)
         if not records and not self.pulse:
             raise InvalidOption(
-                "give one record or more: files, folders, or names of shipped records (see rocking records), or --pulse"
+                "give one record or more: files, folders, or names of shipped records (see rocking records), or {}",
+                "pulse",
             )
         pulses = self.pulses()
         motions: dict[str, Motion] = {}
@@ -514,41 +516,3 @@ class OutputOptions(PrintOptions):
     def folder(self) -> AbstractContextManager[Path | None]:
         """Make the folder, if one is wanted, before the work; on failure, remove it again where it is empty."""
         return nullcontext() if self.out is None else output_folder(self.out)
-
-
-@contextmanager
-def output_folder(folder: Path) -> Iterator[Path]:
-    """Make a folder for results, and tell which files were replaced; on failure, remove what was made and is empty.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be made or written to.
-    """
-    made = [each for each in (folder, *folder.parents) if not each.exists()]
-    before = _written_at(folder)
-    probe = folder / ".rocking-can-write"
-    try:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            probe.touch()
-            probe.unlink()
-        except OSError as error:
-            sentence = f"this folder cannot be written to: {error.strerror}; choose another {{}}"
-            raise OutputError(sentence, "out", path=str(folder)) from error
-        yield folder
-        now = _written_at(folder)
-        replaced = [name for name, time in before.items() if now.get(name, time) != time]
-        if replaced:
-            note(f"replaced in {folder}: {', '.join(replaced)}")
-    except BaseException:
-        with suppress(OSError):
-            for each in made:
-                each.rmdir()
-        raise
-
-
-def _written_at(folder: Path) -> dict[str, int]:
-    """Return the times, ns, at which the files in a folder and below it were written, by their names in it."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else []
-    return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in files}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
 from rocking.cli.options import OUTPUT, RECORDS, FileOptions, Names, PrintOptions, refusal
@@ -68,32 +69,22 @@ def _contents(name: str, file: FileOptions, *, several: bool) -> Contents:
 
 def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
     """List the pulses that --pulse takes, with their parameters and, where they need not be given, their defaults."""
+    families = FAMILIES.values()
     if output.as_json:
-        print(to_json({"pulses": [_entry(family) for family in FAMILIES.values()]}))
+        units = [{name: one.unit(name) for name in (*one.needed, *one.optional)} for one in families]
+        known = [{"name": one.name, "needs": one.needed, "takes": one.optional} for one in families]
+        print(to_json({"pulses": [one | {"units": of_one} for one, of_one in zip(known, units, strict=True)]}))
         return
-    rows = [(family.name, _needed(family), _optional(family)) for family in FAMILIES.values()]
+    rows = [(one.name, _listed(one, dict.fromkeys(one.needed)), _listed(one, one.optional)) for one in families]
     print(text_table(["pulse", "needs", "takes"], rows))
     print(f"\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:\n{_EXAMPLE}")
 
 
-def _entry(family: Family) -> dict[str, Any]:
-    units = {name: family.unit(name) for name in (*family.needed, *family.optional)}
-    return {"name": family.name, "needs": family.needed, "takes": family.optional, "units": units}
-
-
-def _needed(family: Family) -> str:
-    return ", ".join(f"{name}{_in(family.unit(name))}" for name in family.needed)
-
-
-def _optional(family: Family) -> str:
-    return ", ".join(
-        f"{name}{_in(family.unit(name))}{_by_default(default)}" for name, default in family.optional.items()
-    )
-
-
-def _by_default(default: Any) -> str:
-    return "" if default is None else f" = {default:g}" if isinstance(default, float) else f" = {default}"
-
-
-def _in(unit: str) -> str:
-    return f" ({unit})" if unit else ""
+def _listed(family: Family, parameters: Mapping[str, Any]) -> str:
+    """Return parameters of a pulse with their units and defaults."""
+    units = {name: f" ({family.unit(name)})" if family.unit(name) else "" for name in parameters}
+    defaults = {
+        name: "" if value is None else f" = {value:g}" if isinstance(value, float) else f" = {value}"
+        for name, value in parameters.items()
+    }
+    return ", ".join(name + units[name] + defaults[name] for name in parameters)

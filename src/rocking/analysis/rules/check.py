@@ -24,7 +24,7 @@ from rocking.treatment.base import Model
 #: Width, relative to it, of the level that overturns first: a margin is read to three digits.
 _TOLERANCE: Final = 1e-4
 
-#: From so much on, a factor below 1 is told to four digits.
+#: From so much on, a factor below 1 is shown to four digits.
 _NEAR: Final = 0.985
 
 
