@@ -13,7 +13,7 @@ import numpy as np
 
 import rocking
 from rocking import rules
-from rocking.analysis.rules.check import TITLES
+from rocking.analysis.rules.criteria import TITLES
 from rocking.plot.canvas import add_labels, add_legend, figure_for, labelled
 from rocking.plot.style import CURVES
 

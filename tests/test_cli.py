@@ -1,6 +1,5 @@
 """The command line: results, files, exit codes, and one line for every mistake."""
 
-import importlib
 import inspect
 import json
 import os
@@ -77,16 +76,16 @@ def test_records_shows_what_a_file_was_taken_for(run, tmp_path):
 
 
 def files(folder: Path) -> dict[str, Path]:
-    """One file for each way to spoil a record."""
-    spoilt = {
+    """One file for each way to damage a record."""
+    damaged = {
         "empty": b"",
         "binary": bytes(range(256)) * 20,
         "npts": b"PEER NGA\nevent\nACCELERATION IN UNITS OF G\nNPTS= 7, DT= .01 SEC\n .1 .2 .3\n",
         "token": b"0.0 0.0\n0.01 0.1\n0.02 oops\n0.03 0.1\n",
         "nan": b"0.0 0.0\n0.01 nan\n0.02 0.1\n",
     }
-    paths = {name: folder / name for name in spoilt}
-    for name, content in spoilt.items():
+    paths = {name: folder / name for name in damaged}
+    for name, content in damaged.items():
         paths[name].write_bytes(content)
     return paths | {"missing": folder / "nothing.AT2", "folder": folder}
 
@@ -100,8 +99,8 @@ def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command)
     # What each file of a folder holds is listed, and why it cannot be read.
     listed = ["empty", "binary", "npts", "token", "nan"] if (command, name) == ("records", "folder") else []
     assert code == 2
-    told = (re.split(r": |, line", line)[0] for line in out.splitlines() if line)
-    assert sorted(Path(each).name for each in told) == sorted(listed)
+    reported = (re.split(r": |, line", line)[0] for line in out.splitlines() if line)
+    assert sorted(Path(each).name for each in reported) == sorted(listed)
     assert err.count("\n") == 1
     assert err.startswith("rocking: ")
     assert path.name in err
@@ -211,8 +210,7 @@ COMMANDS = [name for name in app if not name.startswith("-") and name != "study"
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_help_of_a_command_is_all_that_its_function_says(run, command):
-    function = getattr(importlib.import_module(f"rocking.cli.{command}"), command)
-    said = " ".join(inspect.getdoc(function).partition("Parameters\n---")[0].split())
+    said = " ".join(inspect.getdoc(app[command].default_command).partition("Parameters\n---")[0].split())
     assert said in " ".join(run(command, "--help")[1].split())
 
 

@@ -93,13 +93,13 @@ def test_ida_prints_bands_and_writes_what_it_says(run, tmp_path):
     assert "none of them lifts" not in out
 
 
-def test_a_fragility_of_a_symmetric_block_tells_that_both_polarities_count_once(run):
+def test_a_fragility_of_a_symmetric_block_says_that_both_polarities_count_once(run):
     stripes = [RECORD, OTHER, "ridgecrest-clc-090", *SIZES, "--measure", "pgv", "--levels", "0.4:1.2:9"]
     once = run("fragility", *stripes)[1]
     both = run("fragility", *stripes, "--polarity", "both")[1]
-    told = ", one polarity, since a symmetric block does the same in both"
-    assert once and told in both
-    assert both.replace(told, "") == once
+    words = ", one polarity, since a symmetric block does the same in both"
+    assert once and words in both
+    assert both.replace(words, "") == once
 
 
 STRIPES = ["--measure", "pgv", "--levels", "0.4:1.2:9", "--polarity", "both"]

@@ -53,7 +53,7 @@ SIZES = ["--width", "0.24", "--height", "1.1"]
         ),
     ],
 )
-def test_a_mistake_is_told_in_the_words_of_the_command_line(run, tmp_path, monkeypatch, arguments, sentence):
+def test_a_mistake_is_reported_in_the_words_of_the_command_line(run, tmp_path, monkeypatch, arguments, sentence):
     monkeypatch.chdir(tmp_path)
     code, out, err = run(*arguments.split())
     assert (code, out, err) == (2, "", f"rocking: {sentence}\n")
@@ -163,7 +163,7 @@ def test_a_calibration_takes_semicolons_and_gives_units(run, history):
     assert run("calibrate", history(";", "."))[1] == plain
 
 
-def test_a_calibration_tells_all_columns_and_answers_that_it_takes(run, tmp_path):
+def test_a_calibration_names_all_columns_and_answers_that_it_takes(run, tmp_path):
     table = tmp_path / "table.csv"
     table.write_text("a,b\n1,2\n")
     assert "time_s,rotation_rad or time_s,rotation_deg" in run("calibrate", table)[2]
@@ -176,7 +176,7 @@ def test_the_height_of_a_centre_of_mass_is_called_so():
     assert block.description == "body on pivots 0.1 m and 0.2 m from its centre of mass, which is 0.6 m high"
 
 
-def test_a_motion_that_was_scaled_is_told_from_the_record(run):
+def test_a_scaled_motion_is_distinguished_from_the_record(run):
     record = rocking.records.load(RECORD)
     scaled = record.scaled(2.0)
     assert (record.label, scaled.label) == (RECORD, f"{RECORD}, scaled by 2")
@@ -204,7 +204,7 @@ def test_a_motion_times_a_number_is_scaled():
         motion * "2"
 
 
-def test_python_is_told_what_is_meant(tmp_path):
+def test_messages_in_python_say_what_is_meant(tmp_path):
     response = rocking.simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
     with pytest.raises(RockingError, match=rf"it is a shipped record: load it with rocking.records.load\('{RECORD}'\)"):
         rocking.read(RECORD)
@@ -219,7 +219,7 @@ def test_python_is_told_what_is_meant(tmp_path):
             written.to_netcdf(tmp_path / "nowhere" / "x.nc")
 
 
-def test_the_command_line_is_not_told_of_what_only_python_can_give(run):
+def test_the_command_line_does_not_mention_what_only_python_can_give(run):
     _, _, err = run("simulate", RECORD, *SIZES, "--chattering", "foo")
     assert err.strip().endswith("--chattering must be one of time, certified, velocity, interval, not 'foo'")
     with pytest.raises(RockingError, match="interval or a treatment, not 3"):
@@ -326,7 +326,7 @@ def test_formulas_that_mean_nothing_for_a_strong_sine_say_so(run):
     assert "-1.34" not in out
 
 
-def test_large_sizes_are_told_in_whole_metres(run):
+def test_large_sizes_are_shown_in_whole_metres(run):
     _, _, err = run("simulate", RECORD, "--width", "600", "--height", "2100")
     assert "the diagonal of the block is 2184 m" in err
 
@@ -375,11 +375,11 @@ def test_an_eccentric_block_is_that_of_python(run, options, block):
         (["--pivots", "0.2,0.1", "--height-of-mass", "1", "--gyration", "0"], "--gyration must be a positive length"),
         (["--pivots", "0.2,0.1", "--width", "1"], "--width and --pivots belong to different descriptions"),
         (["--width", "0.3", "--height", "1", "--offset", "0.2"], "--offset must be at most a quarter of the width"),
-        (["--p", "3,3.1", "--alpha", "0.2"], "no rigid body has --p 3 and 3.1 rad/s on sides of one slenderness"),
+        (["--p", "3,3.1", "--alpha", "0.2"], "no rigid body has p = 3 and 3.1 rad/s on sides of one slenderness"),
         (["--width", "0.24", "--height", "1.1", "--friction", "30"], "--friction must be a coefficient"),
     ],
 )
-def test_a_block_that_is_none_is_refused_in_options(run, options, words):
+def test_an_impossible_block_is_refused_with_the_names_of_its_options(run, options, words):
     code, out, err = run("simulate", RECORD, *options)
     assert (code, out) == (2, "")
     assert words in err and err.count("\n") == 1
@@ -402,7 +402,7 @@ def test_a_map_takes_a_block_as_the_other_commands_do(run):
     sided = run("map", "one-sine", *ECCENTRIC, *grid)
     assert json.loads(sided[1])["restitution"] == pytest.approx([0.950255, 0.913887], abs=1e-6)
     code, _, err = run("map", "one-sine", "--alpha", "0.27417,0.155", *grid)
-    assert code == 2 and "follows from p and alpha of both: give p, too" in err
+    assert code == 2 and "follows from --p and --alpha of both: give --p, too" in err
 
 
 def test_a_calibration_says_that_its_pairs_are_bounds(run, tmp_path):
@@ -429,4 +429,4 @@ def test_a_fragility_names_the_options_and_counts_the_years(run, tmp_path):
     assert "--standing must be a positive number, not -1" in err
     stripes = [RECORD, "ridgecrest-clc-090", "--width", "0.24", "--height", "1.1", "--offset", "0.03"]
     out = run("fragility", *stripes, "--measure", "pgv", "--levels", "0.4:1.2:9")[1]
-    assert "give another curve; --polarity both counts both" in out
+    assert 'give another curve; --polarity "both" counts both' in out

@@ -145,7 +145,7 @@ def test_every_demand_grows_with_the_motion_and_counts_the_weaker_side(name, rec
     assert not rule(weak, at_limit.scaled(1.0 - 1e-9)).overturns[0]
 
 
-def test_what_a_rule_cannot_take_is_told_in_one_sentence(record):
+def test_what_a_rule_cannot_take_is_refused_in_one_sentence(record):
     with pytest.raises(rocking.InvalidBlock, match=r"priestley needs a restitution above 0\.23"):
         rules.priestley(rocking.Block.from_parameters(2.0, 0.2, 0.2), record)
     with pytest.raises(rocking.InvalidOption, match="rules must be one of west, ishiyama"):
@@ -222,7 +222,7 @@ def test_the_command_prints_and_writes_the_check(run, tmp_path):
     )
 
 
-def test_a_rule_that_does_not_exist_is_told_by_the_option(run):
+def test_a_rule_that_does_not_exist_is_refused_by_the_name_of_the_option(run):
     code, _, err = run("check", RECORD, "--width", "0.3", "--height", "0.9", "--rules", "wst")
     assert code == 2
     assert "--rules must be one of west, ishiyama, housner, asce_43_05, priestley, not 'wst'" in err

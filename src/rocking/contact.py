@@ -25,8 +25,10 @@ def friction_coefficient(value: object) -> float:
     coefficient = checks.positive(value, "friction", InvalidOption)
     if coefficient > _ROUGHEST:
         raise InvalidOption(
-            "friction must be a coefficient (friction over normal force, about 0.6 of stone on stone) of at most "
-            f"{_ROUGHEST:g}, not {coefficient:g}; of an angle of friction take the tangent"
+            "{} must be a coefficient (friction over normal force, about 0.6 of stone on stone) of at most "
+            f"{_ROUGHEST:g}, not {coefficient:g}; of an angle of friction take the tangent",
+            "friction",
+            value=value,
         )
     return coefficient
 

@@ -45,6 +45,9 @@ class Message:
         names = map(spelling, self.arguments)
         return " ".join("".join([first, *(name + rest for name, rest in zip(names, others, strict=False))]).split())
 
+    def __str__(self) -> str:
+        return self.text()
+
 
 class RockingError(Exception):
     """Base of every error that the package raises on purpose.

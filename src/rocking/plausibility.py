@@ -11,6 +11,7 @@ import numpy as np
 from rocking.block import Block
 from rocking.block.body import bodies_of
 from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import Message
 from rocking.motion import measures
 from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
@@ -136,7 +137,7 @@ def _gap_notes(motion: Motion) -> list[str]:
     ]
 
 
-def level_notes(text: str, value: float, option: str) -> tuple[str, ...]:
+def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
     """Return what looks like a mistake in an acceleration that a motion is scaled to; empty if nothing does.
 
     Parameters
@@ -145,22 +146,21 @@ def level_notes(text: str, value: float, option: str) -> tuple[str, ...]:
         As it was written.
     value : float
         What it was taken for, m/s^2.
-    option : str
-        What it was written for.
+    name : str
+        Name of the argument that it was written for.
 
     Examples
     --------
-    >>> level_notes("0.4", 0.4, "--pga"), level_notes("0.4g", 3.92, "--pga")
-    (('--pga 0.4 is taken for 0.4 m/s^2, 0.0408 g; write 0.4g for 0.4 g',), ())
+    >>> print(*level_notes("0.4", 0.4, "pga"), *level_notes("0.4g", 3.92, "pga"))
+    pga 0.4 is taken for 0.4 m/s^2, 0.0408 g; write 0.4g for 0.4 g
     """
     if _UNITLESS.fullmatch(text.strip()) is None or not 0.0 < value <= _PERHAPS_IN_G:
         return ()
-    return (
-        f"{option} {text} is taken for {value:g} m/s^2, {value / STANDARD_GRAVITY:.3g} g; write {text}g for {text} g",
-    )
+    sentence = f"{{}} {text} is taken for {value:g} m/s^2, {value / STANDARD_GRAVITY:.3g} g; write {text}g for {text} g"
+    return (Message(sentence, (name,)),)
 
 
-def block_notes(block: Block) -> tuple[str, ...]:
+def block_notes(block: Block) -> tuple[Message | str, ...]:
     """Return what looks like a mistake in the sizes or the sides of a block; empty if nothing does.
 
     Examples
@@ -181,7 +181,7 @@ def block_notes(block: Block) -> tuple[str, ...]:
     return (*notes, *_side_notes(block))
 
 
-def _side_notes(block: Block) -> Iterator[str]:
+def _side_notes(block: Block) -> Iterator[Message | str]:
     """Sentences on two different sides."""
     slender, stocky = sorted(block.sides, key=lambda side: side.alpha)
     if slender.alpha == stocky.alpha:
@@ -196,9 +196,10 @@ def _side_notes(block: Block) -> Iterator[str]:
     )
     found = bodies_of(p, alpha)
     if np.array_equal(found.restitution, restitution) and found.uncertainty[0] > _UNCERTAIN:
-        yield (
-            f"the digits of p and alpha tell the restitution to +-{found.uncertainty[0]:.1g} only: give more of them, "
-            "or give restitution="
+        yield Message(
+            f"the digits of {{}} and {{}} tell the restitution to +-{found.uncertainty[0]:.1g} only: give more of "
+            "them, or give {}",
+            ("p", "alpha", "restitution"),
         )
 
 

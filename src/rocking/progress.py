@@ -1,14 +1,18 @@
-"""What is said on stderr beside the result: a bar for work that takes long, and notes, each a line."""
+"""What is written to stderr beside the result: a bar for work that takes long, and notes, each a line."""
 
 from __future__ import annotations
 
 import contextlib
 import sys
 import time
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import timedelta
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+from rocking.errors import Message, OutsideFit, Spelling, as_argument
 
 if TYPE_CHECKING:
     import rich.progress
@@ -16,64 +20,79 @@ if TYPE_CHECKING:
 #: Work that is over sooner than this shows no bar, s.
 _PATIENCE = 1.0
 
-
-#: Who is told: a person at a terminal, everybody, nobody.
+#: Who reads notes: a person at a terminal, everybody, nobody.
 Audience = Literal["terminal", "everybody", "nobody"]
-_audience: Audience = "terminal"
 
 
-def _as_it_is(sentence: str) -> str:
-    return sentence
+@dataclass(frozen=True)
+class _Listener:
+    """Who reads notes, how names of arguments are written for them, and which notes they have seen."""
+
+    audience: Audience = "terminal"
+    spelling: Spelling = as_argument
+    seen: set[Message] | None = None
 
 
-_phrased: Callable[[str], str] = _as_it_is
-
-#: What the present audience has been told, where it is told everything once.
-_told: set[str] | None = None
+_listener = _Listener()
 
 
-def phrased(sentence: str) -> str:
-    """Return a sentence in the words of where it is said: the command line names options in place of arguments.
+def spelled(message: Message) -> str:
+    """Return a message with names of arguments as the present reader knows them: on the command line its options.
 
     Examples
     --------
-    >>> phrased('polarity="both" counts both')
-    'polarity="both" counts both'
+    >>> spelled(Message('{} "both" counts both', ("polarity",)))
+    'polarity "both" counts both'
     """
-    return _phrased(sentence)
+    return message.text(_listener.spelling)
 
 
-def note(sentence: str) -> None:
-    """Say a sentence on stderr, on a line of its own, to whom `notes_for` has chosen.
+def note(message: Message | str) -> None:
+    """Print a sentence on stderr, on a line of its own, for those whom `notes_for` has chosen.
 
     Examples
     --------
     >>> note("nobody reads this where stderr is not a terminal")
     """
-    if _told is not None:
-        if sentence in _told:
+    # The template of a sentence in which no argument is named has no places to fill.
+    whole = message if isinstance(message, Message) else Message(message)
+    if _listener.seen is not None:
+        if whole in _listener.seen:
             return
-        _told.add(sentence)
-    if _audience == "everybody" or (_audience == "terminal" and sys.stderr.isatty()):
-        print(f"rocking: note: {_phrased(' '.join(sentence.split()))}", file=sys.stderr)
+        _listener.seen.add(whole)
+    if _listener.audience == "everybody" or (_listener.audience == "terminal" and sys.stderr.isatty()):
+        print(f"rocking: note: {spelled(whole)}", file=sys.stderr)
 
 
 @contextlib.contextmanager
-def notes_for(audience: Audience, phrased: Callable[[str], str] = _as_it_is) -> Iterator[None]:
-    """Choose who is told, while a command runs, and in whose words; the same sentence only once.
+def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[None]:
+    """Choose who reads notes while a command runs, and how arguments are named; each note is given once.
+
+    Warnings that a formula is used outside its fit are notes as well.
 
     Examples
     --------
     >>> with notes_for("nobody"):
     ...     note("not even a person at a terminal sees this")
     """
-    global _audience, _phrased, _told
-    before = _audience, _phrased, _told
-    _audience, _phrased, _told = audience, phrased, set()
-    try:
-        yield
-    finally:
-        _audience, _phrased, _told = before
+    global _listener
+
+    def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
+        if issubclass(category, OutsideFit):
+            note(str(message))
+        else:
+            shown(message, category, *place)
+
+    before = _listener
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+        warnings.simplefilter("always", OutsideFit)
+        warnings.showwarning = show  # type: ignore[assignment]
+        _listener = _Listener(audience, spelling, set())
+        try:
+            yield
+        finally:
+            _listener = before
 
 
 class Progress:
@@ -99,7 +118,7 @@ class Progress:
 
     def __init__(self, what: str, total: int, *, show: bool | None = None, done: int = 0) -> None:
         self._what, self._total = what, total
-        self._show = (_audience != "nobody" and sys.stderr.isatty()) if show is None else show
+        self._show = (_listener.audience != "nobody" and sys.stderr.isatty()) if show is None else show
         self._start = time.monotonic()
         self._before = self._done = done
         self._bar: rich.progress.Progress | None = None

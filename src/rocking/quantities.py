@@ -16,7 +16,7 @@ from rocking.motion.formats.units import find_unit
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.tables import decimal
 
-#: What reads one number of an option: its text and the option's name, to SI units.
+#: What reads one number: its text and the name of the argument that it is of, to SI units.
 Quantity = Callable[[str, str], float]
 
 #: Numbers of one range.
@@ -34,97 +34,99 @@ _LENGTHS: Final = {"": 1.0, "m": 1.0, "cm": 0.01}
 _TIMES: Final = {"": 1.0, "s": 1.0}
 
 
-def number(text: str, option: str) -> float:
+def number(text: str, name: str) -> float:
     """Return a number without a unit."""
     value, unit = _parts(text)
     if value is None or unit:
-        raise InvalidOption(f"{{}} takes a number, not {text.strip()!r}", option)
+        raise InvalidOption(f"{{}} takes a number, not {text.strip()!r}", name)
     return value
 
 
-def acceleration(text: str, option: str) -> float:
+def acceleration(text: str, name: str) -> float:
     """Return an acceleration, m/s^2, from "0.5g", "4.9m/s2", "490gal" or "4.9" (m/s^2)."""
     value, spelling = _parts(text)
     unit = find_unit(spelling or "m/s2")
     if value is None or unit is None:
-        raise InvalidOption(f"{{}} takes an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2), not {text.strip()!r}", option)
+        sentence = f"{{}} takes an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2), not {text.strip()!r}"
+        raise InvalidOption(sentence, name)
     return value * unit.multiplier / unit.divisor
 
 
-def angle(text: str, option: str) -> float:
+def angle(text: str, name: str) -> float:
     """Return an angle, rad, from "12deg", "0.2rad" or "0.2" (rad)."""
-    return _in_units(_ANGLES, text, option, "an angle as 12deg or 0.2 (rad)")
+    return _in_units(_ANGLES, text, name, "an angle as 12deg or 0.2 (rad)")
 
 
-def frequency(text: str, option: str) -> float:
+def frequency(text: str, name: str) -> float:
     """Return a frequency, Hz, from "2Hz", "12.6rad/s" or "2" (Hz)."""
-    return _in_units(_FREQUENCIES, text, option, "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
+    return _in_units(_FREQUENCIES, text, name, "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
 
 
-def velocity(text: str, option: str) -> float:
+def velocity(text: str, name: str) -> float:
     """Return a velocity, m/s, from "0.4m/s", "40cm/s" or "0.4" (m/s)."""
-    return _in_units(_VELOCITIES, text, option, "a velocity as 40cm/s or 0.4 (m/s)")
+    return _in_units(_VELOCITIES, text, name, "a velocity as 40cm/s or 0.4 (m/s)")
 
 
-def duration(text: str, option: str) -> float:
+def duration(text: str, name: str) -> float:
     """Return a time, s, from "1.5s" or "1.5"."""
-    return _in_units(_TIMES, text, option, "a time as 1.5 (s)")
+    return _in_units(_TIMES, text, name, "a time as 1.5 (s)")
 
 
-def length(text: str, option: str) -> float:
+def length(text: str, name: str) -> float:
     """Return a positive length, m, from "0.2m", "20cm" or "0.2" (m)."""
-    value = _in_units(_LENGTHS, text, option, "a length as 0.2, 0.2m or 20cm")
+    value = _in_units(_LENGTHS, text, name, "a length as 0.2, 0.2m or 20cm")
     if not value > 0.0:
-        raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", option)
+        raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", name)
     return value
 
 
-def tilt(text: str, option: str) -> float:
+def tilt(text: str, name: str) -> float:
     """Return an angle, rad, as `angle`, of a block that stands: below pi/2, and no degrees without their unit."""
-    value = angle(text, option)
+    value = angle(text, name)
     if abs(value) < 0.5 * math.pi:
         return value
     if abs(value) < 90.0 and not _parts(text)[1]:
         raise InvalidOption(
-            f"{{}} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?", option
+            f"{{}} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?", name
         )
-    raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", option)
+    raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", name)
 
 
-def sides(text: str, option: str, quantity: Quantity = number) -> float | list[float]:
+def sides(text: str, name: str, quantity: Quantity = number) -> float | list[float]:
     """Return one number, or a list of two: side + and side -."""
-    found = [quantity(part, option) for part in text.split(",")]
+    found = [quantity(part, name) for part in text.split(",")]
     if len(found) > 2:
-        raise InvalidOption(f"{{}} takes a number, or two with a comma between (side +, side -), not {text!r}", option)
+        raise InvalidOption(f"{{}} takes a number, or two with a comma between (side +, side -), not {text!r}", name)
     return found[0] if len(found) == 1 else found
 
 
-def bounds(text: str, option: str, quantity: Quantity = number) -> float | tuple[float, ...]:
+def bounds(text: str, name: str, quantity: Quantity = number) -> float | tuple[float, ...]:
     """Return one number, which is known, or two: the lowest and the highest that are thinkable."""
-    found = [quantity(part, option) for part in text.split(",")]
+    found = [quantity(part, name) for part in text.split(",")]
     if len(found) > 2:
         raise InvalidOption(
-            f"{{}} takes a number, if it is known, or two with a comma between, the lowest and the highest thinkable, "
-            f"not {text!r}",
-            option,
+            "{} takes a number, if it is known, or two with a comma between, the lowest and the highest thinkable, not "
+            f"{text!r}",
+            name,
         )
     return found[0] if len(found) == 1 else tuple(found)
 
 
-def values(text: str, option: str, quantity: Quantity = number) -> Floats:
+def values(text: str, name: str, quantity: Quantity = number) -> Floats:
     """Return numbers from "1,2,5" or from "START:STOP:COUNT", with ":log" at the end for equal ratios."""
     parts = text.split(":")
     if len(parts) == 1:
-        return np.array([quantity(part, option) for part in text.split(",")])
+        return np.array([quantity(part, name) for part in text.split(",")])
     if len(parts) not in (3, 4) or not parts[2].strip().isdecimal() or (len(parts) == 4 and parts[3] != "log"):
-        raise InvalidOption(f"{{}} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}", option)
-    start, stop, count = quantity(parts[0], option), quantity(parts[1], option), int(parts[2])
+        raise InvalidOption(f"{{}} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}", name)
+    start, stop, count = quantity(parts[0], name), quantity(parts[1], name), int(parts[2])
     if not 2 <= count <= _MOST:
-        raise InvalidOption(f"{{}} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}", option)
+        sentence = f"{{}} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}"
+        raise InvalidOption(sentence, name)
     if len(parts) == 3:
         return _decimals(np.linspace(start, stop, count))
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
-        raise InvalidOption(f"{{}}: a range with :log needs positive ends, not {text!r}", option)
+        raise InvalidOption(f"{{}}: a range with :log needs positive ends, not {text!r}", name)
     return _decimals(np.geomspace(start, stop, count))
 
 
@@ -169,10 +171,10 @@ def _decimals(numbers: Floats) -> Floats:
     return np.array([decimal(value) for value in numbers])
 
 
-def _in_units(units: Mapping[str, float], text: str, option: str, wanted: str) -> float:
+def _in_units(units: Mapping[str, float], text: str, name: str, wanted: str) -> float:
     value, unit = _parts(text)
     if value is None or unit.lower() not in units:
-        raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", option)
+        raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", name)
     return value * units[unit.lower()]
 
 

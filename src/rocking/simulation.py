@@ -101,7 +101,7 @@ def simulate(
     start["peak"] = start["u"]
     ending, table = _marched(trail, start)
     if ending == state.Ending.BALANCED:
-        raise InvalidOption("the block balances on its corner for ever; give duration= or another initial state")
+        raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
     return Response.from_march(block, motion, model, how, trail, table, start)
 
 
@@ -129,10 +129,13 @@ def _initial_state(rotation: float, velocity: float) -> tuple[int, float, float]
     theta = checks.finite(rotation, "initial_rotation", InvalidOption)
     rate = checks.finite(velocity, "initial_velocity", InvalidOption)
     if abs(rate) > _FASTEST:
-        raise InvalidOption(f"initial_velocity must be at most {_FASTEST:g} rad/s in size, not {rate:g}")
+        sentence = f"{{}} must be at most {_FASTEST:g} rad/s in size, not {rate:g}"
+        raise InvalidOption(sentence, "initial_velocity", value=velocity)
     if abs(theta) >= 0.5 * math.pi:
         raise InvalidOption(
-            f"initial_rotation must be below pi/2 rad in size, not {theta:g}{checks.hint_of_degrees(theta)}"
+            f"{{}} must be below pi/2 rad in size, not {theta:g}{checks.hint_of_degrees(theta)}",
+            "initial_rotation",
+            value=rotation,
         )
     if theta == 0.0 and rate == 0.0:
         return state.AT_REST, 0.0, 0.0

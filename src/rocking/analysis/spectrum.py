@@ -123,12 +123,12 @@ def rocking_spectrum(
     options: dict[str, Any] = {"model": model, "chattering": chattering, "threads": threads, "progress": progress}
     if blocks is not None:
         if alpha is not None or restitution is not None:
-            raise InvalidOption(
-                "blocks have slendernesses and restitutions of their own: leave alpha and restitution out"
-            )
+            sentence = "{} have slendernesses and restitutions of their own: leave {} and {} out"
+            raise InvalidOption(sentence, "blocks", "alpha", "restitution")
         return RockingSpectrum(_ensemble_spectrum(Blocks.of(blocks), weights, motions, p, size, shares, options))
     if alpha is None or weights is not None:
-        raise InvalidOption("give alpha= (slendernesses), or blocks= of an ensemble, which may have weights=")
+        sentence = "give {} (slendernesses), or {} of an ensemble, which may have {}"
+        raise InvalidOption(sentence, "alpha", "blocks", "weights")
     rates = _rates(p, size, gravity)
     axes = {"p": rates, "alpha": checks.positive_numbers(alpha, "alpha", InvalidOption)}
     if restitution is not None:
@@ -467,7 +467,7 @@ def _rates(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> Float
         g = checks.positive(gravity, "gravity", InvalidOption, "m/s^2")
         return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", InvalidOption))
     which = "one of" if p is None else "not both of"
-    raise InvalidOption(f"give {which} p= (rad/s) and size= (half diagonals, m)")
+    raise InvalidOption(f"give {which} {{}} (rad/s) and {{}} (half diagonals, m)", "p", "size")
 
 
 def _shares(fractiles: Sequence[float]) -> Floats:

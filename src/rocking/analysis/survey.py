@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -38,8 +39,8 @@ _SLIDING: Final = named("sliding_time", "s")
 
 
 @dataclass(frozen=True, eq=False)
-class Survey:
-    """Responses of a block to several motions.
+class BlockUnderRecords(ABC):
+    """One block under several motions: a table with a row for each.
 
     Attributes
     ----------
@@ -49,8 +50,6 @@ class Survey:
         Name of each motion.
     responses : tuple of Response
         Response to each.
-    friction : float or None
-        Coefficient of friction at which sliding is looked for.
     skipped : mapping of str to str
         Records that could not be read, and why.
     """
@@ -58,19 +57,63 @@ class Survey:
     block: Block
     records: tuple[str, ...]
     responses: tuple[Response, ...]
-    friction: float | None = None
-    skipped: Mapping[str, str] = field(default_factory=dict)
+    skipped: Mapping[str, str] = field(default_factory=dict, kw_only=True)
 
+    @abstractmethod
     def rows(self) -> list[dict[str, Any]]:
         """Return what became of the block under each record; units are in the names."""
-        labels = record_columns(self.records, [motion_of(response) for response in self.responses])
-        block = block_columns(self.block)
-        each = zip(labels, self.responses, strict=True)
-        return [label | block | _row(response) | self._sliding(response) for label, response in each]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table for machines."""
+        return {"block": str(self.block), "records": self.rows(), "skipped": dict(self.skipped)}
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the table as a data frame, with a row for each record that could not be read."""
         return frame_of(self.rows(), self.skipped)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the table as text columns with a header.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        """
+        frame = self.to_dataframe()
+        write_text(path, frame.to_csv(index=False, float_format="%.15g", lineterminator="\n"))
+
+    def _labels(self) -> list[dict[str, Any]]:
+        """First columns of each row: the record, its motion, the block."""
+        columns = block_coordinates(Blocks.of(self.block))
+        numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
+        labels = record_columns(self.records, [motion_of(response) for response in self.responses])
+        return [{**label, "block": self.block.description, **numbers} for label in labels]
+
+    def _count(self) -> str:
+        """Say under how many records the block overturns."""
+        overturned = sum(response.overturned for response in self.responses)
+        return f"{self.block.description}: {counted(len(self.records), 'record')}, overturned by {overturned}"
+
+
+@dataclass(frozen=True, eq=False)
+class Survey(BlockUnderRecords):
+    """Responses of a block to several motions; from `survey`.
+
+    Attributes
+    ----------
+    friction : float or None
+        Coefficient of friction at which sliding is looked for.
+    block, records, responses, skipped
+        As in `BlockUnderRecords`.
+
+    """
+
+    friction: float | None = None
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return what became of the block under each record; units are in the names."""
+        each = zip(self._labels(), self.responses, strict=True)
+        return [label | _row(response) | self._sliding(response) for label, response in each]
 
     def summary(self) -> str:
         """Return the table for people."""
@@ -85,13 +128,10 @@ class Survey:
         return f"{self._count()}\n\n{table}"
 
     def _count(self) -> str:
-        """Say under how many records the block overturns."""
-        overturned = sum(response.overturned for response in self.responses)
         undecided = sum(response.stopped or response.unfinished for response in self.responses)
-        count = "1 record" if len(self.records) == 1 else f"{len(self.records)} records"
         known = f", not decided under {undecided}" if undecided else ""
         unread = f"; {counted(len(self.skipped), 'record')} skipped" if self.skipped else ""
-        return f"{self.block.description}: {count}, overturned by {overturned}{known}{unread}"
+        return super()._count() + known + unread
 
     def __repr__(self) -> str:
         return f"<Survey: {self._count()}>"
@@ -131,12 +171,11 @@ class Survey:
         OutputError
             If they cannot be written.
         """
-        frame = self.to_dataframe()
-        digits: dict[str, Any] = {"index": False, "float_format": "%.15g"}
-        write_text(folder / "summary.csv", frame.to_csv(lineterminator="\n", **digits))
+        self.to_csv(folder / "summary.csv")
         try:
             workbook = io.BytesIO()
-            frame.to_excel(workbook, sheet_name="summary", freeze_panes=(1, 0), **digits)
+            table = self.to_dataframe()
+            table.to_excel(workbook, sheet_name="summary", freeze_panes=(1, 0), index=False, float_format="%.15g")
             write_bytes(folder / "summary.xlsx", workbook.getvalue())
         except ImportError:
             note("no summary.xlsx: install rocking[excel] for a workbook; summary.csv holds the same table")
@@ -173,7 +212,9 @@ def survey(
     Raises
     ------
     InvalidOption
-        As for `rocking.simulate`.
+        As for `rocking.simulate`, or if there is no motion.
+    InvalidMotion
+        If a motion is anything else.
 
     Examples
     --------
@@ -187,6 +228,7 @@ def survey(
     named_motions = motions_by_name(motions)
     if friction is not None:
         friction_coefficient(friction)
+    named_motions = motions_by_name(motions)
     responses = []
     with Progress("simulating", total=len(named_motions), show=progress) as bar:
         for motion in named_motions.values():
@@ -203,13 +245,6 @@ def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[di
         {"record": record, "motion": names[k], **{name: column[1][k] for name, column in verticals.items()}}
         for k, record in enumerate(records)
     ]
-
-
-def block_columns(block: Block) -> dict[str, Any]:
-    """Describe a block in the columns of a table."""
-    columns = block_coordinates(Blocks.of(block))
-    numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
-    return {"block": block.description, **numbers}
 
 
 def motion_of(response: Response) -> Motion:

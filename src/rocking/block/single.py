@@ -152,8 +152,10 @@ class Block:
         s = checks.finite(offset, "offset", InvalidBlock)
         if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
             raise InvalidBlock(
-                f"offset must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}: of a block with its mass "
-                "farther out the pivots and the radius of gyration must be given"
+                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}: of a block with its mass "
+                "farther out the pivots and the radius of gyration must be given",
+                "offset",
+                value=offset,
             )
         if s == 0.0:
             alpha, radius = math.atan2(b, h), math.hypot(b, h)
@@ -562,7 +564,8 @@ def _half_sizes(
     if given == [False, False, True, True]:
         return 0.5 * _length(full[0], "width"), 0.5 * _length(full[1], "height")
     raise InvalidBlock(
-        "a block takes either half_width and half_height, or width and height (the full sizes), all in m"
+        "a block takes either {} and {}, or {} and {} (the full sizes), all in m",
+        *("half_width", "half_height", "width", "height"),
     )
 
 
@@ -574,7 +577,8 @@ def _angle(value: object) -> float:
     number = checks.positive(value, "alpha", InvalidBlock, "rad")
     if number >= ALPHA.high:
         hint = checks.hint_of_degrees(number)
-        raise InvalidBlock(f"alpha must be below pi/2 rad for a block that can stand, not {number:g}{hint}")
+        sentence = f"{{}} must be below pi/2 rad for a block that can stand, not {number:g}{hint}"
+        raise InvalidBlock(sentence, "alpha", value=value)
     return within(number, "alpha", ALPHA, "rad")
 
 
@@ -583,7 +587,8 @@ def _pair(value: Any, name: str) -> tuple[object, object]:
         return value, value
     values = tuple(value)
     if len(values) != 2:
-        raise InvalidBlock(f"{name} must be a number or a pair (side +, side -), not {len(values)} values")
+        sentence = f"{{}} must be a number or a pair (side +, side -), not {len(values)} values"
+        raise InvalidBlock(sentence, name, value=value)
     return values[0], values[1]
 
 
@@ -599,7 +604,8 @@ def _restitutions(given: object, default: Sequence[float], mend: str = "") -> tu
         if min(default) <= 0.0:
             raise InvalidBlock(
                 f"conserving angular momentum gives this block a restitution of {min(default):.3g}: it is too stocky "
-                f"to rock that way; {mend}give restitution= a value in (0, 1]"
+                f"to rock that way; {mend}give {{}} a value in (0, 1]",
+                "restitution",
             )
         return default[0], default[1]
     plus, minus = (

@@ -1,12 +1,15 @@
-"""What the commands share: whether there is one record, and delivering what came out."""
+"""What the commands share: a folder for what came out, writing into it, and printing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from rocking.errors import OutputError
+from rocking.progress import note
 from rocking.result import Result
 from rocking.tables import to_json, write_figure, write_text
 
@@ -20,27 +23,8 @@ if TYPE_CHECKING:
 _DOTS_PER_INCH: Final = 160
 
 
-def is_single(names: Sequence[str], records: Sized) -> bool:
-    """Whether one record or pulse is named by itself, and no folder or pattern that happens to hold one."""
-    return (
-        len(names) == len(records) == 1 and not any(sign in names[0] for sign in "*?[") and not Path(names[0]).is_dir()
-    )
-
-
-def write(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, Any]) -> None:
-    """Write figures by name (PNG and PDF) and a result (JSON) into a folder.
-
-    Raises
-    ------
-    OutputError
-        If one of them cannot be written.
-    """
-    write_figures(folder, figures)
-    write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
-
-
-def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
-    """Write figures by name (PNG and PDF) into a folder.
+def write(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, Any] | None = None) -> None:
+    """Write figures by name (PNG and PDF) and, if there is one, a result (JSON) into a folder.
 
     Raises
     ------
@@ -50,6 +34,8 @@ def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
     for stem, figure in figures.items():
         write_figure(folder / f"{stem}.png", figure, dpi=_DOTS_PER_INCH)
         write_figure(folder / f"{stem}.pdf", figure)
+    if result is not None:
+        write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
 
 
 def deliver(
@@ -89,3 +75,41 @@ def show(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | 
     print(text)
     if folder is not None:
         print(f"\nwritten to {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+
+
+@contextmanager
+def output_folder(folder: Path) -> Iterator[Path]:
+    """Make a folder for results, and note which files were replaced; on failure, remove what was made and is empty.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made or written to.
+    """
+    made = [each for each in (folder, *folder.parents) if not each.exists()]
+    before = _written_at(folder)
+    probe = folder / ".rocking-can-write"
+    try:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            probe.touch()
+            probe.unlink()
+        except OSError as error:
+            sentence = f"this folder cannot be written to: {error.strerror}; choose another {{}}"
+            raise OutputError(sentence, "out", path=str(folder)) from error
+        yield folder
+        now = _written_at(folder)
+        replaced = [name for name, time in before.items() if now.get(name, time) != time]
+        if replaced:
+            note(f"replaced in {folder}: {', '.join(replaced)}")
+    except BaseException:
+        with suppress(OSError):
+            for each in made:
+                each.rmdir()
+        raise
+
+
+def _written_at(folder: Path) -> dict[str, int]:
+    """Return the times, ns, at which the files in a folder and below it were written, by their names in it."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else []
+    return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in files}

@@ -51,6 +51,6 @@ def chatter(
             text += f"\n\n{report.table()}"
             result = {**result, "asymptotic_table": report.cycle_rows()}
         if folder is not None:
-            batch.write_figures(folder, {"chatter": report.plot()})
+            batch.write(folder, figures={"chatter": report.plot()})
             report.write(folder)
         batch.show(result, text, as_json=output.as_json, folder=folder)

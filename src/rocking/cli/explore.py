@@ -67,6 +67,7 @@ def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
     try:
         key = explorer.shelf.put(file.name, file.read_bytes())
     except OSError as error:
-        raise UnreadableRecord(f"{motion}: this file could not be read ({error.strerror}); check the name") from None
+        sentence = f"this file could not be read ({error.strerror}); check the name"
+        raise UnreadableRecord(sentence, path=motion) from None
     explorer.shelf.contents(key)
     return {"motion": f"file:{key}"}

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple
 
 from cyclopts import Group, Parameter
 
-from rocking.cli.wording import with_options
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, RockingError, UnreadableRecord
+from rocking.cli.batch import output_folder
+from rocking.cli.wording import option_of
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.motion.scaling import IntensityName, Measure
@@ -25,22 +27,23 @@ from rocking.treatment.base import Model
 if TYPE_CHECKING:
     from rocking.block import Block
 
-#: Options that say what a block is, together, and what may go with them.
-#: What a message about a record file may name.
-_OF_FILES: Final = frozenset({"--channel", "--dt", "--units"})
-
-_SIZES: Final = ("--width", "--height")
-_HALVES: Final = ("--half-width", "--half-height")
-_PARAMETERS: Final = ("--p", "--alpha")
-_PIVOTS: Final = ("--pivots", "--height-of-mass", "--gyration")
+#: What describes a block, together, and what may go with it.
 _Descriptions = Mapping[tuple[str, ...], tuple[str, ...]]
-_DESCRIPTIONS: Final[_Descriptions] = {_SIZES: ("--offset",), _HALVES: ("--offset",), _PARAMETERS: (), _PIVOTS: ()}
+_DESCRIPTIONS: Final[_Descriptions] = {
+    ("width", "height"): ("offset",),
+    ("half_width", "half_height"): ("offset",),
+    ("p", "alpha"): (),
+    ("pivots", "height_of_mass", "gyration"): (),
+}
 
 #: What goes with a slenderness that is all that is known of a block.
 _FREQUENCY_PARAMETER: Final = (
     "p is sqrt(3 g/(4 R)) of a rectangular block, with the distance R from its edge to its centre of mass; the mass "
     "alone does not matter"
 )
+
+#: What a message about a record file may name.
+_OF_FILES: Final = ("channel", "dt", "units")
 
 #: Spread over the command's own options, each group under its own heading in the help.
 BLOCK: Final = Parameter(name="*", group=Group("Block", sort_key=1))
@@ -56,7 +59,7 @@ Names = Annotated[
         name="RECORDS",
         allow_leading_hyphen=True,
         help="Record files, folders, patterns (*.AT2), names of shipped records (see rocking records), or - for "
-        "standard input. A file's format is told from its content.",
+        "standard input. A file's format is recognised by its content.",
     ),
 ]
 
@@ -112,46 +115,36 @@ class BlockOptions:
 
     def block(self) -> Block:
         """Return the block, with notes on what looks like a mistake."""
-        e = None if self.restitution is None else sides(self.restitution, "--restitution")
-        block = self._block(e)
+        from rocking.block import Block
+
+        e = None if self.restitution is None else sides(self.restitution, "restitution")
+        given = self.given()
+        complete = [each for each, more in self._TAKEN.items() if {*each} <= given.keys() <= {*each, *more}]
+        if not complete:
+            raise _which_block(tuple(given), self._TAKEN)
+        if "pivots" in given:
+            distances = sides(given["pivots"], "pivots", length)
+            height, gyration = (length(given[name], name) for name in ("height_of_mass", "gyration"))
+            pair = [distances] * 2 if isinstance(distances, float) else distances
+            block = Block.from_pivots(pair, height, gyration, restitution=e)
+        elif self.alpha is not None:
+            alpha = sides(self.alpha, "alpha", tilt)
+            if self.p is None and e is None and isinstance(alpha, list):
+                raise InvalidBlock(
+                    "the restitution of two different sides follows from {} and {} of both: give {}, too",
+                    *("p", "alpha", "p"),
+                )
+            block = Block.from_parameters(1.0 if self.p is None else sides(self.p, "p"), alpha, e)
+        else:
+            block = Block(**given, restitution=e)
         for sentence in block_notes(block):
             note(sentence)
         return block
 
-    def _block(self, e: float | list[float] | None) -> Block:
-        from rocking.block import Block
-
-        given = self.given()
-        described = next(
-            (all_ for all_, more in self._TAKEN.items() if {*all_} <= given.keys() <= {*all_, *more}), None
-        )
-        if described is None:
-            raise InvalidBlock(_which_block(tuple(given), self._TAKEN))
-        if described in (_SIZES, _HALVES):
-            return Block(
-                half_width=self.half_width,
-                half_height=self.half_height,
-                width=self.width,
-                height=self.height,
-                offset=self.offset or 0.0,
-                restitution=e,
-            )
-        if described == _PIVOTS:
-            distances = sides(given["--pivots"], "--pivots", length)
-            height, gyration = (length(given[option], option) for option in _PIVOTS[1:])
-            pair = [distances] * 2 if isinstance(distances, float) else distances
-            return Block.from_pivots(pair, height, gyration, restitution=e)
-        return Block.from_parameters(self._p(), sides(given["--alpha"], "--alpha", tilt), e)
-
-    def _p(self) -> float | list[float]:
-        assert self.p is not None
-        return sides(self.p, "--p")
-
     def given(self) -> dict[str, Any]:
-        """Return what is given of the block, by option, in the order of the descriptions."""
-        options = dict.fromkeys(option for each in _DESCRIPTIONS.items() for options in each for option in options)
-        values = {option: getattr(self, option.removeprefix("--").replace("-", "_")) for option in options}
-        return {option: value for option, value in values.items() if value is not None}
+        """Return what is given of the block, in the order of the descriptions."""
+        names = dict.fromkeys(name for each in _DESCRIPTIONS.items() for names in each for name in names)
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
 @dataclass(frozen=True)
@@ -159,32 +152,31 @@ class SlendernessOptions(BlockOptions):
     """A block, of which the slenderness alone may be given: p is then 1."""
 
     _TAKEN: ClassVar[_Descriptions] = {
-        ("--alpha",) if options == _PARAMETERS else options: ("--p",) if options == _PARAMETERS else more
-        for options, more in _DESCRIPTIONS.items()
+        ("alpha",) if "alpha" in needed else needed: ("p",) if "alpha" in needed else more
+        for needed, more in _DESCRIPTIONS.items()
     }
 
-    def _p(self) -> float | list[float]:
-        if self.p is not None:
-            return super()._p()
-        if self.restitution is None and isinstance(sides(self.alpha or "", "--alpha", tilt), list):
-            raise InvalidBlock("the restitution of two different sides follows from p and alpha of both: give p, too")
-        return 1.0
 
-
-def _which_block(given: Sequence[str], descriptions: _Descriptions) -> str:
-    """Say what is missing of a block, or which of the options that are given belong to different descriptions of it."""
-    having = {options: {*options, *more} for options, more in descriptions.items() if {*options, *more} & {*given}}
-    begun = [options for options in having if {*options} & {*given}] or [*having]
-    if any(not {*given} <= having[options] for options in begun):
-        return f"{' and '.join(given)} belong to different descriptions of a block; give one: {_choices([*having])}"
+def _which_block(given: Sequence[str], descriptions: _Descriptions) -> InvalidBlock:
+    """Return the error that says what is missing of a block, or what belongs to different descriptions of it."""
+    having = {needed: {*needed, *more} for needed, more in descriptions.items() if {*needed, *more} & {*given}}
+    begun = [needed for needed in having if {*needed} & {*given}] or [*having]
+    if any(not {*given} <= having[needed] for needed in begun):
+        sentence = f"{_all_of(given)} belong to different descriptions of a block; give one: {_one_of(having)}"
+        return InvalidBlock(sentence, *given, *chain(*having))
     if begun:
-        hint = "" if given != ("--alpha",) or "--p" not in begun[0] else f"; {_FREQUENCY_PARAMETER}"
-        return f"a block needs more than {' and '.join(given)}: give {_choices(begun)}{hint}"
-    return f"a block is needed: give {_choices([*descriptions])}"
+        hint = f"; {_FREQUENCY_PARAMETER}" if given == ("alpha",) and "p" in begun[0] else ""
+        sentence = f"a block needs more than {_all_of(given)}: give {_one_of(begun)}{hint}"
+        return InvalidBlock(sentence, *given, *chain(*begun))
+    return InvalidBlock(f"a block is needed: give {_one_of(descriptions)}", *chain(*descriptions))
 
 
-def _choices(descriptions: Sequence[Sequence[str]]) -> str:
-    return ", or ".join(" and ".join(options) for options in descriptions)
+def _all_of(names: Sequence[str]) -> str:
+    return " and ".join(["{}"] * len(names))
+
+
+def _one_of(descriptions: Iterable[Sequence[str]]) -> str:
+    return ", or ".join(map(_all_of, descriptions))
 
 
 @dataclass(frozen=True)
@@ -202,7 +194,7 @@ class EnsembleOptions(BlockOptions):
             return {"blocks": self.block(), "model": model.model}
         given = self.given()
         if given:
-            raise InvalidBlock(f"--ensemble has blocks of its own: leave {' and '.join(given)} out")
+            raise InvalidBlock(f"{{}} has blocks of its own: leave {_all_of([*given])} out", "ensemble", *given)
         return ensemble_of(self.ensemble, model)
 
 
@@ -236,30 +228,27 @@ class FileOptions:
 
 def refusal(name: str, error: RockingError) -> str:
     """Return why a record cannot be read, with its name, in the words of the command line."""
-    spelled = error.text(lambda argument: f"--{argument}" if f"--{argument}" in _OF_FILES else argument)
-    sentence = spelled if name in spelled else f"{name}: {spelled}"
-    return with_options(sentence, _OF_FILES, _OF_FILES)
+    reason = error.text(lambda argument: option_of(argument) if argument in _OF_FILES else argument)
+    return reason if error.path == name else f"{name}: {reason}"
 
 
-def _acceleration(text: str, option: str) -> float:
+def _acceleration(text: str, name: str) -> float:
     """Return an acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
-    value = acceleration(text, option)
+    value = acceleration(text, name)
     if not value > 0.0:
-        raise InvalidOption(f"{option} must be above 0, not {text.strip()}; --scale -1 reverses a motion")
-    for sentence in level_notes(text, value, option):
+        raise InvalidOption(f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale")
+    for sentence in level_notes(text, value, name):
         note(sentence)
     return value
 
 
-def _ratio(text: str, option: str) -> float:
+def _ratio(text: str, name: str) -> float:
     """Return a level of a measure in the block's own units."""
     try:
-        return number(text, option)
+        return number(text, name)
     except InvalidOption:
-        raise InvalidOption(
-            f"{option} takes plain numbers with this --measure, which counts in the block's own units, "
-            f"not {text.strip()!r}"
-        ) from None
+        sentence = "{} takes plain numbers with this {}, which counts in the block's own units, not "
+        raise InvalidOption(sentence + repr(text.strip()), name, "measure") from None
 
 
 @dataclass(frozen=True)
@@ -346,10 +335,13 @@ class Records(NamedTuple):
         Motions by the names that were asked for.
     skipped : dict of str to str
         Why records could not be read.
+    single : bool
+        Whether one record or pulse was named by itself, and no folder or pattern that happens to hold one.
     """
 
     motions: dict[str, Motion]
     skipped: dict[str, str]
+    single: bool
 
     def to_dict(self) -> dict[str, Any]:
         """Return for machines what stands for each record in other tables, and what was skipped."""
@@ -376,7 +368,8 @@ class RecordOptions(PulseOptions):
         records = expanded(names)
         if not records and not self.pulse:
             raise InvalidOption(
-                "give one record or more: files, folders, or names of shipped records (see rocking records), or --pulse"
+                "give one record or more: files, folders, or names of shipped records (see rocking records), or {}",
+                "pulse",
             )
         pulses = self.pulses()
         motions: dict[str, Motion] = {}
@@ -396,7 +389,9 @@ class RecordOptions(PulseOptions):
             )
         for reason in skipped.values():
             note(f"skipped: {reason}")
-        return Records(motions | pulses, skipped)
+        motions |= pulses
+        single = [*motions] == [*names, *self.pulse] and len(motions) == 1
+        return Records(motions, skipped, single)
 
 
 @dataclass(frozen=True)
@@ -437,7 +432,7 @@ class MeasureOptions:
 
     def chosen(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        levels = None if self.levels is None else values(self.levels, "--levels", self._quantity())
+        levels = None if self.levels is None else values(self.levels, "levels", self._quantity())
         return {"measure": self.wanted, "levels": levels}
 
     @property
@@ -485,7 +480,7 @@ class TreatmentOptions(ModelOptions):
         """Return model and treatment as arguments."""
         from rocking.treatment import treatment
 
-        return {"model": self.model, "chattering": treatment(self.chattering)}
+        return {"model": self.equation or "nonlinear", "chattering": treatment(self.chattering)}
 
 
 @dataclass(frozen=True)
@@ -508,48 +503,6 @@ class OutputOptions(PrintOptions):
 
     out: Annotated[Path | None, _help("Folder for the files: figures, tables, result.json.")] = None
 
-    @contextlib.contextmanager
-    def folder(self) -> Iterator[Path | None]:
+    def folder(self) -> AbstractContextManager[Path | None]:
         """Make the folder, if one is wanted, before the work; on failure, remove it again where it is empty."""
-        if self.out is None:
-            yield None
-            return
-        with output_folder(self.out) as folder:
-            yield folder
-
-
-@contextlib.contextmanager
-def output_folder(folder: Path) -> Iterator[Path]:
-    """Make a folder for results, and tell which files were replaced; on failure, remove what was made and is empty.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be made or written to.
-    """
-    made = [each for each in (folder, *folder.parents) if not each.exists()]
-    before = _written_at(folder)
-    probe = folder / ".rocking-can-write"
-    try:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            probe.touch()
-            probe.unlink()
-        except OSError as error:
-            raise OutputError(f"{folder} cannot be written to: {error.strerror}; choose another --out") from error
-        yield folder
-        now = _written_at(folder)
-        replaced = [name for name, time in before.items() if now.get(name, time) != time]
-        if replaced:
-            note(f"replaced in {folder}: {', '.join(replaced)}")
-    except BaseException:
-        with contextlib.suppress(OSError):
-            for each in made:
-                each.rmdir()
-        raise
-
-
-def _written_at(folder: Path) -> dict[str, int]:
-    """Return the times, ns, at which the files in a folder and below it were written, by their names in it."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else []
-    return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in files}
+        return nullcontext() if self.out is None else output_folder(self.out)

@@ -9,7 +9,8 @@ from typing import Annotated
 from cyclopts import Group, Parameter
 
 from rocking.chattering.paper import FIGURES, paper_figure
-from rocking.cli.options import OUTPUT, QuietOptions, output_folder
+from rocking.cli import batch
+from rocking.cli.options import OUTPUT, QuietOptions
 from rocking.errors import InvalidOption
 from rocking.quantities import angle
 
@@ -53,7 +54,7 @@ def paper(
     if parameters and figure is None:
         options = " and ".join(f"--{name}" for name in parameters)
         raise InvalidOption(f"with {options} one figure is drawn: say which with --figure")
-    with output_folder(out) as folder:
+    with batch.output_folder(out) as folder:
         for number in FIGURES if figure is None else [figure]:
             drawn = paper_figure(number, **parameters)
             print(drawn.caption)

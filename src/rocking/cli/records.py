@@ -1,19 +1,23 @@
-"""`rocking records`: the shipped records, or what a record file holds."""
+"""`rocking records` and `rocking pulses`: what may shake a block."""
 
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Final
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
 
 from rocking.cli.options import OUTPUT, RECORDS, FileOptions, Names, PrintOptions, refusal
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion.named import STANDARD_INPUT, Contents, contents, expanded, is_shipped, refuse_what_is_known, shipped
+from rocking.named_pulses import FAMILIES, Family
 from rocking.plausibility import reading_notes
 from rocking.progress import Progress, note
-from rocking.tables import to_json
+from rocking.tables import text_table, to_json
 
 #: Names of files in one sentence.
 _SHOWN: Final = 5
+
+_EXAMPLE = "rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1"
 
 
 def records(
@@ -60,3 +64,26 @@ def _contents(name: str, file: FileOptions, *, several: bool) -> Contents:
         for sentence in reading_notes(motion):
             note(f"{name}, channel {entry['channel']}: {sentence}")
     return found
+
+
+def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
+    """List the pulses that --pulse takes, with their parameters and, where they need not be given, their defaults."""
+    families = FAMILIES.values()
+    if output.as_json:
+        units = [{name: one.unit(name) for name in (*one.needed, *one.optional)} for one in families]
+        known = [{"name": one.name, "needs": one.needed, "takes": one.optional} for one in families]
+        print(to_json({"pulses": [one | {"units": of_one} for one, of_one in zip(known, units, strict=True)]}))
+        return
+    rows = [(one.name, _listed(one, dict.fromkeys(one.needed)), _listed(one, one.optional)) for one in families]
+    print(text_table(["pulse", "needs", "takes"], rows))
+    print(f"\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:\n{_EXAMPLE}")
+
+
+def _listed(family: Family, parameters: Mapping[str, Any]) -> str:
+    """Return parameters of a pulse with their units and defaults."""
+    units = {name: f" ({family.unit(name)})" if family.unit(name) else "" for name in parameters}
+    defaults = {
+        name: "" if value is None else f" = {value:g}" if isinstance(value, float) else f" = {value}"
+        for name, value in parameters.items()
+    }
+    return ", ".join(name + units[name] + defaults[name] for name in parameters)

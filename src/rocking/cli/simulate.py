@@ -1,4 +1,4 @@
-"""`rocking simulate`: one block under one record, or under many."""
+"""`rocking simulate` and `rocking check`: one block under one record, or under many."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rocking.analysis.survey import Survey, survey
+from rocking.analysis.rules.check import check as apply_rules
+from rocking.analysis.survey import survey
 from rocking.cli import batch
 from rocking.cli.options import (
     BLOCK,
@@ -16,6 +17,7 @@ from rocking.cli.options import (
     OUTPUT,
     RECORDS,
     BlockOptions,
+    ModelOptions,
     MotionOptions,
     Names,
     OutputOptions,
@@ -72,48 +74,68 @@ def simulate(
     options: dict[str, Any] = {
         **model.chosen(),
         "duration": start.duration,
-        "initial_rotation": tilt(start.initial_rotation, "--initial-rotation"),
+        "initial_rotation": tilt(start.initial_rotation, "initial_rotation"),
         "initial_velocity": start.initial_velocity,
     }
     if each and output.out is None:
-        raise InvalidOption("--each writes files; name the folder for them with --out")
+        raise InvalidOption("{} writes files; name the folder for them with {}", "each", "out")
     with output.folder() as folder:
-        motions, skipped = motion.read_all(names)
-        if batch.is_single((*names, *motion.pulse), motions):
-            ((record, shaking),) = motions.items()
-            _deliver(run(body, shaking, **options), record, folder, friction=start.friction, as_json=output.as_json)
+        read = motion.read_all(names)
+        if read.single:
+            ((record, shaking),) = read.motions.items()
+            response = run(body, shaking, **options)
+            result, text = _result(response, record, start.friction, folder), response.summary(start.friction)
         else:
-            found = survey(body, motions, friction=start.friction, **options)
-            _deliver_all(replace(found, skipped=skipped), folder, each=each, as_json=output.as_json)
+            found = replace(survey(body, read.motions, friction=start.friction, **options), skipped=read.skipped)
+            if folder is not None:
+                found.write(folder)
+            if folder is not None and each:
+                for name, record, response in zip(found.folders(), found.records, found.responses, strict=True):
+                    (folder / name).mkdir(exist_ok=True)
+                    _result(response, record, start.friction, folder / name)
+            result, text = found.to_dict(), found.summary()
+        batch.show(result, text, as_json=output.as_json, folder=folder)
 
 
-def _deliver(response: Response, record: str, folder: Path | None, *, friction: float | None, as_json: bool) -> None:
-    result = _result(response, record, friction)
-    if folder is not None:
-        _write(response, result, folder)
-    batch.show(result, response.summary(friction), as_json=as_json, folder=folder)
-
-
-def _deliver_all(found: Survey, folder: Path | None, *, each: bool, as_json: bool) -> None:
-    if folder is not None:
-        found.write(folder)
-    if folder is not None and each:
-        for name, record, response in zip(found.folders(), found.records, found.responses, strict=True):
-            (folder / name).mkdir(exist_ok=True)
-            _write(response, _result(response, record, found.friction), folder / name)
-    batch.show(found.to_dict(), found.summary(), as_json=as_json, folder=folder)
-
-
-def _result(response: Response, record: str, friction: float | None) -> dict[str, Any]:
-    """Return the result, whose motion is named by the record that was read, too, as in tables of many."""
+def _result(response: Response, record: str, friction: float | None, folder: Path | None) -> dict[str, Any]:
+    """Return the result, and write it with figures, histories and events into a folder where there is one."""
     result = response.to_dict(friction)
-    return result | {"motion": {"record": record, **result["motion"]}}
+    # Its motion is named by the record that was read, too, as in tables of many.
+    result |= {"motion": {"record": record, **result["motion"]}}
+    if folder is not None:
+        response.to_csv(folder / "response.csv")
+        response.to_csv(folder / "events.csv", "events")
+        response.to_csv(folder / "impacts.csv", "impacts")
+        response.to_netcdf(folder / "response.nc")
+        batch.write(folder, figures={"response": response.plot()}, result=result)
+    return result
 
 
-def _write(response: Response, result: dict[str, Any], folder: Path) -> None:
-    """Write figure, histories, events and result into a folder."""
-    response.to_csv(folder / "response.csv")
-    response.to_csv(folder / "events.csv", "events")
-    response.to_csv(folder / "impacts.csv", "impacts")
-    response.to_netcdf(folder / "response.nc")
-    batch.write(folder, figures={"response": response.plot()}, result=result)
+def check(
+    *names: Names,
+    rules: str | None = None,
+    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
+    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
+    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Say of each record what rules of thumb make of a block, and what it really does.
+
+    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Numbers are
+    demand over capacity: from 1 on the block overturns. --out holds check.csv and result.json.
+
+    Parameters
+    ----------
+    rules
+        Some of west,ishiyama,housner,asce_43_05,priestley; by default all.
+    """
+    body = block.block()
+    chosen = None if rules is None else [name.strip() for name in rules.split(",")]
+    with output.folder() as folder:
+        read = motion.read_all(names)
+        found = replace(apply_rules(body, read.motions, rules=chosen, model=model.model), skipped=read.skipped)
+        result = found.to_dict()
+        if folder is not None:
+            found.to_csv(folder / "check.csv")
+            batch.write(folder, figures={}, result=result)
+        batch.show(result, found.summary(), as_json=output.as_json, folder=folder)

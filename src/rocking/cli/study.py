@@ -13,7 +13,6 @@ from cyclopts import App, Parameter
 import rocking
 from rocking import checks
 from rocking.cli import batch
-from rocking.cli.options import output_folder
 from rocking.errors import InvalidOption, OutputError, StudyError
 from rocking.progress import note
 from rocking.studies.cluster import local_executor, scheduler_executor
@@ -176,7 +175,7 @@ def report(
     found = rocking.study(folder)
     if out is None and "://" in folder:
         raise InvalidOption(f"{folder} is no folder for figures and tables: name one as well")
-    with output_folder(out or Path(folder) / "report") as target:
+    with batch.output_folder(out or Path(folder) / "report") as target:
         made = found.report()
         for name, one in made.items():
             one.to_csv(target / f"{name}.csv")

@@ -418,7 +418,7 @@ def _facts(shown: Shown) -> dict[str, Any]:
             "symmetric": block.is_symmetric,
             "thresholds_g": [each / gravity for each in block.uplift_thresholds(case.model)],
             "outline": _outline(block),
-            "notes": list(block_notes(block)),
+            "notes": [*map(str, block_notes(block))],
         },
         "motion": None if motion is None else _motion_facts(motion, gravity),
         "model": case.model,

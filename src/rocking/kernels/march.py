@@ -1,6 +1,7 @@
 """The whole response of one block to one motion: rest, uplift, arc, impact, and so on to the end."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +54,7 @@ def march(ground: Ground, block: Record, rules: Record, table: Records, scratch:
 
 
 @inlined
-def march_step(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> Ending:
+def march_step(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> Any:
     """One iteration of a march: to the next uplift of a block at rest, or along an arc to its first event."""
     write_node(ground, rules, table, state)
     if state.side == AT_REST:

@@ -74,13 +74,14 @@ class AsymptoticTime(Treatment):
         """Chattering time of every side, s; infinite where chattering is not complete."""
         if motion is None or motion.description.family != "sine":
             raise InvalidOption(
-                'chattering="time" is the scheme for sinusoidal motions (rocking.pulses.sine), not for '
-                f'{"free rocking" if motion is None else motion.description.family}; use "certified"'
+                '{} "time" is the scheme for sinusoidal motions (rocking.pulses.sine), not for '
+                f'{"free rocking" if motion is None else motion.description.family}; use "certified"',
+                "chattering",
             )
         if motion.vertical is not None:
-            raise InvalidOption('chattering="time" knows no vertical motion; use "certified"')
+            raise InvalidOption('{} "time" knows no vertical motion; use "certified"', "chattering")
         if not blocks.is_symmetric:
-            raise InvalidOption('chattering="time" is for symmetric blocks; use "certified"')
+            raise InvalidOption('{} "time" is for symmetric blocks; use "certified"', "chattering")
         parameters = motion.description.parameters
         threshold = blocks.alpha if model == "linear" else np.tan(blocks.alpha)
         amplitude = abs(factor * parameters["amplitude"]) / (blocks.gravity * threshold)

@@ -90,10 +90,12 @@ def treatment(chattering: str | Treatment) -> Treatment:
     name, given, value = chattering.partition("=") if isinstance(chattering, str) else ("", "", "")
     if name not in _BY_NAME:
         kinds = "" if isinstance(chattering, str) else " or a treatment"
-        raise InvalidOption(f"chattering must be one of {', '.join(_BY_NAME)}{kinds}, not {chattering!r}")
+        sentence = f"{{}} must be one of {', '.join(_BY_NAME)}{kinds}, not {chattering!r}"
+        raise InvalidOption(sentence, "chattering", value=chattering)
     if not given:
         return _BY_NAME[name]()
     try:
         return _BY_NAME[name].from_text(value)
     except InvalidOption as error:
-        raise InvalidOption(f'chattering="{chattering}": {error}') from None
+        sentence = f'{{}} "{chattering}": {error.message.template}'
+        raise InvalidOption(sentence, "chattering", *error.message.arguments) from None

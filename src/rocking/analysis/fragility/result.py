@@ -22,9 +22,9 @@ from rocking.analysis.survival import Survival
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, Message
 from rocking.motion.scaling import Measure
-from rocking.progress import phrased
+from rocking.progress import spelled
 from rocking.tables import counted, text_table
 from rocking.treatment.base import Model
 
@@ -106,7 +106,7 @@ class Fragility(Tabled):
         if self.one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
-                + phrased('polarity="both" counts both')
+                + spelled(Message('{} "both" counts both', ("polarity",)))
             )
         if not self.curves[0].bounded:
             notes.append(f"intervals and bands go from 0 to infinity: {self._too_few()}")

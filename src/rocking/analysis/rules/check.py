@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
-from types import MappingProxyType
+from dataclasses import dataclass
 from typing import Any, Final
 
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.rules.criteria import rate
-from rocking.analysis.survey import block_columns, motion_of, record_columns
+from rocking.analysis.rules.criteria import TITLES, rate
+from rocking.analysis.survey import BlockUnderRecords, motion_of
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
@@ -21,54 +19,33 @@ from rocking.progress import Progress
 from rocking.response import Response
 from rocking.response.verdict import in_brief
 from rocking.simulation import simulate
-from rocking.tables import decimal, frame_of, named, text_table, write_text
+from rocking.tables import decimal, named, text_table
 from rocking.treatment.base import Model
-
-#: Names of the rules for people.
-TITLES: Final = MappingProxyType(
-    {
-        "west": "West",
-        "ishiyama": "Ishiyama",
-        "housner": "Housner",
-        "asce_43_05": "ASCE 43-05",
-        "priestley": "Priestley",
-    }
-)
 
 #: Width, relative to it, of the level that overturns first: a margin is read to three digits.
 _TOLERANCE: Final = 1e-4
 
-#: From so much on, a factor below 1 is told to four digits.
+#: From so much on, a factor below 1 is shown to four digits.
 _NEAR: Final = 0.985
 
 
 @dataclass(frozen=True, eq=False)
-class Check:
+class Check(BlockUnderRecords):
     """Rules of thumb beside the exact answer, for a block under several motions; from `check`.
 
     Attributes
     ----------
-    block : Block
-        What rocks.
-    records : tuple of str
-        Name of each motion.
-    responses : tuple of Response
-        Exact response to each.
     ratios : tuple of mapping of str to float
         For each motion, demand over capacity by each rule.
     margins : tuple of float
         For each motion, one over the lowest factor on it at which the block is found to overturn. NaN if it overturns
         at none. Above 1 the block need not overturn under the motion as it is: see `falls_under_less`.
-    skipped : mapping of str to str
-        Records that could not be read, and why.
+    block, records, responses, skipped
+        What rocks, the name of each motion, the exact response to each, and why records could not be read.
     """
 
-    block: Block
-    records: tuple[str, ...]
-    responses: tuple[Response, ...]
     ratios: tuple[Mapping[str, float], ...]
     margins: tuple[float, ...]
-    skipped: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def falls_under_less(self) -> tuple[bool, ...]:
@@ -81,12 +58,9 @@ class Check:
 
     def rows(self) -> list[dict[str, Any]]:
         """Return demand, ratios and the exact answer for each record; units are in the names."""
-        labels = record_columns(self.records, [motion_of(response) for response in self.responses])
-        block = block_columns(self.block)
         return [
             {
                 **label,
-                **block,
                 named("pga", "g"): decimal(motion_of(response).pga / STANDARD_GRAVITY),
                 named("pgv", "m/s"): motion_of(response).pgv,
                 **ratios,
@@ -98,7 +72,7 @@ class Check:
                 "verdict": _verdict(response, margin, falls_under_less=less),
             }
             for label, response, ratios, margin, less in zip(
-                labels, self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
+                self._labels(), self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
             )
         ]
 
@@ -128,10 +102,7 @@ class Check:
         )
 
     def __repr__(self) -> str:
-        count = "1 record" if len(self.records) == 1 else f"{len(self.records)} records"
-        overturned = sum(response.overturned for response in self.responses)
-        rules = ", ".join(self.ratios[0]) or "no rule"
-        return f"<Check: {self.block.description}: {count}, overturned by {overturned}; by {rules}>"
+        return f"<Check: {self._count()}; by {', '.join(self.ratios[0]) or 'no rule'}>"
 
     def _disagreements(self, rules: list[str]) -> list[str]:
         """Say of each rule how often it is wrong, and how; where no number can be right, none is counted."""
@@ -153,21 +124,6 @@ class Check:
                 "under the same motion scaled down"
             )
         return lines
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the table for machines."""
-        return {"block": str(self.block), "records": self.rows(), "skipped": dict(self.skipped)}
-
-    def to_csv(self, path: str | Path) -> None:
-        """Write the table as text columns with a header.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        """
-        frame = frame_of(self.rows(), self.skipped)
-        write_text(path, frame.to_csv(index=False, float_format="%.15g", lineterminator="\n"))
 
 
 def check(

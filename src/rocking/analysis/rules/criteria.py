@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import wraps
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -71,15 +72,59 @@ class Rating:
         return np.asarray(self.ratio >= 1.0)
 
 
-def west(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
-    """Compare the peak acceleration with the static threshold g tan(alpha): West's formula.
+#: What a rule takes, and what it makes of it.
+Rule = Callable[[Blocks | Block | Iterable[Block], Motion], Rating]
 
-    Parameters
+_rules: dict[str, Rule] = {}
+_titles: dict[str, str] = {}
+
+#: Rules by name, and their names for people.
+RULES: Final[Mapping[str, Rule]] = MappingProxyType(_rules)
+TITLES: Final[Mapping[str, str]] = MappingProxyType(_titles)
+
+#: What is the same in the documentation of every rule.
+_PARAMETERS: Final = """    Parameters
     ----------
     blocks : Blocks, Block or iterable of Block
         n blocks.
     motion : Motion
-        Ground motion.
+        Ground motion."""
+_EXAMPLE: Final = """
+    Examples
+    --------
+    >>> import rocking
+    >>> tombstone = rocking.Block(width=0.3, height=0.9)
+    >>> record = rocking.records.load("el-centro-meloland-270")
+    >>> f"{{rocking.rules.{}(tombstone, record).ratio[0]:.3f}}"
+    '{}'
+    """
+
+
+def _rule(title: str, unit: str, example: str) -> Callable[[Callable[[Blocks, Motion], tuple[Any, Floats]]], Rule]:
+    """Make a rule of demand and capacity of the sides of blocks, shape (n, 2), with their unit and a ratio to show."""
+
+    def rule_of(compared: Callable[[Blocks, Motion], tuple[Any, Floats]]) -> Rule:
+        @wraps(compared, assigned=("__module__", "__name__", "__qualname__"))
+        def rule(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+            (shaking,) = several_motions([motion])
+            demand, capacity = np.broadcast_arrays(*compared(Blocks.of(blocks), shaking))
+            weaker = np.argmax(demand / capacity, axis=1)[:, None]
+            of_weaker = [np.take_along_axis(each, weaker, axis=1)[:, 0] for each in (demand, capacity)]
+            return Rating(name, of_weaker[0], of_weaker[1], unit)
+
+        name = compared.__name__
+        first, _, rest = (compared.__doc__ or "").partition("\n\n")
+        rule.__doc__ = f"{first}\n\n{_PARAMETERS}\n\n{rest.rstrip()}\n{_EXAMPLE.format(name, example)}"
+        del rule.__wrapped__  # its arguments are not those of the rule
+        _rules[name], _titles[name] = rule, title
+        return rule
+
+    return rule_of
+
+
+@_rule("West", "m/s^2", "0.895")
+def west(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
+    """Compare the peak acceleration with the static threshold g tan(alpha): West's formula.
 
     Returns
     -------
@@ -94,25 +139,13 @@ def west(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
     ----------
     Milne, J. and Omori, F. (1893). On the overturning and fracturing of brick and other columns by horizontally applied
     motion. Seismological Journal of Japan 1, 59-86; the formula is attributed to C. D. West.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, gravity=10.0)
-    >>> round(float(west(block, rocking.pulses.half_sine(1.0, 0.5)).capacity[0]), 4)
-    2.0271
     """
-    many = Blocks.of(blocks)
-    return _weaker("west", _shaking(motion).pga, many.gravity * np.tan(many.alpha), "m/s^2")
+    return motion.pga, blocks.gravity * np.tan(blocks.alpha)
 
 
-def ishiyama(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+@_rule("Ishiyama", "1", "0.895")
+def ishiyama(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """Ask for a peak acceleration as well as a peak velocity: Ishiyama's criteria.
-
-    Parameters
-    ----------
-    blocks, motion
-        As for `west`.
 
     Returns
     -------
@@ -131,20 +164,10 @@ def ishiyama(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating
     ----------
     Ishiyama, Y. (1982). Motions of rigid bodies and criteria for overturning by earthquake excitations. Earthquake
     Engineering and Structural Dynamics 10(5), 635-650.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> tombstone = rocking.Block(width=0.3, height=0.9)
-    >>> record = rocking.records.load("el-centro-meloland-270")
-    >>> f"{ishiyama(tombstone, record).ratio[0]:.3f}"
-    '0.895'
     """
-    many = Blocks.of(blocks)
-    shaking = _shaking(motion)
-    acceleration = shaking.pga / (many.gravity * np.tan(many.alpha))
-    velocity = shaking.pgv / (_ISHIYAMA * overturning_velocity(many))
-    return _weaker("ishiyama", np.minimum(acceleration, velocity), np.ones_like(velocity), "1")
+    acceleration = motion.pga / (blocks.gravity * np.tan(blocks.alpha))
+    velocity = motion.pgv / (_ISHIYAMA * overturning_velocity(blocks))
+    return np.minimum(acceleration, velocity), np.ones_like(velocity)
 
 
 def overturning_velocity(blocks: Blocks) -> Floats:
@@ -163,13 +186,9 @@ def overturning_velocity(blocks: Blocks) -> Floats:
     return np.asarray(2.0 * blocks.gravity * np.sin(0.5 * blocks.alpha) / (blocks.p * np.cos(blocks.alpha)))
 
 
-def housner(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+@_rule("Housner", "rad", "1.840")
+def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """Compare energies: one block in two overturns where alpha = S_v sqrt(m R/(g I)) = p S_v/g (Housner).
-
-    Parameters
-    ----------
-    blocks, motion
-        As for `west`.
 
     Returns
     -------
@@ -195,17 +214,8 @@ def housner(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
 
     Housner, G. W. (1952). Spectrum intensities of strong-motion earthquakes. Symposium on Earthquake and Blast Effects
     on Structures, 20-36.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> tombstone = rocking.Block(width=0.3, height=0.9)
-    >>> record = rocking.records.load("el-centro-meloland-270")
-    >>> f"{housner(tombstone, record).ratio[0]:.3f}"
-    '1.840'
     """
-    many = Blocks.of(blocks)
-    return _weaker("housner", many.p * mean_spectral_velocity(_shaking(motion)) / many.gravity, many.alpha, "rad")
+    return blocks.p * mean_spectral_velocity(motion) / blocks.gravity, blocks.alpha
 
 
 def mean_spectral_velocity(motion: Motion) -> float:
@@ -215,13 +225,9 @@ def mean_spectral_velocity(motion: Motion) -> float:
     return float(np.trapezoid(velocities, periods) / (periods[-1] - periods[0]))
 
 
-def asce_43_05(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+@_rule("ASCE 43-05", "m/s^2", "1.579")
+def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """Replace the block by an oscillator with its energy and damping: the approximate method of ASCE/SEI 43-05.
-
-    Parameters
-    ----------
-    blocks, motion
-        As for `west`.
 
     Returns
     -------
@@ -252,25 +258,13 @@ def asce_43_05(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rati
     ----------
     ASCE (2005). Seismic Design Criteria for Structures, Systems, and Components in Nuclear Facilities. ASCE/SEI 43-05,
     Appendix A, section A.2.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> tombstone = rocking.Block(width=0.3, height=0.9)
-    >>> record = rocking.records.load("el-centro-meloland-270")
-    >>> f"{asce_43_05(tombstone, record).ratio[0]:.3f}"
-    '1.579'
     """
-    return _along_rotations("asce_43_05", blocks, _shaking(motion), _reserve_energy, "m/s^2")
+    return _least_ratio(blocks, motion, _reserve_energy)
 
 
-def priestley(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
+@_rule("Priestley", "m", "1.070")
+def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """Replace the block by an oscillator with the period of free rocking: Priestley, Evison and Carr, in FEMA 356.
-
-    Parameters
-    ----------
-    blocks, motion
-        As for `west`.
 
     Returns
     -------
@@ -301,29 +295,14 @@ def priestley(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Ratin
 
     Makris, N. and Konstantinidis, D. (2003). The rocking spectrum and the limitations of practical design
     methodologies. Earthquake Engineering and Structural Dynamics 32(2), 265-289.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> tombstone = rocking.Block(width=0.3, height=0.9)
-    >>> record = rocking.records.load("el-centro-meloland-270")
-    >>> f"{priestley(tombstone, record).ratio[0]:.3f}"
-    '1.070'
     """
-    many = Blocks.of(blocks)
     lowest = math.exp(-0.5 / _DAMPING)
-    if many.restitution.min() <= lowest:
+    if blocks.restitution.min() <= lowest:
         raise InvalidBlock(
             f"priestley needs a restitution above {lowest:.2g}, from where on its damping is below critical, not "
-            f"{many.restitution.min():g}; leave that rule out"
+            f"{blocks.restitution.min():g}; leave that rule out"
         )
-    return _along_rotations("priestley", many, _shaking(motion), _free_rocking, "m")
-
-
-#: Rules by name.
-RULES: Final[Mapping[str, Callable[[Blocks | Block | Iterable[Block], Motion], Rating]]] = MappingProxyType(
-    {rule.__name__: rule for rule in (west, ishiyama, housner, asce_43_05, priestley)}
-)
+    return _least_ratio(blocks, motion, _free_rocking)
 
 
 def rate(
@@ -333,8 +312,10 @@ def rate(
 
     Parameters
     ----------
-    blocks, motion
-        As for `west`.
+    blocks : Blocks, Block or iterable of Block
+        n blocks.
+    motion : Motion
+        Ground motion.
     rules : iterable of str, optional
         Names in `RULES`; by default all.
 
@@ -405,40 +386,18 @@ def _free_rocking(p: float, alpha: float, restitution: float, gravity: float) ->
     return _Oscillator(periods, -2.0 * _DAMPING * math.log(restitution), displacements, per_acceleration)
 
 
-def _along_rotations(
-    rule: str,
-    blocks: Blocks | Block | Iterable[Block],
-    motion: Motion,
-    oscillator_of: Callable[[float, float, float, float], _Oscillator],
-    unit: str,
-) -> Rating:
-    """Rating at the rotation where the demand on the oscillators is least, over their capacity."""
-    many = Blocks.of(blocks)
-    sides = np.stack([many.p, many.alpha, many.restitution], axis=-1).reshape(-1, 3)
+def _least_ratio(
+    blocks: Blocks, motion: Motion, oscillator_of: Callable[[float, float, float, float], _Oscillator]
+) -> tuple[Floats, Floats]:
+    """Demand and capacity of the sides of blocks at the rotation where the demand on oscillators is least over it."""
+    sides = np.stack([blocks.p, blocks.alpha, blocks.restitution], axis=-1).reshape(-1, 3)
     # Both sides of a symmetric block, and blocks that repeat, are looked at once.
     distinct, place = np.unique(sides, axis=0, return_inverse=True)
     found = np.empty((len(distinct), 2))
     for k, (p, alpha, restitution) in enumerate(distinct.tolist()):
-        here = oscillator_of(p, alpha, restitution, many.gravity)
+        here = oscillator_of(p, alpha, restitution, blocks.gravity)
         demands = here.per_acceleration * motion.spectral_acceleration(here.periods, here.damping)
         least = int(np.argmin(demands / here.capacities))
         found[k] = demands[least], here.capacities[least]
-    demand, capacity = found[place.reshape(-1)].reshape(len(many), 2, 2).transpose(2, 0, 1)
-    return _weaker(rule, demand, capacity, unit)
-
-
-def _shaking(motion: Motion) -> Motion:
-    (shaking,) = several_motions([motion])
-    return shaking
-
-
-def _weaker(rule: str, demand: float | Floats, capacity: Floats, unit: str) -> Rating:
-    """Rating of the side of each block, shape (n, 2), with the larger ratio."""
-    demands, capacities = np.broadcast_arrays(demand, capacity)
-    side = np.argmax(demands / capacities, axis=1)[:, None]
-    return Rating(
-        rule,
-        np.take_along_axis(demands, side, axis=1)[:, 0],
-        np.take_along_axis(capacities, side, axis=1)[:, 0],
-        unit,
-    )
+    demand, capacity = found[place.reshape(-1)].reshape(len(blocks), 2, 2).transpose(2, 0, 1)
+    return demand, capacity

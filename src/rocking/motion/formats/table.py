@@ -442,5 +442,5 @@ def _timing(
     if gap is not None:
         raise missing_value(source, written[gap], shape.row_at(source, gap))
     if request.dt is not None:
-        raise source.error(f"the times are not evenly {request.dt:g} s apart; leave dt out", shape.start)
+        raise source.error(f"the times are not evenly {request.dt:g} s apart; leave {{}} out", shape.start, "dt")
     return None, times
