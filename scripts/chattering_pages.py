@@ -17,7 +17,7 @@ from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.maps import chattering_map
 from rocking.chattering.paper import FIGURES, paper_figure
-from rocking.chattering.paper.case import Case
+from rocking.chattering.paper.figure import BlockUnderSine
 from rocking.chattering.schemes import compare_schemes
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -176,7 +176,7 @@ def robust_table():
 
 def schemes_table(a):
     """All schemes under the paper's sine of amplitude a."""
-    return table_of_comparison(compare_schemes(PAPER_BLOCK, Case(a).excitation(), model="linear"))
+    return table_of_comparison(compare_schemes(PAPER_BLOCK, BlockUnderSine(a).excitation(), model="linear"))
 
 
 def table_of_comparison(comparison):

@@ -7,7 +7,7 @@ import pytest
 from oracles.sine_chattering import settle
 
 from rocking import chattering
-from rocking.chattering.theory.surface_coefficients import LARGEST_ERROR
+from rocking.chattering.coefficients import LARGEST_ERROR
 from rocking.errors import InvalidOption
 
 

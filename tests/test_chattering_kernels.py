@@ -6,7 +6,7 @@ import pytest
 from numpy.polynomial import polynomial
 
 from rocking import chattering
-from rocking.chattering.theory import duration
+from rocking.chattering import duration
 from rocking.kernels.sine import FOUND, OUTLASTS, UNRESOLVED, lanes
 from rocking.kernels.sine.arc import State, arc
 from rocking.kernels.sine.basis import basis
@@ -61,7 +61,7 @@ def test_a_sequence_has_a_status_and_finite_numbers(omega):
 
 
 def test_what_is_not_resolved_is_told_as_infinite():
-    told = duration._told(np.array([1.0, 2.0, 3.0]), np.array([FOUND, OUTLASTS, UNRESOLVED], np.int8))
+    told = duration._marked(np.array([1.0, 2.0, 3.0]), np.array([FOUND, OUTLASTS, UNRESOLVED], np.int8))
     assert told == pytest.approx([1.0, np.nan, np.inf], nan_ok=True)
 
 

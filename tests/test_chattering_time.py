@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from oracles.sine_chattering import settle
 
 from rocking import chattering
-from rocking.chattering.theory import duration
+from rocking.chattering import duration
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import FOUND
 from rocking.kernels.sine.sequence import semianalytical_phases
@@ -197,9 +197,9 @@ def test_a_time_does_not_depend_on_its_neighbours_in_the_array():
 
 def test_threads_give_the_same_bits(monkeypatch):
     a, omega, eta = random_parameters(40_000, seed=8)
-    monkeypatch.setattr(duration, "_cores", lambda: 3)
+    monkeypatch.setattr(duration, "cores", lambda: 3)
     shared_out = chattering.chattering_time(a, omega, eta)
-    monkeypatch.setattr(duration, "_cores", lambda: 1)
+    monkeypatch.setattr(duration, "cores", lambda: 1)
     assert np.array_equal(shared_out, chattering.chattering_time(a, omega, eta), equal_nan=True)
 
 

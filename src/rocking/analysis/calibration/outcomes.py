@@ -290,8 +290,8 @@ class Calibration:
             As `rocking.rocking_spectrum`.
         """
         return rocking_spectrum(
+            self.blocks,
             motions,
-            blocks=self.blocks,
             weights=self.weights,
             p=p,
             model=self.model if model is None else model,
