@@ -284,16 +284,12 @@ def images():
     omega = np.linspace(0.5, 8.0, 61)
     labels = {"a": "amplitude over the threshold, $a$", "omega": r"frequency over $p$, $\omega$"}
     sine = chattering_map(families.sine(PAPER_BLOCK, model="linear"), {"a": amplitude, "omega": omega}).plot(
-        labels=labels,
-        title=r"sine, 2.5 cycles; $\eta$ = 0.92",
+        labels=labels, title=r"sine, 2.5 cycles; $\eta$ = 0.92"
     )
     yield "map-sine.png", with_theory(sine, omega)
     ricker = chattering_map(
         families.ricker(PAPER_BLOCK, kind="antisymmetric", model="linear"), {"a": amplitude, "omega": omega}
-    ).plot(
-        labels=labels,
-        title=r"antisymmetric Ricker pulse; $\eta$ = 0.92",
-    )
+    ).plot(labels=labels, title=r"antisymmetric Ricker pulse; $\eta$ = 0.92")
     yield "map-ricker.png", with_theory(ricker, omega)
     yield (
         "map-lobes.png",

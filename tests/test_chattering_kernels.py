@@ -26,12 +26,16 @@ def exact_basis(t, delta):
         return mpmath.sin(t) / t, (1 - mpmath.cos(t)) / t**2, E, W
 
 
-@pytest.mark.parametrize("reach", [1e-9, 0.0029, 0.0031, 0.119, 0.121, 1.49, 1.51, 11.9, 12.1, 200.0, 1e4, 4e5])
-@pytest.mark.parametrize("delta", [1e-6, 0.1, 1.0, 40.0, 1e6, 1e12])
+REACHES = (1e-9, 0.0029, 0.0031, 0.119, 0.121, 1.49, 1.51, 11.9, 12.1, 200.0, 1e4, 4e5)
+DELTAS = (1e-6, 0.1, 1.0, 40.0, 1e6, 1e12)
+
+
+@pytest.mark.parametrize(
+    ("reach", "delta"),
+    [(reach, delta) for delta in DELTAS for reach in REACHES if reach <= np.pi**2 * (1.0 + delta)],
+)
 def test_the_basis_is_right_on_both_sides_of_every_change_of_sum(reach, delta):
     t = float(np.sqrt(reach / (1.0 + delta)))
-    if t > np.pi:
-        return
     *values, decay = basis(t, delta)
     exact = exact_basis(t, delta)
     assert values[:2] == pytest.approx([float(x) for x in exact[:2]], rel=4e-16)
@@ -55,14 +59,14 @@ def test_an_arc_tells_what_became_of_it():
 def test_a_sequence_has_a_status_and_finite_numbers(omega):
     critical = float(chattering.critical_amplitude(omega, 0.5)) - 1.0
     for share, status in ((0.5, FOUND), (1.01, OUTLASTS), (30.0, OUTLASTS)):
-        told, phase = rest_phase(share * critical, 1.0 / omega**2, 0.5)
-        assert told == status
+        found, phase = rest_phase(share * critical, 1.0 / omega**2, 0.5)
+        assert found == status
         assert 0.0 < phase <= np.pi
 
 
-def test_what_is_not_resolved_is_told_as_infinite():
-    told = duration._marked(np.array([1.0, 2.0, 3.0]), np.array([FOUND, OUTLASTS, UNRESOLVED], np.int8))
-    assert told == pytest.approx([1.0, np.nan, np.inf], nan_ok=True)
+def test_what_is_not_resolved_is_infinite():
+    marked = duration._marked(np.array([1.0, 2.0, 3.0]), np.array([FOUND, OUTLASTS, UNRESOLVED], np.int8))
+    assert marked == pytest.approx([1.0, np.nan, np.inf], nan_ok=True)
 
 
 @pytest.mark.parametrize("count", [1, 2, 63, 64, 65, 511, 512, 513, 1100])

@@ -93,6 +93,7 @@ def test_boundaries_separate_what_simulate_says():
     dataset = overturning_map(BLOCK, "one-sine", amplitudes=[0.5, 2.0, 4.0, 7.0, 10.0], frequencies=[4.5])
     motion = rocking.pulses.one_sine(1.0, 4.5 * 2.0 / (2.0 * math.pi))
     threshold = BLOCK.minimum_acceleration
+    assert dataset.sizes["boundary"] >= 4
     for edge, *modes in zip(
         *(dataset[n].values for n in ("boundary_amplitude", "mode_below", "mode_above")), strict=True
     ):

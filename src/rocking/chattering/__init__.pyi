@@ -1,12 +1,6 @@
 from . import families
 from .amplitude import critical_amplitude, critical_amplitude_nonlinear
-from .duration import (
-    ChatteringSequence,
-    chattering_time,
-    interval_ratios,
-    is_complete,
-    sequence,
-)
+from .duration import ChatteringSequence, chattering_time, interval_ratios, is_complete, sequence
 from .episodes import ChatteringEpisodes, chattering_episodes
 from .expansions import (
     SeriesDiagnosis,

@@ -17,11 +17,12 @@ from rocking.block import Block
 from rocking.chattering.coefficients import COEFFICIENTS
 from rocking.chattering.parameters import broadcast, checked_frequency, checked_restitution, checked_slenderness
 from rocking.compiling import AMPLITUDES, announce
-from rocking.engine import require_finished
+from rocking.engine import in_threads, require_finished
 from rocking.errors import InvalidOption
 from rocking.kernels.paper import fitted_amplitudes
 from rocking.kernels.sine.critical import critical_amplitudes
 from rocking.motion import pulses
+from rocking.progress import Progress
 from rocking.simulation import simulate
 from rocking.treatment.asymptotic_time import warn_outside_fit
 
@@ -146,7 +147,14 @@ def parameters_at(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return inverse_square**-0.5, 1.0 - root**2
 
 
-def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike) -> Floats:
+def critical_amplitude_nonlinear(
+    omega: ArrayLike,
+    eta: ArrayLike,
+    alpha: ArrayLike,
+    *,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Floats:
     """Critical amplitude of the nonlinear block, which `critical_amplitude` gives in the slender limit.
 
     Parameters
@@ -157,6 +165,10 @@ def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayL
         Coefficient of restitution.
     alpha : array_like
         Slenderness angle, rad, between 0 and pi/2.
+    threads : int, optional
+        Number of threads; by default one for every core.
+    progress : bool, optional
+        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
     Returns
     -------
@@ -168,6 +180,8 @@ def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayL
     ------
     InvalidOption
         If a parameter is NaN, infinite or out of range.
+    Unfinished
+        If a simulation is given up: eta is too close to 1.
 
     Notes
     -----
@@ -181,9 +195,15 @@ def critical_amplitude_nonlinear(omega: ArrayLike, eta: ArrayLike, alpha: ArrayL
     '-7.3e-06'
     """
     parameters = checked_frequency(omega), checked_restitution(eta), checked_slenderness(alpha)
-    shape, (frequencies, restitutions, angles) = broadcast(*parameters)
-    cases = zip(frequencies.tolist(), restitutions.tolist(), angles.tolist(), strict=True)
-    return np.array([_critical(*case) for case in cases]).reshape(shape)[()]
+    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    shape, flat = broadcast(*parameters)
+    cases = list(zip(*(values.tolist() for values in flat), strict=True))
+    found = np.empty(len(cases))
+    with Progress("bisecting", len(cases), show=progress) as bar:
+        for k, amplitude in enumerate(in_threads(lambda case: _critical(*case), cases, threads=count)):
+            found[k] = amplitude
+            bar.advance()
+    return found.reshape(shape)[()]
 
 
 def _critical(omega: float, eta: float, alpha: float) -> float:

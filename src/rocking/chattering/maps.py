@@ -96,11 +96,7 @@ _ATTRIBUTES: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
 
 
 def chattering_map(
-    family: Family,
-    parameters: Mapping[str, ArrayLike],
-    *,
-    threads: int | None = None,
-    progress: bool | None = None,
+    family: Family, parameters: Mapping[str, ArrayLike], *, threads: int | None = None, progress: bool | None = None
 ) -> ChatteringMap:
     """Simulate a family of inputs over a grid, and tell where chattering after the first uplift is complete.
 

@@ -220,13 +220,7 @@ class ChatteringReport:
 
 
 def chattering_report(
-    a: float,
-    omega: float,
-    eta: float,
-    *,
-    order: int = 4,
-    resolved: int | None = None,
-    p: float | None = None,
+    a: float, omega: float, eta: float, *, order: int = 4, resolved: int | None = None, p: float | None = None
 ) -> ChatteringReport:
     """Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
@@ -19,7 +18,7 @@ from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import Setup, Task, simulate_tasks
-from rocking.errors import InvalidOption, OutsideFit
+from rocking.errors import InvalidOption
 from rocking.explorer.case import BLOCK_NAMES, Case, Texts
 from rocking.explorer.pulses import arguments_of, is_pulse, pulse_of
 from rocking.motion.motion import Motion
@@ -194,9 +193,7 @@ def curves(grid: MapGrid) -> dict[str, Floats]:
     found = {"exact": critical_amplitude(omega, eta), "eq76": np.full(omega.size, np.nan)}
     (low, high), (least, most) = FITTED_FREQUENCIES, FITTED_RESTITUTIONS
     fitted = (omega >= low) & (omega <= high) & (eta >= least) & (eta <= most)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", OutsideFit)
-        found["eq76"][fitted] = critical_amplitude(omega[fitted], eta[fitted], method="eq76")
+    found["eq76"][fitted] = critical_amplitude(omega[fitted], eta[fitted], method="eq76")
     return found
 
 

@@ -33,13 +33,7 @@ _LABEL_MARGIN: Final = 0.03
 _LABEL_DISTANCE: Final = 0.11
 
 
-def duration_figure(
-    *,
-    amplitude: Floats,
-    durations: Mapping[str, Floats],
-    critical: float,
-    title: str,
-) -> Figure:
+def duration_figure(*, amplitude: Floats, durations: Mapping[str, Floats], critical: float, title: str) -> Figure:
     """Draw chattering time over half a period by several methods, and below how far they are from the first.
 
     All are over amplitudes (n,), of the ground acceleration over g alpha: by the exact method first, NaN where
@@ -172,10 +166,7 @@ def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: st
         for (name, values), style in zip(critical.items(), _FREQUENCY_CURVES, strict=False):
             axes.plot(omega, values, label=name, **style)
         axes.annotate(
-            rf"spread {100.0 * (high / low - 1.0):.2f} %",
-            (omega[-1], 0.5 * (low + high)),
-            ha="right",
-            va="center",
+            rf"spread {100.0 * (high / low - 1.0):.2f} %", (omega[-1], 0.5 * (low + high)), ha="right", va="center"
         )
         axes.set_xlim(omega[0], omega[-1])
         low, high = axes.get_ylim()

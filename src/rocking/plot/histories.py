@@ -54,12 +54,7 @@ class Mark(NamedTuple):
 
 
 def excitation_figure(
-    *,
-    time: Floats,
-    acceleration: Floats,
-    marks: tuple[Mark, ...],
-    chattering_time: float,
-    title: str,
+    *, time: Floats, acceleration: Floats, marks: tuple[Mark, ...], chattering_time: float, title: str
 ) -> Figure:
     """Draw a sine with the thresholds, its exceedances, the initiations and the time to the first rest.
 
@@ -156,12 +151,7 @@ def _mark_initiations(axes: Axes, marks: tuple[Mark, ...], peak: float) -> None:
     for mark in marks:
         axes.plot(mark.time, height, "v", **_MARK)
         axes.annotate(
-            mark.text,
-            (mark.time, height),
-            xytext=(-4, 4),
-            textcoords="offset points",
-            color=ABOVE,
-            fontsize=7.5,
+            mark.text, (mark.time, height), xytext=(-4, 4), textcoords="offset points", color=ABOVE, fontsize=7.5
         )
 
 

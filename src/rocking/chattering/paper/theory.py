@@ -312,9 +312,7 @@ def figure_3(*, a: float | None = None, omega: float | None = None, eta: float |
     cases = list(
         dict.fromkeys(
             BlockUnderSine(
-                case.a if a is None else a,
-                case.omega if omega is None else omega,
-                case.eta if eta is None else eta,
+                case.a if a is None else a, case.omega if omega is None else omega, case.eta if eta is None else eta
             )
             for case in _CASES
         )
