@@ -405,7 +405,7 @@ class Walker:
     def lands(self):
         return "no" if self.tau + self.next >= self.end else "yes"
 
-    def strike(self):
+    def impact(self):
         speed = self.eta * abs(self.slope(self.next))
         self.tau += self.next
         self.speed, self.sign = speed, -self.sign
