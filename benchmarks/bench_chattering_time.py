@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rocking import chattering
-from rocking.chattering.theory import duration
+from rocking.chattering import duration
 
 CASE = (1.03, 2.0, 0.92)
 CASE_TIME = 1.1259476769338108721
@@ -94,10 +94,10 @@ def main():
         start = time.perf_counter()
         chattering.chattering_time(*parameters)
         wall = time.perf_counter() - start
-        cores = duration._cores
-        duration._cores = lambda: 1
+        cores = duration.cores
+        duration.cores = lambda: 1
         each = seconds_per_call(lambda parameters=parameters: chattering.chattering_time(*parameters)) / LARGE
-        duration._cores = cores
+        duration.cores = cores
         print(f"{name}: {1e9 * each:.0f} ns, {1e-6 / each:.2f} million per second and core")
         incomplete = np.isnan(times).mean()
         print(f"  on {cores()} cores (wall) {1e-6 * LARGE / wall:.2f} million per second, {incomplete:.0%} incomplete")

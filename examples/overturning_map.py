@@ -26,14 +26,14 @@ def main() -> float:
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     amplitudes, frequencies = np.linspace(0.5, 15.0, 59), np.linspace(0.4, 9.0, 87)
     OUT.mkdir(exist_ok=True)
-    found = overturning_map("one-sine", block, amplitudes=amplitudes, frequencies=frequencies)
+    found = overturning_map(block, "one-sine", amplitudes=amplitudes, frequencies=frequencies)
     found.plot().savefig(OUT / "map.png", dpi=160)
 
     # So slender that pi/2, where a block has fallen, is too many times alpha to be reached before the pulse is over.
     slender = rocking.Block.from_parameters(p=2.0, alpha=1e-5, restitution=0.9)
     frequencies = np.linspace(1.0, 7.0, 7)
     linear = overturning_map(
-        "one-sine", slender, amplitudes=np.linspace(0.5, 15.0, 30), frequencies=frequencies, model="linear"
+        slender, "one-sine", amplitudes=np.linspace(0.5, 15.0, 30), frequencies=frequencies, model="linear"
     )
     upper = linear.boundary_amplitude.where(linear.mode_above == 0, drop=True)
     exact = np.array([closed_form(ratio) for ratio in frequencies])

@@ -22,7 +22,7 @@ RECORDS = (
 def main() -> float:
     """Draw the spectra; return the exponent with which the peak rotation falls as large similar blocks grow."""
     motions = [rocking.records.load(name).scaled_to(0.5, "pgv") for name in RECORDS]
-    spectrum = rocking_spectrum(motions, alpha=[0.1, 0.2], size=np.geomspace(0.3, 60.0, 48))
+    spectrum = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.2], size=np.geomspace(0.3, 60.0, 48)), motions)
     OUT.mkdir(exist_ok=True)
     figure = spectrum.plot(against="size", title="Six records scaled to a PGV of 0.5 m/s")
     figure.savefig(OUT / "spectrum.png", dpi=160)
@@ -31,7 +31,7 @@ def main() -> float:
         print(f"slenderness {alpha:g}: overturned up to R = {float(overturned.sel(alpha=alpha)):.2f} m")
 
     sizes = np.geomspace(20.0, 160.0, 16)
-    large = rocking_spectrum(motions, alpha=[0.1], size=sizes)
+    large = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1], size=sizes), motions)
     exponents = [np.polyfit(np.log(sizes), np.log(peaks), 1)[0] for peaks in large.peak_rotation.values[:, 0]]
     for name, exponent in zip(RECORDS, exponents, strict=True):
         print(f"{name}: peak rotation goes as R^{exponent:.2f}")

@@ -17,7 +17,7 @@ from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.maps import chattering_map
 from rocking.chattering.paper import FIGURES, paper_figure
-from rocking.chattering.paper.case import Case
+from rocking.chattering.paper.figure import BlockUnderSine
 from rocking.chattering.schemes import compare_schemes
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -176,7 +176,7 @@ def robust_table():
 
 def schemes_table(a):
     """All schemes under the paper's sine of amplitude a."""
-    return table_of_comparison(compare_schemes(PAPER_BLOCK, Case(a).excitation(), model="linear"))
+    return table_of_comparison(compare_schemes(PAPER_BLOCK, BlockUnderSine(a).excitation(), model="linear"))
 
 
 def table_of_comparison(comparison):
@@ -284,16 +284,12 @@ def images():
     omega = np.linspace(0.5, 8.0, 61)
     labels = {"a": "amplitude over the threshold, $a$", "omega": r"frequency over $p$, $\omega$"}
     sine = chattering_map(families.sine(PAPER_BLOCK, model="linear"), {"a": amplitude, "omega": omega}).plot(
-        labels=labels,
-        title=r"sine, 2.5 cycles; $\eta$ = 0.92",
+        labels=labels, title=r"sine, 2.5 cycles; $\eta$ = 0.92"
     )
     yield "map-sine.png", with_theory(sine, omega)
     ricker = chattering_map(
         families.ricker(PAPER_BLOCK, kind="antisymmetric", model="linear"), {"a": amplitude, "omega": omega}
-    ).plot(
-        labels=labels,
-        title=r"antisymmetric Ricker pulse; $\eta$ = 0.92",
-    )
+    ).plot(labels=labels, title=r"antisymmetric Ricker pulse; $\eta$ = 0.92")
     yield "map-ricker.png", with_theory(ricker, omega)
     yield (
         "map-lobes.png",

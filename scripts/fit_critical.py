@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rocking.chattering import critical_amplitude
-from rocking.chattering.theory import surface
+from rocking.chattering.amplitude import critical_amplitude, parameters_at
 
-TARGET = Path(__file__).resolve().parents[1] / "src" / "rocking" / "chattering" / "theory" / "surface_coefficients.py"
+TARGET = Path(__file__).resolve().parents[1] / "src" / "rocking" / "chattering" / "coefficients.py"
 
 #: Coefficients kept in 1/omega^2 and sqrt(1 - eta), and nodes that determine them.
 KEPT = (8, 10)
@@ -32,6 +31,7 @@ import numpy as np
 #: Largest error on a grid of {checks} x {checks} points that reaches all edges.
 LARGEST_ERROR: Final = {error:.2g}
 
+# fmt: off
 #: Row i, column j: T_i of the scaled 1/omega^2, T_j of the scaled sqrt(1 - eta).
 COEFFICIENTS: Final = np.array(
     [
@@ -52,7 +52,7 @@ def main() -> None:
 def fit():
     """Interpolating coefficients of a_cr - 1, cut to those kept and rounded to 1e-12."""
     nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-    omega, eta = surface.parameters(*np.meshgrid(nodes, nodes, indexing="ij"))
+    omega, eta = parameters_at(*np.meshgrid(nodes, nodes, indexing="ij"))
     excess = critical_amplitude(omega, eta) - 1.0
     transform = chebyshev.chebvander(nodes, NODES - 1) * (2.0 / NODES)
     transform[:, 0] /= 2.0
@@ -64,13 +64,16 @@ def measured_error(coefficients):
     side = np.linspace(-1.0, 1.0, CHECKS)
     x, y = np.meshgrid(side, side, indexing="ij")
     approximate = 1.0 + chebyshev.chebval2d(x, y, coefficients)
-    return float(np.abs(approximate - critical_amplitude(*surface.parameters(x, y))).max())
+    return float(np.abs(approximate - critical_amplitude(*parameters_at(x, y))).max())
 
 
 def write(coefficients, error):
     """Write the module with the coefficients."""
+    half = KEPT[1] // 2
     rows = "\n".join(
-        "        [\n" + "".join(f"            {value!r},\n" for value in row) + "        ],"
+        "        [\n"
+        + "".join(f"            {', '.join(map(repr, part))},\n" for part in (row[:half], row[half:]))
+        + "        ],"
         for row in coefficients.tolist()
     )
     TARGET.write_text(HEADER.format(checks=CHECKS, error=error, rows=rows), encoding="utf-8")

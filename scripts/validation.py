@@ -113,7 +113,7 @@ def blocks_table():
 def lowest_amplitude(block, pulse, frequency, amplitudes, model="nonlinear"):
     """Lowest amplitude over the threshold that overturns, at a frequency over p."""
     found = overturning_map(
-        pulse, block, amplitudes=amplitudes, frequencies=[frequency], model=model, tolerance=1e-12, progress=False
+        block, pulse, amplitudes=amplitudes, frequencies=[frequency], model=model, tolerance=1e-12, progress=False
     )
     return float(found.overturning_amplitude[0])
 
@@ -168,7 +168,7 @@ def without_impact(amplitude, w, sign, cycles):
 def last_amplitude(block, pulse, frequency, amplitudes):
     """Amplitude from which on a slender block overturns without impact."""
     found = overturning_map(
-        pulse, block, amplitudes=amplitudes, frequencies=[frequency], model="linear", tolerance=1e-12, progress=False
+        block, pulse, amplitudes=amplitudes, frequencies=[frequency], model="linear", tolerance=1e-12, progress=False
     )
     return float(found.boundary_amplitude.values[found.mode_above.values == 0][-1])
 
@@ -214,7 +214,7 @@ def package_limit(alpha, eta, about, amplitude):
 
     def overturns(frequency):
         found = overturning_map(
-            "one-sine", block, amplitudes=amplitudes, frequencies=[frequency], tolerance=1e-3, progress=False
+            block, "one-sine", amplitudes=amplitudes, frequencies=[frequency], tolerance=1e-3, progress=False
         )
         return bool((found.mode.values == 1).any())
 

@@ -17,7 +17,7 @@ MOTION = rocking.pulses.one_sine(3.0, 1.0)
 TAKES_A_MOTION = {
     "simulate": lambda motion: rocking.simulate(BLOCK, motion),
     "simulate_many": lambda motion: rocking.simulate_many(BLOCK, motion),
-    "rocking_spectrum": lambda motion: rocking.rocking_spectrum(motion, alpha=[0.2], p=[2.0]),
+    "rocking_spectrum": lambda motion: rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0]), motion),
     "fragility": lambda motion: rocking.fragility(BLOCK, motion, levels=[1.0, 2.0], measure="pga"),
     "incremental_dynamic_analysis": lambda motion: rocking.incremental_dynamic_analysis(BLOCK, motion, measure="pga"),
 }
@@ -125,12 +125,12 @@ ARRAY = np.array([[1.0, 1.0], [1.0, 1.0]])
 SITE = rocking.HazardCurve([0.5, 1.0, 2.0], [0.1, 0.01, 0.001])
 FITTED = rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
 
-MAP = rocking.overturning_map("one-sine", BLOCK, amplitudes=[1.0, 2.0], frequencies=[1.0])
+MAP = rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 2.0], frequencies=[1.0])
 
 #: Each takes one argument that is often given as something else.
 TAKES_ONE_THING = {
-    "pulse of a map": lambda value: rocking.overturning_map(value, BLOCK, amplitudes=[2.0], frequencies=[1.0]),
-    "block of a map": lambda value: rocking.overturning_map("one-sine", value, amplitudes=[2.0], frequencies=[1.0]),
+    "pulse of a map": lambda value: rocking.overturning_map(BLOCK, value, amplitudes=[2.0], frequencies=[1.0]),
+    "block of a map": lambda value: rocking.overturning_map(value, "one-sine", amplitudes=[2.0], frequencies=[1.0]),
     "text of a pulse": named_pulse,
     "name of a shipped record": rocking.records.load,
     "critical amplitude of a treatment": rocking.AsymptoticTime,

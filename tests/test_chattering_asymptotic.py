@@ -9,6 +9,7 @@ from rocking.errors import InvalidOption
 
 
 def test_eq65_of_the_reference(reference):
+    assert len(reference["paper_scheme_eq65"]) >= 4
     for case in reference["paper_scheme_eq65"]:
         time = chattering.chattering_time(case["a"], case["omega"], case["eta"], method="asymptotic")
         assert time == pytest.approx(case["tau"], rel=1e-13)

@@ -5,11 +5,12 @@ import pytest
 from oracles.sine_chattering import settle
 
 from rocking import chattering
-from rocking.chattering.theory.surface_coefficients import LARGEST_ERROR
+from rocking.chattering.coefficients import LARGEST_ERROR
 from rocking.errors import InvalidOption
 
 
 def test_critical_amplitudes_of_the_reference(reference):
+    assert len(reference["critical_amplitude"]) >= 3
     for case in reference["critical_amplitude"]:
         assert chattering.critical_amplitude(case["omega"], case["eta"]) == pytest.approx(case["value"], abs=1e-13)
 

@@ -8,7 +8,7 @@ import pytest
 from oracles.slow_sine import _Arc
 
 from rocking.chattering import chattering_report, sequence
-from rocking.chattering.theory.duration import first_arc
+from rocking.chattering.duration import first_arc
 from rocking.errors import InvalidOption
 
 #: Looks at each half period for the first change of sign.

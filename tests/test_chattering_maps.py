@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
-from rocking.chattering.families import Case
+from rocking.chattering.families import SimulationInput
 from rocking.chattering.maps import Outcome, chattering_map
 from rocking.motion.exceedance import exceedances
 
@@ -21,7 +21,7 @@ STATUE = rocking.Block(width=0.24, height=1.1)
 
 
 def outcome_of(motion, block=BLOCK, model="linear"):
-    dataset = chattering_map(lambda a, b: Case(block, motion, model), {"a": [1.0], "b": [1.0]})
+    dataset = chattering_map(lambda a, b: SimulationInput(block, motion, model), {"a": [1.0], "b": [1.0]})
     return Outcome(dataset.outcome.item())
 
 
@@ -83,7 +83,7 @@ def test_a_strong_motion_overturns():
 def test_overturning_after_a_complete_sequence_is_both():
     quiet = (0.0, 0.0, 0.0, 0.0)
     dataset = chattering_map(
-        lambda a, b: Case(BLOCK, lobes(1.02, *quiet, a), "linear"), {"strong": [1.5, 9.0], "any": [0.0]}
+        lambda a, b: SimulationInput(BLOCK, lobes(1.02, *quiet, a), "linear"), {"strong": [1.5, 9.0], "any": [0.0]}
     )
     assert dataset.complete.all()
     assert dataset.overturned.values.ravel().tolist() == [False, True]
@@ -156,6 +156,14 @@ def test_a_map_tells_its_outcomes_and_units_and_can_be_stored(tmp_path):
 def test_unusable_parameters_are_refused(parameters):
     with pytest.raises(rocking.InvalidOption):
         chattering_map(families.sine(BLOCK), parameters)
+
+
+def test_a_map_is_the_same_in_one_thread_and_in_several():
+    parameters = {"a": [0.9, 1.03, 1.05, 9.0], "omega": [1.0, 2.0]}
+    one, several = (chattering_map(families.sine(BLOCK), parameters, threads=count) for count in (1, 3))
+    assert one.data.identical(several.data)
+    with pytest.raises(rocking.InvalidOption, match="threads"):
+        chattering_map(families.sine(BLOCK), parameters, threads=0)
 
 
 def test_a_map_is_drawn_with_the_outcomes_that_it_has():
@@ -311,6 +319,8 @@ def test_a_motion_that_lifts_nothing_has_no_episode():
 
 
 def test_episodes_print_as_a_table():
-    text = str(chattering_episodes(rocking.simulate(STATUE, rocking.records.load("ridgecrest-clc-090"))))
+    found = chattering_episodes(rocking.simulate(STATUE, rocking.records.load("ridgecrest-clc-090")))
+    text = str(found)
     assert len(text.splitlines()) == 1 + 6 + 1
+    assert [row["rest"] for row in found.to_dict()["episodes"]] == found.episodes["rest"].tolist()
     assert "of the shaking from" in text

@@ -21,7 +21,7 @@ def test_spectrum_json_is_the_spectrum(run):
     assert (code, err) == (0, "")
     result = json.loads(out)
     motions = [rocking.records.load(name) for name in (RECORD, OTHER)]
-    dataset = rocking_spectrum(motions, alpha=[0.1, 0.2], p=quantities.values("1:4:5:log", "--p"))
+    dataset = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.2], p=quantities.values("1:4:5:log", "--p")), motions)
     assert result["motions"] == [RECORD, OTHER]
     assert result["axes"] == ["alpha", "p"]
     assert result["overturned_share"] == dataset.overturned_share.values.tolist()
@@ -46,7 +46,7 @@ def test_map_json_is_the_map(run):
     result = json.loads(out)
     block = rocking.Block.from_parameters(1.0, 0.2, 0.9)
     grid = {"amplitudes": np.linspace(0.5, 8.0, 16), "frequencies": [2.0, 5.0]}
-    dataset = overturning_map("one-sine", block, model="linear", **grid)
+    dataset = overturning_map(block, "one-sine", model="linear", **grid)
     assert result["mode"] == dataset.mode.values.tolist()
     assert [row["boundary_amplitude"] for row in result["boundaries"]] == dataset.boundary_amplitude.values.tolist()
     assert result["modes"]["0"] == "overturns without impact"

@@ -19,6 +19,7 @@ def test_chatter_json_is_what_the_functions_give(run):
     assert (code, err) == (0, "")
     result = json.loads(out)
     assert result["complete"] is True
+    assert len(result["chattering_time"]) == 4
     for method, value in result["chattering_time"].items():
         assert value == float(chattering_time(1.03, 2.0, 0.92, method=method))
     exact = sequence(1.03, 2.0, 0.92)

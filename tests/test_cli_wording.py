@@ -91,7 +91,9 @@ def test_angles_that_may_be_radians_are_taken_for_them(run):
         lambda: Block.from_parameters(2.0, 12.0, 0.9),
         lambda: Blocks(p=2.0, alpha=[0.2, 12.0], restitution=0.9),
         lambda: rocking.simulate(Block(half_width=0.2, half_height=1.0), None, initial_rotation=12.0),
-        lambda: rocking.rocking_spectrum(rocking.pulses.one_sine(1.0, 1.0), alpha=12.0, p=1.0, restitution=0.9),
+        lambda: rocking.rocking_spectrum(
+            rocking.Blocks.grid(alpha=12.0, p=1.0, restitution=0.9), rocking.pulses.one_sine(1.0, 1.0)
+        ),
         lambda: rocking.calibrate([rocking.pulses.one_sine(1.0, 1.0)] * 2, [True, False], alpha=(0.1, 12.0)),
     ],
 )
@@ -184,11 +186,12 @@ def test_a_scaled_motion_is_distinguished_from_the_record(run):
     response = rocking.simulate(Block(width=0.24, height=1.1), scaled)
     assert scaled.label in repr(response)
     assert f"under {scaled.label}" in response.plot().get_suptitle().replace("\n", " ")
-    spectrum = rocking.rocking_spectrum(scaled, alpha=0.2, p=[1.0, 2.0], restitution=0.9)
+    spectrum = rocking.rocking_spectrum(rocking.Blocks.grid(alpha=0.2, p=[1.0, 2.0], restitution=0.9), scaled)
     assert scaled.label in spectrum.summary().splitlines()[0]
     assert scaled.label in spectrum.plot().get_suptitle().replace("\n", " ")
     assert list(spectrum.motion.values) == [RECORD]
-    two = rocking.rocking_spectrum([scaled, record], alpha=0.2, p=[1.0, 2.0], restitution=0.9).summary()
+    blocks = rocking.Blocks.grid(alpha=0.2, p=[1.0, 2.0], restitution=0.9)
+    two = rocking.rocking_spectrum(blocks, [scaled, record]).summary()
     assert "2 motions, 1 of them scaled or processed" in two
     out = run("simulate", RECORD, "el-centro-meloland-360", *SIZES, "--pga", "0.4g")[1]
     assert out.count("to a peak ground acceleration of 3.92266 m/s^2 (0.4 g)") == 2
@@ -214,7 +217,8 @@ def test_messages_in_python_say_what_is_meant(tmp_path):
         response.to_dataframe(dt=1e-9)
     with pytest.raises(RockingError, match="ax must be axes of Matplotlib's to draw in, not 'x'"):
         response.plot(ax="x")
-    for written in (response, rocking.rocking_spectrum(response.motion, alpha=0.2, p=1.0, restitution=0.9)):
+    blocks = rocking.Blocks.grid(alpha=0.2, p=1.0, restitution=0.9)
+    for written in (response, rocking.rocking_spectrum(blocks, response.motion)):
         with pytest.raises(RockingError, match=r"there is no folder .*nowhere; make it"):
             written.to_netcdf(tmp_path / "nowhere" / "x.nc")
 

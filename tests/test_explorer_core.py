@@ -512,9 +512,9 @@ def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
     )
     found = filled(grid)
     expected = rocking.overturning_map(
-        "one-sine", case.block, amplitudes=grid.y.values, frequencies=grid.x.values, model="linear", tolerance=0.4
+        case.block, "one-sine", amplitudes=grid.y.values, frequencies=grid.x.values, model="linear", tolerance=0.4
     )
-    modes = np.where(found["mode"] == maps.OVERTURNS_AFTER_REST, expected.mode.values, found["mode"])
+    modes = np.where(found["mode"] == maps.Mode.OVERTURNS_AFTER_REST, expected.mode.values, found["mode"])
     assert np.array_equal(modes, expected.mode.values)
     stays = found["mode"] < 0
     assert found["peak"][stays] == pytest.approx(expected.peak_rotation.values[stays] / 0.2, rel=1e-6)
@@ -763,7 +763,7 @@ def test_a_map_of_overturning_is_a_command_and_a_script(tmp_path):
     texts = {**SINE, "motion": "ricker:amplitude=3,frequency=1,kind=antisymmetric", "model": "nonlinear"}
     axes = {"x": "omega", "x_from": "0.6", "x_to": "5", "y": "a", "y_from": "0.7", "y_to": "9"}
     grid, found = _mapped(texts, axes)
-    modes = np.where(found["mode"] == maps.OVERTURNS_AFTER_REST, 0, found["mode"])
+    modes = np.where(found["mode"] == maps.Mode.OVERTURNS_AFTER_REST, 0, found["mode"])
     ran = _ran(map_code.as_command(grid), tmp_path)
     assert np.array_equal(np.array(ran["mode"]), modes)
     assert len(np.unique(modes)) > 3

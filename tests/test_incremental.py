@@ -35,7 +35,7 @@ def bands(dataset, motion=0, block=0):
 def test_a_pulse_overturns_in_two_bands_that_a_map_finds_as_well():
     dataset = incremental_dynamic_analysis(BLOCK, PULSE, measure="pga_ratio")
     grid = {"amplitudes": np.linspace(0.5, 10.0, 30), "frequencies": [5.0]}
-    edges = rocking.overturning_map("one-sine", BLOCK, **grid).boundary_amplitude.values[-3:]
+    edges = rocking.overturning_map(BLOCK, "one-sine", **grid).boundary_amplitude.values[-3:]
     (start, end), (again, never) = bands(dataset)
     np.testing.assert_allclose([start, end, again], edges, rtol=1e-6)
     assert math.isnan(never)

@@ -52,7 +52,7 @@ def sequence(dataset, column):
 
 def test_a_half_sine_overturns_a_slender_block_from_the_closed_form_on():
     grid = np.linspace(0.5, 6.0, 12)
-    dataset = overturning_map("half-sine", THIN, amplitudes=grid, frequencies=FREQUENCIES, model="linear")
+    dataset = overturning_map(THIN, "half-sine", amplitudes=grid, frequencies=FREQUENCIES, model="linear")
     exact = [half_sine_amplitude(ratio) for ratio in FREQUENCIES]
     np.testing.assert_allclose(dataset.overturning_amplitude, exact, rtol=0.0, atol=1e-8)
     # Values known beforehand.
@@ -61,7 +61,7 @@ def test_a_half_sine_overturns_a_slender_block_from_the_closed_form_on():
 
 def test_a_one_sine_overturns_a_slender_block_without_impact_from_the_closed_form_on():
     grid = np.linspace(0.5, 14.0, 46)
-    dataset = overturning_map("one-sine", THIN, amplitudes=grid, frequencies=FREQUENCIES, model="linear")
+    dataset = overturning_map(THIN, "one-sine", amplitudes=grid, frequencies=FREQUENCIES, model="linear")
     for k, ratio in enumerate(FREQUENCIES):
         modes, edges = sequence(dataset, k)
         assert modes[-1] == 0
@@ -70,7 +70,7 @@ def test_a_one_sine_overturns_a_slender_block_without_impact_from_the_closed_for
 
 def test_a_second_region_overturns_after_one_impact_with_safety_above_it():
     grid = np.linspace(0.5, 14.0, 46)
-    dataset = overturning_map("one-sine", BLOCK, amplitudes=grid, frequencies=[4.0, 5.0, 6.0])
+    dataset = overturning_map(BLOCK, "one-sine", amplitudes=grid, frequencies=[4.0, 5.0, 6.0])
     for k in range(3):
         modes, _ = sequence(dataset, k)
         assert modes == [-3, -2, -1, 1, -1, 0] or modes == [-3, -1, 1, -1, 0]
@@ -85,14 +85,15 @@ def test_a_second_region_overturns_after_one_impact_with_safety_above_it():
 def test_the_larger_of_two_similar_blocks_is_safer(pulse):
     # A larger block has a smaller p, so the same pulse has a larger ratio to it.
     ratios = np.linspace(1.5, 4.0, 6)
-    dataset = overturning_map(pulse, BLOCK, amplitudes=np.linspace(0.5, 14.0, 28), frequencies=ratios)
+    dataset = overturning_map(BLOCK, pulse, amplitudes=np.linspace(0.5, 14.0, 28), frequencies=ratios)
     assert np.all(np.diff(dataset.overturning_amplitude) > 0.0)
 
 
 def test_boundaries_separate_what_simulate_says():
-    dataset = overturning_map("one-sine", BLOCK, amplitudes=[0.5, 2.0, 4.0, 7.0, 10.0], frequencies=[4.5])
+    dataset = overturning_map(BLOCK, "one-sine", amplitudes=[0.5, 2.0, 4.0, 7.0, 10.0], frequencies=[4.5])
     motion = rocking.pulses.one_sine(1.0, 4.5 * 2.0 / (2.0 * math.pi))
     threshold = BLOCK.minimum_acceleration
+    assert dataset.sizes["boundary"] >= 4
     for edge, *modes in zip(
         *(dataset[n].values for n in ("boundary_amplitude", "mode_below", "mode_above")), strict=True
     ):
@@ -109,7 +110,7 @@ def test_boundaries_separate_what_simulate_says():
 
 
 def test_nothing_moves_below_an_amplitude_of_one():
-    dataset = overturning_map("half-sine", BLOCK, amplitudes=[0.5, 1.5], frequencies=[1.0, 4.0])
+    dataset = overturning_map(BLOCK, "half-sine", amplitudes=[0.5, 1.5], frequencies=[1.0, 4.0])
     assert np.all(dataset.mode.values[0] == -3)
     np.testing.assert_allclose(dataset.boundary_amplitude.values[dataset.mode_below == -3], 1.0, rtol=1e-9)
     assert np.all(dataset.peak_rotation.values[0] == 0.0)
@@ -121,7 +122,7 @@ def test_an_overturned_block_counts_the_impacts_since_its_last_uplift():
         return rocking.pulses.n_lobe([0.35 * amplitude, 0.0, 0.0, amplitude], frequency)
 
     damped = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.5)
-    dataset = overturning_map(pulse, damped, amplitudes=[3.0], frequencies=[1.0])
+    dataset = overturning_map(damped, pulse, amplitudes=[3.0], frequencies=[1.0])
     response = rocking.simulate(damped, pulse(3.0 * damped.minimum_acceleration, 1.0 / math.pi))
     assert response.overturned
     assert response.events["kind"].tolist() == ["uplift", "rest", "uplift", "overturn"]
@@ -132,7 +133,7 @@ def test_an_overturned_block_counts_the_impacts_since_its_last_uplift():
 def test_only_ratios_count():
     larger = rocking.Block.from_parameters(p=0.7, alpha=0.2, restitution=0.9)
     maps = [
-        overturning_map("one-cosine", block, amplitudes=np.linspace(0.5, 8.0, 9), frequencies=[1.0, 3.0])
+        overturning_map(block, "one-cosine", amplitudes=np.linspace(0.5, 8.0, 9), frequencies=[1.0, 3.0])
         for block in (BLOCK, larger)
     ]
     np.testing.assert_array_equal(maps[0].mode, maps[1].mode)
@@ -147,7 +148,7 @@ def test_a_mirrored_two_sided_block_under_a_mirrored_pulse():
         return -rocking.pulses.one_sine(amplitude, frequency)
 
     grid = {"amplitudes": np.linspace(0.5, 8.0, 9), "frequencies": [2.0, 4.0]}
-    here, there = overturning_map("one-sine", sided, **grid), overturning_map(reversed_sine, mirrored, **grid)
+    here, there = overturning_map(sided, "one-sine", **grid), overturning_map(mirrored, reversed_sine, **grid)
     np.testing.assert_array_equal(here.mode, there.mode)
     np.testing.assert_array_equal(here.boundary_amplitude, there.boundary_amplitude)
 
@@ -163,7 +164,7 @@ def test_a_mirrored_two_sided_block_under_a_mirrored_pulse():
     ],
 )
 def test_the_amplitude_of_a_pulse_is_its_peak(pulse, parameters):
-    dataset = overturning_map(pulse, BLOCK, amplitudes=[0.9, 1.1], frequencies=[2.0], **parameters)
+    dataset = overturning_map(BLOCK, pulse, amplitudes=[0.9, 1.1], frequencies=[2.0], **parameters)
     assert dataset.mode.values[0, 0] == -3
     assert dataset.mode.values[1, 0] > -3
     lifting = dataset.boundary_amplitude.values[dataset.mode_below == -3]
@@ -222,7 +223,7 @@ def test_blocks_that_each_have_their_own_scaling_do_what_simulate_says():
 
 
 def test_a_map_has_units_names_and_provenance():
-    dataset = overturning_map("half-sine", BLOCK, amplitudes=[0.5, 3.0], frequencies=[1.0, 2.0])
+    dataset = overturning_map(BLOCK, "half-sine", amplitudes=[0.5, 3.0], frequencies=[1.0, 2.0])
     assert dataset.pulse.startswith("half sine: ")
     assert dataset.alpha_rad == [0.2, 0.2]
     assert dataset.tolerance == 1e-9
@@ -230,16 +231,16 @@ def test_a_map_has_units_names_and_provenance():
 
 
 def test_a_map_that_never_overturns_has_no_overturning_amplitude():
-    dataset = overturning_map("half-sine", BLOCK, amplitudes=[0.5, 1.01], frequencies=[5.0])
+    dataset = overturning_map(BLOCK, "half-sine", amplitudes=[0.5, 1.01], frequencies=[5.0])
     assert np.isnan(dataset.overturning_amplitude.values).all()
-    below = overturning_map("half-sine", BLOCK, amplitudes=[8.0, 9.0], frequencies=[1.0])
+    below = overturning_map(BLOCK, "half-sine", amplitudes=[8.0, 9.0], frequencies=[1.0])
     assert np.isnan(below.overturning_amplitude.values).all()
     assert below.sizes["boundary"] == 0
 
 
 def test_the_figure_names_every_mode_that_it_shows():
     dataset = overturning_map(
-        "one-sine", BLOCK, amplitudes=np.linspace(0.5, 10.0, 20), frequencies=np.linspace(2, 6, 5)
+        BLOCK, "one-sine", amplitudes=np.linspace(0.5, 10.0, 20), frequencies=np.linspace(2, 6, 5)
     )
     figure = dataset.plot()
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -278,7 +279,13 @@ def test_the_figure_names_every_mode_that_it_shows():
 def test_what_makes_no_map_is_refused(changes, word):
     arguments = {"pulse": "half-sine", "block": BLOCK, "amplitudes": [0.5, 2.0], "frequencies": [1.0]} | changes
     with pytest.raises(rocking.RockingError, match=word):
-        overturning_map(arguments.pop("pulse"), arguments.pop("block"), **arguments)
+        overturning_map(arguments.pop("block"), arguments.pop("pulse"), **arguments)
+
+
+def test_a_map_is_the_same_in_one_thread_and_in_several():
+    grid = {"amplitudes": [0.5, 2.0, 6.0], "frequencies": [1.0, 4.0]}
+    one, several = (overturning_map(BLOCK, "one-sine", threads=count, **grid) for count in (1, 3))
+    assert one.data.identical(several.data)
 
 
 def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
@@ -289,7 +296,7 @@ def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
 
 def test_the_summary_tells_none_from_already_the_first():
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    low = rocking.overturning_map("one-sine", block, amplitudes=[0.5, 1.5], frequencies=[5.0]).summary()
+    low = rocking.overturning_map(block, "one-sine", amplitudes=[0.5, 1.5], frequencies=[5.0]).summary()
     assert "none of those up to 1.5" in low
-    high = rocking.overturning_map("one-sine", block, amplitudes=[4.0, 5.0], frequencies=[5.0]).summary()
+    high = rocking.overturning_map(block, "one-sine", amplitudes=[4.0, 5.0], frequencies=[5.0]).summary()
     assert "4 or less" in high

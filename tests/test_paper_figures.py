@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, interval_ratios
 from rocking.chattering.paper import FIGURES, Statement, paper_figure
-from rocking.chattering.paper.case import Case
+from rocking.chattering.paper.figure import BlockUnderSine
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -170,7 +170,7 @@ def test_figure_6_holds_the_whole_surface(figures):
 def test_histories_are_the_responses_of_the_schemes(figures, number):
     history, events = figures[number].tables["history"], figures[number].tables["events"]
     a = {9: 1.03, 10: 1.03, 11: 1.05}[number]
-    case = Case(a)
+    case = BlockUnderSine(a)
     response = case.simulated("certified")
     rotation = response.rotation(history["time_over_period"] * case.period) / 0.2
     np.testing.assert_allclose(history["rotation_over_alpha_certified"], rotation, atol=1e-15)
@@ -405,7 +405,7 @@ class Walker:
     def lands(self):
         return "no" if self.tau + self.next >= self.end else "yes"
 
-    def strike(self):
+    def impact(self):
         speed = self.eta * abs(self.slope(self.next))
         self.tau += self.next
         self.speed, self.sign = speed, -self.sign
@@ -434,7 +434,7 @@ class Walker:
 )
 def test_whoever_follows_the_flowcharts_rests_when_simulate_does(figures, k, a, threshold, count):
     chart = figures[8].drawings["flowcharts"].args[0][k]
-    case = Case(a)
+    case = BlockUnderSine(a)
     limit = float(chattering_time(a, 2.0, 0.92, method="asymptotic"))
     complete = 1.0 <= a < critical_amplitude(2.0, 0.92, method="eq76")
     rules = (

@@ -28,8 +28,10 @@ def small_budget(monkeypatch):
 @pytest.mark.parametrize(
     "analysis",
     [
-        lambda: rocking.rocking_spectrum(PULSE.scaled(0.4), alpha=[0.2], p=[2.0], restitution=[1.0 - 1e-9]),
-        lambda: rocking.overturning_map("one-sine", RESTLESS, amplitudes=[1.2, 1.4], frequencies=[3.0]),
+        lambda: rocking.rocking_spectrum(
+            rocking.Blocks.grid(alpha=[0.2], p=[2.0], restitution=[1.0 - 1e-9]), PULSE.scaled(0.4)
+        ),
+        lambda: rocking.overturning_map(RESTLESS, "one-sine", amplitudes=[1.2, 1.4], frequencies=[3.0]),
         lambda: rocking.incremental_dynamic_analysis(RESTLESS, PULSE, levels=[2.2, 2.4]),
         lambda: rocking.compare_measures(RESTLESS, [PULSE, PULSE]),
         lambda: rocking.fragility(RESTLESS, PULSE, levels=[2.2, 2.4]),
@@ -59,14 +61,15 @@ def test_an_ensemble_marks_what_was_given_up_and_keeps_the_rest(monkeypatch):
 
 @pytest.fixture(scope="module")
 def spectrum():
-    return rocking.rocking_spectrum([PULSE, PULSE.scaled(0.5)], alpha=[0.15, 0.2], p=[1.0, 2.0, 3.0], restitution=[0.9])
+    blocks = rocking.Blocks.grid(alpha=[0.15, 0.2], p=[1.0, 2.0, 3.0], restitution=[0.9])
+    return rocking.rocking_spectrum(blocks, [PULSE, PULSE.scaled(0.5)])
 
 
 @pytest.fixture(scope="module")
 def results(spectrum):
     return {
         "RockingSpectrum": spectrum,
-        "OverturningMap": rocking.overturning_map("one-sine", BLOCK, amplitudes=[1.0, 4.0], frequencies=[2.0, 3.0]),
+        "OverturningMap": rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0, 3.0]),
         "IncrementalDynamicAnalysis": rocking.incremental_dynamic_analysis(BLOCK, PULSE),
         "MeasureComparison": rocking.compare_measures(BLOCK, [PULSE, rocking.pulses.one_sine(6.0, 2.0)]),
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),

@@ -190,6 +190,13 @@ def test_the_table_has_a_line_for_each_scheme():
     assert any(line.startswith("velocity 0.05") and "false rest" in line for line in lines)
 
 
+def test_a_comparison_is_the_same_in_one_thread_and_in_several():
+    one, several = (compare_schemes(BLOCK, sine(1.05), model="linear", threads=count).to_dict() for count in (1, 3))
+    assert repr(one) == repr(several)
+    assert len(one["schemes"]) == len(SCHEMES)
+    assert sum(not scheme["is_right"] for scheme in one["schemes"]) == 1
+
+
 def test_free_rocking_is_compared_too():
     comparison = compare_schemes(
         BLOCK, None, schemes=[rocking.IntervalThreshold(1e-6)], model="linear", initial_rotation=0.02

@@ -19,7 +19,7 @@ PULSES = [rocking.pulses.one_sine(5.0, frequency) for frequency in (0.5, 0.8, 1.
 
 @pytest.fixture(scope="module")
 def spectrum():
-    return rocking_spectrum(PULSES, alpha=[0.1, 0.2], p=[1.0, 2.0, 4.0], restitution=[0.8, 0.9])
+    return rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.2], p=[1.0, 2.0, 4.0], restitution=[0.8, 0.9]), PULSES)
 
 
 def test_every_peak_is_the_one_of_its_block_and_motion(spectrum):
@@ -48,7 +48,7 @@ def test_an_overturned_block_counts_as_infinitely_large(spectrum):
 
 
 def test_housners_restitution_goes_with_each_slenderness():
-    result = rocking_spectrum(PULSES[2], alpha=[0.1, 0.3], p=[2.0])
+    result = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.3], p=[2.0]), PULSES[2])
     assert "restitution" not in result.dims
     for alpha in (0.1, 0.3):
         response = rocking.simulate(rocking.Block.from_parameters(2.0, alpha), PULSES[2])
@@ -57,7 +57,7 @@ def test_housners_restitution_goes_with_each_slenderness():
 
 def test_sizes_are_half_diagonals_of_rectangles():
     block = rocking.Block(half_width=0.2, half_height=1.0)
-    result = rocking_spectrum(PULSES[3], alpha=block.alpha, size=[block.radius])
+    result = rocking_spectrum(rocking.Blocks.grid(alpha=block.alpha, size=[block.radius]), PULSES[3])
     assert float(result.p[0]) == pytest.approx(block.p, rel=1e-14)
     assert float(result["size"][0]) == pytest.approx(block.radius, rel=1e-14)
     assert float(result.period[0]) == pytest.approx(2.0 * math.pi / block.p, rel=1e-14)
@@ -69,7 +69,8 @@ def test_large_similar_blocks_have_equal_displacements():
     # R theta'' = -(3/4) (g sin(alpha - theta) + a cos(alpha - theta)): as R grows theta vanishes beside alpha, and
     # R theta obeys an equation without R. What differs falls as theta does, in proportion to 1/R.
     record = rocking.records.load("el-centro-meloland-270")
-    result = rocking_spectrum(record, alpha=[0.1, 0.2], size=[80.0, 160.0, 320.0, 640.0, 1280.0], restitution=[0.9])
+    sizes = [80.0, 160.0, 320.0, 640.0, 1280.0]
+    result = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.2], size=sizes, restitution=[0.9]), record)
     displacement = (result.peak_rotation * result["size"]).isel(motion=0, restitution=0).values
     steps = np.abs(np.diff(displacement, axis=1))
     assert np.all(steps[:, -1] < 0.005 * displacement[:, -1])
@@ -108,8 +109,8 @@ def test_the_figure_draws_fractiles_and_leaves_out_what_overturns(spectrum):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"p": None}, "give one of p="),
-        ({"size": [1.0]}, "not both of p="),
+        ({"p": None}, "give one of p "),
+        ({"size": [1.0]}, "not both of p "),
         ({"p": None, "size": [-1.0]}, "size"),
         ({"p": [0.0]}, "p must"),
         ({"p": "fast"}, "p must"),
@@ -124,14 +125,15 @@ def test_the_figure_draws_fractiles_and_leaves_out_what_overturns(spectrum):
 )
 def test_what_makes_no_spectrum_is_refused(changes, word):
     arguments = {"motions": PULSES, "alpha": [0.2], "p": [2.0]} | changes
+    grid = {name: arguments.pop(name) for name in ("alpha", "p", "size", "restitution") if name in arguments}
     with pytest.raises(rocking.RockingError, match=word):
-        rocking_spectrum(arguments.pop("motions"), **arguments)
+        rocking_spectrum(rocking.Blocks.grid(**grid), arguments.pop("motions"), **arguments)
 
 
 def test_the_title_of_a_figure_says_what_the_legend_need_not():
-    one = rocking_spectrum(PULSES[0], alpha=[0.2], p=[2.0, 3.0]).plot()
+    one = rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0, 3.0]), PULSES[0]).plot()
     assert "alpha = 0.2 rad (11.46°), nonlinear model" in one.get_suptitle()
-    two = rocking_spectrum(PULSES[0], alpha=[0.2, 0.3], p=[2.0, 3.0]).plot()
+    two = rocking_spectrum(rocking.Blocks.grid(alpha=[0.2, 0.3], p=[2.0, 3.0]), PULSES[0]).plot()
     assert "alpha" not in two.get_suptitle()
     assert [text.get_text() for text in two.legends[0].get_texts()[:2]] == [
         "alpha = 0.2 rad (11.46°)",
@@ -140,7 +142,7 @@ def test_the_title_of_a_figure_says_what_the_legend_need_not():
 
 
 def test_a_figure_of_too_many_curves_is_refused(spectrum):
-    more = rocking_spectrum(PULSES[0], alpha=[0.1, 0.15, 0.2, 0.25, 0.3], p=[2.0])
+    more = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.15, 0.2, 0.25, 0.3], p=[2.0]), PULSES[0])
     with pytest.raises(rocking.InvalidOption, match="at most 4"):
         more.plot()
     with pytest.raises(rocking.InvalidOption, match="against"):
@@ -170,11 +172,20 @@ def test_an_ensemble_of_one_block_has_the_spectrum_of_its_shape():
     motions = [rocking.pulses.one_sine(4.0, f) for f in (0.5, 1.0, 2.0)]
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     p = [1.0, 2.0, 3.0]
-    grid = rocking_spectrum(motions, alpha=[0.2], restitution=[0.9], p=p)
-    ensemble = rocking_spectrum(motions, blocks=block, p=p)
+    grid = rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], restitution=[0.9], p=p), motions)
+    ensemble = rocking_spectrum(block, motions, p=p)
     assert ensemble.peak_rotation.values[:, 0] == pytest.approx(grid.peak_rotation.values[:, 0, 0], rel=1e-12)
     assert ensemble.overturned_share.values.tolist() == grid.overturned_share.values[0, 0].tolist()
     assert ensemble.plot().axes
-    for wrong, word in (({"alpha": [0.2], "blocks": block}, "of their own"), ({"p": [1.0]}, "give alpha=")):
-        with pytest.raises(rocking.InvalidOption, match=word):
-            rocking_spectrum(motions, **wrong)
+    with pytest.raises(rocking.InvalidBlock, match="not both of p "):
+        rocking_spectrum(block, motions, p=p, size=[1.0])
+
+
+def test_a_grid_that_is_moved_or_weighted_is_an_ensemble():
+    grid = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.1, 0.2], restitution=0.9)
+    assert [*grid.axes] == ["p", "alpha", "restitution"] and grid.select(slice(2)).axes is None
+    assert dict(rocking_spectrum(grid, PULSES[0]).peak_rotation.sizes) == {
+        "motion": 1, "alpha": 2, "restitution": 1, "p": 2,
+    }  # fmt: skip
+    for options in ({"p": [1.0]}, {"size": [1.0]}, {"weights": [1.0, 1.0, 2.0, 2.0]}):
+        assert rocking_spectrum(grid, PULSES[0], **options).sizes["block"] == 4

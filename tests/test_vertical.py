@@ -15,7 +15,8 @@ from scipy.optimize import brentq
 import rocking
 from rocking import InvalidMotion, InvalidOption, Motion
 from rocking.block import Blocks
-from rocking.chattering.maps import Case, chattering_map
+from rocking.chattering.families import SimulationInput
+from rocking.chattering.maps import chattering_map
 from rocking.explorer.case import read_case, texts_of
 from rocking.explorer.maps import grid_of, parts
 from rocking.explorer.shelf import Shelf
@@ -431,8 +432,8 @@ def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_com
     for part in parts(grid, threads=1):
         found[part.points] = part.values[0]
 
-    def at(p: float, pga: float) -> Case:
-        return Case(block_for(p, 0.2, 0.5), case.motion.scaled_to(pga * G), case.model)
+    def at(p: float, pga: float) -> SimulationInput:
+        return SimulationInput(block_for(p, 0.2, 0.5), case.motion.scaled_to(pga * G), case.model)
 
     singly = chattering_map(at, {"p": grid.x.values, "pga": grid.y.values}).outcome.values
     assert np.array_equal(found.reshape(grid.shape), singly.T)
@@ -632,7 +633,7 @@ def test_tables_of_many_records_name_the_vertical_components(tmp_path: Path) -> 
     motions = [el_centro(), alone]
     names = ["el-centro-meloland-up", ""]
     block = rocking.Block(width=0.24, height=1.1)
-    spectrum = rocking.rocking_spectrum(motions, alpha=[0.2], p=[2.0, 3.0])
+    spectrum = rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0, 3.0]), motions)
     ida = rocking.incremental_dynamic_analysis(block, motions, tolerance=1e-2)
     measures = rocking.compare_measures(block, motions, tolerance=1e-2)
     for found, table in ((spectrum, "peaks"), (ida, "levels"), (measures, "intensities")):
@@ -646,7 +647,8 @@ def test_tables_of_many_records_name_the_vertical_components(tmp_path: Path) -> 
     assert set(curve.outcomes.vertical) == set(names)
     curve.to_nrml(tmp_path / "f.xml")
     assert "noDamageLimit" not in (tmp_path / "f.xml").read_text("utf-8")
-    assert "vertical" not in rocking.rocking_spectrum(alone, alpha=[0.2], p=[2.0]).to_dataframe("peaks")
+    spectrum = rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0]), alone)
+    assert "vertical" not in spectrum.to_dataframe("peaks")
 
 
 def test_a_jump_beyond_one_threshold_lifts_off_though_the_other_is_only_reached() -> None:

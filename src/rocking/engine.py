@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import os
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,9 @@ OUTCOME = np.dtype(
         ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("stalled", "i8"), ("duration", "f8"),
     ]
 )  # fmt: skip
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
 
 #: Steps that a simulation may take, besides a few for every piece of its motion.
 BUDGET: Final = 3_000_000
@@ -140,6 +143,23 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def in_threads(work: Callable[[Item], Found], items: Sequence[Item], *, threads: int | None = None) -> Iterator[Found]:
+    """Results of some work on each item, in their order; by default in a thread for every core.
+
+    An interrupt leaves the rest undone.
+    """
+    count = min(cores() if threads is None else threads, len(items))
+    if count < 2:
+        yield from map(work, items)
+        return
+    with ThreadPoolExecutor(count) as pool:
+        try:
+            yield from pool.map(work, items)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
 def parts_of(count: int, motion: Motion) -> Iterator[slice]:
     """Ranges of ``count`` blocks, each as large as a task should be."""
     size = _TOGETHER * max(1, _TASK // (_TOGETHER * len(motion.coefficients)))
@@ -216,7 +236,7 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
         _march_together(ground, rules, (bodies, states), chosen, step, substeps)
     _march_on(ground, rules, bodies, states, stop)
     outcomes = _outcomes(states, task.motion.end)
-    outcomes["complete_chattering"] = _complete(ground, bodies, states)
+    outcomes["complete_chattering"] = complete_chattering(ground, bodies, states)
     return outcomes
 
 
@@ -281,8 +301,8 @@ def slices(ground: Ground) -> int:
     return math.ceil((BUDGET + _BUDGET_OF_A_PIECE * len(ground.pieces)) / SLICE)
 
 
-def _complete(ground: Ground, bodies: Records, states: Records) -> Flags:
-    """Whether the chattering after the first uplift was complete."""
+def complete_chattering(ground: Ground, bodies: Records, states: Records) -> Flags:
+    """Whether the chattering after the first uplift was complete, by the times of that uplift and the first rest."""
     complete = np.empty(len(states), dtype=bool)
     note_complete(ground, bodies, states, state.new_scratch(), complete)
     return complete

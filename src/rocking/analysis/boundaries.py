@@ -18,16 +18,9 @@ _MOST: Final = 64
 
 @dataclass(frozen=True)
 class Boundaries:
-    """Changes of the outcome, each between a lower and a higher level, n in all; ordered by column, then level.
+    """Changes of the outcome in columns of a grid, ordered by column, then level.
 
-    Attributes
-    ----------
-    column : ndarray of int
-        What is scaled: a column of the grid.
-    low, high : ndarray
-        Levels that bracket the change.
-    below, above : ndarray of int
-        Outcomes at these levels.
+    Each lies between a low and a high level, which have the outcomes below and above.
     """
 
     column: Integers
@@ -50,23 +43,10 @@ def boundaries(
     tolerance: float,
     progress: bool | None = None,
 ) -> Boundaries:
-    """Find all changes of the outcome between neighbouring levels of a grid, to a relative tolerance.
+    """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
-    Parameters
-    ----------
-    levels : ndarray, shape (m,)
-        Increasing and positive.
-    outcome : ndarray of int, shape (m, columns)
-        Outcome at every level of every column.
-    outcome_of : callable
-        Outcomes for arrays of columns and levels.
-    tolerance : float
-        Width of each bracket over its level.
-    progress : bool, optional
-        Whether to draw a progress bar.
+    `outcome_of` tells outcomes for arrays of columns and levels; the tolerance is relative to the level.
 
-    Notes
-    -----
     Where a bisection meets a third outcome both halves are followed, so each bracket ends with two outcomes that are
     neighbours to within the tolerance. Only where an interval of the grid holds 64 changes or more, as between the
     regions of a fractal, one is followed up for all that lie between two outcomes. Outcomes between two levels of the

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import IntEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -36,33 +37,52 @@ if TYPE_CHECKING:
 #: A pulse from its amplitude (m/s^2) and frequency (Hz), proportional to its amplitude.
 PulseFamily = Callable[[float, float], Motion]
 
-#: What a block that stays does; n >= 0 is a block that overturns after n impacts.
-NO_UPLIFT: Final = -3
-RESTS: Final = -2
-ROCKS: Final = -1
+
+class Mode(IntEnum):
+    """What a block does; a mode n >= 0, which is none of these, is a block that overturns after n impacts.
+
+    Attributes
+    ----------
+    OVERTURNS_AFTER_REST
+        It overturns after it has been at rest; the maps of `overturning_map` count its impacts since then instead.
+    NO_UPLIFT
+        The pulse does not lift it.
+    RESTS
+        It comes to rest at least once before the pulse is over.
+    ROCKS
+        It rocks until the pulse is over.
+    """
+
+    OVERTURNS_AFTER_REST = -4
+    NO_UPLIFT = -3
+    RESTS = -2
+    ROCKS = -1
+
 
 _NAMES: Final = {
-    NO_UPLIFT: "no uplift",
-    RESTS: "rests before the pulse is over",
-    ROCKS: "rocks until the pulse is over",
+    Mode.OVERTURNS_AFTER_REST: "overturns after a rest",
+    Mode.NO_UPLIFT: "no uplift",
+    Mode.RESTS: "rests before the pulse is over",
+    Mode.ROCKS: "rocks until the pulse is over",
     0: "overturns without impact",
 }
 
 #: Families of one amplitude and one frequency; the others of `rocking.pulses` are given as functions.
-_FAMILIES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
+PULSES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
 #: Share of a map that is written as a number.
 _LEAST_SHARE: Final = 1e-3
 
 
 def overturning_map(
-    pulse: str | PulseFamily,
     block: Block,
+    pulse: str | PulseFamily,
     *,
     amplitudes: ArrayLike,
     frequencies: ArrayLike,
     model: Model = "nonlinear",
     tolerance: float = 1e-9,
+    threads: int | None = None,
     progress: bool | None = None,
     **parameters: Any,
 ) -> OverturningMap:
@@ -70,12 +90,12 @@ def overturning_map(
 
     Parameters
     ----------
+    block : Block
+        Its slenderness and restitution count; its p does not, since only ratios to it enter.
     pulse : str or callable
         "sine" (give `cycles`), "half-sine", "one-sine", "one-cosine", "ricker" (`kind`) or "mavroeidis-papageorgiou"
         (`phase`, `gamma`); or a function of amplitude (m/s^2) and frequency (Hz) that returns a motion proportional to
         the amplitude.
-    block : Block
-        Its slenderness and restitution count; its p does not, since only ratios to it enter.
     amplitudes : array_like, shape (m,)
         Increasing amplitudes, over the smallest acceleration that lifts the block: g tan(alpha), in the linear model
         g alpha. The amplitude of a Mavroeidis-Papageorgiou pulse is here its peak acceleration.
@@ -85,6 +105,8 @@ def overturning_map(
         Equation of motion.
     tolerance : float
         Boundaries are refined to this width, relative to the amplitude.
+    threads : int, optional
+        Number of threads; by default one for every core.
     progress : bool, optional
         Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
     **parameters
@@ -118,7 +140,7 @@ def overturning_map(
 
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    >>> result = overturning_map("half-sine", block, amplitudes=[0.5, 1.5, 2.5], frequencies=[2.0], model="linear")
+    >>> result = overturning_map(block, "half-sine", amplitudes=[0.5, 1.5, 2.5], frequencies=[2.0], model="linear")
     >>> [mode_name(mode) for mode in result.mode.values[:, 0]]
     ['no uplift', 'rocks until the pulse is over', 'overturns without impact']
     >>> print(f"{float(result.overturning_amplitude[0]):.7f}")
@@ -132,11 +154,15 @@ def overturning_map(
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
     one_block(block)
     if all(side.restitution == 1.0 for side in block.sides):
-        raise InvalidOption("a block with restitution 1 never comes to rest; an overturning map needs one below 1")
+        raise InvalidOption(
+            "a block with {} 1 never comes to rest; an overturning map needs one below 1", "restitution"
+        )
     slowest = min(side.p for side in block.sides)
     unit = _unit_pulse(pulse, slowest / (2.0 * math.pi), parameters)
     chattering = Certified(width * unit.duration)
-    problem = _PulseProblem(_resized(block, ratios), unit, min(block.uplift_thresholds(model)), model, chattering)
+    setup = Setup(_resized(block, ratios), model, chattering)
+    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    problem = _PulseProblem(setup, unit, min(block.uplift_thresholds(model)), count)
     modes, peaks = problem.grid(levels, progress)
     edges = boundaries(levels, modes, problem.modes, tolerance=width, progress=progress)
     attributes = {
@@ -146,6 +172,7 @@ def overturning_map(
         named("alpha", "rad"): [side.alpha for side in block.sides],
         "restitution": [side.restitution for side in block.sides],
         "pulse": f"{unit.name}: {unit.description.text}",
+        "pulse_name": unit.name,
         "tolerance": width,
     }
     return OverturningMap(_dataset(levels, ratios, modes, peaks, edges, attributes))
@@ -165,22 +192,12 @@ def mode_name(mode: int) -> str:
 
 
 def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
-    """Modes of blocks under one motion.
+    """Modes of blocks under a motion of some duration (s), from what the engine keeps of each.
 
-    Parameters
-    ----------
-    ends : structured array
-        What became of them, as the engine tells it (`rocking.engine.OUTCOME`).
-    duration : float
-        Of the motion, s.
-
-    Returns
-    -------
-    ndarray of int
-        As in `OverturningMap`, but of a block that overturns after it has rested, all its impacts.
+    They are those of `OverturningMap`, but count all impacts of a block that overturns after it has been at rest.
     """
     rested = (ends["uplifts"] > 1) | ((ends["rests"] > 0) & (ends["last_rest"] <= duration))
-    modes = np.where(ends["uplifts"] == 0, NO_UPLIFT, np.where(rested, RESTS, ROCKS))
+    modes = np.where(ends["uplifts"] == 0, Mode.NO_UPLIFT, np.where(rested, Mode.RESTS, Mode.ROCKS))
     return np.where(ends["overturned"], ends["impacts"], modes)
 
 
@@ -217,7 +234,7 @@ class OverturningMap(Result):
         rows = [(float(ratio), self._lowest(k)) for k, ratio in enumerate(self.data.frequency)]
         return "\n\n".join(
             [
-                f"{self._pulse} on a block with {self._proportions}; {self.data.model} model",
+                f"{self.data.pulse_name} on a block with {self._proportions}; {self.data.model} model",
                 text_table(["outcome", "share of the map"], shares),
                 table_of_some(["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"], rows),
             ]
@@ -256,10 +273,8 @@ class OverturningMap(Result):
         ----------
         ax : matplotlib.axes.Axes, optional
             Where to draw; by default in a new figure.
-        title : str
-            Title; by default the pulse and the block.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
+        title, figsize
+            Title, by default the pulse and the block; width and height of a new figure, inches.
         """
         from rocking.plot import regions_figure
 
@@ -274,14 +289,10 @@ class OverturningMap(Result):
             names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, data.mode_above.values)},
             x_label="2πf/p, with the frequency f of the pulse",
             y_label="amplitude over the smallest that lifts the block",
-            title=title or f"{self._pulse}, {self._proportions}, {data.model} model",
+            title=title or f"{self.data.pulse_name}, {self._proportions}, {data.model} model",
             ax=ax,
             figsize=figsize,
         )
-
-    @property
-    def _pulse(self) -> str:
-        return str(self.data.pulse.partition(":")[0])
 
     @property
     def _proportions(self) -> str:
@@ -301,15 +312,14 @@ def _percent(share: float) -> str:
 class _PulseProblem:
     """Blocks, one for every frequency, under multiples of one pulse."""
 
-    blocks: Blocks
+    setup: Setup
     unit: Motion
     threshold: float
-    model: Model
-    chattering: Certified
+    threads: int | None
 
     def grid(self, levels: Floats, progress: bool | None) -> tuple[Integers, Floats]:
         """Modes and peak rotations at every level, shape (levels, blocks)."""
-        shape = levels.size, len(self.blocks)
+        shape = levels.size, len(self.setup.blocks)
         row, column = (index.ravel() for index in np.indices(shape))
         with Progress("mapping", row.size, show=progress) as bar:
             modes, peaks = self._followed(column, levels[row], bar.advance)
@@ -320,20 +330,19 @@ class _PulseProblem:
         return self._followed(column, level, lambda count: None)[0]
 
     def _followed(self, column: Integers, level: Floats, done: Callable[[int], None]) -> tuple[Integers, Floats]:
-        blocks = self.blocks.select(column)
-        factors = self.threshold * level
-        ends = np.empty(len(blocks), dtype=OUTCOME)
-        for task, outcomes in simulate_each(Setup(blocks, self.model, self.chattering), self.unit, factors):
+        setup = replace(self.setup, blocks=self.setup.blocks.select(column))
+        ends = np.empty(column.size, dtype=OUTCOME)
+        for task, outcomes in simulate_each(setup, self.unit, self.threshold * level, threads=self.threads):
             ends[task.blocks] = outcomes
             done(len(outcomes))
         modes = modes_of(ends, self.unit.duration)
         for k in np.flatnonzero(ends["overturned"] & (ends["uplifts"] > 1)):
-            modes[k] = self._last_impacts(blocks[int(k)], float(level[k]))
+            modes[k] = self._last_impacts(setup.blocks[int(k)], float(level[k]))
         return modes, ends["peak_rotation"]
 
     def _last_impacts(self, block: Block, level: float) -> int:
         """Impacts since the last uplift, of a block that had been at rest in between."""
-        response = simulate(block, self.unit.scaled(self.threshold * level), model=self.model)
+        response = simulate(block, self.unit.scaled(self.threshold * level), model=self.setup.model)
         uplifts = response.events["time"][response.events["kind"] == "uplift"]
         return int(np.sum(response.impacts["time"] >= uplifts[-1]))
 
@@ -342,11 +351,13 @@ def _unit_pulse(pulse: str | PulseFamily, frequency: float, parameters: dict[str
     """Pulse of amplitude 1 m/s^2."""
     if callable(pulse):
         if parameters:
-            raise InvalidOption(f"a pulse given as a function takes no {', '.join(parameters)}; bind them to it")
+            raise InvalidOption(
+                f"a {{}} given as a function takes no {', '.join(parameters)}: bind them to it", "pulse"
+            )
         return pulse(1.0, frequency)
     family = pulse_family(pulse)
-    if family.name not in _FAMILIES:
-        raise InvalidOption(f"pulse must be one of {', '.join(_FAMILIES)}, or a function, not {pulse!r}")
+    if family.name not in PULSES:
+        raise InvalidOption(f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse")
     unit = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
     return unit.scaled_to(1.0) if family.make is pulses.mavroeidis_papageorgiou else unit
 

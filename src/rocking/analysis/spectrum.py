@@ -15,12 +15,13 @@ from rocking import checks
 from rocking.analysis.levels import mean_one, pooled
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
-from rocking.constants import STANDARD_GRAVITY
+from rocking.block.many import rates_of
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
+from rocking.motion.motion import Motion
 from rocking.result import Result, table_of_some
 from rocking.treatment import Treatment
 from rocking.treatment.base import Model
@@ -38,50 +39,45 @@ _FACTORS: Final = np.geomspace(0.5, 2.0, 25)
 _HALF: Final = np.array([0.5])
 
 #: Most curves that one figure shows.
-_MOST_CURVES = 4
+_MOST_CURVES: Final = 4
+
+_UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "fractile": "1"}
 
 
 def rocking_spectrum(
+    blocks: Blocks | Block | Sequence[Block],
     motions: Motions,
     *,
-    alpha: ArrayLike | None = None,
     p: ArrayLike | None = None,
     size: ArrayLike | None = None,
-    restitution: ArrayLike | None = None,
-    blocks: Blocks | Block | Sequence[Block] | None = None,
     weights: ArrayLike | None = None,
     fractiles: Sequence[float] = (0.16, 0.5, 0.84),
     model: Model = "nonlinear",
     chattering: str | Treatment = "certified",
-    gravity: float = STANDARD_GRAVITY,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> RockingSpectrum:
-    """Peak rotation against the frequency parameter or the size, for slendernesses and restitutions or an ensemble.
+    """Peak rotation against the frequency parameter or the size, of a grid of blocks or of an ensemble.
 
     Parameters
     ----------
+    blocks : Blocks, Block or sequence of Block
+        A grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), which are the dimensions of the
+        spectrum. Or any blocks as an ensemble, such as that of a calibration: all are made larger or smaller together,
+        so that their median p is each of `p`, and keep their shapes. A grid with `p`, `size` or `weights` is an
+        ensemble, too.
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
-    alpha : array_like, optional
-        Slendernesses, rad; or give `blocks`.
-    p : array_like
-        Frequency parameters, rad/s; or give `size`.
-    size : array_like
-        Half diagonals R of rectangular blocks, m: p = sqrt(3 g/(4 R)); or give `p`.
-    restitution : array_like, optional
-        Restitutions; Housner's from each alpha by default.
-    blocks : Blocks, Block or sequence of Block, optional
-        An ensemble in place of slendernesses and restitutions, as that of a calibration: all are made larger or smaller
-        together, so that their median p is each of `p` (by default half to twice their own), and keep their shapes.
+    p : array_like, optional
+        Frequency parameters, rad/s, of an ensemble; by default half to twice its own, or those that `size` gives.
+    size : array_like, optional
+        Half diagonals R, m, in place of `p`: p = sqrt(3 g/(4 R)), as of a rectangular block.
     weights : array_like, optional
-        How much each block of the ensemble counts; by default all alike.
+        How much each block of an ensemble counts; by default all alike.
     fractiles : sequence of float
         Shares, in (0, 1), of motions (and of the ensemble's weight) that stay below the fractile curves.
     model, chattering, threads, progress
         As for `simulate_many`.
-    gravity : float
-        Acceleration of gravity, m/s^2; an ensemble has its own.
 
     Returns
     -------
@@ -93,7 +89,7 @@ def rocking_spectrum(
     InvalidOption
         If an argument is out of its range.
     InvalidBlock
-        If p, alpha or restitution is.
+        If p or size is, or one of the blocks is no block.
 
     Notes
     -----
@@ -101,8 +97,8 @@ def rocking_spectrum(
     ordered peaks, and are infinite where that share of the motions, or the next motion above it, overturns. Those of an
     ensemble are the lowest peaks that the share of the weight does not pass.
 
-    Blocks of slendernesses are symmetric, so a motion and its mirror image give the same peaks. Those of an ensemble
-    may not be, and their peaks are over the smaller slenderness.
+    Blocks of a grid are symmetric, so a motion and its mirror image give the same peaks. Those of an ensemble may not
+    be, and their peaks are over the smaller slenderness.
 
     References
     ----------
@@ -113,7 +109,8 @@ def rocking_spectrum(
     --------
     >>> import rocking
     >>> motions = [rocking.pulses.one_sine(5.0, f) for f in (0.5, 1.0, 2.0)]
-    >>> spectrum = rocking_spectrum(motions, alpha=[0.2], p=[1.0, 2.0, 4.0], restitution=[0.9])
+    >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0], alpha=[0.2], restitution=[0.9])
+    >>> spectrum = rocking_spectrum(blocks, motions)
     >>> spectrum.overturned.sum("motion").values.ravel().tolist()
     [1, 2, 3]
     >>> spectrum.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
@@ -121,39 +118,25 @@ def rocking_spectrum(
     """
     shares = _shares(fractiles)
     options: dict[str, Any] = {"model": model, "chattering": chattering, "threads": threads, "progress": progress}
-    if blocks is not None:
-        if alpha is not None or restitution is not None:
-            sentence = "{} have slendernesses and restitutions of their own: leave {} and {} out"
-            raise InvalidOption(sentence, "blocks", "alpha", "restitution")
-        return RockingSpectrum(_ensemble_spectrum(Blocks.of(blocks), weights, motions, p, size, shares, options))
-    if alpha is None or weights is not None:
-        sentence = "give {} (slendernesses), or {} of an ensemble, which may have {}"
-        raise InvalidOption(sentence, "alpha", "blocks", "weights")
-    rates = _rates(p, size, gravity)
-    axes = {"p": rates, "alpha": checks.positive_numbers(alpha, "alpha", InvalidOption)}
-    if restitution is not None:
-        axes["restitution"] = checks.positive_numbers(restitution, "restitution", InvalidOption)
-    shaken = motions if isinstance(motions, Sequence) else [motions]
-    checks.grid_size({"motions": len(shaken)} | {name: len(axis) for name, axis in axes.items()}, InvalidOption)
-    grid = Blocks.grid(**axes, gravity=gravity)
-    table = simulate_many(grid, motions, **options)
-    require_finished(table.unfinished.values)
-    return RockingSpectrum(_spectrum(table, axes, grid, shares))
+    gathered, shaken = Blocks.of(blocks), several_motions(motions)
+    if gathered.axes is not None and p is None and size is None and weights is None:
+        checks.grid_size({"motions": len(shaken), "blocks": len(gathered)}, InvalidOption)
+        table = simulate_many(gathered, shaken, **options)
+        require_finished(table.unfinished.values)
+        return RockingSpectrum(_grid_spectrum(table, gathered.axes, gathered.gravity, shares))
+    weight = mean_one(weights, len(gathered))
+    median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
+    rates = median * _FACTORS
+    if p is not None or size is not None:
+        rates = checks.positive_numbers(rates_of(p, size, gathered.gravity), "p", InvalidOption)
+    found = _ensemble_spectrum(gathered, weight, shaken, rates / median, rates, shares, options)
+    return RockingSpectrum(found.assign_attrs(blocks=pooled(gathered, weights)))
 
 
 def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
-    """Fractiles along the first axis, interpolated in the ordered values; infinite where either neighbour is.
+    """Fractiles of peaks (n, ...) along the first axis, shape (k, ...), for k shares from 0 to 1.
 
-    Parameters
-    ----------
-    peaks : ndarray, shape (n, ...)
-        Values; infinity stands for more than any number.
-    shares : ndarray, shape (k,)
-        Shares from 0 to 1.
-
-    Returns
-    -------
-    ndarray, shape (k, ...)
+    They are interpolated in the ordered values, and infinite where either neighbour is.
     """
     ordered = np.sort(peaks, axis=0)
     place = shares * (len(ordered) - 1)
@@ -166,21 +149,7 @@ def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
 
 
 def weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Floats:
-    """Lowest values that shares of the weight do not pass, along the first axis.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n, ...)
-        Values; infinity stands for more than any number.
-    weights : ndarray, shape (n,)
-        Their weights.
-    shares : ndarray, shape (k,)
-        Shares from 0 to 1.
-
-    Returns
-    -------
-    ndarray, shape (k, ...)
-    """
+    """Lowest of the values (n, ...), some perhaps infinite, that k shares of the weight do not pass, shape (k, ...)."""
     order = np.argsort(values, axis=0, kind="stable")
     ordered = np.take_along_axis(values, order, axis=0)
     passed = np.cumsum(weights[order], axis=0)
@@ -265,11 +234,9 @@ class RockingSpectrum(Result):
             Where to draw; by default in a new figure.
         against : {"p", "period", "size"}
             Abscissa.
-        title : str
-            Title; by default the motion or the number of motions, the block's slenderness (and restitution) if it is
-            one, and the model.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
+        title, figsize
+            Title, by default the motion or the number of motions, the block's slenderness (and restitution) if it is
+            one, and the model; width and height of a new figure, inches.
 
         Raises
         ------
@@ -325,7 +292,7 @@ class RockingSpectrum(Result):
         ]
 
     def _motions(self) -> str:
-        """Name the motion, or count them; those that were scaled are told from those that were not."""
+        """Name the motion, or count them, and those that were scaled or processed among them."""
         labels = self._labels()
         changed = sum(bool(done) for done in self.data.histories)
         if len(labels) == 1:
@@ -348,27 +315,21 @@ def _curve_name(one: xr.Dataset) -> str:
 
 def _ensemble_spectrum(
     blocks: Blocks,
-    weights: ArrayLike | None,
-    motions: Motions,
-    p: ArrayLike | None,
-    size: ArrayLike | None,
+    weight: Floats,
+    motions: Sequence[Motion],
+    factors: Floats,
+    rates: Floats,
     shares: Floats,
     options: dict[str, Any],
 ) -> xr.Dataset:
-    """Spectrum of an ensemble, whose blocks are all made larger or smaller together, p last."""
+    """Spectrum of an ensemble, whose blocks are all made larger or smaller by factors on their p, p last."""
     import xarray as xr
 
-    weight = mean_one(weights, len(blocks))
-    own = blocks.p.mean(axis=1)
-    median = float(weighted_fractiles(own, weight, _HALF)[0])
-    rates = median * _FACTORS if p is None and size is None else _rates(p, size, blocks.gravity)
     count, n = len(rates), len(blocks)
-    checks.grid_size({"motions": len(several_motions(motions)), "blocks": n, "p": count}, InvalidOption)
-    factors = np.tile(rates / median, n)[:, None]
-    resized = blocks.select(np.repeat(np.arange(n), count))
-    table = simulate_many(
-        Blocks(resized.p * factors, resized.alpha, resized.restitution, gravity=blocks.gravity), motions, **options
-    )
+    checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, InvalidOption)
+    same = blocks.select(np.repeat(np.arange(n), count))
+    resized = Blocks(same.p * np.tile(factors, n)[:, None], same.alpha, same.restitution, gravity=blocks.gravity)
+    table = simulate_many(resized, motions, **options)
     require_finished(table.unfinished.values)
     peak, overturned = (
         table[name].transpose("motion", "block").values.reshape(-1, n, count)
@@ -376,36 +337,29 @@ def _ensemble_spectrum(
     )
     over_alpha = np.where(overturned, np.inf, peak / blocks.alpha.min(axis=1)[:, None])
     weights_of_all = np.tile(weight, len(peak))
-    return (
-        _described_spectrum(
-            table,
-            ("block", "p"),
-            (peak, over_alpha, overturned),
-            (
-                ("p",),
-                weighted_fractiles(over_alpha.reshape(-1, count), weights_of_all, shares),
-                np.average(overturned.reshape(-1, count), axis=0, weights=weights_of_all),
-            ),
-            {"p": rates, "fractile": shares},
-            blocks.gravity,
-        )
-        .assign_coords(weight=xr.DataArray(weight, dims="block"))
-        .assign_attrs(blocks=pooled(blocks, weights))
+    found = (
+        ("p",),
+        weighted_fractiles(over_alpha.reshape(-1, count), weights_of_all, shares),
+        np.average(overturned.reshape(-1, count), axis=0, weights=weights_of_all),
     )
+    axes, peaks = {"p": rates, "fractile": shares}, (peak, over_alpha, overturned)
+    described = _described_spectrum(table, ("block", "p"), peaks, found, axes, blocks.gravity)
+    return described.assign_coords(weight=xr.DataArray(weight, dims="block"))
 
 
-def _spectrum(table: xr.Dataset, axes: dict[str, Floats], blocks: Blocks, shares: Floats) -> xr.Dataset:
-    """Ensemble over a grid of blocks as a spectrum, p last."""
-    names = [*(name for name in axes if name != "p"), "p"]
+def _grid_spectrum(table: xr.Dataset, axes: dict[str, Floats], gravity: float, shares: Floats) -> xr.Dataset:
+    """Arrange simulations of a grid of blocks as a spectrum, p last."""
+    names = (*(name for name in axes if name != "p"), "p")
 
     def on_grid(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         return np.moveaxis(values.reshape(len(values), *map(len, axes.values())), 1, -1)
 
     peak, overturned = on_grid(table.peak_rotation.values), on_grid(table.overturned.values)
     over_alpha = np.where(overturned, np.inf, peak / axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
-    found = tuple(names), fractiles_of(over_alpha, shares), overturned.mean(axis=0)
-    peaks = peak, over_alpha, overturned
-    return _described_spectrum(table, tuple(names), peaks, found, {**axes, "fractile": shares}, blocks.gravity)
+    found = names, fractiles_of(over_alpha, shares), overturned.mean(axis=0)
+    return _described_spectrum(
+        table, names, (peak, over_alpha, overturned), found, {**axes, "fractile": shares}, gravity
+    )
 
 
 def _described_spectrum(
@@ -455,19 +409,6 @@ def _described_spectrum(
         },
         {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions", "histories")},
     )
-
-
-_UNITS = {"p": "rad/s", "alpha": "rad", "restitution": "1", "fractile": "1"}
-
-
-def _rates(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> Floats:
-    if p is not None and size is None:
-        return checks.positive_numbers(p, "p", InvalidOption)
-    if size is not None and p is None:
-        g = checks.positive(gravity, "gravity", InvalidOption, "m/s^2")
-        return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", InvalidOption))
-    which = "one of" if p is None else "not both of"
-    raise InvalidOption(f"give {which} {{}} (rad/s) and {{}} (half diagonals, m)", "p", "size")
 
 
 def _shares(fractiles: Sequence[float]) -> Floats:

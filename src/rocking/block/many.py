@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import cast
 
@@ -36,6 +36,11 @@ class Blocks:
 
     All broadcast against each other: a number, shape (n,) for symmetric blocks, or shape (n, 2).
 
+    Attributes
+    ----------
+    axes : dict of str to ndarray, or None
+        Of a grid its axes p (rad/s), alpha (rad) and, where it was given, restitution; the last one varies fastest.
+
     Raises
     ------
     InvalidBlock
@@ -52,6 +57,7 @@ class Blocks:
     alpha: Floats
     restitution: Floats
     gravity: float = STANDARD_GRAVITY
+    axes: dict[str, Floats] | None = None
 
     def __init__(
         self,
@@ -89,33 +95,53 @@ class Blocks:
     def grid(
         cls,
         *,
-        p: float | Sequence[float] | Floats,
-        alpha: float | Sequence[float] | Floats,
-        restitution: float | Sequence[float] | Floats | None = None,
+        alpha: ArrayLike,
+        p: ArrayLike | None = None,
+        size: ArrayLike | None = None,
+        restitution: ArrayLike | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> Blocks:
-        """Symmetric blocks for every combination of parameters, the last one varying fastest.
+        """Symmetric blocks for every combination of p, alpha and restitution, the last one varying fastest.
 
         Parameters
         ----------
-        p, alpha, restitution : float or sequence of float
-            Value or values of each parameter; without restitution, Housner's from alpha.
+        alpha : float or sequence of float
+            Slendernesses, rad.
+        p : float or sequence of float
+            Frequency parameters, rad/s; or give `size`.
+        size : float or sequence of float
+            Half diagonals R of rectangular blocks, m: p = sqrt(3 g/(4 R)); or give `p`.
+        restitution : float or sequence of float, optional
+            Restitutions; Housner's from each alpha by default.
         gravity : float
             Acceleration of gravity, m/s^2.
 
+        Returns
+        -------
+        Blocks
+            With its `axes`.
+
+        Raises
+        ------
+        InvalidBlock
+            If a value is out of its range, an axis is empty, or not one of `p` and `size` is given.
+
         Examples
         --------
-        >>> len(Blocks.grid(p=[1.0, 2.0, 3.0], alpha=[0.1, 0.2], restitution=[0.9]))
-        6
+        >>> blocks = Blocks.grid(p=[1.0, 2.0, 3.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> len(blocks), [*blocks.axes]
+        (6, ['p', 'alpha', 'restitution'])
         """
-        given: dict[str, ArrayLike] = {"p": p, "alpha": alpha}
+        given = {"p": rates_of(p, size, gravity), "alpha": alpha}
         if restitution is not None:
             given["restitution"] = restitution
-        axes = [np.atleast_1d(checks.numbers(axis, name, InvalidBlock)) for name, axis in given.items()]
-        if any(axis.ndim != 1 or axis.size == 0 for axis in axes):
+        axes = {name: np.atleast_1d(checks.numbers(axis, name, InvalidBlock)) for name, axis in given.items()}
+        if any(axis.ndim != 1 or axis.size == 0 for axis in axes.values()):
             raise InvalidBlock("each parameter of a grid must be a number or a sequence of at least one number")
-        columns = [column.ravel() for column in np.meshgrid(*axes, indexing="ij")]
-        return cls(*columns, gravity=gravity)
+        checks.grid_size({name: axis.size for name, axis in axes.items()}, InvalidBlock)
+        blocks = cls(*(column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")), gravity=gravity)
+        object.__setattr__(blocks, "axes", axes)
+        return blocks
 
     @classmethod
     def of(cls, blocks: Blocks | Block | Iterable[Block]) -> Blocks:
@@ -204,6 +230,17 @@ class Blocks:
                 f"values, not {checks.shown(index)}; for one block alone blocks[0]"
             )
         return chosen
+
+
+def rates_of(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:
+    """Return the frequency parameters, rad/s, that are given by themselves, or by half diagonals, m, of rectangles."""
+    if p is not None and size is None:
+        return p
+    if size is not None and p is None:
+        g = checks.positive(gravity, "gravity", InvalidBlock, "m/s^2")
+        return np.sqrt(0.75 * g / checks.positive_numbers(size, "size", InvalidBlock))
+    which = "one of" if p is None else "not both of"
+    raise InvalidBlock(f"give {which} {{}} (rad/s) and {{}} (half diagonals, m)", "p", "size")
 
 
 def _columns(array: Floats) -> Floats:

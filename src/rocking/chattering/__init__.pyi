@@ -1,20 +1,19 @@
 from . import families
-from .amplitude import critical_amplitude_nonlinear
+from .amplitude import critical_amplitude, critical_amplitude_nonlinear
+from .duration import ChatteringSequence, chattering_time, interval_ratios, is_complete, sequence
 from .episodes import ChatteringEpisodes, chattering_episodes
+from .expansions import (
+    SeriesDiagnosis,
+    asymptotic_table,
+    first_impact_speed,
+    first_interval,
+    series_coefficients,
+    series_diagnosis,
+)
 from .maps import ChatteringMap, Outcome, chattering_map
-from .paper import paper_figure
+from .paper import PaperFigure, Statement, paper_figure
 from .report import ChatteringReport, CriticalReport, chattering_report, critical_report
 from .schemes import SchemeComparison, SchemeOutcome, compare_schemes
-from .theory.amplitude import critical_amplitude
-from .theory.asymptotic import asymptotic_table, first_impact_speed, first_interval
-from .theory.duration import (
-    ChatteringSequence,
-    chattering_time,
-    interval_ratios,
-    is_complete,
-    sequence,
-)
-from .theory.series import SeriesDiagnosis, series_coefficients, series_diagnosis
 
 __all__ = [
     "ChatteringEpisodes",
@@ -23,9 +22,11 @@ __all__ = [
     "ChatteringSequence",
     "CriticalReport",
     "Outcome",
+    "PaperFigure",
     "SchemeComparison",
     "SchemeOutcome",
     "SeriesDiagnosis",
+    "Statement",
     "asymptotic_table",
     "chattering_episodes",
     "chattering_map",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rocking.errors import InvalidOption
 from rocking.motion.exceedance import exceedances
 from rocking.response import Response
+from rocking.tables import rows_of, text_table
 
 EPISODE: Final = np.dtype(
     [
@@ -64,27 +65,38 @@ class ChatteringEpisodes:
         return np.asarray(self.episodes["upper"] < self.shaking[1])
 
     def __str__(self) -> str:
-        """Table for people."""
-        rows = [("uplift, s", "rest, s", "bracket, s", "duration, s", "impacts", "ground, m/s^2")]
-        rows += [
-            (
+        return self.summary()
+
+    def summary(self) -> str:
+        """Return a table of the episodes, and how much of the shaking the block is at rest."""
+        header = ["uplift, s", "rest, s", "bracket, s", "duration, s", "impacts", "ground, m/s^2"]
+        rows = [
+            [
                 f"{row['uplift']:.6f}",
                 f"{row['rest']:.9f}",
                 f"{row['upper'] - row['lower']:.1e}",
                 f"{row['duration']:.6f}",
-                str(row["impacts"]),
+                int(row["impacts"]),
                 f"{row['ground']:+.4f}",
-            )
+            ]
             for row in self.episodes
         ]
-        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-        if math.isnan(self.shaking[0]):
-            return "\n".join([*lines, "the motion never passes a threshold of the block"])
         start, end = self.shaking
-        return "\n".join(
-            [*lines, f"at rest for {self.share_at_rest:.1%} of the shaking from {start:.3f} s to {end:.3f} s"]
+        about = (
+            "the motion never passes a threshold of the block"
+            if math.isnan(start)
+            else f"at rest for {self.share_at_rest:.1%} of the shaking from {start:.3f} s to {end:.3f} s"
         )
+        return f"{text_table(header, rows)}\n{about}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the episodes and the shares by name; times in s, accelerations in m/s^2."""
+        return {
+            "episodes": rows_of(self.episodes),
+            "shaking_s": self.shaking,
+            "at_rest_s": self.at_rest,
+            "share_at_rest": self.share_at_rest,
+        }
 
 
 def chattering_episodes(response: Response) -> ChatteringEpisodes:
@@ -98,9 +110,14 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     Returns
     -------
     ChatteringEpisodes
-        Episodes with duration and bracket, and the share of the shaking during which the block is at rest. The shaking
-        is the bracketed duration for this block: from the first to the last time that the motion is beyond one of the
-        block's own thresholds.
+        The episodes with duration and bracket, and the share of the shaking during which the block is at rest. The
+        shaking is the bracketed duration for this block: from the first to the last time that the motion is beyond one
+        of the block's own thresholds.
+
+    Raises
+    ------
+    InvalidOption
+        If it is given anything but a response.
 
     Examples
     --------
@@ -113,19 +130,20 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     0.498
     """
     if not isinstance(response, Response):
-        raise InvalidOption(f"a Response is needed, not a {type(response).__name__}: simulate(block, motion) makes one")
+        raise InvalidOption(
+            f"{{}} must be a Response, not a {type(response).__name__}: simulate(block, motion) makes one", "response"
+        )
     proven = response.chattering[np.isfinite(response.chattering["upper"])]
     starts = response.events["time"][response.events["kind"] == "uplift"]
-    struck = response.impacts["time"]
+    impacts = response.impacts["time"]
     episodes = np.zeros(len(proven), EPISODE)
     before = np.searchsorted(starts, proven["end"], side="left") - 1
     episodes["uplift"] = np.where(before >= 0, np.append(starts, 0.0)[before], 0.0)
     for name, source in (("proven", "start"), ("rest", "end"), ("lower", "lower"), ("upper", "upper")):
         episodes[name] = proven[source]
     episodes["duration"] = episodes["rest"] - episodes["uplift"]
-    episodes["impacts"] = np.searchsorted(struck, proven["end"], "right") - np.searchsorted(
-        struck, episodes["uplift"], "left"
-    )
+    impacts_before = np.searchsorted(impacts, episodes["uplift"], "left")
+    episodes["impacts"] = np.searchsorted(impacts, proven["end"], "right") - impacts_before
     if response.motion is None:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     episodes["ground"] = response.motion.acceleration(proven["end"])

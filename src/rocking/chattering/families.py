@@ -1,6 +1,7 @@
 """Families of cases with two parameters, ready for `chattering_map`.
 
-Each function returns a callable that makes a `Case` from two numbers, the first of them the amplitude ``a``: the
+Each function takes a block or a motion and the numbers that are the same all over a map, and returns a callable that
+makes a `SimulationInput` from the two that vary, the first of them the amplitude ``a``: the
 motion's peak acceleration over the smallest that lifts the block (g tan(alpha), in the linear model g alpha).
 Frequencies ``omega`` are 2 pi f over the block's p (the smaller one of a two-sided block).
 """
@@ -17,15 +18,25 @@ from rocking.motion.motion import Motion
 from rocking.treatment.base import Model
 
 
-class Case(NamedTuple):
-    """A block, what shakes it, and the equation of motion."""
+class SimulationInput(NamedTuple):
+    """What one point of a map simulates.
+
+    Attributes
+    ----------
+    block : Block
+        What rocks.
+    motion : Motion
+        What shakes it.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    """
 
     block: Block
     motion: Motion
     model: Model = "nonlinear"
 
 
-Family = Callable[[float, float], Case]
+Family = Callable[[float, float], SimulationInput]
 
 
 def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Family:
@@ -40,19 +51,19 @@ def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Fa
     1.1
     """
     scale = _threshold(block, model)
-    return lambda a, omega: Case(block, pulses.sine(a * scale, _hertz(block, omega), cycles=cycles), model)
+    return lambda a, omega: SimulationInput(block, pulses.sine(a * scale, _hertz(block, omega), cycles=cycles), model)
 
 
 def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> Family:
     """Half cycles of a sine with unequal amplitudes: (a, ratio).
 
-    The first lobe has the amplitude a, each other one `ratio` times that of the lobe before it: the shaking swells
+    The first lobe has the amplitude a, each other one `ratio` times that of the lobe before it: the shaking grows
     (ratio above 1) or fades. Here a is the first lobe's, not the largest.
     """
     scale, frequency = _threshold(block, model), _hertz(block, omega)
 
-    def case(a: float, ratio: float) -> Case:
-        return Case(block, pulses.n_lobe([a * scale * ratio**k for k in range(count)], frequency), model)
+    def case(a: float, ratio: float) -> SimulationInput:
+        return SimulationInput(block, pulses.n_lobe([a * scale * ratio**k for k in range(count)], frequency), model)
 
     return case
 
@@ -62,7 +73,7 @@ def ricker(
 ) -> Family:
     """Ricker pulses: (a, omega)."""
     scale = _threshold(block, model)
-    return lambda a, omega: Case(block, pulses.ricker(a * scale, _hertz(block, omega), kind=kind), model)
+    return lambda a, omega: SimulationInput(block, pulses.ricker(a * scale, _hertz(block, omega), kind=kind), model)
 
 
 def mavroeidis_papageorgiou(
@@ -71,24 +82,24 @@ def mavroeidis_papageorgiou(
     """Near-fault pulses of Mavroeidis and Papageorgiou: (a, omega)."""
     scale = _threshold(block, model)
 
-    def case(a: float, omega: float) -> Case:
+    def case(a: float, omega: float) -> SimulationInput:
         pulse = pulses.mavroeidis_papageorgiou(1.0, _hertz(block, omega), phase=phase, gamma=gamma)
-        return Case(block, pulse.scaled_to(a * scale), model)
+        return SimulationInput(block, pulse.scaled_to(a * scale), model)
 
     return case
 
 
 def record(
     motion: Motion, alpha: float, restitution: float | None = None, *, model: Model = "nonlinear"
-) -> Callable[[float, float], Case]:
+) -> Callable[[float, float], SimulationInput]:
     """One motion, scaled, under blocks of one shape and any size: (a, p), p in rad/s.
 
     By dimensional analysis a smaller p is also the same block under a faster motion.
     """
 
-    def case(a: float, p: float) -> Case:
+    def case(a: float, p: float) -> SimulationInput:
         block = Block.from_parameters(p, alpha, restitution)
-        return Case(block, motion.scaled_to(a * _threshold(block, model)), model)
+        return SimulationInput(block, motion.scaled_to(a * _threshold(block, model)), model)
 
     return case
 

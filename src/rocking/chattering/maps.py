@@ -13,12 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.arrays import Floats
-from rocking.chattering.families import Case, Family
+from rocking.arrays import Floats, Integers
+from rocking.chattering.families import Family, SimulationInput
 from rocking.constants import VERSION
+from rocking.engine import OUTCOME, complete_chattering, in_threads
 from rocking.errors import InvalidOption
+from rocking.kernels import state
 from rocking.motion.exceedance import exceedances
 from rocking.motion.motion import Motion
+from rocking.progress import Progress
+from rocking.response import Response
 from rocking.result import Result
 from rocking.simulation import simulate
 from rocking.tables import text_table
@@ -56,32 +60,57 @@ class Outcome(IntEnum):
     OVERTURNS = 4
     UNPROVEN = 5
 
+    @property
+    def words(self) -> str:
+        """The outcome in words: "rests later"."""
+        return self.name.lower().replace("_", " ")
+
 
 #: Four ulp: by so much of itself a peak that was meant to be the threshold may exceed it.
 _ROUNDING: Final = 2.0**-50
 
 
 class _Point(NamedTuple):
-    """One point of a map."""
+    """One point of a map; times that do not exist are NaN."""
 
     outcome: int
-    uplift: float
-    rest: float
-    lower: float
-    upper: float
-    rests: int
-    overturned: bool
+    uplift: float = math.nan
+    rest: float = math.nan
+    lower: float = math.nan
+    upper: float = math.nan
+    rests: int = 0
+    overturned: bool = False
 
 
-def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> ChatteringMap:
-    """Simulate a family of cases over a grid, and tell where chattering after the first uplift is complete.
+#: Units and meanings of the variables of a map.
+_ATTRIBUTES: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
+    {
+        "outcome": {
+            "flag_values": [outcome.value for outcome in Outcome],
+            "flag_meanings": " ".join(outcome.name.lower() for outcome in Outcome),
+        },
+        **{name: {"units": "s"} for name in ("uplift", "rest", "lower", "upper")},
+        "rests": {"units": "1", "long_name": "times the block comes to rest"},
+    }
+)
+
+
+def chattering_map(
+    family: Family, parameters: Mapping[str, ArrayLike], *, threads: int | None = None, progress: bool | None = None
+) -> ChatteringMap:
+    """Simulate a family of inputs over a grid, and tell where chattering after the first uplift is complete.
 
     Parameters
     ----------
     family : callable
-        Makes a `Case` (block, motion, model) from two numbers: one of `rocking.chattering.families`, or your own.
+        Makes a `SimulationInput` (block, motion, model) from two numbers: one of `rocking.chattering.families`, or your
+        own.
     parameters : mapping
         Names and values of the two parameters, in the order in which the family takes them.
+    threads : int, optional
+        Number of threads; by default one for every core.
+    progress : bool, optional
+        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
     Returns
     -------
@@ -113,26 +142,23 @@ def chattering_map(family: Family, parameters: Mapping[str, ArrayLike]) -> Chatt
 
     checks.mapping(parameters, "parameters", InvalidOption, '{"a": [1.0, 1.1], "omega": [1.0, 2.0]}')
     if len(parameters) != 2:
-        raise InvalidOption(f"a map has two parameters, not {len(parameters)}")
+        raise InvalidOption(f"{{}} must be two, not {len(parameters)}", "parameters")
+    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     (first, x), (second, y) = ((name, _axis(values, name)) for name, values in parameters.items())
-    cases = [family(float(one), float(other)) for one in x for other in y]
-    points = [_followed(case) for case in cases]
+    inputs = [family(float(one), float(other)) for one in x for other in y]
+    points = []
+    with Progress("mapping", len(inputs), show=progress) as bar:
+        for point in in_threads(_simulated, inputs, threads=count):
+            points.append(point)
+            bar.advance()
     columns = {name: np.array(column) for name, column in zip(_Point._fields, zip(*points, strict=True), strict=True)}
-    attributes = {
-        "outcome": {
-            "flag_values": [outcome.value for outcome in Outcome],
-            "flag_meanings": " ".join(outcome.name.lower() for outcome in Outcome),
-        },
-        **{name: {"units": "s"} for name in ("uplift", "rest", "lower", "upper")},
-        "rests": {"units": "1", "long_name": "times the block comes to rest"},
-    }
     dataset = xr.Dataset(
         {
-            name: ((first, second), column.reshape(x.size, y.size), attributes.get(name, {}))
+            name: ((first, second), column.reshape(x.size, y.size), _ATTRIBUTES.get(name, {}))
             for name, column in columns.items()
         },
         {first: x, second: y},
-        {"program": f"rocking {VERSION}", "case": _in_common(cases[0], cases[-1])},
+        {"program": f"rocking {VERSION}", "case": _in_common(inputs[0], inputs[-1])},
     )
     return ChatteringMap(dataset.assign(complete=dataset.outcome == Outcome.COMPLETE))
 
@@ -157,7 +183,7 @@ class ChatteringMap(Result):
         """Shares of the map that each outcome takes."""
         values, counts = np.unique(self.data.outcome, return_counts=True)
         rows = [
-            (_words(Outcome(value)), f"{100 * count / self.data.outcome.size:.1f} %")
+            (Outcome(value).words, f"{100 * count / self.data.outcome.size:.1f} %")
             for value, count in zip(values, counts, strict=True)
         ]
         first, second = self.data.outcome.dims
@@ -167,7 +193,7 @@ class ChatteringMap(Result):
     def to_dict(self) -> dict[str, Any]:
         """Axes and variables by name."""
         columns = {str(name): self.data[name].values for name in (*self.data.outcome.dims, *self.data.data_vars)}
-        return {"outcomes": {outcome.value: _words(outcome) for outcome in Outcome}, **columns}
+        return {"outcomes": {outcome.value: outcome.words for outcome in Outcome}, **columns}
 
     def plot(
         self,
@@ -185,10 +211,9 @@ class ChatteringMap(Result):
             Where to draw; by default in a new figure.
         labels : mapping of str to str, optional
             What to write at the axes in place of the parameters' names.
-        title : str
-            Title; by default the motion, the block and the model, as far as they are the same all over the map.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
+        title, figsize
+            Title, by default the motion, the block and the model, as far as they are the same all over the map; width
+            and height of a new figure, inches.
         """
         from rocking.plot.maps import outcome_figure
 
@@ -198,7 +223,7 @@ class ChatteringMap(Result):
             x=self.data[second].values,
             y=self.data[first].values,
             outcome=self.data.outcome.values,
-            meanings=[_words(outcome) for outcome in Outcome],
+            meanings=[outcome.words for outcome in Outcome],
             x_label=written.get(str(second), str(second)),
             y_label=written.get(str(first), str(first)),
             title=title or f"first uplift under {self.data.attrs['case']}",
@@ -207,96 +232,81 @@ class ChatteringMap(Result):
         )
 
 
-def hardly_lifts(motion: Motion, thresholds: tuple[float, float], gravity: float) -> bool:
-    """Whether a motion passes the thresholds of the two sides (m/s^2) by no more than rounding, if at all."""
-    plus, minus = (threshold * (1.0 + _ROUNDING) for threshold in thresholds)
-    if motion.vertical is None and motion.pga > min(plus, minus):
-        return False
-    return not len(exceedances(motion, (plus, minus), gravity))
+def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: float) -> float | None:
+    """Time, s, at which a motion last passes the thresholds of the two sides (m/s^2); None if it hardly passes one.
 
-
-def outcomes_of(ends: NDArray[np.void], later: Floats) -> NDArray[np.int64]:
-    """Outcomes of blocks under one motion, from what the engine keeps of each.
-
-    Parameters
-    ----------
-    ends : structured array
-        What became of them (`rocking.engine.OUTCOME`), by certified simulation.
-    later : ndarray
-        Times, s, at which the motion passes their threshold after it did so first.
-
-    Returns
-    -------
-    ndarray of int
-        An `Outcome` each. A rest counts by its time, not by the upper bound on it; and of a block that rests several
-        times UNPROVEN says that one of the rests is not proven.
+    What passes a threshold by no more than rounding lifts no block.
     """
-    rest, rested = ends["first_rest"], ends["rests"] > 0
-    first, last = later.min(initial=math.inf), later.max(initial=-math.inf)
-    found = np.where(rest <= last, Outcome.RESTS_LATER, Outcome.RESTS_AT_LAST)
-    found[rest <= first] = Outcome.COMPLETE
+    plus, minus = (threshold * (1.0 + _ROUNDING) for threshold in thresholds)
+    lifts = motion.vertical is None and motion.pga > min(plus, minus)
+    if not (lifts or len(exceedances(motion, (plus, minus), gravity))):
+        return None
+    starts = exceedances(motion, thresholds, gravity)[:, 0]
+    return float(starts[-1]) if starts.size else None
+
+
+def outcomes_of(ends: NDArray[np.void], last: float | None) -> Integers:
+    """Return the `Outcome` of each block, from what the engine keeps of its certified simulation.
+
+    The last exceedance is that of their motion, as `last_exceedance` gives it. Of a block that rests several times
+    UNPROVEN says that one of the rests is not proven.
+    """
+    if last is None:
+        return np.full(len(ends), Outcome.NO_UPLIFT, dtype=np.int64)
+    rested = ends["rests"] > 0
+    found = np.where(ends["first_rest"] <= last, Outcome.RESTS_LATER, Outcome.RESTS_AT_LAST)
+    found[ends["complete_chattering"]] = Outcome.COMPLETE
     found[~rested] = Outcome.OVERTURNS
     found[(ends["stalled"] > 0) | (ends["unfinished"] & ~rested)] = Outcome.UNPROVEN
     found[ends["uplifts"] == 0] = Outcome.NO_UPLIFT
     return found.astype(np.int64)
 
 
-def _words(outcome: Outcome) -> str:
-    return outcome.name.lower().replace("_", " ")
-
-
-def _in_common(one: Case, other: Case) -> str:
-    """Say what two cases have in common: the motion's name, the proportions and the size of the block, the model."""
+def _in_common(one: SimulationInput, other: SimulationInput) -> str:
+    """Say what two inputs have in common: the motion's name, the proportions and the size of the block, the model."""
     what = [
-        ("{}", *(case.motion.name for case in (one, other))),
-        ("alpha = {} rad", *(_of_sides(case, "alpha") for case in (one, other))),
-        ("restitution = {}", *(_of_sides(case, "restitution") for case in (one, other))),
+        ("{}", *(each.motion.name for each in (one, other))),
+        ("alpha = {} rad", *(_of_sides(each, "alpha") for each in (one, other))),
+        ("restitution = {}", *(_of_sides(each, "restitution") for each in (one, other))),
         ("{} model", one.model, other.model),
     ]
     return ", ".join(words.format(first) for words, first, last in what if first == last)
 
 
-def _of_sides(case: Case, name: str) -> str:
-    """Return a parameter of a case's block, once where both sides have the same."""
-    return ", ".join(dict.fromkeys(f"{getattr(side, name):.5g}" for side in case.block.sides))
+def _of_sides(given: SimulationInput, name: str) -> str:
+    """Return a parameter of a block, once where both sides have the same."""
+    return ", ".join(dict.fromkeys(f"{getattr(side, name):.5g}" for side in given.block.sides))
 
 
-def _followed(case: Case) -> _Point:
-    response = simulate(case.block, case.motion, model=case.model)
-    events = response.events
-    thresholds = case.block.uplift_thresholds(case.model)
-    if not len(events) or hardly_lifts(case.motion, thresholds, case.block.gravity):
-        return _Point(Outcome.NO_UPLIFT, math.nan, math.nan, math.nan, math.nan, 0, False)
-    uplift = float(events["time"][0])
-    if response.unfinished and not len(response.chattering):
-        return _Point(Outcome.UNPROVEN, uplift, math.nan, math.nan, math.nan, 0, False)
-    if not len(response.chattering):
-        return _Point(Outcome.OVERTURNS, uplift, math.nan, math.nan, math.nan, 0, response.overturned)
-    first = response.chattering[0]
-    # The first exceedance is the one that lifted the block.
-    later = exceedances(case.motion, thresholds, case.block.gravity)[1:, 0]
-    return _Point(
-        _outcome(float(first["upper"]), later),
-        uplift,
-        float(first["end"]),
-        float(first["lower"]),
-        float(first["upper"]),
-        len(response.chattering),
-        response.overturned,
-    )
+def _simulated(given: SimulationInput) -> _Point:
+    """Simulate one point and keep all that a response knows: the engine's outcomes hold no bracket on a rest."""
+    response = simulate(given.block, given.motion, model=given.model)
+    last = last_exceedance(given.motion, given.block.uplift_thresholds(given.model), given.block.gravity)
+    if not len(response.events) or last is None:
+        return _Point(Outcome.NO_UPLIFT)
+    ends = np.zeros(1, OUTCOME)
+    uplift, rests = float(response.events["time"][0]), len(response.chattering)
+    ends["uplifts"], ends["rests"], ends["unfinished"] = 1, rests, response.unfinished
+    times: dict[str, float] = {}
+    if rests:
+        first = response.chattering[0]
+        times = {"rest": float(first["end"]), "lower": float(first["lower"]), "upper": float(first["upper"])}
+        # What the motion must not pass a threshold before is the upper bound on the rest.
+        ends["first_rest"], ends["stalled"] = times["upper"], math.isnan(times["upper"])
+        ends["complete_chattering"] = _is_complete(response, rests, uplift, times["upper"])
+    return _Point(int(outcomes_of(ends, last)[0]), uplift, **times, rests=rests, overturned=response.overturned)
 
 
-def _outcome(rest: float, later: Floats) -> Outcome:
-    """Outcome from the upper bound on the first rest and the later times at which a threshold is passed."""
+def _is_complete(response: Response, rests: int, uplift: float, rest: float) -> bool:
     if math.isnan(rest):
-        return Outcome.UNPROVEN
-    if rest <= later.min(initial=math.inf):
-        return Outcome.COMPLETE
-    return Outcome.RESTS_LATER if rest <= later.max() else Outcome.RESTS_AT_LAST
+        return False
+    states = state.new_states(1, 0)
+    states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, rest
+    return bool(complete_chattering(response.trail.ground, np.array([response.trail.block]), states)[0])
 
 
 def _axis(values: ArrayLike, name: str) -> Floats:
-    axis = checks.numbers(values, f"values of {name}", InvalidOption)
+    axis = checks.numbers(values, name, InvalidOption)
     if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or not (np.diff(axis) > 0.0).all():
-        raise InvalidOption(f"the values of {name} must be finite numbers in increasing order")
+        raise InvalidOption("{} must be finite numbers in increasing order", name, value=values)
     return axis

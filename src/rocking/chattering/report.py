@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking import checks
-from rocking.chattering.theory.amplitude import critical_amplitude
-from rocking.chattering.theory.asymptotic import asymptotic_table, first_impact_speed, first_interval
-from rocking.chattering.theory.duration import chattering_time, first_arc, sequence
-from rocking.chattering.theory.series import series_diagnosis
+from rocking.chattering.amplitude import critical_amplitude
+from rocking.chattering.duration import chattering_time, first_arc, sequence
+from rocking.chattering.expansions import asymptotic_table, first_impact_speed, first_interval, series_diagnosis
 from rocking.errors import InvalidOption, OutsideFit
 from rocking.tables import counted, rows_of, text_table, to_json, write_text
 
@@ -72,7 +71,10 @@ class ChatteringReport:
             ("critical amplitude", f"{critical:.9g}"),
             ("time of rest, exact", self._time(times["exact"])),
             ("  proven bracket", self._bracket(bracket)),
-            (f"  by Eq. 75{_resolved(result['resolved'])}", self._time(times["semianalytical"])),
+            (
+                "  by Eq. 75" + ("" if result["resolved"] is None else f", {counted(result['resolved'], 'impact')}"),
+                self._time(times["semianalytical"]),
+            ),
             ("  by Eq. 65", f"{self._time(times['asymptotic'])}{'' if result['complete'] else _TAKES_FOR_COMPLETE}"),
             (
                 f"  by a series, {result['series']['order']} terms",
@@ -92,9 +94,7 @@ class ChatteringReport:
         InvalidOption
             Without loss at impacts, when there is no such procedure.
         """
-        if self.cycles is None:
-            raise InvalidOption("eta must be below 1 for the iterative procedure: without loss at impacts nothing ends")
-        return rows_of(self.cycles)
+        return rows_of(self._table("cycles"))
 
     def table(self) -> str:
         """Return the first cycles of the paper's iterative procedure, and its last.
@@ -125,18 +125,39 @@ class ChatteringReport:
             rows.insert(-1, ["...", "", f"({left_out} more)", "", "", "", "", ""])
         return text_table(header, rows)
 
-    def write(self, folder: Path) -> None:
-        """Write result.json, impacts.csv and, where there is such a procedure, cycles.csv.
+    def to_json(self, path: str | Path) -> None:
+        """Write all numbers as JSON; NaN and infinity are null.
 
         Raises
         ------
         OutputError
-            If they cannot be written.
+            If the file cannot be written.
         """
-        write_text(folder / "impacts.csv", _csv(self.impacts))
-        if self.cycles is not None:
-            write_text(folder / "cycles.csv", _csv(self.cycles))
-        write_text(folder / "result.json", to_json(self.values) + "\n")
+        write_text(path, to_json(self.values) + "\n")
+
+    def to_csv(self, path: str | Path, table: str = "impacts") -> None:
+        """Write a table as text columns with a header.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        table : {"impacts", "cycles"}
+            The impacts that are resolved, or the cycles of the paper's iterative procedure.
+
+        Raises
+        ------
+        InvalidOption
+            If there is no such table: without loss at impacts there are no cycles.
+        OutputError
+            If the file cannot be written.
+        """
+        rows = self._table(checks.one_of(table, "table", InvalidOption, ["impacts", "cycles"]))
+        text = io.StringIO()
+        writer = csv.DictWriter(text, rows.dtype.names or (), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows_of(rows))
+        write_text(path, text.getvalue())
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the intervals between the impacts, and the ratios that tend to eta^2 where chattering is complete.
@@ -145,10 +166,12 @@ class ChatteringReport:
         ----------
         ax : matplotlib.axes.Axes, optional
             Draw the intervals here, without the ratios; by default in a new figure.
-        title : str
-            Title; by default the parameters and the time of rest.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
+        title, figsize
+            Title, by default the parameters and the time of rest; width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
         """
         from rocking.plot import intervals_figure
 
@@ -162,6 +185,15 @@ class ChatteringReport:
             ax=ax,
             figsize=figsize,
         )
+
+    def _table(self, name: str) -> NDArray[np.void]:
+        if name == "impacts":
+            return self.impacts
+        if self.cycles is None:
+            raise InvalidOption(
+                "{} must be below 1 for the iterative procedure: without loss at impacts nothing ends", "eta"
+            )
+        return self.cycles
 
     def _verdict(self) -> str:
         half_period = self._time(self.values["half_period"])
@@ -188,13 +220,7 @@ class ChatteringReport:
 
 
 def chattering_report(
-    a: float,
-    omega: float,
-    eta: float,
-    *,
-    order: int = 4,
-    resolved: int | None = None,
-    p: float | None = None,
+    a: float, omega: float, eta: float, *, order: int = 4, resolved: int | None = None, p: float | None = None
 ) -> ChatteringReport:
     """Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.
 
@@ -294,19 +320,28 @@ class CriticalReport:
                 lines.append(f"{name:<24}{amplitude:<16.9g}off by {amplitude - exact:+.2e}")
         return "\n".join([*lines, "", "amplitudes of the ground acceleration over g alpha"])
 
-    def write(self, folder: Path) -> None:
-        """Write result.json.
+    def to_json(self, path: str | Path) -> None:
+        """Write all numbers as JSON.
 
         Raises
         ------
         OutputError
-            If it cannot be written.
+            If the file cannot be written.
         """
-        write_text(folder / "result.json", to_json(self.to_dict()) + "\n")
+        write_text(path, to_json(self.to_dict()) + "\n")
 
 
 def critical_report(omega: float, eta: float) -> CriticalReport:
     """Give the amplitude up to which chattering under a sine is complete, by every method.
+
+    Parameters
+    ----------
+    omega, eta : float
+        As in `critical_amplitude`, each one number.
+
+    Returns
+    -------
+    CriticalReport
 
     Raises
     ------
@@ -345,15 +380,3 @@ def _trust(series: dict[str, float]) -> str:
     if math.isfinite(series["error"]):
         return f", the terms left out add about {series['error']:.1e}"
     return f", worthless: it converges up to a = {1.0 + series['radius']:.5g} only"
-
-
-def _resolved(impacts: int | None) -> str:
-    return "" if impacts is None else f", {counted(impacts, 'impact')}"
-
-
-def _csv(table: NDArray[np.void]) -> str:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, table.dtype.names or (), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows_of(table))
-    return text.getvalue()

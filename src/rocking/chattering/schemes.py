@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block
-from rocking.engine import require_finished
+from rocking.engine import in_threads, require_finished
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
+from rocking.progress import Progress
 from rocking.response import Response
 from rocking.simulation import simulate
-from rocking.tables import counted
+from rocking.tables import counted, rows_of, text_table
 from rocking.treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
 from rocking.treatment.base import Model
 
@@ -131,29 +132,52 @@ class SchemeComparison:
         )
 
     def __str__(self) -> str:
-        """Table for people."""
-        heading = ("scheme", "rests", "false", "missed", "worst error, s", "impacts", "rotation off by", "verdict")
+        return self.summary()
+
+    def summary(self) -> str:
+        """Return a table with a row for the certified response and for each scheme."""
+        header = ["scheme", "rests", "false", "missed", "worst error, s", "impacts", "rotation off by", "verdict"]
         certified = self.certified
-        reference = _account(certified)
-        rows = [heading, ("certified", str(len(_rests(certified))), "", "", "", _impacts(certified), "", reference)]
+        rows: list[list[Any]] = [
+            ["certified", len(_rests(certified)), "", "", "", len(certified.impacts), "", _account(certified)]
+        ]
         for outcome in self.outcomes:
             worst = outcome.largest_error
             rows.append(
-                (
+                [
                     outcome.treatment.label,
-                    str(len(outcome.rests)),
-                    str(outcome.false_rests.size),
-                    str(outcome.missed.size),
+                    len(outcome.rests),
+                    outcome.false_rests.size,
+                    outcome.missed.size,
                     "" if math.isnan(worst) else f"{worst:+.2e}",
-                    _impacts(outcome.response),
+                    len(outcome.response.impacts),
                     f"{outcome.rotation_error:.1e}",
                     outcome.verdict,
-                )
+                ]
             )
-        widths = [max(len(row[k]) for row in rows) for k in range(len(heading))]
-        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-        lines += [f"{scheme.label}: not applicable, {reason}" for scheme, reason in self.not_applicable]
-        return "\n".join(lines)
+        refused = [f"{scheme.label}: not applicable, {reason}" for scheme, reason in self.not_applicable]
+        return "\n".join([text_table(header, rows), *refused])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what each scheme makes of the case by name; times in s."""
+        return {
+            "certified": {"rests_s": _rests(self.certified)[:, 0], "impacts": len(self.certified.impacts)},
+            "schemes": [
+                {
+                    "scheme": str(outcome.treatment),
+                    "rests": rows_of(outcome.rests),
+                    "missed_s": outcome.missed,
+                    "impacts": len(outcome.response.impacts),
+                    "peak_error": outcome.peak_error,
+                    "rotation_error": outcome.rotation_error,
+                    "overturns_wrongly": outcome.overturns_wrongly,
+                    "is_right": outcome.is_right,
+                    "verdict": outcome.verdict,
+                }
+                for outcome in self.outcomes
+            ],
+            "not_applicable": {str(scheme): reason for scheme, reason in self.not_applicable},
+        }
 
 
 def compare_schemes(
@@ -164,6 +188,8 @@ def compare_schemes(
     model: Model = "nonlinear",
     initial_rotation: float = 0.0,
     initial_velocity: float = 0.0,
+    threads: int | None = None,
+    progress: bool | None = None,
 ) -> SchemeComparison:
     """Run one case with every scheme that ends chattering, and measure each against the certified response.
 
@@ -178,6 +204,10 @@ def compare_schemes(
     schemes : sequence of treatments
         By default velocity thresholds from 5e-10 to 5e-2 (both in the paper's Fig. 11), intervals of 1e-9 and 1e-3 s,
         and the paper's asymptotic time.
+    threads : int, optional
+        Number of threads; by default one for every core.
+    progress : bool, optional
+        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
     Returns
     -------
@@ -220,15 +250,24 @@ def compare_schemes(
         require_finished(np.array([found.unfinished]))
         return found
 
-    tried = checks.several(schemes, "schemes", InvalidOption)
+    def tried(scheme: Treatment) -> SchemeOutcome | str:
+        try:
+            return _outcome(scheme, response(scheme), certified)
+        except InvalidOption as error:
+            # The certified run has checked everything but the scheme itself.
+            return str(error)
+
+    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    all_schemes = checks.several(schemes, "schemes", InvalidOption)
     certified = response(Certified())
     outcomes, refused = [], []
-    for scheme in tried:
-        try:
-            outcomes.append(_outcome(scheme, response(scheme), certified))
-        except InvalidOption as error:
-            # The certified run above has checked everything but the scheme itself.
-            refused.append((scheme, str(error)))
+    with Progress("simulating", len(all_schemes), show=progress) as bar:
+        for scheme, found in zip(all_schemes, in_threads(tried, all_schemes, threads=count), strict=True):
+            if isinstance(found, str):
+                refused.append((scheme, found))
+            else:
+                outcomes.append(found)
+            bar.advance()
     return SchemeComparison(certified, tuple(outcomes), tuple(refused))
 
 
@@ -240,12 +279,13 @@ def _outcome(scheme: Treatment, response: Response, certified: Response) -> Sche
     rests["error"] = rests["time"] - rests["certified"]
     rests["speed"] = [_speed_left(response, time) for time in rests["time"]]
     found = rests["certified"]
+    peak, reference = response.peak_rotation, certified.peak_rotation
     return SchemeOutcome(
         treatment=scheme,
         response=response,
         rests=rests,
         missed=np.setdiff1d(proven[:, 0], found[~np.isnan(found)]),
-        peak_error=_relative(response.peak_rotation, certified.peak_rotation),
+        peak_error=0.0 if peak == reference else peak / reference - 1.0,
         rotation_error=_rotation_error(response, certified),
         overturns_wrongly=response.overturned != certified.overturned,
     )
@@ -283,10 +323,6 @@ def _rotation_error(response: Response, certified: Response) -> float:
     return float(np.max(np.abs(response.rotation(times) - certified.rotation(times)))) / slenderness
 
 
-def _relative(value: float, reference: float) -> float:
-    return 0.0 if value == reference else value / reference - 1.0
-
-
 def _account(certified: Response) -> str:
     """Say what the certified response comes to."""
     ending = "overturns" if certified.overturned else "does not overturn"
@@ -296,7 +332,3 @@ def _account(certified: Response) -> str:
     if np.isnan(widths).any():
         return f"{counted(int(np.isnan(widths).sum()), 'rest')} not proven; {ending}"
     return f"every rest known to {widths.max():.0e} s; {ending}"
-
-
-def _impacts(response: Response) -> str:
-    return str(len(response.impacts))

@@ -51,6 +51,8 @@ def chatter(
             text += f"\n\n{report.table()}"
             result = {**result, "asymptotic_table": report.cycle_rows()}
         if folder is not None:
-            batch.write(folder, figures={"chatter": report.plot()})
-            report.write(folder)
+            report.to_csv(folder / "impacts.csv")
+            if report.cycles is not None:
+                report.to_csv(folder / "cycles.csv", "cycles")
+            batch.write(folder, figures={"chatter": report.plot()}, result=report.to_dict())
         batch.show(result, text, as_json=output.as_json, folder=folder)

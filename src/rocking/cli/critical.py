@@ -24,5 +24,5 @@ def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPU
     with output.folder() as folder:
         report = critical_report(omega, eta)
         if folder is not None:
-            report.write(folder)
+            report.to_json(folder / "result.json")
         batch.show(report.to_dict(), report.summary(), as_json=output.as_json, folder=folder)

@@ -57,8 +57,8 @@ def map(
     }
     with output.folder() as folder:
         found = overturning_map(
-            pulse,
             block.block(),
+            pulse,
             amplitudes=values(amplitudes, "--amplitudes"),
             frequencies=values(frequencies, "--frequencies"),
             model=model.model,

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
+from rocking.block import Blocks
 from rocking.cli import batch
 from rocking.cli.options import (
     MODEL,
@@ -59,16 +60,29 @@ def spectrum(
         Abscissa of the figure.
     """
     if alpha is None and ensemble is None:
-        raise InvalidOption("a spectrum needs --alpha, or the --ensemble of a calibration")
+        raise InvalidOption("a spectrum needs {}, or the {} of a calibration", "alpha", "ensemble")
+    if ensemble is not None and (alpha is not None or restitution is not None):
+        raise InvalidOption(
+            "the blocks of {} have slendernesses and restitutions of their own: leave {} and {} out",
+            "ensemble",
+            "alpha",
+            "restitution",
+        )
     with output.folder() as folder:
         axes: dict[str, Any] = {
-            "alpha": None if alpha is None else values(alpha, "--alpha", tilt),
             "p": None if p is None else values(p, "--p"),
             "size": None if size is None else values(size, "--size"),
-            "restitution": None if restitution is None else values(restitution, "--restitution"),
         }
+        how = model.chosen()
+        if alpha is not None:
+            restitutions = None if restitution is None else values(restitution, "--restitution")
+            blocks = Blocks.grid(alpha=values(alpha, "--alpha", tilt), restitution=restitutions, **axes)
+            axes = {}
+        elif ensemble is not None:
+            given = ensemble_of(ensemble, model)
+            blocks = given.pop("blocks")
+            how |= given
         shares = values(fractiles, "--fractiles").tolist()
-        how = model.chosen() | ({} if ensemble is None else ensemble_of(ensemble, model))
         read = motion.read_all(names)
-        found = rocking_spectrum([*read.motions.values()], **axes, fractiles=shares, **how)
+        found = rocking_spectrum(blocks, [*read.motions.values()], **axes, fractiles=shares, **how)
         batch.deliver(found, "spectrum", read, folder=folder, as_json=output.as_json, against=against)

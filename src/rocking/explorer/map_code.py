@@ -6,14 +6,12 @@ import itertools
 import shlex
 from typing import Any, Final
 
+from rocking.analysis.overturning import PULSES
 from rocking.constants import STANDARD_GRAVITY
 from rocking.explorer.case import BLOCK_NAMES, NAMES, block_as_python
-from rocking.explorer.maps import QUANTITIES, Axis, Grid
+from rocking.explorer.maps import QUANTITIES, Axis, MapGrid
 from rocking.explorer.pulses import arguments_of, is_pulse, pulse_call
 from rocking.named_pulses import pulse_values
-
-#: Pulses that have an amplitude and a frequency, over which `rocking map` maps them.
-_MAPPED: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
 #: Quantities of a map of overturning.
 _OVERTURNING: Final = ("peak", "mode")
@@ -30,7 +28,7 @@ from rocking.chattering import {names}
 def case({y}, {x}):
     block = rocking.{block}
     motion = {motion}
-    return families.Case(block, motion, {model!r})
+    return families.SimulationInput(block, motion, {model!r})
 
 """
 
@@ -61,7 +59,7 @@ print(found.summary())
 """
 
 
-def as_python(grid: Grid, quantity: str) -> str:
+def as_python(grid: MapGrid, quantity: str) -> str:
     """Write a script that computes a quantity of a map; it runs as it stands.
 
     Chattering is mapped by `chattering_map`, overturning by `overturning_map` where the map is over frequency and
@@ -83,13 +81,13 @@ def as_python(grid: Grid, quantity: str) -> str:
         given = {name: value for name, value in numbers.items() if name not in ("amplitude", "frequency")}
         if grid.case.model != "nonlinear":
             given["model"] = grid.case.model
-        arguments = [repr(name), "block", f"amplitudes={texts['ys']}", f"frequencies={texts['xs']}"]
+        arguments = ["block", repr(name), f"amplitudes={texts['ys']}", f"frequencies={texts['xs']}"]
         arguments += [f"{name}={value!r}" for name, value in given.items()]
         return _MODES.format(block=texts["block"], arguments=", ".join(arguments))
     return (_HEAD + _PEAKS).format(**texts, names="families")
 
 
-def as_command(grid: Grid) -> str | None:
+def as_command(grid: MapGrid) -> str | None:
     """Write a map of overturning as a command; None for what the command line does not map."""
     texts = grid.case.texts
     if not _is_overturning_map(grid) or "gravity" in texts:
@@ -105,7 +103,7 @@ def as_command(grid: Grid) -> str | None:
     return shlex.join(["rocking", "map", name, *itertools.chain.from_iterable(words)])
 
 
-def described(grid: Grid) -> dict[str, Any]:
+def described(grid: MapGrid) -> dict[str, Any]:
     """Return a script for every quantity, and the command for those that it computes."""
     command = as_command(grid)
     return {
@@ -114,13 +112,13 @@ def described(grid: Grid) -> dict[str, Any]:
     }
 
 
-def _is_overturning_map(grid: Grid) -> bool:
+def _is_overturning_map(grid: MapGrid) -> bool:
     """Whether the map is one of `rocking.overturning_map`: a pulse's amplitude over its frequency."""
     name = grid.case.texts.get("motion", "").partition(":")[0]
-    return name in _MAPPED and (grid.x.name, grid.y.name) == ("omega", "a")
+    return name in PULSES and (grid.x.name, grid.y.name) == ("omega", "a")
 
 
-def _pulse(grid: Grid) -> tuple[str, dict[str, str], dict[str, Any]]:
+def _pulse(grid: MapGrid) -> tuple[str, dict[str, str], dict[str, Any]]:
     """Name of the pulse, its parameters as they were written, and as numbers."""
     text = grid.case.texts["motion"]
     name, _, written = text.partition(":")
@@ -135,7 +133,7 @@ def _range(axis: Axis) -> str:
     return f"{float(axis.values[0])!r}:{float(axis.values[-1])!r}:{len(axis.values)}"
 
 
-def _block(grid: Grid) -> str:
+def _block(grid: MapGrid) -> str:
     """Call that makes the block, with the names of the axes among its arguments."""
     varied = {grid.x.name, grid.y.name} & {"p", "alpha", "restitution"}
     texts, sides = grid.case.texts, grid.case.block.sides
@@ -160,7 +158,7 @@ def _pair(sides: list[str]) -> str:
     return plain[0] if plain[0] == plain[1] else f"[{', '.join(plain)}]"
 
 
-def _motion(grid: Grid) -> str:
+def _motion(grid: MapGrid) -> str:
     """Call that makes the motion, with the names of the axes among its arguments."""
     names, made = {grid.x.name, grid.y.name}, grid.case.python
     text = grid.case.texts.get("motion", "")

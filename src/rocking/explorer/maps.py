@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
@@ -11,18 +10,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.analysis.overturning import modes_of
+from rocking.analysis.overturning import Mode, modes_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Blocks
 from rocking.block.single import housner_restitution
-from rocking.chattering.maps import Outcome, hardly_lifts, outcomes_of
-from rocking.chattering.theory.amplitude import critical_amplitude
+from rocking.chattering.amplitude import critical_amplitude
+from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import Setup, Task, simulate_tasks
-from rocking.errors import InvalidOption, OutsideFit
+from rocking.errors import InvalidOption
 from rocking.explorer.case import BLOCK_NAMES, Case, Texts
 from rocking.explorer.pulses import arguments_of, is_pulse, pulse_of
-from rocking.motion.exceedance import exceedances
 from rocking.motion.motion import Motion
 from rocking.quantities import number
 from rocking.treatment import Certified
@@ -36,9 +34,6 @@ _STRIDES: Final = (8, 4, 2, 1)
 
 #: What is kept of each point, in this order.
 QUANTITIES: Final = ("outcome", "rest", "peak", "mode")
-
-#: Mode of a block that overturns after it has been at rest; the others are those of an overturning map.
-OVERTURNS_AFTER_REST: Final = -4
 
 
 @dataclass(frozen=True)
@@ -79,18 +74,8 @@ class Axis(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
-    """A case and the two parameters over which it is mapped.
-
-    Attributes
-    ----------
-    case : Case
-        All that is not varied.
-    motion : Motion
-        What shakes it.
-    x, y : Axis
-        Parameters to the right and upwards.
-    """
+class MapGrid:
+    """A case, the motion that shakes it, and the two parameters over which it is mapped: to the right and upwards."""
 
     case: Case
     motion: Motion
@@ -132,15 +117,8 @@ def _has_one_slenderness(case: Case) -> bool:
     return "restitution" in case.texts or (plus.p == minus.p and not {"pivots", "offset"} & case.texts.keys())
 
 
-def grid_of(case: Case, texts: Texts) -> Grid:
-    """Read the axes of a map.
-
-    Parameters
-    ----------
-    case : Case
-        What is not varied.
-    texts : mapping of str to str
-        ``x``, ``x_from``, ``x_to``, ``y``, ``y_from``, ``y_to``: name and ends of each axis; ``points`` of each.
+def grid_of(case: Case, texts: Texts) -> MapGrid:
+    """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same of ``y``, and how many ``points`` each has.
 
     Raises
     ------
@@ -148,68 +126,55 @@ def grid_of(case: Case, texts: Texts) -> Grid:
         If the case has no motion, or an axis is none of it, varies the same as the other or is out of range.
     """
     if case.motion is None:
-        raise InvalidOption("a map needs a motion: choose a record or a pulse")
+        raise InvalidOption("a map needs a {}: choose a record or a pulse", "motion")
     points = number(texts.get("points", "200"), "points")
     if not (_FEWEST <= points <= _MOST and points == int(points)):
         raise InvalidOption(f"a map has from {_FEWEST} to {_MOST} points on each axis, not {points:g}")
     x, y = (_axis(which, case, texts, int(points)) for which in ("x", "y"))
     if x.name == y.name or {x.name, y.name} in _SAME:
-        raise InvalidOption(f"{x.name} and {y.name} vary the same: choose another pair of axes")
-    return Grid(case, case.motion, x, y)
+        raise InvalidOption("{} and {} vary the same: choose another pair of axes", x.name, y.name)
+    return MapGrid(case, case.motion, x, y)
 
 
-def parts(grid: Grid, threads: int | None = None) -> Iterator[Part]:
-    """Simulate the points of a grid, coarse to fine, and give them as they come.
-
-    Raises
-    ------
-    RockingError
-        If a point is no block, or no motion.
-    """
+def parts(grid: MapGrid, threads: int | None = None) -> Iterator[Part]:
+    """Simulate the points of a grid, coarse to fine, and give them as they come."""
     blocks, factors, scale = _points(grid)
     setup = Setup(blocks, grid.case.model, Certified())
-    later = _Later(grid)
+    last: dict[tuple[tuple[float, float], float], float | None] = {}
     for task, ends in simulate_tasks(setup, _tasks(grid, factors), threads=threads):
         chosen = task.blocks
         assert isinstance(chosen, np.ndarray)
-        values = np.empty((len(QUANTITIES), len(chosen)), np.float32)
         alpha = blocks.alpha[chosen]
         thresholds = _thresholds(alpha, grid)
+        outcome = np.empty(len(chosen))
         for pair in np.unique(thresholds, axis=0):
             here = (thresholds == pair).all(axis=1)
-            times = later.of((float(pair[0]), float(pair[1])), task.factor)
-            values[0, here] = Outcome.NO_UPLIFT if times is None else outcomes_of(ends[here], times)
-        rested = ends["rests"] > 0
-        values[1] = np.where(rested, (ends["first_rest"] - ends["first_uplift"]) * scale[chosen], np.nan)
-        values[2] = np.where(ends["overturned"], np.inf, ends["peak_rotation"] / alpha.min(axis=1))
-        modes = modes_of(ends, grid.motion.duration)
-        values[3] = np.where(ends["overturned"] & (ends["uplifts"] > 1), OVERTURNS_AFTER_REST, modes)
+            passed = _passed(grid, pair / task.factor, task.factor)
+            if passed not in last:
+                last[passed] = last_exceedance(grid.motion, *passed)
+            outcome[here] = outcomes_of(ends[here], last[passed])
+        rest = (ends["first_rest"] - ends["first_uplift"]) * scale[chosen]
+        after_rest = ends["overturned"] & (ends["uplifts"] > 1)
+        quantities = {
+            "outcome": outcome,
+            "rest": np.where(ends["rests"] > 0, rest, np.nan),
+            "peak": np.where(ends["overturned"], np.inf, ends["peak_rotation"] / alpha.min(axis=1)),
+            "mode": np.where(after_rest, Mode.OVERTURNS_AFTER_REST, modes_of(ends, grid.motion.duration)),
+        }
+        values = np.array([quantities[name] for name in QUANTITIES], np.float32)
         yield Part(task.key[0], chosen, values)
 
 
-class _Later:
-    """When the scaled motion passes thresholds again, for each pair and factor that was asked for."""
+def _passed(grid: MapGrid, thresholds: Floats, factor: float) -> tuple[tuple[float, float], float]:
+    """Thresholds (m/s^2) and gravity with which the motion as it is passes what it passes times a factor.
 
-    def __init__(self, grid: Grid) -> None:
-        self._motion, self._gravity = grid.motion, grid.case.block.gravity
-        self._known: dict[tuple[float, float, float], Floats | None] = {}
-
-    def of(self, thresholds: tuple[float, float], factor: float) -> Floats | None:
-        """Return the times, s, at which the motion times a factor passes the thresholds (m/s^2) after the first.
-
-        None if it hardly passes one. The motion as it is passes those divided by the factor at the same times, if
-        gravity is divided, too: a vertical component changes it.
-        """
-        plus, minus = (each / factor for each in thresholds)
-        gravity = self._gravity / factor if self._motion.vertical else self._gravity
-        if (plus, minus, gravity) not in self._known:
-            none = hardly_lifts(self._motion, (plus, minus), gravity)
-            found = exceedances(self._motion, (plus, minus), gravity)[1:, 0]
-            self._known[plus, minus, gravity] = None if none else found
-        return self._known[plus, minus, gravity]
+    A vertical component changes gravity: it is divided, too.
+    """
+    gravity = grid.case.block.gravity
+    return (float(thresholds[0]), float(thresholds[1])), gravity / factor if grid.motion.vertical else gravity
 
 
-def curves(grid: Grid) -> dict[str, Floats]:
+def curves(grid: MapGrid) -> dict[str, Floats]:
     """Critical amplitudes along the x axis: exact, and by the paper's Eq. 76 where that was fitted.
 
     Empty but for a symmetric block under a sine, with the amplitude upwards.
@@ -221,46 +186,42 @@ def curves(grid: Grid) -> dict[str, Floats]:
     if grid.x.name not in ("omega", "restitution"):
         return {}
     side = case.block.sides[0]
-    omega = np.full(grid.x.values.size, 2.0 * math.pi * arguments_of(motion)["frequency"] / side.p)
-    eta = np.full(grid.x.values.size, side.restitution)
-    if grid.x.name == "omega":
-        omega = grid.x.values
-    else:
-        eta = grid.x.values
+    size = grid.x.values.size
+    omega = np.full(size, 2.0 * math.pi * arguments_of(motion)["frequency"] / side.p)
+    eta = np.full(size, side.restitution)
+    omega, eta = (grid.x.values, eta) if grid.x.name == "omega" else (omega, grid.x.values)
     found = {"exact": critical_amplitude(omega, eta), "eq76": np.full(omega.size, np.nan)}
     (low, high), (least, most) = FITTED_FREQUENCIES, FITTED_RESTITUTIONS
     fitted = (omega >= low) & (omega <= high) & (eta >= least) & (eta <= most)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", OutsideFit)
-        found["eq76"][fitted] = critical_amplitude(omega[fitted], eta[fitted], method="eq76")
+    found["eq76"][fitted] = critical_amplitude(omega[fitted], eta[fitted], method="eq76")
     return found
 
 
-def texts_at(grid: Grid, x: float, y: float) -> dict[str, str]:
+def texts_at(grid: MapGrid, x: float, y: float) -> dict[str, str]:
     """Texts of the case at a point of the map."""
     texts = dict(grid.case.texts)
-    for name, value in ((grid.x.name, x), (grid.y.name, y)):
-        if name in ("p", "alpha", "restitution"):
-            _change_block(texts, grid, name, value)
-    for name, value in ((grid.x.name, x), (grid.y.name, y)):
-        if name == "omega":
-            p = min(side.p for side in grid.case.block.sides)
-            _change_pulse(texts, frequency=value * p / (2.0 * math.pi))
-    for name, value in ((grid.x.name, x), (grid.y.name, y)):
-        if name in ("a", "pga"):
-            alpha = math.radians(x) if grid.x.name == "alpha" else None
-            _change_amplitude(texts, value * (STANDARD_GRAVITY if name == "pga" else _lifting(grid, alpha)))
+    at = {grid.x.name: x, grid.y.name: y}
+    for name in ("p", "alpha", "restitution"):
+        if name in at:
+            _change_block(texts, grid, name, at[name])
+    if "omega" in at:
+        p = min(side.p for side in grid.case.block.sides)
+        _change_pulse(texts, frequency=at["omega"] * p / (2.0 * math.pi))
+    if "a" in at:
+        _change_amplitude(texts, at["a"] * _lifting(grid, math.radians(at["alpha"]) if "alpha" in at else None))
+    if "pga" in at:
+        _change_amplitude(texts, at["pga"] * STANDARD_GRAVITY)
     return texts
 
 
-def described(grid: Grid) -> dict[str, Any]:
+def described(grid: MapGrid) -> dict[str, Any]:
     """Say what a map shows: its axes, and what the numbers of outcomes and modes mean."""
     return {
         "shape": list(grid.shape),
         "x": _described(grid.x),
         "y": _described(grid.y),
         "quantities": list(QUANTITIES),
-        "outcomes": [outcome.name.lower().replace("_", " ") for outcome in Outcome],
+        "outcomes": [outcome.words for outcome in Outcome],
         "curves": {name: [None if math.isnan(v) else v for v in values] for name, values in curves(grid).items()},
     }
 
@@ -282,11 +243,11 @@ def _axis(which: str, case: Case, texts: Texts, points: int) -> Axis:
         for end, default in zip(("from", "to"), kind.close, strict=True)
     )
     if not 0.0 < low < high < math.inf:
-        raise InvalidOption(f"the axis of {name} needs a positive start below its end, not {low:g} to {high:g}")
+        raise InvalidOption(f"the axis of {{}} needs a positive start below its end, not {low:g} to {high:g}", name)
     return Axis(name, np.linspace(low, high, points))
 
 
-def _points(grid: Grid) -> tuple[Blocks, Floats, Floats]:
+def _points(grid: MapGrid) -> tuple[Blocks, Floats, Floats]:
     """Blocks of all points row by row, factors on the motion, and by what times are multiplied to be the case's."""
     case = grid.case
     y, x = (values.ravel() for values in np.meshgrid(grid.y.values, grid.x.values, indexing="ij"))
@@ -319,20 +280,20 @@ def _points(grid: Grid) -> tuple[Blocks, Floats, Floats]:
     return Blocks(**sides, gravity=case.block.gravity), factors, scale
 
 
-def _thresholds(alpha: Floats, grid: Grid) -> Floats:
+def _thresholds(alpha: Floats, grid: MapGrid) -> Floats:
     """Ground accelerations, m/s^2, that lift blocks of these slendernesses, shape (n, 2)."""
     steepness: Floats = alpha if grid.case.model == "linear" else np.tan(alpha)
     return grid.case.block.gravity * steepness
 
 
-def _lifting(grid: Grid, alpha: float | None) -> float:
+def _lifting(grid: MapGrid, alpha: float | None) -> float:
     """Smallest ground acceleration, m/s^2, that lifts the case's block, or one of another slenderness."""
     if alpha is None:
         return min(grid.case.block.uplift_thresholds(grid.case.model))
     return float(_thresholds(np.array([[alpha]]), grid)[0, 0])
 
 
-def _tasks(grid: Grid, factors: Floats) -> Iterator[Task]:
+def _tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
     """Tasks level by level, row by row; points of a task share the factor on the motion."""
     rows, columns = grid.shape
     for level, stride in enumerate(_STRIDES):
@@ -343,7 +304,7 @@ def _tasks(grid: Grid, factors: Floats) -> Iterator[Task]:
                 yield Task(index[factors[index] == factor], grid.motion, float(factor), (stride, row))
 
 
-def _change_block(texts: dict[str, str], grid: Grid, name: str, value: float) -> None:
+def _change_block(texts: dict[str, str], grid: MapGrid, name: str, value: float) -> None:
     sides = grid.case.block.sides
     if "alpha" not in (grid.x.name, grid.y.name) and (not grid.case.block.is_symmetric or "pivots" in texts):
         texts.setdefault("restitution", _both([side.restitution for side in sides]))

@@ -230,7 +230,7 @@ class App:
     async def _in_thread(self, work: Callable[[], T]) -> T:
         return await anyio.to_thread.run_sync(work, limiter=self._threads)
 
-    async def _map(self, grid: maps.Grid, about: dict[str, Any]) -> AsyncIterator[bytes]:
+    async def _map(self, grid: maps.MapGrid, about: dict[str, Any]) -> AsyncIterator[bytes]:
         """Parts of a map as bytes; the work ends with the reader."""
         yield _framed(json.dumps({**about, "problem": None}).encode())
         async with self._maps:

@@ -3,18 +3,23 @@
 from rocking.plot.amplitudes import contour_figure, duration_figure, frequency_figure, surface_figure
 from rocking.plot.blocks import blocks_figure
 from rocking.plot.calibration import Parameter, measured_figure, outcomes_figure
-from rocking.plot.flowchart import Box, Flowchart, Way, flowchart_figure
 from rocking.plot.fragility import FragilityLine, dispersions_figure, fragility_figure
-from rocking.plot.histories import Detail, Mark, excitation_figure, history_figure
+from rocking.plot.histories import (
+    Detail,
+    Mark,
+    Ratios,
+    chattering_figure,
+    excitation_figure,
+    history_figure,
+    ratio_figure,
+)
 from rocking.plot.ida import ScaledMotion, ida_figure
 from rocking.plot.intervals import intervals_figure
-from rocking.plot.maps import outcome_figure
+from rocking.plot.maps import outcome_figure, regions_figure
 from rocking.plot.motion import motion_figure
-from rocking.plot.regions import regions_figure
 from rocking.plot.response import DrawnSequence, RotationUnits, response_figure
 from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
-from rocking.plot.sequences import Ratios, chattering_figure, ratio_figure
-from rocking.plot.sketch import block_figure
+from rocking.plot.sketches import Box, Flowchart, Way, block_figure, flowchart_figure
 from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
 __all__ = [

@@ -16,42 +16,28 @@ if TYPE_CHECKING:
     from matplotlib.contour import ContourSet
     from matplotlib.figure import Figure
 
-#: How the curves of several methods are told apart, in colour and in grey.
+#: How the curves of several methods are distinguished, in colour and in grey.
 _CURVES: Final[tuple[dict[str, Any], ...]] = (
     {"color": INK, "linewidth": 1.3},
     {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (5, 2))},
     {"color": GROUND, "linewidth": 0.0, "marker": "o", "markersize": 4.0, "markerfacecolor": "white", "markevery": 6},
 )
-
+_FREQUENCY_CURVES: Final[tuple[dict[str, Any], ...]] = (
+    {"color": INK, "linewidth": 1.4},
+    {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (5, 2))},
+    {"color": GROUND, "linewidth": 1.4, "linestyle": (0, (1, 1))},
+)
 
 #: Least distance of a contour's label from the frame and from other labels, over the size of the axes.
 _LABEL_MARGIN: Final = 0.03
 _LABEL_DISTANCE: Final = 0.11
 
 
-def duration_figure(
-    *,
-    amplitude: Floats,
-    durations: Mapping[str, Floats],
-    critical: float,
-    title: str,
-) -> Figure:
+def duration_figure(*, amplitude: Floats, durations: Mapping[str, Floats], critical: float, title: str) -> Figure:
     """Draw chattering time over half a period by several methods, and below how far they are from the first.
 
-    Parameters
-    ----------
-    amplitude : ndarray, shape (n,)
-        Amplitude a of the ground acceleration over g alpha.
-    durations : mapping of str to ndarray, shape (n,)
-        Chattering time over half a period by each method, the exact one first; NaN where incomplete.
-    critical : float
-        Critical amplitude.
-    title : str
-        Title of the figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    All are over amplitudes (n,), of the ground acceleration over g alpha: by the exact method first, NaN where
+    incomplete.
     """
     with figure_for(None, (5.2, 5.0)) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
@@ -86,16 +72,7 @@ def duration_figure(
 def contour_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats) -> Figure:
     """Draw contours of the critical amplitude over frequency and restitution, and the error of its fit.
 
-    Parameters
-    ----------
-    omega, eta : ndarray, shapes (m,) and (n,)
-        Frequencies and coefficients of restitution.
-    exact, fitted : ndarray, shape (m, n)
-        Critical amplitude.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    Frequencies (m,) and coefficients of restitution (n,); critical amplitudes (m, n).
     """
     from matplotlib.lines import Line2D
 
@@ -131,16 +108,7 @@ def contour_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
 def surface_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats) -> Figure:
     """Draw the critical amplitude over frequency and restitution as a surface, and its fit as points on or off it.
 
-    Parameters
-    ----------
-    omega, eta : ndarray, shapes (m,) and (n,)
-        Frequencies and coefficients of restitution.
-    exact, fitted : ndarray, shape (m, n)
-        Critical amplitude.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    Frequencies (m,) and coefficients of restitution (n,); critical amplitudes (m, n).
     """
     from matplotlib.lines import Line2D
 
@@ -185,42 +153,28 @@ def surface_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
     return figure
 
 
-def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: str, ax: Axes | None = None) -> Figure:
+def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: str) -> Figure:
     """Draw the critical amplitude against frequency by several methods, and its spread.
 
-    Parameters
-    ----------
-    omega : ndarray, shape (n,)
-        Frequencies.
-    critical : mapping of str to ndarray, shape (n,)
-        Critical amplitude by each method, the exact one first.
-    title : str
-        Title of the figure.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    All are over frequencies (n,), by the exact method first.
     """
-    with figure_for(ax, (5.2, 3.3)) as figure:
-        axes = ax or figure.add_subplot()
+    with figure_for(None, (5.2, 3.3)) as figure:
+        axes = figure.add_subplot()
         exact = next(iter(critical.values()))
         low, high = float(exact.min()), float(exact.max())
         axes.axhspan(low, high, color=REST, linewidth=0.0)
         for (name, values), style in zip(critical.items(), _FREQUENCY_CURVES, strict=False):
             axes.plot(omega, values, label=name, **style)
         axes.annotate(
-            rf"spread {100.0 * (high / low - 1.0):.2f} %",
-            (omega[-1], 0.5 * (low + high)),
-            ha="right",
-            va="center",
+            rf"spread {100.0 * (high / low - 1.0):.2f} %", (omega[-1], 0.5 * (low + high)), ha="right", va="center"
         )
         axes.set_xlim(omega[0], omega[-1])
-        _loosen(axes)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low - 0.3 * (high - low), high + 0.1 * (high - low))
+        axes.ticklabel_format(axis="y", useOffset=False)
         axes.set_xlabel(r"frequency, $\omega = \omega_g / p$")
         axes.set_ylabel(r"critical amplitude, $a_{cr}$")
-        add_title(figure, ax, title)
+        add_title(figure, None, title)
         axes.legend(loc="lower right")
     return figure
 
@@ -239,19 +193,6 @@ def _label(axes: Axes, lines: ContourSet, form: str) -> None:
     for text in axes.clabel(lines, fmt=form, fontsize=7, inline_spacing=2, manual=[tuple(at) for at in chosen]):
         text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.85})
         text.set_clip_on(True)
-
-
-_FREQUENCY_CURVES: Final[tuple[dict[str, Any], ...]] = (
-    {"color": INK, "linewidth": 1.4},
-    {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (5, 2))},
-    {"color": GROUND, "linewidth": 1.4, "linestyle": (0, (1, 1))},
-)
-
-
-def _loosen(axes: Axes) -> None:
-    low, high = axes.get_ylim()
-    axes.set_ylim(low - 0.3 * (high - low), high + 0.1 * (high - low))
-    axes.ticklabel_format(axis="y", useOffset=False)
 
 
 def _spread(rows: int, most_rows: int, columns: int, most_columns: int) -> tuple[Any, ...]:

@@ -1,10 +1,13 @@
-"""Histories under a sine: the excitation with its thresholds, and responses by several schemes."""
+"""Histories of one block under a sine: a chattering sequence with its intervals, and responses by several schemes."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
 
 from rocking.arrays import Floats
 from rocking.plot.canvas import add_legend, add_title, figure_for, labelled, magnified
@@ -14,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: How responses are told apart, in colour and in grey: the first is a broad line below all others.
+#: How responses are distinguished, in colour and in grey: the first is a broad line below all others.
 _SCHEMES: Final[tuple[dict[str, Any], ...]] = (
     {"color": GROUND, "linewidth": 3.0},
     {"color": INK, "linewidth": 1.1},
@@ -22,6 +25,16 @@ _SCHEMES: Final[tuple[dict[str, Any], ...]] = (
     {"color": "#3c6aa0", "linewidth": 1.8, "linestyle": (0, (1, 1))},
 )
 
+
+#: Cycles that the details show: the first, and those after the impact with this number.
+_FIRST_CYCLES: Final = 5
+_LAST_CYCLES: Final = 5
+
+#: Intervals shorter than this share of a detail have no name in it.
+_NARROW: Final = 0.1
+
+#: The line at which a block comes to rest, or to which ratios tend.
+_LIMIT: Final[dict[str, Any]] = {"color": ABOVE, "linestyle": (0, (4, 2))}
 
 _MARK: Final[dict[str, Any]] = {"color": ABOVE, "markersize": 4.5, "markeredgewidth": 0.0, "zorder": 4}
 
@@ -41,35 +54,15 @@ class Mark(NamedTuple):
 
 
 def excitation_figure(
-    *,
-    time: Floats,
-    acceleration: Floats,
-    marks: tuple[Mark, ...],
-    chattering_time: float,
-    title: str,
-    ax: Axes | None = None,
+    *, time: Floats, acceleration: Floats, marks: tuple[Mark, ...], chattering_time: float, title: str
 ) -> Figure:
     """Draw a sine with the thresholds, its exceedances, the initiations and the time to the first rest.
 
-    Parameters
-    ----------
-    time, acceleration : ndarray, shape (n,)
-        Time over the period and ground acceleration over g alpha.
-    marks : tuple of Mark
-        The first one or two initiations.
-    chattering_time : float
-        Time from the first initiation to rest, over the period; NaN where chattering is incomplete.
-    title : str
-        Title of the figure.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    Times are over the period, accelerations over g alpha; `marks` are the first one or two initiations. The chattering
+    time is NaN where chattering is incomplete.
     """
-    with figure_for(ax, (7.0, 2.9)) as figure:
-        axes = ax or figure.add_subplot()
+    with figure_for(None, (7.0, 2.9)) as figure:
+        axes = figure.add_subplot()
         _draw_excitation(axes, time, acceleration)
         _mark_initiations(axes, marks, float(acceleration.max()))
         first = marks[0].time
@@ -82,10 +75,10 @@ def excitation_figure(
                 text, (0.5 * (first + end), height), xytext=(0, 2), textcoords="offset points", ha="center", va="bottom"
             )
         if not math.isnan(rest):
-            axes.plot([rest, rest], [-0.75, 0.1], color=ABOVE, linewidth=0.9, linestyle=(0, (4, 2)))
+            axes.plot([rest, rest], [-0.75, 0.1], linewidth=0.9, **_LIMIT)
             axes.annotate("at rest", (rest, -0.75), xytext=(-3, 0), textcoords="offset points", ha="right", color=ABOVE)
         axes.set_xlim(time[0], time[-1])
-        add_title(figure, ax, title)
+        add_title(figure, None, title)
         axes.set_xlabel("time over period, $t/T$")
         axes.legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.04))
     return figure
@@ -102,24 +95,8 @@ def history_figure(
 ) -> Figure:
     """Draw responses by one or several schemes, the excitation below, and a detail of what matters below that.
 
-    Parameters
-    ----------
-    time : ndarray, shape (n,)
-        Time over the period.
-    rotations : mapping of str to ndarray, shape (n,)
-        Rotation over slenderness by each scheme, the reference first.
-    acceleration : ndarray, shape (n,)
-        Ground acceleration over g alpha.
-    detail : Detail
-        What the last panel shows; its time is shaded in the first.
-    marks : tuple of Mark
-        Instants to mark.
-    title : str
-        Title of the figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    Times are over the period, rotations over the slenderness, the reference first, accelerations over g alpha. The time
+    of the detail is shaded in the first panel.
     """
     with figure_for(None, (7.0, 5.6)) as figure:
         response, excitation, close = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 1.2))
@@ -174,10 +151,151 @@ def _mark_initiations(axes: Axes, marks: tuple[Mark, ...], peak: float) -> None:
     for mark in marks:
         axes.plot(mark.time, height, "v", **_MARK)
         axes.annotate(
-            mark.text,
-            (mark.time, height),
-            xytext=(-4, 4),
-            textcoords="offset points",
-            color=ABOVE,
-            fontsize=7.5,
+            mark.text, (mark.time, height), xytext=(-4, 4), textcoords="offset points", color=ABOVE, fontsize=7.5
         )
+
+
+class Ratios(NamedTuple):
+    """Ratios of intervals of one sequence, their limit, and what to write above them."""
+
+    values: Floats
+    limit: float
+    title: str
+
+
+def chattering_figure(
+    *, time: Floats, rotation: Floats, impact_times: Floats, rest: float, late_impact: int, title: str
+) -> Figure:
+    """Draw a chattering sequence (a) with details of its first cycles (b) and of late ones (c).
+
+    Times are p t since uplift, dense also between the late impacts; rotations are over the slenderness. The second
+    detail starts at the impact with the index `late_impact`.
+    """
+    with figure_for(None, (7.0, 5.0)) as figure:
+        grid = figure.add_gridspec(2, 2)
+        whole, first, last = (figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1]))
+        add_title(figure, None, title)
+        _draw_whole(whole, time, rotation, impact_times, rest)
+        early = np.append(0.0, impact_times[:_FIRST_CYCLES])
+        _draw_cycles(first, time, rotation, early, 0)
+        first.set_title("(b) first cycles", loc="left")
+        first.set_xlabel(r"time since uplift, $\tau$")
+        late = impact_times[late_impact : late_impact + _LAST_CYCLES + 1]
+        scale, power = magnified(float(late[-1] - late[0]))
+        _draw_cycles(last, scale * (time - late[0]), rotation, scale * (late - late[0]), late_impact + 1)
+        last.set_title(rf"(c) cycles after impact {late_impact + 1}", loc="left")
+        last.set_xlabel(rf"{power}$(\tau - \tau_{{{late_impact + 1}}})$")
+    return figure
+
+
+def _draw_whole(axes: Axes, time: Floats, rotation: Floats, impact_times: Floats, rest: float) -> None:
+    scale, power = magnified(float(np.max(np.abs(rotation))))
+    axes.axhline(0.0, color=INK, linewidth=0.4)
+    axes.plot(time, scale * rotation, color=INK, linewidth=0.9)
+    axes.plot(
+        impact_times,
+        np.full(impact_times.size, 0.06),
+        "|",
+        color=INK,
+        markersize=6,
+        markeredgewidth=0.5,
+        transform=axes.get_xaxis_transform(),
+    )
+    axes.axvline(rest, linewidth=1.0, **_LIMIT)
+    axes.annotate(
+        rf"at rest, $\tau_{{ch}}$ = {rest:.6f}",
+        (rest, 0.3),
+        xycoords=axes.get_xaxis_transform(),
+        xytext=(-6, 0),
+        textcoords="offset points",
+        ha="right",
+        color=ABOVE,
+    )
+    axes.set_xlim(0.0, 1.06 * rest)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - 0.18 * (high - low), high)
+    axes.set_title("(a) the whole sequence, with its impacts as ticks", loc="left")
+    axes.set_xlabel(r"time since uplift, $\tau$")
+    axes.set_ylabel(rf"rotation, {power}$\phi$")
+
+
+def _draw_cycles(axes: Axes, time: Floats, rotation: Floats, impacts: Floats, number: int) -> None:
+    """Draw the stretch between the given impacts, which are numbered from `number` on, with the intervals."""
+    margin = 0.06 * (impacts[-1] - impacts[0])
+    shown = (time >= impacts[0] - margin) & (time <= impacts[-1] + margin)
+    scale, power = magnified(float(np.max(np.abs(rotation[(time >= impacts[0]) & (time <= impacts[-1])]))))
+    axes.axhline(0.0, color=INK, linewidth=0.4)
+    axes.plot(time[shown], scale * rotation[shown], color=INK, linewidth=1.0)
+    axes.plot(impacts, np.zeros(impacts.size), "o", color=INK, markersize=3.4, markerfacecolor="white")
+    axes.set_xlim(impacts[0] - margin, impacts[-1] + margin)
+    low, high = axes.get_ylim()
+    span = high - low
+    # Neighbours lie close together: their labels stand above the curve, at two heights.
+    axes.set_ylim(low - 0.24 * span, high + 0.4 * span)
+    for k, at in enumerate(impacts):
+        height = high + (0.16 if k % 2 else 0.3) * span
+        axes.plot([at, at], [low - 0.08 * span, height], color=GROUND, linewidth=0.6, zorder=0)
+        axes.annotate(rf"$\tau_{{{number + k}}}$", (at, height), ha="center", va="bottom")
+    _draw_intervals(axes, impacts, number, low - 0.05 * span)
+    axes.set_ylabel(rf"rotation, {power}$\phi$")
+
+
+def _draw_intervals(axes: Axes, impacts: Floats, number: int, height: float) -> None:
+    """Draw an arrow from impact to impact, where there is room for its name."""
+    for k, (start, end) in enumerate(itertools.pairwise(impacts)):
+        if end - start < _NARROW * (impacts[-1] - impacts[0]):
+            continue
+        arrow = {
+            "arrowstyle": "<->",
+            "linewidth": 0.6,
+            "color": INK,
+            "shrinkA": 0.0,
+            "shrinkB": 0.0,
+            "mutation_scale": 6,
+        }
+        axes.annotate("", (end, height), (start, height), arrowprops=arrow)
+        axes.annotate(
+            rf"$\Delta\tau_{{{number + k}}}$",
+            (0.5 * (start + end), height),
+            xytext=(0, -2),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+        )
+
+
+def ratio_figure(panels: Sequence[Ratios]) -> Figure:
+    """Draw the ratios of the intervals between every second impact, each panel with the limit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> figure = ratio_figure([Ratios(np.array([0.2, 1.0, 0.6, 0.9]), 0.8464, "a sequence")])
+    >>> figure.axes[0].get_title(loc="left")
+    '(a) a sequence'
+    """
+    with figure_for(None, (7.0, 2.9)) as figure:
+        for k, (panel, axes) in enumerate(zip(panels, figure.subplots(1, len(panels), squeeze=False)[0], strict=True)):
+            n = np.arange(panel.values.size)
+            for start, face, label in ((0, INK, "even $n$"), (1, "white", "odd $n$")):
+                chosen = slice(start, None, 2)
+                axes.plot(
+                    n[chosen], panel.values[chosen], "o", color=INK, markersize=3.0, markerfacecolor=face, label=label
+                )
+            axes.axhline(panel.limit, linewidth=0.9, **_LIMIT, zorder=0)
+            axes.annotate(
+                rf"$\eta^2$ = {panel.limit:.4f}",
+                (0.98, panel.limit),
+                xycoords=axes.get_yaxis_transform(),
+                xytext=(0, -5),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                color=ABOVE,
+            )
+            axes.set_title(f"({'abcdef'[k]}) {panel.title}", loc="left")
+            axes.set_xlabel("impact $n$")
+            axes.grid(color=GROUND, linewidth=0.3, alpha=0.6)
+            axes.legend(loc="center right")
+        figure.axes[0].set_ylabel(r"$\Delta\tau_{n+2}\,/\,\Delta\tau_n$")
+    return figure

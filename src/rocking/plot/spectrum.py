@@ -69,13 +69,9 @@ def spectrum_figure(
         What the fractiles are, in (0, 1). None of two motions or fewer is drawn, and only the middle one of three
         curves or four.
     motions : sequence of str
-        Names of the motions; two are told apart and named, more are counted.
-    x_label, title : str
-        Texts.
-    ax : matplotlib.axes.Axes, optional
-        Draw the peak rotations here, without the shares.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches; by default 5.6 by 4.8.
+        Names of the motions; two are named, more are counted.
+    x_label, title, ax, figsize
+        Texts; where to draw the peak rotations, without the shares; the size of a new figure, inches.
 
     Notes
     -----

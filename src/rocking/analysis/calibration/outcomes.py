@@ -302,7 +302,7 @@ class Calibration(Tabled):
             As `rocking.rocking_spectrum`.
         """
         chosen = self.model if model is None else model
-        return rocking_spectrum(motions, blocks=self.blocks, weights=self.weights, model=chosen, **options)
+        return rocking_spectrum(self.blocks, motions, weights=self.weights, model=chosen, **options)
 
     def _headline(self) -> str:
         overturned = int(self.observed.sum())

@@ -8,29 +8,23 @@ from types import MappingProxyType
 from typing import Final
 
 from rocking import checks
-from rocking.chattering.paper.amplitudes import figure_5, figure_6, figure_7
 from rocking.chattering.paper.figure import PaperFigure, Statement
-from rocking.chattering.paper.histories import figure_4, figure_9, figure_10, figure_11
-from rocking.chattering.paper.sequences import figure_2, figure_3
-from rocking.chattering.paper.sketches import figure_1, figure_8
+from rocking.chattering.paper.responses import figure_1, figure_4, figure_8, figure_9, figure_10, figure_11
+from rocking.chattering.paper.theory import figure_2, figure_3, figure_5, figure_6, figure_7
 from rocking.errors import InvalidOption
 
 #: All figures of the paper. A figure takes those parameters that it depends on; their defaults are the paper's values.
 FIGURES: Final[Mapping[int, Callable[..., PaperFigure]]] = MappingProxyType(
-    {
-        1: figure_1,
-        2: figure_2,
-        3: figure_3,
-        4: figure_4,
-        5: figure_5,
-        6: figure_6,
-        7: figure_7,
-        8: figure_8,
-        9: figure_9,
-        10: figure_10,
-        11: figure_11,
-    }
-)
+    dict(
+        enumerate(
+            (
+                figure_1, figure_2, figure_3, figure_4, figure_5, figure_6,
+                figure_7, figure_8, figure_9, figure_10, figure_11,
+            ),
+            start=1,
+        )
+    )
+)  # fmt: skip
 
 
 def paper_figure(

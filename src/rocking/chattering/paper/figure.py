@@ -1,18 +1,36 @@
-"""A figure of the paper, redrawn: its data, what the paper states about it in numbers, and its files."""
+"""A figure of the paper, redrawn: the block and the sine that it shows, its data, and what the paper states of them."""
 
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.block import Block
+from rocking.chattering.amplitude import critical_amplitude
+from rocking.chattering.duration import chattering_time
+from rocking.chattering.parameters import (
+    checked_frequency,
+    checked_loss,
+    checked_slenderness,
+    lifting_amplitude,
+    single,
+)
 from rocking.errors import InvalidOption
+from rocking.motion import pulses
+from rocking.motion.motion import Motion
+from rocking.response import Response
+from rocking.simulation import simulate
 from rocking.tables import whole_file, write_figure
+from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,6 +39,104 @@ if TYPE_CHECKING:
 Table = Mapping[str, NDArray[np.generic]]
 
 _DOTS_PER_INCH: Final = 200
+
+#: The paper's case. Its Fig. 11 has an amplitude of its own, and Fig. 3 two cases.
+A: Final = 1.03
+OMEGA: Final = 2.0
+ETA: Final = 0.92
+P: Final = 1.0
+ALPHA: Final = 0.2
+
+#: The excitation lasts so many periods.
+CYCLES: Final = 2.5
+
+_EVEN_TIMES: Final = 2001
+_POINTS_PER_ARC: Final = 16
+
+_SYMBOLS: Final = {"a": "$a$", "omega": r"$\omega$", "eta": r"$\eta$", "p": "$p$", "alpha": r"$\alpha$"}
+_UNITS: Final = {"p": " rad/s", "alpha": " rad"}
+
+
+@dataclass(frozen=True)
+class BlockUnderSine:
+    """One slender block (p in rad/s, alpha in rad) that lifts off under one sine that starts at phase zero."""
+
+    a: float = A
+    omega: float = OMEGA
+    eta: float = ETA
+    p: float = P
+    alpha: float = ALPHA
+
+    def __post_init__(self) -> None:
+        lifting_amplitude(self.a, above=True)
+        single(checked_frequency(self.omega), "omega")
+        single(checked_loss(self.eta), "eta")
+        checks.positive(self.p, "p", InvalidOption, "rad/s")
+        single(checked_slenderness(self.alpha), "alpha")
+
+    @property
+    def period(self) -> float:
+        """Period of the excitation, s."""
+        return 2.0 * math.pi / (self.omega * self.p)
+
+    @property
+    def critical(self) -> float:
+        """Critical amplitude, over g alpha."""
+        return float(critical_amplitude(self.omega, self.eta))
+
+    @property
+    def rest(self) -> float:
+        """Chattering time over the period; NaN where chattering is incomplete."""
+        return float(chattering_time(self.a, self.omega, self.eta)) * self.omega / (2.0 * math.pi)
+
+    def block(self) -> Block:
+        """Return the block."""
+        return Block.from_parameters(p=self.p, alpha=self.alpha, restitution=self.eta)
+
+    def excitation(self) -> Motion:
+        """Return the sine."""
+        return pulses.sine(self.a * self.block().gravity * self.alpha, 1.0 / self.period, cycles=CYCLES)
+
+    def simulated(self, treatment: str | Treatment) -> Response:
+        """Response of the linear model over the duration of the excitation; the block must not overturn."""
+        motion = self.excitation()
+        response = simulate(self.block(), motion, model="linear", chattering=treatment, duration=motion.duration)
+        if response.overturned:
+            raise InvalidOption(f"the block overturns under a sine of {{}} = {self.a:g}: take a smaller one", "a")
+        return response
+
+    def words(self, *names: str) -> str:
+        """Parameters of these names and their values: "a = 1.03, p = 1 rad/s"."""
+        return in_words({name: value for name, value in asdict(self).items() if name in names})
+
+    def symbols(self, *names: str) -> str:
+        """Return the same with the symbols of a figure's title."""
+        return in_symbols({name: value for name, value in asdict(self).items() if name in names})
+
+
+def in_words(parameters: Mapping[str, float]) -> str:
+    """Parameters and their values: "omega = 2, eta = 0.92"."""
+    return ", ".join(f"{name} = {value:.12g}{_UNITS.get(name, '')}" for name, value in parameters.items())
+
+
+def in_symbols(parameters: Mapping[str, float]) -> str:
+    """Return the same with the symbols of a figure's title."""
+    return ", ".join(f"{_SYMBOLS[name]} = {value:g}{_UNITS.get(name, '')}" for name, value in parameters.items())
+
+
+def yes_or_no(truth: bool) -> str:
+    """Return a verdict as statements write it."""
+    return "yes" if truth else "no"
+
+
+def dense_times(impacts: Floats, end: float, *, shortest: float = 0.0) -> Floats:
+    """Lay times from 0 to the end: even ones, and some within each arc that is not shorter than the shortest."""
+    marks = np.concatenate([[0.0], impacts[impacts < end], [end]])
+    lengths = np.diff(marks)
+    long = lengths >= shortest
+    fractions = np.arange(_POINTS_PER_ARC) / _POINTS_PER_ARC
+    arcs = marks[:-1][long, np.newaxis] + fractions * lengths[long, np.newaxis]
+    return np.unique(np.concatenate([np.linspace(0.0, end, _EVEN_TIMES), arcs.ravel()]))
 
 
 @dataclass(frozen=True)
@@ -89,7 +205,7 @@ class PaperFigure:
     statements : tuple of Statement
         What the paper states about it in numbers, beside ours.
     drawings : mapping of str to callable
-        What draws it, by name; the first is what `draw` draws unless told otherwise.
+        What draws it, by name; the first is what `draw` draws by default.
     """
 
     number: int
@@ -128,7 +244,9 @@ class PaperFigure:
         """
         chosen = next(iter(self.drawings)) if drawing is None else drawing
         if chosen not in self.drawings:
-            raise InvalidOption(f"Fig. {self.number} is drawn as {' or '.join(self.drawings)}, not as {drawing!r}")
+            raise InvalidOption(
+                f"{{}} of Fig. {self.number} must be {' or '.join(self.drawings)}, not {drawing!r}", "drawing"
+            )
         return self.drawings[chosen]()
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:

@@ -1,4 +1,4 @@
-"""Checks and broadcasting of the dimensionless parameters, shared by all functions of the package."""
+"""Checks and broadcasting of the dimensionless parameters."""
 
 from __future__ import annotations
 
@@ -40,6 +40,14 @@ def checked_restitution(eta: ArrayLike) -> Floats:
     return values
 
 
+def checked_loss(eta: ArrayLike) -> Floats:
+    """Return coefficients of restitution below one as an array."""
+    values = checked_restitution(eta)
+    if (values == 1.0).any():
+        raise InvalidOption("{} must be below 1 here: without loss at impacts chattering never ends", "eta", value=eta)
+    return values
+
+
 def checked_slenderness(alpha: ArrayLike) -> Floats:
     """Return slenderness angles as an array."""
     values = _finite(alpha, "alpha", "the slenderness angle in rad")
@@ -47,16 +55,20 @@ def checked_slenderness(alpha: ArrayLike) -> Floats:
     return values
 
 
-def checked_count(value: int, name: str, lowest: int, highest: int) -> int:
-    """Check a whole number against bounds."""
-    return checks.whole(value, name, InvalidOption, lowest, highest)
-
-
 def single(values: Floats, name: str) -> float:
     """Return the one value of a parameter that may not be an array."""
     if values.ndim:
-        raise InvalidOption(f"{name} must be a single number here, not an array of shape {values.shape}")
+        raise InvalidOption(f"{{}} must be a single number here, not an array of shape {values.shape}", name)
     return float(values)
+
+
+def lifting_amplitude(a: ArrayLike, *, above: bool = False) -> float:
+    """Return one amplitude that lifts the block; where it must be above 1, one that also makes it rock."""
+    amplitude = single(checked_amplitude(a), "a")
+    if amplitude < 1.0 or (above and amplitude == 1.0):
+        bound = "above" if above else "at least"
+        raise InvalidOption(f"{{}} must be {bound} 1, or the block does not lift off, not {amplitude:g}", "a", value=a)
+    return amplitude
 
 
 def broadcast(*parameters: Floats) -> tuple[tuple[int, ...], list[Floats]]:
@@ -70,7 +82,7 @@ def broadcast(*parameters: Floats) -> tuple[tuple[int, ...], list[Floats]]:
 
 
 def _finite(given: ArrayLike, name: str, meaning: str) -> Floats:
-    values = checks.numbers(given, f"{name} ({meaning})", InvalidOption)
+    values = checks.numbers(given, name, InvalidOption)
     _require(np.isfinite(values), values, name, f"finite ({meaning})")
     return values
 
@@ -80,4 +92,5 @@ def _require(usable: NDArray[np.bool_], values: Floats, name: str, condition: st
         return
     index = np.argwhere(~usable)[0]
     where = f" at index {tuple(map(int, index))}" if values.ndim else ""
-    raise InvalidOption(f"{name} must be {condition}, not {values[tuple(index)]:g}{where}")
+    value = float(values[tuple(index)])
+    raise InvalidOption(f"{{}} must be {condition}, not {value:g}{where}", name, value=value)

@@ -1,4 +1,4 @@
-"""Figs 5, 6 and 7: chattering time against amplitude, and the critical amplitude."""
+"""Figs 2, 3, 5, 6 and 7: a chattering sequence, the ratios of its intervals, its duration, the critical amplitude."""
 
 from __future__ import annotations
 
@@ -9,11 +9,27 @@ from typing import Final
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.chattering.paper.case import ETA, OMEGA, Case, in_symbols, in_words, lossy
-from rocking.chattering.paper.figure import PaperFigure, Statement
-from rocking.chattering.theory.amplitude import critical_amplitude
-from rocking.chattering.theory.duration import chattering_time, resolved_by_default
-from rocking.plot.amplitudes import contour_figure, duration_figure, frequency_figure, surface_figure
+from rocking.chattering.amplitude import critical_amplitude
+from rocking.chattering.duration import chattering_time, interval_ratios, resolved_by_default, sequence
+from rocking.chattering.expansions import first_impact_speed, first_interval
+from rocking.chattering.paper.figure import (
+    ALPHA,
+    ETA,
+    OMEGA,
+    A,
+    BlockUnderSine,
+    P,
+    PaperFigure,
+    Statement,
+    dense_times,
+    in_symbols,
+    in_words,
+    yes_or_no,
+)
+from rocking.chattering.parameters import checked_loss, single
+from rocking.errors import InvalidOption
+from rocking.plot import amplitudes
+from rocking.plot.histories import Ratios, chattering_figure, ratio_figure
 
 #: Amplitudes of Fig. 5, gathered towards both of its vertical tangents, and how far it goes past the second.
 _AMPLITUDES: Final = 201
@@ -35,7 +51,7 @@ _COMPARED: Final = np.array([0.5, 1.0, 2.0, 5.0])
 
 def figure_5(*, omega: float = OMEGA, eta: float = ETA) -> PaperFigure:
     """Chattering time over half a period against amplitude: exact, Eq. 75, Eq. 65."""
-    case = Case(omega=omega, eta=eta)
+    case = BlockUnderSine(omega=omega, eta=eta)
     critical = case.critical
     inside = 1.0 + (critical - 1.0) * np.sin(np.linspace(0.0, 0.5 * math.pi, _AMPLITUDES)) ** 2
     a = np.concatenate([inside, np.linspace(critical, 1.0 + _BEYOND * (critical - 1.0), 32)[1:]])
@@ -49,7 +65,7 @@ def figure_5(*, omega: float = OMEGA, eta: float = ETA) -> PaperFigure:
         _duration_statements(case),
         {
             "durations": partial(
-                duration_figure,
+                amplitudes.duration_figure,
                 amplitude=a,
                 durations={label: durations[name] for name, label in methods.items()},
                 critical=critical,
@@ -69,8 +85,8 @@ def figure_6() -> PaperFigure:
     spread = _spread(exact)
     practical = spread[_RESTITUTIONS >= _PRACTICAL]
     statements = (
-        Statement("a_cr rises as eta falls, at every omega", "yes", _yes(rising)),
-        Statement("the influence of omega falls as eta rises", "yes", _yes(bool((np.diff(spread) < 0.0).all()))),
+        Statement("a_cr rises as eta falls, at every omega", "yes", yes_or_no(rising)),
+        Statement("the influence of omega falls as eta rises", "yes", yes_or_no(bool((np.diff(spread) < 0.0).all()))),
         Statement(
             f"spread of a_cr over omega for eta > {_PRACTICAL:g}, %", '"independent"', float(practical.max()), digits=3
         ),
@@ -90,15 +106,19 @@ def figure_6() -> PaperFigure:
         {"surface": {"omega": grid[0].ravel(), "eta": grid[1].ravel(), "exact": exact.ravel(), "eq76": fitted.ravel()}},
         statements,
         {
-            "contours": partial(contour_figure, omega=_FREQUENCIES, eta=_RESTITUTIONS, exact=exact, fitted=fitted),
-            "surface": partial(surface_figure, omega=_FREQUENCIES, eta=_RESTITUTIONS, exact=exact, fitted=fitted),
+            "contours": partial(
+                amplitudes.contour_figure, omega=_FREQUENCIES, eta=_RESTITUTIONS, exact=exact, fitted=fitted
+            ),
+            "surface": partial(
+                amplitudes.surface_figure, omega=_FREQUENCIES, eta=_RESTITUTIONS, exact=exact, fitted=fitted
+            ),
         },
     )
 
 
 def figure_7(*, eta: float = ETA) -> PaperFigure:
     """Critical amplitude against frequency: exact, Eq. 76 and Eq. 77."""
-    lossy(eta)
+    single(checked_loss(eta), "eta")
     labels = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77"}
     critical = {name: critical_amplitude(_FREQUENCIES, eta, method=name) for name in labels}
     exact = critical["exact"]
@@ -119,7 +139,7 @@ def figure_7(*, eta: float = ETA) -> PaperFigure:
         statements,
         {
             "critical": partial(
-                frequency_figure,
+                amplitudes.frequency_figure,
                 omega=_FREQUENCIES,
                 critical={label: critical[name] for name, label in labels.items()},
                 title=in_symbols({"eta": eta}),
@@ -128,7 +148,7 @@ def figure_7(*, eta: float = ETA) -> PaperFigure:
     )
 
 
-def _duration_statements(case: Case) -> tuple[Statement, ...]:
+def _duration_statements(case: BlockUnderSine) -> tuple[Statement, ...]:
     critical = case.critical
     excess = critical - 1.0
     most = 1.0 + excess * np.linspace(0.01, 0.9, 90)
@@ -184,11 +204,11 @@ def _by_frequency(eta: float) -> Statement:
     return Statement(f"tau_ch/(T/2) at {in_words({'a': a, 'eta': eta})}", '"solely on a and eta"', here)
 
 
-def _over_half_period(a: Floats, case: Case, method: str) -> Floats:
+def _over_half_period(a: Floats, case: BlockUnderSine, method: str) -> Floats:
     return np.asarray(chattering_time(a, case.omega, case.eta, method=method)) * (case.omega / math.pi)
 
 
-def _crossing(case: Case) -> float | str:
+def _crossing(case: BlockUnderSine) -> float | str:
     """Amplitude at which Eq. 65 falls below the exact time, by bisection."""
 
     def exceeds(a: float) -> bool:
@@ -217,5 +237,140 @@ def _spread(critical: Floats) -> Floats:
     return spread
 
 
-def _yes(truth: bool) -> str:
-    return "yes" if truth else "no"
+#: Impact at which the detail of Fig. 2(c) starts, and the one from which the paper calls the ratios of Fig. 3 constant.
+_LATE: Final = 60
+
+#: Impacts that Fig. 2(c) shows after that one.
+_AFTER: Final = 5
+
+_RATIOS: Final = 100
+_CASES: Final = (BlockUnderSine(a=1.01, omega=5.0, eta=0.92), BlockUnderSine(a=1.03, omega=2.0, eta=0.86))
+_NAMES: Final = ("a", "omega", "eta")
+
+
+def figure_2(
+    *, a: float = A, omega: float = OMEGA, eta: float = ETA, p: float = P, alpha: float = ALPHA
+) -> PaperFigure:
+    """Chattering oscillations from uplift to rest."""
+    case = BlockUnderSine(a, omega, eta, p, alpha)
+    _require_complete(case, 2)
+    chattering = sequence(a, omega, eta)
+    response = case.simulated("certified")
+    uplift, rest = response.events["time"][:2]
+    tau = dense_times(chattering.impacts["time"], chattering.time)
+    rotation = response.rotation(uplift + tau / p)
+    first = chattering.impacts[0]
+    resolved = int(np.sum(response.impacts["time"] <= rest))
+    statements = (
+        Statement("complete chattering: at rest in finite time", "yes", yes_or_no(chattering.complete)),
+        Statement("chattering time", '"finite"', chattering.time, digits=13),
+        Statement("bracket on it narrower than 2e-12", None, yes_or_no(chattering.upper - chattering.lower < 2e-12)),
+        Statement(
+            "first interval, p t",
+            _eq32_as_printed(a - 1.0, omega),
+            float(first["interval"]),
+            formula="Eq. 32 as printed",
+        ),
+        Statement(
+            "first interval, p t",
+            float(first_interval(a, omega)),
+            float(first["interval"]),
+            formula="Eq. 32 with its slip corrected",
+        ),
+        Statement(
+            "speed at the first impact",
+            float(first_impact_speed(a, omega)),
+            float(first["speed_before"]),
+            formula="Eq. 34",
+        ),
+    )
+    return PaperFigure(
+        2,
+        "chattering oscillations",
+        case.words(*_NAMES, "p", "alpha"),
+        {
+            "history": {"tau": tau, "phi": rotation / alpha, "time_s": uplift + tau / p, "rotation_rad": rotation},
+            "impacts": {name: chattering.impacts[name] for name in chattering.impacts.dtype.names or ()},
+        },
+        statements,
+        {
+            "sequence": partial(
+                chattering_figure,
+                time=tau,
+                rotation=rotation / alpha,
+                impact_times=chattering.impacts["time"],
+                rest=chattering.time,
+                late_impact=max(0, min(_LATE, resolved - _AFTER) - 1),
+                title=case.symbols(*_NAMES),
+            )
+        },
+    )
+
+
+def figure_3(*, a: float | None = None, omega: float | None = None, eta: float | None = None) -> PaperFigure:
+    """Ratios of the intervals between every second impact, which tend to eta^2; the paper has two cases."""
+    cases = list(
+        dict.fromkeys(
+            BlockUnderSine(
+                case.a if a is None else a, case.omega if omega is None else omega, case.eta if eta is None else eta
+            )
+            for case in _CASES
+        )
+    )
+    for case in cases:
+        _require_complete(case, 3)
+    ratios = [interval_ratios(case.a, case.omega, case.eta, _RATIOS) for case in cases]
+    conditions = [case.words(*_NAMES) for case in cases]
+    columns = {f"ratio_{'ab'[k]}": values for k, values in enumerate(ratios)}
+    return PaperFigure(
+        3,
+        "ratio of intervals",
+        "; ".join(conditions),
+        {"ratios": {"n": np.arange(_RATIOS), **columns}},
+        tuple(
+            statement
+            for case, values, words in zip(cases, ratios, conditions, strict=True)
+            for statement in _ratio_statements(case, values, words)
+        ),
+        {
+            "ratios": partial(
+                ratio_figure,
+                [
+                    Ratios(values, case.eta**2, case.symbols(*_NAMES))
+                    for case, values in zip(cases, ratios, strict=True)
+                ],
+            )
+        },
+    )
+
+
+def _ratio_statements(case: BlockUnderSine, ratios: Floats, words: str) -> list[Statement]:
+    """Compare the ratios with their limit; those of intervals below the range of a double are NaN."""
+    limit = case.eta**2
+    known = np.flatnonzero(np.isfinite(ratios))
+    last = int(known[-1])
+    statements = [
+        Statement(f"{words}: ratio at n = {last}, and its limit", limit, float(ratios[last]), formula="Eq. 73, eta^2")
+    ]
+    late = ratios[known[known >= _LATE]]
+    if late.size:
+        apart = float(np.max(np.abs(late / limit - 1.0)))
+        statements.append(
+            Statement(f"{words}: largest relative distance from it for n >= {_LATE}", '"constant"', apart, digits=2)
+        )
+    return statements
+
+
+def _require_complete(case: BlockUnderSine, number: int) -> None:
+    if math.isnan(case.rest):
+        raise InvalidOption(
+            f"Fig. {number} shows complete chattering: {{}} must be below the critical amplitude "
+            f"{case.critical:.9g} at {in_words({'omega': case.omega, 'eta': case.eta})}, not {case.a:.9g}",
+            "a",
+        )
+
+
+def _eq32_as_printed(eps: float, omega: float) -> float:
+    """Eq. 32 with the paper's 32/5, where 32/15 is right: Phi^(6) enters at the same order as Phi^(5)."""
+    second = 1.0 - 32.0 * (omega**2 - 1.0) / (5.0 * omega**2)
+    return math.sqrt(2.0 * eps) / omega * (4.0 + second * eps)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,17 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.chattering.theory.asymptotic import asymptotic_times
-from rocking.chattering.theory.parameters import (
+from rocking.chattering.expansions import HIGHEST_ORDER, asymptotic_times, series_times
+from rocking.chattering.parameters import (
     broadcast,
     checked_amplitude,
-    checked_count,
     checked_frequency,
     checked_restitution,
+    lifting_amplitude,
     single,
 )
-from rocking.chattering.theory.series import series_times
 from rocking.compiling import SEQUENCES, announce
+from rocking.engine import cores, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.arc import first_landing
@@ -122,9 +120,9 @@ def chattering_time(
     0.573426
     """
     announce(SEQUENCES)
-    order = checked_count(order, "order", 1, 40)
+    order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER)
     if resolved is not None:
-        resolved = checked_count(resolved, "resolved", 1, 1_000_000)
+        resolved = checks.whole(resolved, "resolved", InvalidOption, 1, 1_000_000)
     parameters = checked_amplitude(a), checked_frequency(omega), checked_restitution(eta)
     methods: dict[str, Callable[[], Floats]] = {
         "exact": lambda: _exact_times(*parameters),
@@ -227,7 +225,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     announce(SEQUENCES)
     amplitude, frequency, restitution = _single_case(a, omega, eta)
     if checks.finite(tolerance, "tolerance", InvalidOption) < 1e-15:
-        raise InvalidOption(f"tolerance must be at least 1e-15 and finite, not {tolerance!r}")
+        raise InvalidOption(f"{{}} must be at least 1e-15 and finite, not {tolerance!r}", "tolerance", value=tolerance)
     if amplitude == 1.0:
         return ChatteringSequence(np.zeros(0, IMPACT), True, 0.0, 0.0, 0.0)
     capacity = _FIRST_CAPACITY
@@ -237,38 +235,18 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
             break
         capacity *= 2
         if capacity > _LARGEST_CAPACITY:
-            raise InvalidOption(f"the sequence takes more than {_LARGEST_CAPACITY} impacts: lower eta = {eta!r}")
+            raise InvalidOption(
+                f"the sequence takes more than {_LARGEST_CAPACITY} impacts: lower {{}} = {eta!r}", "eta", value=eta
+            )
     if status == Verdict.FOUND:
         return ChatteringSequence(impacts, True, *phases)
     return ChatteringSequence(impacts, False, math.nan, math.nan, math.nan)
 
 
 def first_arc(a: float, omega: float) -> tuple[float, float]:
-    """Time from uplift to the first impact, and the speed before it, however long the arc lasts.
+    """Dimensionless time from uplift to the first impact, and the speed before it, however long the arc lasts.
 
-    Parameters
-    ----------
-    a, omega : float
-        As in `sequence`.
-
-    Returns
-    -------
-    interval, speed : float
-        Dimensionless; NaN where the block does not come down within a time of 20, in which it grows by exp(20).
-
-    Raises
-    ------
-    InvalidOption
-        If a parameter is not a single number or out of range.
-
-    Examples
-    --------
-    Half a period, pi/2, is over before this one ends:
-
-    >>> "{:.6f} {:.6f}".format(*first_arc(1.5, 2.0))
-    '1.922289 1.032126'
-    >>> first_arc(3.0, 2.0)
-    (nan, nan)
+    Both are NaN where the block does not come down within a time of 20, in which it grows by exp(20).
     """
     amplitude, frequency, _ = _single_case(a, omega, 1.0)
     if amplitude == 1.0:
@@ -311,7 +289,7 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
     (0.74, 0.74)
     """
     amplitude, frequency, restitution = _single_case(a, omega, eta)
-    n = checked_count(n, "n", 1, 100_000)
+    n = checks.whole(n, "n", InvalidOption, 1, 100_000)
     ratios = np.full(n, math.nan)
     intervals = _resolved(amplitude, frequency, restitution, -1.0, n + 2)[1]["interval"]
     intervals = intervals[intervals > 0.0]
@@ -321,9 +299,7 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
 
 
 def _single_case(a: float, omega: float, eta: float) -> tuple[float, float, float]:
-    amplitude = single(checked_amplitude(a), "a")
-    if amplitude < 1.0:
-        raise InvalidOption(f"a must be at least 1, or the block does not lift off, not {amplitude:g}")
+    amplitude = lifting_amplitude(a)
     return amplitude, single(checked_frequency(omega), "omega"), single(checked_restitution(eta), "eta")
 
 
@@ -353,12 +329,15 @@ def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
         order = _alike_together(sequences[0], sequences[2])
         rest_phases(sequences, order, np.zeros(BLOCKS + 1, BLOCK), Answers(phases[some], statuses[some]))
 
-    _share(part, phases.size)
-    return (_told(phases, statuses) / frequencies).reshape(shape)[()]
+    # The compiled function holds no lock.
+    parts = [slice(start, start + _PART) for start in range(0, phases.size, _PART)]
+    for _ in in_threads(part, parts, threads=cores()):
+        pass
+    return (_marked(phases, statuses) / frequencies).reshape(shape)[()]
 
 
-def _told(phases: Floats, statuses: NDArray[np.int8]) -> Floats:
-    """Mark phases as the interface does times: NaN for incomplete chattering, infinity for what is not resolved."""
+def _marked(phases: Floats, statuses: NDArray[np.int8]) -> Floats:
+    """Mark phases as times are: NaN for incomplete chattering, infinity for what is not resolved."""
     phases[statuses == Verdict.INCOMPLETE] = math.nan
     phases[statuses == Verdict.UNRESOLVED] = math.inf
     return phases
@@ -373,24 +352,6 @@ def _alike_together(a: Floats, eta: Floats) -> NDArray[np.int64]:
     classes = (_CLASSES * loss).astype(np.uint16)
     share = (_CLASSES * np.minimum((a[rock] - 1.0) / loss, 1.0)).astype(np.uint16)
     return rock[np.argsort(classes * np.uint16(_CLASSES) + share, kind="stable")]
-
-
-def _share(part: Callable[[slice], None], size: int) -> None:
-    """Run a compiled function, which holds no lock, on parts of so many sequences, in several threads if worth it."""
-    parts = [slice(start, start + _PART) for start in range(0, size, _PART)]
-    threads = min(_cores(), len(parts))
-    if threads < 2:
-        for some in parts:
-            part(some)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(part, parts))
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int | None) -> Floats:
@@ -410,7 +371,7 @@ def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int |
 
 
 def resolved_by_default(eta: Floats) -> NDArray[np.int64]:
-    """Return how many impacts Eq. 75 resolves unless told otherwise.
+    """Return how many impacts Eq. 75 resolves by default.
 
     After them the speed has fallen as far as after 60 with the paper's restitution.
     """

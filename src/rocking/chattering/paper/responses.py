@@ -1,19 +1,32 @@
-"""Figs 4, 9, 10 and 11: the excitation, and responses by the schemes of Fig. 8 beside the certified one."""
+"""Figs 1, 4 and 8 to 11: the block, the excitation, two schemes that end chattering, and responses by them."""
 
 from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.chattering.paper.case import ALPHA, CYCLES, ETA, OMEGA, A, Case, P, dense_times
-from rocking.chattering.paper.figure import PaperFigure, Statement, Table
-from rocking.chattering.theory.amplitude import critical_amplitude
-from rocking.chattering.theory.duration import chattering_time
+from rocking.chattering.amplitude import critical_amplitude
+from rocking.chattering.duration import chattering_time
+from rocking.chattering.paper.figure import (
+    ALPHA,
+    CYCLES,
+    ETA,
+    OMEGA,
+    A,
+    BlockUnderSine,
+    P,
+    PaperFigure,
+    Statement,
+    Table,
+    dense_times,
+    yes_or_no,
+)
 from rocking.plot.histories import Detail, Mark, excitation_figure, history_figure
+from rocking.plot.sketches import Box, Flowchart, Way, block_figure, flowchart_figure
 from rocking.response import Response
 from rocking.treatment import AsymptoticTime, Certified, Treatment, VelocityThreshold
 
@@ -31,23 +44,26 @@ _BLOCK: Final = ("p", "alpha")
 
 
 class _Scheme(NamedTuple):
-    """A scheme by its name in tables and its label in figures."""
+    """A scheme: what it is called in statements and in legends, and the treatment."""
 
+    words: str
     label: str
     treatment: Treatment
 
 
 _SCHEMES: Final = {
-    "certified": _Scheme("certified", Certified()),
-    "chattering_threshold": _Scheme("chattering threshold (Eq. 65)", AsymptoticTime()),
-    "veltol_5e-10": _Scheme(r"$VelTol/(p\alpha) = 5\cdot 10^{-10}$", VelocityThreshold(5e-10)),
-    "veltol_5e-2": _Scheme(r"$VelTol/(p\alpha) = 5\cdot 10^{-2}$", VelocityThreshold(5e-2)),
+    "certified": _Scheme("certified", "certified", Certified()),
+    "chattering_threshold": _Scheme("chattering threshold", "chattering threshold (Eq. 65)", AsymptoticTime()),
+    "veltol_5e-10": _Scheme(
+        "VelTol/(p alpha) = 5e-10", r"$VelTol/(p\alpha) = 5\cdot 10^{-10}$", VelocityThreshold(5e-10)
+    ),
+    "veltol_5e-2": _Scheme("VelTol/(p alpha) = 5e-2", r"$VelTol/(p\alpha) = 5\cdot 10^{-2}$", VelocityThreshold(5e-2)),
 }
 
 
 def figure_4(*, a: float = A, omega: float = OMEGA, eta: float = ETA) -> PaperFigure:
     """Excitation, with the initiations and, where chattering is complete, the time to rest between them."""
-    case = Case(a, omega, eta)
+    case = BlockUnderSine(a, omega, eta)
     response = case.simulated("certified")
     time = np.linspace(0.0, CYCLES, 1001)
     marks = _initiations(case, {"certified": response})
@@ -81,7 +97,7 @@ def figure_9(
     *, a: float = A, omega: float = OMEGA, eta: float = ETA, p: float = P, alpha: float = ALPHA
 ) -> PaperFigure:
     """Response by the scheme that rests after Eq. 65's time."""
-    case = Case(a, omega, eta, p, alpha)
+    case = BlockUnderSine(a, omega, eta, p, alpha)
     responses = _responses(case, ("certified", "chattering_threshold"))
     scheme, certified = responses["chattering_threshold"], responses["certified"]
     stated = [Statement("a_cr", 1.038, case.critical)]
@@ -113,7 +129,7 @@ def figure_10(
     *, a: float = A, omega: float = OMEGA, eta: float = ETA, p: float = P, alpha: float = ALPHA
 ) -> PaperFigure:
     """Responses by both schemes where chattering is complete: they rest, as they should."""
-    case = Case(a, omega, eta, p, alpha)
+    case = BlockUnderSine(a, omega, eta, p, alpha)
     names = ("chattering_threshold", "veltol_5e-10")
     responses = _responses(case, ("certified", *names))
     certified = responses["certified"]
@@ -121,8 +137,8 @@ def figure_10(
     statements = [
         Statement(
             "complete chattering, a below a_cr",
-            "yes" if a < fitted else "no",
-            "no" if math.isnan(case.rest) else "yes",
+            yes_or_no(a < fitted),
+            yes_or_no(not math.isnan(case.rest)),
             formula="Eq. 76",
         )
     ]
@@ -130,7 +146,7 @@ def figure_10(
         response = responses[name]
         statements += [
             Statement(
-                f"{_words(name)}: rests in 2.5 T (certified: {_rests(certified)})",
+                f"{_SCHEMES[name].words}: rests in 2.5 T (certified: {_rests(certified)})",
                 _shown(case, A),
                 float(_rests(response)),
             ),
@@ -143,7 +159,7 @@ def figure_11(
     *, a: float = _INCOMPLETE, omega: float = OMEGA, eta: float = ETA, p: float = P, alpha: float = ALPHA
 ) -> PaperFigure:
     """Responses where chattering is incomplete: a coarse velocity threshold rests where the block does not."""
-    case = Case(a, omega, eta, p, alpha)
+    case = BlockUnderSine(a, omega, eta, p, alpha)
     responses = _responses(case, tuple(_SCHEMES))
     coarse, certified = responses["veltol_5e-2"], responses["certified"]
     papers = _is_papers(case, _INCOMPLETE)
@@ -155,21 +171,21 @@ def figure_11(
             float(_rests(certified)),
         ),
         *(
-            Statement(f"{_words(name)}: rests in 2.5 T", none, float(_rests(responses[name])))
+            Statement(f"{_SCHEMES[name].words}: rests in 2.5 T", none, float(_rests(responses[name])))
             for name in ("chattering_threshold", "veltol_5e-10")
         ),
         Statement(
-            f"{_words('veltol_5e-2')}: rests in 2.5 T{', all wrong' if papers else ''}",
+            f"{_SCHEMES['veltol_5e-2'].words}: rests in 2.5 T{', all wrong' if papers else ''}",
             _shown(case, _INCOMPLETE),
             float(_rests(coarse)),
         ),
         Statement(
-            f"{_words('veltol_5e-2')}: first {'wrong ' if papers else ''}rest, s after uplift",
+            f"{_SCHEMES['veltol_5e-2'].words}: first {'wrong ' if papers else ''}rest, s after uplift",
             _shown(case, _INCOMPLETE),
             _none(_first(coarse)),
         ),
         Statement(
-            f"{_words('veltol_5e-2')}: peak rotation over the certified one",
+            f"{_SCHEMES['veltol_5e-2'].words}: peak rotation over the certified one",
             '"completely different"' if papers else None,
             coarse.peak_rotation / certified.peak_rotation,
             digits=4,
@@ -178,12 +194,12 @@ def figure_11(
     return _history(11, "response by both schemes, and by a coarse velocity threshold", case, responses, statements)
 
 
-def _responses(case: Case, names: tuple[str, ...]) -> dict[str, Response]:
+def _responses(case: BlockUnderSine, names: tuple[str, ...]) -> dict[str, Response]:
     return {name: case.simulated(_SCHEMES[name].treatment) for name in names}
 
 
 def _history(
-    number: int, title: str, case: Case, responses: dict[str, Response], statements: tuple[Statement, ...]
+    number: int, title: str, case: BlockUnderSine, responses: dict[str, Response], statements: tuple[Statement, ...]
 ) -> PaperFigure:
     end, shortest = CYCLES * case.period, _SHORTEST * case.period
     dense = [dense_times(response.impacts["time"], end, shortest=shortest) for response in responses.values()]
@@ -215,7 +231,7 @@ def _history(
     )
 
 
-def _detail(case: Case, shares: tuple[float, float], time: Floats, rotations: list[Floats]) -> Detail:
+def _detail(case: BlockUnderSine, shares: tuple[float, float], time: Floats, rotations: list[Floats]) -> Detail:
     """Return what a detail shows: all rotations within its limits of time, up to the end of chattering."""
     uplift, length = _uplift(case), 0.5 if math.isnan(case.rest) else case.rest
     start, end = (uplift + share * length for share in shares)
@@ -224,7 +240,7 @@ def _detail(case: Case, shares: tuple[float, float], time: Floats, rotations: li
     return Detail((start, end), (-reach, reach))
 
 
-def _events(case: Case, responses: dict[str, Response]) -> Table:
+def _events(case: BlockUnderSine, responses: dict[str, Response]) -> Table:
     """Uplifts and rests of all schemes in one table."""
     names = [name for name, response in responses.items() for _ in response.events]
     events = np.concatenate([response.events for response in responses.values()])
@@ -232,7 +248,7 @@ def _events(case: Case, responses: dict[str, Response]) -> Table:
     return {"scheme": np.array(names), "kind": events["kind"], **times}
 
 
-def _initiations(case: Case, responses: dict[str, Response]) -> tuple[Mark, ...]:
+def _initiations(case: BlockUnderSine, responses: dict[str, Response]) -> tuple[Mark, ...]:
     """First two uplifts from rest, of the scheme that rests most often; only one where none comes to rest.
 
     The first response is the certified one: what it has not got is another scheme's.
@@ -245,12 +261,12 @@ def _initiations(case: Case, responses: dict[str, Response]) -> tuple[Mark, ...]
     return tuple(Mark(float(time), text) for time, text in zip(times, texts, strict=False))
 
 
-def _uplift(case: Case) -> float:
+def _uplift(case: BlockUnderSine) -> float:
     """Time of the first uplift, over the period (Eq. 12)."""
     return math.asin(1.0 / case.a) / (2.0 * math.pi)
 
 
-def _acceleration(case: Case, time_over_period: Floats) -> Floats:
+def _acceleration(case: BlockUnderSine, time_over_period: Floats) -> Floats:
     return case.excitation().acceleration(time_over_period * case.period) / (case.block().gravity * case.alpha)
 
 
@@ -270,12 +286,12 @@ def _rests(response: Response) -> int:
     return int(np.sum(response.events["kind"] == "rest"))
 
 
-def _is_papers(case: Case, a: float) -> bool:
+def _is_papers(case: BlockUnderSine, a: float) -> bool:
     """Whether a figure is the paper's own, at this amplitude; of others it states nothing."""
-    return case == Case(a)
+    return case == BlockUnderSine(a)
 
 
-def _shown(case: Case, a: float) -> str | None:
+def _shown(case: BlockUnderSine, a: float) -> str | None:
     return "shown" if _is_papers(case, a) else None
 
 
@@ -283,16 +299,122 @@ def _first_rest(name: str, response: Response, certified: Response, paper: str |
     """Say how long before or after the certified response a scheme comes to rest for the first time."""
     late = _first(response) - _first(certified)
     if math.isnan(late):
-        rest = f"only {_words(name)} rests" if _rests(response) else "only certified rests"
+        rest = f"only {_SCHEMES[name].words} rests" if _rests(response) else "only certified rests"
         here = rest if _rests(response) or _rests(certified) else "neither rests"
-        return Statement(f"{_words(name)}: first rest, beside that of certified", paper, here)
+        return Statement(f"{_SCHEMES[name].words}: first rest, beside that of certified", paper, here)
     side = "before" if late < 0.0 else "after"
-    return Statement(f"{_words(name)}: first rest, s {side} that of certified", paper, abs(late), digits=3)
+    return Statement(f"{_SCHEMES[name].words}: first rest, s {side} that of certified", paper, abs(late), digits=3)
 
 
 def _none(value: float) -> float | str:
     return "none" if math.isnan(value) else value
 
 
-def _words(name: str) -> str:
-    return name.replace("_", " ").replace("veltol", "VelTol/(p alpha) =")
+#: Rotation of the block in Fig. 1, over its slenderness, and at most; rad.
+_ROTATION: Final = 0.7
+_LARGEST_ROTATION: Final = 0.25
+
+_POINTS: Final = ("O", "right upper corner", "left upper corner", "O'", "centre of mass")
+
+#: What both schemes do, from top to bottom, and what they do in words of their own: `limit` and `over`.
+_SPINE: Final[dict[str, tuple[str, Literal["step", "decision", "end"]]]] = {
+    "start": ("block at rest", "end"),
+    "limit": ("", "step"),
+    "uplift": ("next uplift: first time at which $\\ddot u_g$\npasses the threshold of a side", "step"),
+    "lifts": ("before the end of the analysis?", "decision"),
+    "arc": ("arc: Taylor series about the last event;\nits first root is the next impact", "step"),
+    "lands": ("impact before the end,\nand before the block overturns?", "decision"),
+    "impact": ("impact $n$ at $t_n$:  $\\dot\\theta \\leftarrow \\eta\\,\\dot\\theta$, the other pivot", "step"),
+    "over": ("", "decision"),
+    "still": ("no speed left,\nor time no longer advances?", "decision"),
+    "rest": ("rest:  $\\theta = \\dot\\theta = 0$", "step"),
+}
+_END: Final = "end"
+
+_WIDTH: Final = 2.14
+_HEIGHT: Final = 0.4
+_STEP: Final = 0.62
+
+#: How far from the middle the ways run that pass other boxes by: to end and rest, to the next arc, to the next uplift.
+_LEFT: Final = -1.58
+_NEXT_ARC: Final = 1.32
+_NEXT_UPLIFT: Final = 1.48
+
+
+def figure_1(*, alpha: float = ALPHA) -> PaperFigure:
+    """Sketch of the block, in its true proportions."""
+    case = BlockUnderSine(alpha=alpha)
+    upright = _points(alpha)
+    rocking = _rotated(upright, min(_ROTATION * alpha, _LARGEST_ROTATION))
+    columns = {
+        f"{axis}_{state}_over_R": places[:, k]
+        for state, places in (("upright", upright), ("rocking", rocking))
+        for k, axis in enumerate("xy")
+    }
+    return PaperFigure(
+        1,
+        "rigid rocking block",
+        case.words("alpha"),
+        {"points": {"point": np.array(_POINTS), **columns}},
+        (),
+        {"block": partial(block_figure, upright=upright, rocking=rocking, title=case.symbols("alpha"))},
+    )
+
+
+def figure_8() -> PaperFigure:
+    """Flowcharts of the schemes of Fig. 8a and 8b as `simulate` follows them."""
+    charts = (
+        _flowchart(
+            '(a) chattering="time"',
+            limit="$\\tau_{ch}$ by Eq. 65 where $1 \\leq a < a_{cr}$,\nelse infinite;  $a_{cr}$ by Eq. 76",
+            over="time since uplift:\n$p\\,(t_n - t_{uplift}) \\geq \\tau_{ch}$?",
+        ),
+        _flowchart(
+            '(b) chattering="velocity"',
+            limit="threshold  $VelTol$",
+            over="speed after the impact:\n$|\\dot\\theta| \\leq VelTol$?",
+        ),
+    )
+    return PaperFigure(
+        8, "flowcharts of the two schemes", "", {}, (), {"flowcharts": partial(flowchart_figure, charts)}
+    )
+
+
+def _flowchart(title: str, *, limit: str, over: str) -> Flowchart:
+    own = {"limit": limit, "over": over}
+    boxes = {
+        name: Box(own.get(name, text), kind, (0.0, -_STEP * k), (_WIDTH, _HEIGHT))
+        for k, (name, (text, kind)) in enumerate(_SPINE.items())
+    }
+    row = boxes["lands"].at[1]
+    boxes[_END] = Box("end", "end", (_LEFT, row), (0.44, 0.26))
+    ways = (
+        Way("start", "limit"),
+        Way("limit", "uplift"),
+        Way("uplift", "lifts"),
+        Way("lifts", "arc", "yes"),
+        Way("lifts", _END, "no"),
+        Way("arc", "lands"),
+        Way("lands", "impact", "yes"),
+        Way("lands", _END, "no"),
+        Way("impact", "over"),
+        Way("over", "still", "no"),
+        Way("over", "rest", "yes", _LEFT),
+        Way("still", "rest", "yes"),
+        Way("still", "arc", "no", _NEXT_ARC),
+        Way("rest", "uplift", "", _NEXT_UPLIFT),
+    )
+    return Flowchart(title, boxes, ways)
+
+
+def _points(alpha: float) -> Floats:
+    """Pivots, corners and centre of mass of an upright block, over R."""
+    b, h = math.sin(alpha), math.cos(alpha)
+    return np.array([(b, 0.0), (b, 2.0 * h), (-b, 2.0 * h), (-b, 0.0), (0.0, h)])
+
+
+def _rotated(points: Floats, theta: float) -> Floats:
+    """Return the points turned clockwise by theta about the first one."""
+    cosine, sine = math.cos(theta), math.sin(theta)
+    turned: Floats = points[0] + (points - points[0]) @ np.array([[cosine, -sine], [sine, cosine]])
+    return turned
