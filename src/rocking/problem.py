@@ -77,7 +77,9 @@ def rules_of(
     checks.one_of(model, "model", InvalidOption, get_args(Model))
     if duration is None:
         if np.any(np.prod(blocks.restitution, axis=1) == 1.0):
-            raise InvalidOption("a block with restitution 1 never comes to rest; give duration= to say when to stop")
+            raise InvalidOption(
+                "a block with {} 1 never comes to rest; give {} to say when to stop", "restitution", "duration"
+            )
     else:
         duration = checks.positive(duration, "duration", InvalidOption, "s")
     return state.record(

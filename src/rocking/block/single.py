@@ -152,8 +152,10 @@ class Block:
         s = checks.finite(offset, "offset", InvalidBlock)
         if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
             raise InvalidBlock(
-                f"offset must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}: of a block with its mass "
-                "farther out the pivots and the radius of gyration must be given"
+                f"{{}} must be at most a quarter of the width, {0.5 * b:g} m, not {s:g}: of a block with its mass "
+                "farther out the pivots and the radius of gyration must be given",
+                "offset",
+                value=offset,
             )
         if s == 0.0:
             alpha, radius = math.atan2(b, h), math.hypot(b, h)
