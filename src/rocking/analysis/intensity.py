@@ -47,7 +47,7 @@ class Measure:
     def __post_init__(self) -> None:
         checks.one_of(self.name, "measure", InvalidOption, get_args(MeasureName))
         if (self.name == "sa") != (self.period is not None):
-            raise InvalidOption('period= (s) goes with measure="sa", and only with it')
+            raise InvalidOption('{} (s) goes with {} "sa", and only with it', "period", "measure")
         if self.period is not None:
             object.__setattr__(self, "period", checks.positive(self.period, "period", InvalidOption, "s"))
         damping = checks.number(self.damping, "damping", InvalidOption)

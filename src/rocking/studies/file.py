@@ -190,10 +190,10 @@ class _Reader:
         with self._located("simulation", "scales", "blocks"):
             product = Product(blocks, tuple(motions), scales, polarity, model, chattering, rules.get("duration"))
             kept = chosen_outcomes(rules.get("outcomes"))
-        refine = given.get("refine")
+        report, refine = self._report(kept), given.get("refine")
         with self._located("scales", key="refine"):
             tolerances = None if refine is None else tolerances_of(product, refine, kept)
-        return StudyFile(product, tuple(skipped), self._report(kept), tolerances, kept, tuple(names))
+        return StudyFile(product, tuple(skipped), report, tolerances, kept, tuple(names))
 
     def _check_tables(self) -> None:
         """Check names of tables and keys, and that values which are no numbers are what they must be."""
