@@ -167,7 +167,7 @@ def test_damage_to_a_round_is_named_and_corrected(complete, tmp_path):
     assert study.verify(recompute=5) == []
     assert digest(folder) == digest(complete)
     (folder / "round.2" / "brackets.npz").write_bytes(b"")
-    with pytest.raises(rocking.StudyError, match=r"round\.2 in .* is damaged: remove"):
+    with pytest.raises(rocking.StudyError, match=r"round\.2 is damaged: remove"):
         study.verify()
 
 

@@ -314,9 +314,9 @@ class _Reader:
                 where = f"{table}, whose block 0 is in line {rows[0][0]}"
                 raise self._wrong(f"{where}: {error}", **about) from None
         bodies = []
-        for (line, _), row in zip(rows, zip(*columns.values(), strict=True), strict=True):
+        for (line, _), values in zip(rows, zip(*columns.values(), strict=True), strict=True):
             with _in_table(table, line):
-                bodies.append(_body(dict(zip(columns, row, strict=True))))
+                bodies.append(_body(dict(zip(columns, values, strict=True))))
         return Blocks.of(bodies)
 
     def _motions(self, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
