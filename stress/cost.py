@@ -28,8 +28,7 @@ import rocking
 from rocking.arrays import Floats
 from rocking.engine import simulate_task
 from rocking.plot.canvas import add_labels, figure_for
-from rocking.studies.study import _LARGEST
-from rocking.studies.units import name_of
+from rocking.studies.units import LARGEST, name_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,7 +96,7 @@ def paired(blocks: rocking.Blocks, pga: float, width: int, repeats: int) -> Floa
 def overhead(simulations: int, repeats: int) -> None:
     """Compare processor times at once and as a study: of units as large as in long studies, and of next to nothing."""
     rng = np.random.default_rng(0)
-    groups = max(1, min(_LARGEST, simulations // 8) // 512)
+    groups = max(1, min(LARGEST, simulations // 8) // 512)
     for name, pga, each in (
         ("blocks that rock", 4.0, 512 * max(1, groups // 16)),
         ("blocks that stay", 0.5, 512 * groups),

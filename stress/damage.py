@@ -25,17 +25,17 @@ def damaged(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def seen(folder: Path, name: str, reference: xr.Dataset) -> str:
-    """Whether the damage of a file is told when it is read; if not, that what is read is the same."""
+    """Whether the damage of a file is reported when it is read; if not, that what is read is the same."""
     try:
         study = rocking.study(folder)
         faults = study.verify()
     except rocking.StudyError as error:
         assert "damaged" in str(error)
-        return "told when the study is opened"
+        return "reported when the study is opened"
     if faults:
         assert len(faults) == 1
         assert Path(name).name in faults[0]
-        return "told by verify"
+        return "reported by verify"
     assert study.results().load().identical(reference)
     return "harmless: the same is read"
 
@@ -63,7 +63,7 @@ def main() -> None:
             path.write_bytes(damaged(sound, rng))
             what = seen(folder, str(path), reference)
             found["unit" if path.name.startswith("c.") else path.name, what] += 1
-            if what == "told when the study is opened":
+            if what == "reported when the study is opened":
                 path.write_bytes(sound)
             else:
                 rocking.study(folder).verify(repair=True)

@@ -11,6 +11,7 @@ import pytest
 import rocking
 from rocking.analysis.survey import survey
 from rocking.result import Result
+from rocking.studies.results import FORMATS
 from rocking.tables import whole_file, write_figure
 
 resource = pytest.importorskip("resource")
@@ -73,11 +74,11 @@ def test_an_export_of_a_study_is_whole_or_not_there(tmp_path, suffix):
     blocks = rocking.Blocks.grid(p=[1.0, 2.0, 3.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     study = rocking.study(tmp_path / "study", blocks, rocking.pulses.one_sine(4.0, 1.0), levels=[0.4, 1.0])
     study.run()
-    target = tmp_path / f"results{suffix}"
+    target, write = tmp_path / f"results{suffix}", getattr(study, f"to_{FORMATS[suffix]}")
     with full_disk(700), pytest.raises(rocking.OutputError, match="cannot be written"):
-        study.export(target)
+        write(target)
     assert {file.name for file in tmp_path.iterdir()} == {"study"}
-    study.export(target)
+    write(target)
     assert {file.name for file in tmp_path.iterdir()} == {"study", target.name}
 
 

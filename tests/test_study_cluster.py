@@ -131,7 +131,7 @@ def test_a_cluster_loses_a_unit_a_worker_and_its_scheduler_but_no_result(complet
     with scheduler_executor(cluster.address) as pool:
         wait_until(lambda: len(pool._client.nthreads()) == 2)
         pool._client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 0))
-        monkeypatch.setattr("rocking.studies.workers.compute", deadly)
+        monkeypatch.setattr("rocking.studies.run.compute", deadly)
         report = study.run(executor=pool)
         monkeypatch.undo()
     assert report.failed == study.status.failed

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.studies import objects
+from rocking.studies import place as places
 
 obstore = pytest.importorskip("obstore")
 server = pytest.importorskip("moto.server")
@@ -136,7 +136,7 @@ def test_a_lock_of_a_host_that_is_not_heard_of_is_taken_over(complete, url, monk
     put_lock(study, "process 17 on elsewhere")
     with pytest.raises(rocking.StudyError, match=r"process 17 on elsewhere, heard of \d s ago; if that is dead"):
         study.run()
-    monkeypatch.setattr(objects, "_LEASE", 0.5)
+    monkeypatch.setattr(places, "_LEASE", 0.5)
     time.sleep(2.1)  # times of objects are whole seconds
     study.run()
     assert "took over from process 17 on elsewhere, which was not heard of for" in study.status.runs[0]["note"]
@@ -144,7 +144,7 @@ def test_a_lock_of_a_host_that_is_not_heard_of_is_taken_over(complete, url, monk
 
 
 def test_a_lock_is_renewed_and_a_run_that_lost_it_stops(url, monkeypatch):
-    monkeypatch.setattr(objects, "_BEAT", 0.05)
+    monkeypatch.setattr(places, "_RENEWAL", 0.05)
     study = made(url)
     with study.place.locked():
         first = study.place.get("lock")
@@ -164,7 +164,7 @@ def test_of_many_who_come_at_once_one_runs_it(url):
     def try_it():
         start.wait()
         try:
-            with objects.ObjectStore(url).locked():
+            with places.ObjectStore(url).locked():
                 ran.append(1)
                 time.sleep(1.0)
         except rocking.StudyError:
@@ -182,9 +182,9 @@ def test_of_many_who_come_at_once_one_runs_it(url):
 def test_a_store_that_is_not_there_is_one_sentence(run, bucket, monkeypatch):
     code, out, err = run("study", "run", "s3://nobody/has/this")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "s3://nobody/has/this/study.json cannot be read" in err or "there is no study in" in err
+    assert "s3://nobody/has/this/study.json: the object cannot be read" in err or "there is no study here" in err
     code, out, err = run("study", "run", "nonsense://x/y")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "nonsense://x/y is no object store" in err
+    assert "nonsense://x/y: this is no URL of an object store" in err
     monkeypatch.setitem(sys.modules, "obstore", None)
     assert "install rocking[objects]" in run("study", "run", "s3://nobody/has/this")[2]

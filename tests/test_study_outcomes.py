@@ -12,15 +12,15 @@ import xarray as xr
 import rocking
 from rocking.explorer.studies import StudyView
 from rocking.studies import read_study
-from rocking.studies.outcomes import DOUBTS, OUTCOMES
-from rocking.studies.units import Grid, Line
+from rocking.studies.inputs import ALWAYS_KEPT, OUTCOMES
+from rocking.studies.units import UnitGrid
 
 BLOCKS = rocking.Blocks.grid(p=np.linspace(1.0, 6.0, 130), alpha=[0.1, 0.2, 0.25, 0.3], restitution=[0.85])
 MOTIONS = [rocking.pulses.one_sine(1.0, frequency) for frequency in (0.5, 1.0, 2.0)]
 LEVELS = [2.0, 4.0, 8.0]
 OPTIONS = {"levels": LEVELS, "measure": "pga", "polarity": "both", "model": "linear"}
 TWO = ["peak_rotation", "overturned"]
-KEPT = ["overturned", "peak_rotation", *DOUBTS]
+KEPT = ["overturned", "peak_rotation", *ALWAYS_KEPT]
 
 
 def made(folder, **changes):
@@ -79,7 +79,7 @@ def test_a_unit_holds_only_what_is_kept(complete, whole):
 
 
 @pytest.mark.parametrize(
-    "outcomes", [None, OUTCOMES, OUTCOMES[::-1], [name for name in OUTCOMES if name not in DOUBTS]]
+    "outcomes", [None, OUTCOMES, OUTCOMES[::-1], [name for name in OUTCOMES if name not in ALWAYS_KEPT]]
 )
 def test_without_a_choice_or_with_all_outcomes_a_study_is_what_it_always_was(whole, tmp_path, outcomes):
     made(tmp_path, outcomes=outcomes).run(threads=1)
@@ -94,14 +94,14 @@ def test_without_a_choice_or_with_all_outcomes_a_study_is_what_it_always_was(who
     ("grid", "digest"),
     [
         (
-            Grid((3, 2, 2, 1300), (1, 1, 1, 9), OUTCOMES),
+            UnitGrid((3, 2, 2, 1300), (1, 1, 1, 9), OUTCOMES),
             "344b720410338e6b86fca1e59ed56b68767297c9741e5ed4f09b56901d050cad",
         ),
-        (Line(1000, 64, OUTCOMES), "bc3f04121c5e20dc9ef2e117ffc2ffd0936905edd73ae4252670bd3c6987781f"),
+        (UnitGrid((1000,), (64,), OUTCOMES), "bc3f04121c5e20dc9ef2e117ffc2ffd0936905edd73ae4252670bd3c6987781f"),
     ],
 )
 def test_the_array_of_all_outcomes_is_described_to_the_byte_as_it_always_was(grid, digest):
-    assert hashlib.sha256(grid.metadata().encode()).hexdigest() == digest
+    assert hashlib.sha256(grid.metadata()).hexdigest() == digest
 
 
 def test_the_order_of_the_store_is_that_of_the_outcomes_and_those_always_kept_may_be_named(complete, tmp_path):
@@ -239,7 +239,7 @@ def test_a_refinement_keeps_as_little_as_its_verdict_needs_and_finds_the_same(tm
     assert few.critical_scales(verdict).identical(all_.critical_scales(verdict))
     assert few.verify(recompute=20) == []
     assert json.loads((few.place.path / "round.1" / "zarr.json").read_text())["attributes"]["outcomes"] == [
-        name for name in OUTCOMES if name in {*outcomes, *DOUBTS}
+        name for name in OUTCOMES if name in {*outcomes, *ALWAYS_KEPT}
     ]
 
 
@@ -269,9 +269,9 @@ def test_what_a_refinement_lacks_is_told_before_anything_is_computed(tmp_path, r
 
 def test_an_export_has_a_column_for_each_outcome_that_is_kept(complete, tmp_path, reference):
     pandas = pytest.importorskip("pandas")
-    rocking.study(complete).export(tmp_path / "all.csv")
+    rocking.study(complete).to_csv(tmp_path / "all.csv")
     table = pandas.read_csv(tmp_path / "all.csv")
-    assert [*table.columns][-5:] == ["overturned", "peak_rotation_rad", *DOUBTS]
+    assert [*table.columns][-5:] == ["overturned", "peak_rotation_rad", *ALWAYS_KEPT]
     assert not {"impacts", "rests"} & {*table.columns}
     np.testing.assert_array_equal(table.peak_rotation_rad, reference.peak_rotation.values.ravel())
 

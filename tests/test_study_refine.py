@@ -16,7 +16,8 @@ import rocking
 from rocking.motion.exceedance import exceedances
 from rocking.progress import Progress
 from rocking.studies import read_study, refine
-from rocking.studies.outcomes import OUTCOMES
+from rocking.studies.inputs import OUTCOMES
+from rocking.studies.state import Log
 from rocking.studies.units import name_of
 
 TOLERANCE = 1e-3
@@ -144,7 +145,7 @@ def test_a_refinement_says_how_far_it_is_and_goes_on_at_the_unit_that_is_missing
     assert f"round {count - 1}: " in str(study.status)
     assert not study.status.complete
     with study.place.locked():
-        study._log({"event": "start", "done": 5400})
+        Log(study.place).add({"event": "start", "done": 5400})
         running = study.status.running
     assert running.rate > 0.0
     assert 0.0 < running.seconds_left < 10.0
@@ -154,7 +155,7 @@ def test_a_refinement_says_how_far_it_is_and_goes_on_at_the_unit_that_is_missing
     assert digest(folder) == digest(complete)
 
 
-def test_damage_to_a_round_is_named_and_mended(complete, tmp_path):
+def test_damage_to_a_round_is_named_and_corrected(complete, tmp_path):
     folder = tmp_path / "study"
     study = made(folder)
     study.run()
@@ -166,7 +167,7 @@ def test_damage_to_a_round_is_named_and_mended(complete, tmp_path):
     assert study.verify(recompute=5) == []
     assert digest(folder) == digest(complete)
     (folder / "round.2" / "brackets.npz").write_bytes(b"")
-    with pytest.raises(rocking.StudyError, match=r"round\.2 in .* is damaged: remove"):
+    with pytest.raises(rocking.StudyError, match=r"round\.2 is damaged: remove"):
         study.verify()
 
 
@@ -271,8 +272,8 @@ def test_chattering_that_was_cut_off_or_is_not_proven_is_no_verdict():
         "complete_chattering": np.array([0, 0, 1, 0, 1, 1]),
         "stalled": np.array([0, 0, 0, 0, 0, 1]),
     }
-    assert refine._verdict("overturning", outcomes).tolist() == [-1, -1, -1, 1, 0, 0]
-    assert refine._verdict("complete_chattering", outcomes).tolist() == [-1, -1, 1, 0, 1, -1]
+    assert refine._finding("overturning", outcomes).tolist() == [-1, -1, -1, 1, 0, 0]
+    assert refine._finding("complete_chattering", outcomes).tolist() == [-1, -1, 1, 0, 1, -1]
 
 
 def test_the_bar_says_which_round_it_is_and_what_is_counted(tmp_path, monkeypatch):

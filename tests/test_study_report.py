@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.studies import ratios as reading
 from rocking.studies import read_study
+from rocking.studies import spectrum as reading
 
 BLOCKS = rocking.Blocks.grid(p=[1.5, 2.0, 3.0], alpha=[0.1, 0.15, 0.2, 0.25], restitution=[0.9])
 MOTIONS = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.6, 9)]
@@ -187,11 +187,11 @@ def test_a_study_without_a_report_says_how_to_ask_for_one(run, tmp_path):
     ("old", "new", "line", "sentence"),
     [
         ('measure = "pga"', 'measure = "pgd"', 15, "measure must be one of"),
-        ('measure = "pga"', 'measure = "sa"', 15, "period"),
+        ('measure = "pga"', 'measure = "sa"', 15, "period .s. goes with measure"),
         ("half = 0.5", "half = -1", 16, "limits.half must be"),
-        ("[report.spectrum]", "[report.spectra]", 18, "has no spectra; it takes fragility, spectrum"),
+        ("[report.spectrum]", "[report.spectra]", 18, "has no spectra; did you mean spectrum"),
         ("[0.25, 0.5]", "[0.25, 1.5]", 19, "fractiles"),
-        ('measure = "pga"', 'measures = "pga"', 15, "has no measures; it takes measure"),
+        ('measure = "pga"', 'measures = "pga"', 15, "has no measures; did you mean measure"),
         ('measure = "pga"', 'blocks = "all"', 15, "blocks must be one of each, together"),
     ],
 )

@@ -1,4 +1,4 @@
-from . import chattering
+from . import chattering, studies
 from .analysis import rules
 from .analysis.calibration import Calibration, HistoryCalibration, calibrate, calibrate_history
 from .analysis.efficiency import compare_measures
@@ -10,12 +10,15 @@ from .analysis.spectrum import rocking_spectrum
 from .block import Block, Blocks
 from .ensemble import simulate_many
 from .errors import (
+    DamagedStudy,
     InvalidBlock,
     InvalidMotion,
     InvalidOption,
     OutputError,
+    OutsideFit,
     RockingError,
     StudyError,
+    Unfinished,
     UnreadableRecord,
 )
 from .explorer.notebook import explore
@@ -35,6 +38,7 @@ __all__ = [
     "Blocks",
     "Calibration",
     "Certified",
+    "DamagedStudy",
     "Fragility",
     "HazardCurve",
     "HistoryCalibration",
@@ -45,10 +49,12 @@ __all__ = [
     "Measure",
     "Motion",
     "OutputError",
+    "OutsideFit",
     "Response",
     "RockingError",
     "Study",
     "StudyError",
+    "Unfinished",
     "UnreadableRecord",
     "VelocityThreshold",
     "calibrate",
@@ -67,5 +73,6 @@ __all__ = [
     "rules",
     "simulate",
     "simulate_many",
+    "studies",
     "study",
 ]

@@ -78,7 +78,7 @@ def rules_of(
     if duration is None:
         if np.any(np.prod(blocks.restitution, axis=1) == 1.0):
             raise InvalidOption(
-                "a block with restitution 1 never comes to rest; give {} to say when to stop", "duration"
+                "a block with {} 1 never comes to rest; give {} to say when to stop", "restitution", "duration"
             )
     else:
         duration = checks.positive(duration, "duration", InvalidOption, "s")

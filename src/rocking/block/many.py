@@ -78,13 +78,12 @@ class Blocks:
                 "p, alpha and restitution must be numbers, or arrays of shape (n,) or (n, 2) with one n"
             ) from None
         g = within(gravity, "gravity", GRAVITY, "m/s^2")
-        _check(arrays[0], P, "p must be positive, from {:g} to {:g} rad/s")
-        _check(
-            arrays[1], ALPHA._replace(high=np.nextafter(ALPHA.high, 0.0)), "alpha must be from {:g} to below pi/2 rad"
-        )
+        _check(arrays[0], P, "p", "must be positive, from {:g} to {:g} rad/s")
+        below = ALPHA._replace(high=np.nextafter(ALPHA.high, 0.0))
+        _check(arrays[1], below, "alpha", "must be from {:g} to below pi/2 rad")
         if restitution is None:
             arrays.append(_conserved(*arrays))
-        _check(arrays[2], RESTITUTION, "restitution must be in (0, 1], at least {:g}; give restitution=")
+        _check(arrays[2], RESTITUTION, "restitution", "must be in (0, 1], at least {:g}; give restitution=")
         for name, array in zip(("p", "alpha", "restitution"), arrays, strict=True):
             held = np.array(array)
             held.flags.writeable = False
@@ -263,9 +262,9 @@ def _conserved(p: Floats, alpha: Floats) -> Floats:
     return kept
 
 
-def _check(values: Floats, limits: Limits, rule: str) -> None:
+def _check(values: Floats, limits: Limits, name: str, rule: str) -> None:
     bad = np.argwhere(~((values >= limits.low) & (values <= limits.high)))
     if len(bad):
         value = float(values[tuple(bad[0])])
-        hint = checks.hint_of_degrees(value) if rule.startswith("alpha") else ""
-        raise InvalidBlock(f"{rule.format(*limits)}, not {value:g} (block {bad[0][0]}){hint}")
+        hint = checks.hint_of_degrees(value) if name == "alpha" else ""
+        raise InvalidBlock(f"{{}} {rule.format(*limits)}, not {value:g} (block {bad[0][0]}){hint}", name, value=value)

@@ -19,6 +19,7 @@ from rocking.studies.cluster import local_executor, scheduler_executor
 from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.place import place_of
 from rocking.studies.refine import Verdict
+from rocking.studies.results import FORMATS
 from rocking.studies.study import Study, study_of
 from rocking.tables import counted, to_json, write_text
 
@@ -35,7 +36,7 @@ def new(file: Path) -> None:
         TOML file to write; one that is there is left alone.
     """
     if file.exists():
-        raise OutputError(f"{file} is there already: choose another name, or remove it first")
+        raise OutputError("the file is there already: choose another name, or remove it first", path=str(file))
     write_text(file, TEMPLATE)
     print(f"written to {file}; edit it, then: rocking study run {file}")
 
@@ -109,9 +110,9 @@ def status(folder: str, *, as_json: Annotated[bool, Parameter(name="--json", neg
     """
     state = rocking.study(folder).status
     running = None if state.running is None else asdict(state.running)
-    told = {name: getattr(state, name) for name in ("done", "units", "simulations", "failed")}
-    told |= {"running": running, "refinement": None if state.refinement is None else asdict(state.refinement)}
-    print(to_json({"folder": folder, **told}) if as_json else f"{folder}: {state}")
+    about = {name: getattr(state, name) for name in ("done", "units", "simulations", "failed")}
+    about |= {"running": running, "refinement": None if state.refinement is None else asdict(state.refinement)}
+    print(to_json({"folder": folder, **about}) if as_json else f"{folder}: {state}")
 
 
 @study.command
@@ -132,7 +133,8 @@ def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter
     for fault in faults:
         print(fault)
     if faults and not repair:
-        raise StudyError(f"{counted(len(faults), 'fault')} found; --repair mends what can be computed or written again")
+        found_faults = f"{counted(len(faults), 'fault')} found"
+        raise StudyError(f"{found_faults}; --repair corrects what can be computed or written again")
     print(_sound(found, folder, len(faults)))
 
 
@@ -150,8 +152,10 @@ def export(folder: str, file: Path, *, critical: Verdict | None = None) -> None:
     critical
         Write the scales between which this verdict on a block changes instead.
     """
+    if file.suffix not in FORMATS:
+        raise InvalidOption(f"a study is exported to {', '.join(FORMATS)}, not to {file.name}", "file", value=file)
     is_replaced = file.exists()
-    rocking.study(folder).export(file, critical=critical)
+    getattr(rocking.study(folder), f"to_{FORMATS[file.suffix]}")(file, critical=critical)
     if is_replaced:
         note(f"replaced {file}")
     print(f"written to {file}")
@@ -174,7 +178,7 @@ def report(
     """
     found = rocking.study(folder)
     if out is None and "://" in folder:
-        raise InvalidOption(f"{folder} is no folder for figures and tables: name one as well")
+        raise InvalidOption("this is no folder for figures and tables: name one as well", path=folder)
     with batch.output_folder(out or Path(folder) / "report") as target:
         made = found.report()
         for name, one in made.items():
@@ -206,7 +210,7 @@ def _executor(workers: int | None, scheduler: str | None) -> contextlib.Abstract
     if scheduler is not None:
         return scheduler_executor(scheduler)
     if workers is not None:
-        return local_executor(checks.whole(workers, "--workers", InvalidOption, least=1))
+        return local_executor(checks.whole(workers, "workers", InvalidOption, least=1))
     return contextlib.nullcontext()
 
 

@@ -1,14 +1,17 @@
 from .file import TEMPLATE, StudyFile, read_study
 from .fragility import BlockFragilities
+from .refine import Refinement
 from .report import FragilityPlan, ReportPlan, SpectrumPlan
 from .run import RunReport
 from .spectrum import StudySpectrum
-from .study import Running, Status, Study, study
+from .state import Running, Status
+from .study import Study, study
 
 __all__ = [
     "TEMPLATE",
     "BlockFragilities",
     "FragilityPlan",
+    "Refinement",
     "ReportPlan",
     "RunReport",
     "Running",

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
+import difflib
 import itertools
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -20,102 +22,43 @@ from rocking.errors import InvalidMotion, InvalidOption, RockingError, StudyErro
 from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
-from rocking.motion.scaling import SCALES, Measure, MeasureName
+from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.named_pulses import pulse_family
 from rocking.plausibility import vertical_notes
 from rocking.product import Product, Scales
 from rocking.progress import note
-from rocking.studies.outcomes import OUTCOMES, chosen_outcomes
+from rocking.studies.inputs import OUTCOMES, chosen_outcomes
 from rocking.studies.refine import Tolerances, tolerances_of
-from rocking.studies.report import FragilityPlan, ReportPlan, SpectrumPlan
+from rocking.studies.report import PLANS, ReportPlan
 from rocking.tables import csv_rows
 from rocking.treatment import treatment
 
-TEMPLATE: Final = """\
-# A study: every block under every motion at every scale. Numbers may be written 1.5, [1.0, 2.0], or as a
-# range "START:STOP:COUNT" with ":log" for equal ratios; accelerations as "0.5g", angles as "12deg".
+#: A file to start from, with comments.
+TEMPLATE: Final = Path(__file__).with_name("template.toml").read_text("utf-8")
 
-[blocks]                        # the full grid of these; or: csv = "blocks.csv" with these columns
-p = "1.5:6:20"                  # frequency parameter, rad/s
-alpha = "5deg:20deg:16"         # slenderness
-restitution = 0.9               # leave out for that of angular momentum (Housner's)
-# width = [0.3, 0.6]            # instead of p and alpha: rectangles, m,
-# height = "1:2:5"
-# offset = 0.02                 # with the centre of mass off the middle, positive to side +
-# pivots = [[0.2, 0.15]]        # or bodies: distances of the pivots of side + and side - from the centre of mass, m,
-# height_of_mass = 0.6          # its height, and the radius of gyration
-# gyration = 0.4
+_Kept = TypeVar("_Kept", bound=RockingError)
 
-[motions]
-records = ["ridgecrest-clc-090", "el-centro-meloland-270"]   # files, folders, patterns, shipped records
-# channel = "1"
-# vertical = "3"                # a channel of the same file, or a record: moves the ground up and down besides
-# units = "g"                   # of files that do not say theirs
-# dt = 0.01
-skip_unreadable = false         # true: leave out records that cannot be read, and list them
 
-# [[motions.pulses]]            # any number of these; lists and ranges make one pulse each
-# family = "one_sine"
-# amplitude = 1.0
-# frequency = "0.5:5:10:log"
+class _Kind(NamedTuple):
+    """What a value must be, in words, and whether it is."""
 
-[scales]                        # at most one of factor, pga, pgv, sa (with period, damping)
-pga = ["0.2g", "0.4g", "0.8g"]
-polarity = "+"                  # or "-", "both"
-# refine = 1e-3                 # halve gaps between scales of which one overturns a block, to this relative width;
-#                               # or { overturning = 1e-3, complete_chattering = 1e-6 }
-
-[simulation]
-model = "nonlinear"             # or "linear"
-chattering = "certified"
-# duration = 40.0
-# outcomes = ["overturned", "peak_rotation"]   # keep these, and stalled, unfinished and stopped; by default all
-
-[report.fragility]              # what `rocking study report` makes; may be changed later
-measure = "pga"                 # pga, pgv, sa (with period, damping), pga_ratio, pgv_ratio
-limits = { overturning = inf }  # peak rotation over slenderness, as half = 0.5; inf: overturning
-blocks = "each"                 # a curve for each block; or "together": one for all
-
-# [report.spectrum]
-# fractiles = [0.16, 0.5, 0.84]
-"""
+    words: str
+    holds: Callable[[Any], bool]
 
 
 def _is_text(value: Any) -> bool:
     return isinstance(value, str)
 
 
-def _is_list_of_texts(value: Any) -> bool:
-    return isinstance(value, list) and all(map(_is_text, value))
-
-
-#: Keys of every table.
-_KEYS: Final[Mapping[str, frozenset[str]]] = {
-    "blocks": frozenset(
-        {"p", "alpha", "restitution", "csv", "width", "height", "offset", "pivots", "height_of_mass", "gyration"}
-    ),
-    "motions": frozenset({"records", "channel", "vertical", "units", "dt", "skip_unreadable", "pulses"}),
-    "scales": frozenset({"factor", "pga", "pgv", "sa", "period", "damping", "polarity", "refine"}),
-    "simulation": frozenset({"model", "chattering", "duration", "outcomes"}),
-    "report": frozenset({"fragility", "spectrum"}),
-}
-
-#: Keys whose values are no numbers: what they are, in words, and whether a value is that.
-_KINDS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
-    **dict.fromkeys(("csv", "vertical", "units", "polarity", "model", "chattering"), ("text", _is_text)),
-    "channel": ("text or a whole number", lambda value: _is_text(value) or type(value) is int),
-    **dict.fromkeys(("records", "outcomes"), ("a list of texts", _is_list_of_texts)),
-    "skip_unreadable": ("true or false", lambda value: isinstance(value, bool)),
-    "pulses": ("tables, [[motions.pulses]]", lambda value: all(isinstance(each, dict) for each in value)),
-}
-
-_QUANTITIES: Final[Mapping[str, Callable[[str, str], float]]] = {
-    "alpha": quantities.tilt,
-    **dict.fromkeys(("width", "height", "pivots", "height_of_mass", "gyration"), quantities.length),
-    "pga": quantities.acceleration,
-    "sa": quantities.acceleration,
-}
-
+_ANY: Final = _Kind("", lambda value: True)
+_TEXT: Final = _Kind("text", _is_text)
+_TEXTS: Final = _Kind("a list of texts", lambda value: isinstance(value, list) and all(map(_is_text, value)))
+_CHANNEL: Final = _Kind("text or a whole number", lambda value: _is_text(value) or type(value) is int)
+_TRUTH: Final = _Kind("true or false", lambda value: isinstance(value, bool))
+_TABLE: Final = _Kind("a table", lambda value: isinstance(value, dict))
+_TABLES: Final = _Kind(
+    "tables, [[motions.pulses]]", lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value)
+)
 
 #: What says together what a block is, and what may go with it.
 _BODIES: Final[Mapping[tuple[str, ...], tuple[str, ...]]] = {
@@ -123,10 +66,39 @@ _BODIES: Final[Mapping[tuple[str, ...], tuple[str, ...]]] = {
     ("width", "height"): ("offset", "restitution"),
     ("pivots", "height_of_mass", "gyration"): ("restitution",),
 }
+_PARAMETERS: Final = sorted({name for needed, more in _BODIES.items() for name in (*needed, *more)})
+
+#: What motions may be scaled to.
+_MEASURES: Final = ("factor", "pga", "pgv", "sa")
 
 #: What both sides of a block may have of their own, in columns of a table that end so.
 _SIDED: Final = ("p", "alpha", "pivots", "restitution")
 _SIDES: Final = ("_plus", "_minus")
+
+#: Tables of a file, the keys of each, and what their values must be; numbers are read by `_QUANTITIES`.
+_SCHEMA: Final[Mapping[str, Mapping[str, _Kind]]] = {
+    "blocks": {"csv": _TEXT, **dict.fromkeys(_PARAMETERS, _ANY)},
+    "motions": {
+        "records": _TEXTS,
+        "channel": _CHANNEL,
+        "vertical": _TEXT,
+        "units": _TEXT,
+        "dt": _ANY,
+        "skip_unreadable": _TRUTH,
+        "pulses": _TABLES,
+    },
+    "scales": {**dict.fromkeys((*_MEASURES, "period", "damping", "refine"), _ANY), "polarity": _TEXT},
+    "simulation": {"model": _TEXT, "chattering": _TEXT, "duration": _ANY, "outcomes": _TEXTS},
+    "report": dict.fromkeys(PLANS, _TABLE),
+    **{f"report.{name}": {each.name: _ANY for each in dataclasses.fields(plan)} for name, plan in PLANS.items()},
+}
+
+_QUANTITIES: Final[Mapping[str, quantities.Quantity]] = {
+    "alpha": quantities.tilt,
+    **dict.fromkeys(("width", "height", "pivots", "height_of_mass", "gyration"), quantities.length),
+    "pga": quantities.acceleration,
+    "sa": quantities.acceleration,
+}
 
 
 @dataclass(frozen=True)
@@ -172,18 +144,32 @@ def read_study(path: str | Path) -> StudyFile:
     Raises
     ------
     StudyError
-        If the file cannot be read, or a line of it is wrong; the message has the line.
+        If the file cannot be read, or a line of it is wrong: `path`, `line` and `argument` (the key) of the error.
     UnreadableRecord
         If a record cannot be read.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "study.toml"
+    >>> _ = file.write_text(TEMPLATE)
+    >>> read_study(file).product.shape
+    (2, 3, 1, 320)
+    >>> _ = file.write_text(TEMPLATE.replace("restitution", "restitutoin"))
+    >>> try:
+    ...     read_study(file)
+    ... except StudyError as error:
+    ...     print(error.line, error.message.text())
+    7 [blocks] has no restitutoin; did you mean restitution?
     """
     file = checks.path(path, "the file of a study", StudyError)
     try:
         text = file.read_text("utf-8")
         tables = tomllib.loads(text)
     except OSError as error:
-        raise StudyError(f"{file} cannot be read: {error.strerror or error}") from None
+        raise StudyError(f"the file cannot be read: {error.strerror or error}", path=str(file)) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise StudyError(f"{file} is no TOML file: {error}; correct it") from None
+        raise StudyError(f"this is no TOML file: {error}; correct it", path=str(file)) from None
     return _Reader(file, text, tables).study()
 
 
@@ -194,192 +180,184 @@ class _Reader:
         self.file, self.text, self.tables = file, text, tables
 
     def study(self) -> StudyFile:
-        self._check_keys()
+        """Read all tables, the cheapest first."""
+        self._check_tables()
+        rules, given = self._table("simulation"), self._table("scales")
         blocks, scales = self._blocks(), self._scales()
         motions, names, skipped = self._motions(scales)
-        rules = self.tables.get("simulation", {})
-        with self._line_told("simulation", "chattering"):
+        with self._located("simulation", key="chattering"):
             chattering = treatment(rules.get("chattering", "certified"))
-        polarity = self.tables.get("scales", {}).get("polarity", "+")
-        with self._lines_told("simulation", "scales", "blocks"):
-            product = Product(
-                blocks,
-                tuple(motions),
-                scales,
-                polarity,
-                rules.get("model", "nonlinear"),
-                chattering,
-                rules.get("duration"),
-            )
-        with self._line_told("simulation", "outcomes"):
+        model, polarity = rules.get("model", "nonlinear"), given.get("polarity", "+")
+        with self._located("simulation", "scales", "blocks"):
+            product = Product(blocks, tuple(motions), scales, polarity, model, chattering, rules.get("duration"))
             kept = chosen_outcomes(rules.get("outcomes"))
-        return StudyFile(product, tuple(skipped), self._report(kept), self._refine(product, kept), kept, tuple(names))
+        report, refine = self._report(kept), given.get("refine")
+        with self._located("scales", key="refine"):
+            tolerances = None if refine is None else tolerances_of(product, refine, kept)
+        return StudyFile(product, tuple(skipped), report, tolerances, kept, tuple(names))
 
-    def _scales(self) -> Scales:
-        given = {
-            name: value for name, value in self.tables.get("scales", {}).items() if name not in ("polarity", "refine")
-        }
-        measures = {name: self._numbers("scales", name, given.pop(name)) for name in SCALES if name in given}
-        with self._lines_told("scales"):
-            if len(measures) > 1:
-                raise InvalidOption(f"motions can be scaled to one measure only, not to {' and '.join(measures)}")
-            if not measures and given:
-                raise InvalidOption(f"{next(iter(given))} belongs to sa: give that as well, or neither")
-            name, levels = next(iter(measures.items()), ("factor", None))
-            if levels is not None:
-                checks.positive_numbers(levels, name, InvalidOption)
-            return Scales.of(levels, Measure(cast(MeasureName, name), **given))
-
-    def _refine(self, product: Product, kept: tuple[str, ...]) -> Tolerances | None:
-        refine = self.tables.get("scales", {}).get("refine")
-        with self._line_told("scales", "refine"):
-            return None if refine is None else tolerances_of(product, refine, kept)
-
-    def _report(self, kept: tuple[str, ...]) -> ReportPlan | None:
-        if "report" not in self.tables:
-            return None
-        plans: dict[str, Any] = {}
-        for name, kind in {"fragility": FragilityPlan, "spectrum": SpectrumPlan}.items():
-            given = self.tables["report"].get(name)
-            if given is None:
-                continue
-            table = f"report.{name}"
-            if not isinstance(given, dict):
-                raise self._wrong("report", name, f"{name} must be a table, [{table}]")
-            known = [each.name for each in fields(kind)]
-            for key in given:
-                if key not in known:
-                    raise self._wrong(table, key, f"[{table}] has no {key}; it takes {', '.join(known)}")
-            with self._lines_told(table):
-                plans[name] = kind(**given)
-                plans[name].check(kept)
-        return ReportPlan(**plans)
-
-    def _check_keys(self) -> None:
-        for table, content in self.tables.items():
-            if table not in _KEYS:
-                raise self._wrong(table, None, f"there is no table [{table}]; there are {', '.join(_KEYS)}")
-            if not isinstance(content, dict):
-                raise self._wrong(None, table, f"{table} must be a table, [{table}]")
-            for key in content:
-                if key not in _KEYS[table]:
-                    known = ", ".join(sorted(_KEYS[table]))
-                    raise self._wrong(table, key, f"[{table}] has no {key}; it takes {known}")
-                what, is_that = _KINDS.get(key, ("", lambda value: True))
-                if not is_that(content[key]):
-                    raise self._wrong(table, key, f"{key} must be {what}, not {content[key]!r}")
+    def _check_tables(self) -> None:
+        """Check names of tables and keys, and that values which are no numbers are what they must be."""
+        for table in self.tables:
+            if table not in _SCHEMA:
+                hint = _nearest(table, (name for name in _SCHEMA if "." not in name))
+                raise self._wrong(f"there is no table [{{}}]; {hint}", table, table=table)
+            self._check_keys(table)
         for needed in ("blocks", "motions"):
             if needed not in self.tables:
-                raise StudyError(f"{self.file}: the table [{needed}] is missing")
+                raise StudyError("the table [{}] is missing", needed, path=str(self.file))
+
+    def _check_keys(self, table: str) -> None:
+        content = self._table(table)
+        if not isinstance(content, dict):
+            raise self._wrong(f"{{}} must be a table, [{table}]", table.rpartition(".")[2], table="", key=table)
+        for key, value in content.items():
+            if key not in _SCHEMA[table]:
+                hint = _nearest(key, _SCHEMA[table])
+                raise self._wrong(f"[{table}] has no {{}}; {hint}", key, table=table, key=key)
+            kind = _SCHEMA[table][key]
+            if not kind.holds(value):
+                sentence = f"{{}} must be {kind.words}, not {checks.shown(value)}"
+                raise self._wrong(sentence, key, table=table, key=key, value=value)
+            if f"{table}.{key}" in _SCHEMA:
+                self._check_keys(f"{table}.{key}")
+
+    def _table(self, table: str, occurrence: int = 0) -> Any:
+        """Content of a table, empty where it is missing; of those of a list, the occurrence-th."""
+        content: Any = self.tables
+        for name in table.split("."):
+            content = content.get(name, {})
+        return content[occurrence] if isinstance(content, list) else content
+
+    def _scales(self) -> Scales:
+        given = self._table("scales")
+        measures = [name for name in _MEASURES if name in given]
+        if len(measures) > 1:
+            listed = " and ".join(["{}"] * len(measures))
+            sentence = f"motions can be scaled to one measure only, not to {listed}"
+            raise self._wrong(sentence, *measures, table="scales", key=measures[0])
+        if "period" in given and "sa" not in given:
+            raise self._wrong("{} goes with {}, and only with it", "period", "sa", table="scales", key="period")
+        if "sa" in given and "period" not in given:
+            raise self._wrong("{} needs {}, in s", "sa", "period", table="scales", key="sa")
+        levels = {name: self._numbers("scales", name, given[name]) for name in measures}
+        with self._located("scales"):
+            if not levels:
+                return Scales.of(None, FACTOR)
+            ((name, values),) = levels.items()
+            checks.positive_numbers(values, name, InvalidOption)
+            options = {option: given[option] for option in ("period", "damping") if option in given}
+            return Scales.of(values, Measure(cast(MeasureName, name), **options))
+
+    def _report(self, kept: tuple[str, ...]) -> ReportPlan | None:
+        plans: dict[str, Any] = {}
+        for name, given in self._table("report").items():
+            with self._located(f"report.{name}"):
+                plans[name] = PLANS[name](**given)
+                plans[name].check(kept)
+        return ReportPlan(**plans) if "report" in self.tables else None
 
     def _blocks(self) -> Blocks:
-        given = self.tables["blocks"]
+        given = self._table("blocks")
         if "csv" in given:
             if len(given) > 1:
-                raise self._wrong("blocks", "csv", "csv goes without other keys")
+                raise self._wrong("{} goes without other keys", "csv", table="blocks", key="csv")
             return self._blocks_of_csv(self.file.parent / given["csv"])
-        self._check_description(given)
+        if not any({*needed} <= given.keys() <= {*needed, *more} for needed, more in _BODIES.items()):
+            choices = ", or ".join(map(_listed, _BODIES))
+            having = f"; it has {_listed([*given])}" if given else ""
+            raise self._wrong(f"[blocks] needs {choices}, or csv{having}", table="blocks")
         axes: dict[str, Any] = {
             name: self._pivots(value) if name == "pivots" else self._numbers("blocks", name, value)
             for name, value in given.items()
         }
-        with self._lines_told("blocks"):
+        with self._located("blocks"):
             if "p" in axes:
                 return Blocks.grid(**axes)
             checks.grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
-            return Blocks.of(
-                [_body(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())],
-            )
-
-    def _check_description(self, given: Mapping[str, Any]) -> None:
-        """Check that these keys say what a block is."""
-        if not any({*all_} <= given.keys() <= {*all_, *more} for all_, more in _BODIES.items()):
-            choices = ", or ".join(_listed(all_) for all_ in _BODIES)
-            having = f"; it has {_listed([*given])}" if given else ""
-            raise self._wrong("blocks", None, f"[blocks] needs {choices}, or csv{having}")
+            return Blocks.of([_body(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())])
 
     def _pivots(self, value: Any) -> list[Floats]:
         """Pairs of distances: one, or several."""
-        with self._line_told("blocks", "pivots"):
-            pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
-            found = [_read("pivots", pair, quantities.length) for pair in pairs]
+        pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+        with self._located("blocks", key="pivots"):
+            found = [_read("pivots", pair) for pair in pairs]
             if any(len(pair) != 2 for pair in found):
-                raise StudyError("pivots must be a pair, [0.2, 0.15] (side +, side -), or a list of pairs")
+                raise StudyError(
+                    "{} must be a pair, [0.2, 0.15] (side +, side -), or a list of pairs", "pivots", value=value
+                )
             return found
 
     def _blocks_of_csv(self, table: Path) -> Blocks:
+        about: dict[str, Any] = {"table": "blocks", "key": "csv"}
         try:
             rows = csv_rows(table.read_text("utf-8-sig"))
         except OSError as error:
-            raise self._wrong("blocks", "csv", f"{table} cannot be read: {error.strerror}") from None
+            raise self._wrong(f"{table} cannot be read: {error.strerror}", **about) from None
         except UnicodeDecodeError:
-            raise self._wrong("blocks", "csv", f"{table} is no text table in UTF-8; save it as CSV") from None
+            raise self._wrong(f"{table} is no text table in UTF-8; save it as CSV", **about) from None
         columns: dict[str, Any] = {}
-        headings, given = (rows[0][1], rows[1:]) if len(rows) > 1 else ([], [])
-        for name in sorted(_KEYS["blocks"] - {"csv"}):
-            ends = _SIDES if name in _SIDED and f"{name}{_SIDES[0]}" in headings else ("",)
+        headings, rows = (rows[0][1], rows[1:]) if len(rows) > 1 else (list[str](), [])
+        for name in _PARAMETERS:
+            ends = _SIDES if name in _SIDED and name + _SIDES[0] in headings else ("",)
             if all(name + end in headings for end in ends):
                 places = [headings.index(name + end) for end in ends]
-                cells = [
-                    [_cell(table, line, name, row[place] if place < len(row) else "") for place in places]
-                    for line, row in given
-                ]
+                cells = []
+                for line, row in rows:
+                    with _in_table(table, line):
+                        cells.append([_number(name, row[k] if k < len(row) else "") for k in places])
                 columns[name] = np.squeeze(cells, axis=1) if len(ends) == 1 else np.array(cells)
-        if not any({*all_} <= columns.keys() for all_ in _BODIES):
+        if not any({*needed} <= columns.keys() for needed in _BODIES):
             raise self._wrong(
-                "blocks",
-                "csv",
                 f"{table} needs columns p (rad/s) and alpha (rad, or 12deg), or width and height (m), or pivots_plus, "
                 "pivots_minus, height_of_mass and gyration (m), and rows",
+                **about,
             )
         if {"p", "alpha"} <= columns.keys():
             try:
                 return Blocks(**{name: columns[name] for name in ("p", "alpha", "restitution") if name in columns})
             except RockingError as error:
-                raise self._wrong(
-                    "blocks", "csv", f"{table}, whose block 0 is in line {given[0][0]}: {error}"
-                ) from None
+                where = f"{table}, whose block 0 is in line {rows[0][0]}"
+                raise self._wrong(f"{where}: {error}", **about) from None
         bodies = []
-        for (line, _), row in zip(given, zip(*columns.values(), strict=True), strict=True):
-            try:
-                bodies.append(_body(dict(zip(columns, row, strict=True))))
-            except RockingError as error:
-                raise StudyError(f"{table}, line {line}: {error}") from None
+        for (line, _), values in zip(rows, zip(*columns.values(), strict=True), strict=True):
+            with _in_table(table, line):
+                bodies.append(_body(dict(zip(columns, values, strict=True))))
         return Blocks.of(bodies)
 
     def _motions(self, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
         """Motions that can be read and scaled, their records, and a sentence for each that cannot, if it may be so."""
-        given = self.tables["motions"]
+        given = self._table("motions")
+        with self._located("motions", key="dt"):
+            Request.checked(given.get("dt"), None)
+        with self._located("motions", key="units"):
+            Request.checked(None, given.get("units"))
+        records: dict[str, str] = {}  # by their paths or names, what stands for each in the file
+        for name in given.get("records", []):
+            with self._located_record(name):
+                records |= dict.fromkeys(expanded([self._beside(name)]), name)
         motions, names, skipped = [], [], []
-        records = self._records()
         for path, name in records.items():
             try:
-                with self._record_told(name):
-                    motions.append(_scalable(self._record(path, several=len(records) > 1), scales))
-                names.append(self._as_written(path))
+                with self._located_record(name):
+                    motion = self._record(path, several=len(records) > 1)
+                    scales.factors(motion)  # it can be scaled
             except (UnreadableRecord, InvalidMotion) as error:
                 if not given.get("skip_unreadable", False):
                     raise
                 skipped.append(str(error))
+            else:
+                motions.append(motion)
+                names.append(self._as_written(path))
         for k in range(len(given.get("pulses", []))):
             motions += self._pulses(k)
-        names += [""] * (len(motions) - len(names))
         if not motions:
-            raise self._wrong("motions", None, "[motions] holds no motion that can be read: name records or pulses")
-        return motions, names, skipped
-
-    def _records(self) -> dict[str, str]:
-        """Paths (relative to the study's own file) or names of all records, and what stands for each in the file."""
-        with self._lines_told("motions"):
-            Request.checked(self.tables["motions"].get("dt"), self.tables["motions"].get("units"))
-        found: dict[str, str] = {}
-        for name in self.tables["motions"].get("records", []):
-            with self._record_told(name):
-                found |= dict.fromkeys(expanded([self._beside(name)]), name)
-        return found
+            sentence = "[motions] holds no motion that can be read: name records or pulses"
+            raise self._wrong(sentence, table="motions")
+        return motions, names + [""] * (len(motions) - len(names)), skipped
 
     def _record(self, path: str, *, several: bool) -> Motion:
-        given = self.tables["motions"]
+        given = self._table("motions")
         about = {"dt": given.get("dt"), "units": given.get("units")}
         channel = None if "channel" not in given else str(given["channel"])
         motion = named_motion(path, channel=channel, several=several, **about)
@@ -401,45 +379,35 @@ class _Reader:
         return str(Path(path).relative_to(self.file.parent)) if beside else path
 
     def _pulses(self, k: int) -> list[Motion]:
-        pulse = dict(self.tables["motions"]["pulses"][k])
-        with self._line_told("motions.pulses", "family", k):
+        pulse, table = dict(self._table("motions.pulses", k)), "motions.pulses"
+        with self._located(table, key="family", occurrence=k):
             family = pulse_family(str(pulse.pop("family", "")))
         axes: dict[str, Sequence[Any] | Floats] = {}
         for key, value in pulse.items():
-            with self._line_told("motions.pulses", key, k):
+            with self._located(table, key=key, occurrence=k):
                 quantity = family.quantity(key)
                 axes[key] = [value] if quantity is None else _read(key, value, quantity)
-        with self._lines_told("motions.pulses", occurrence=k):
+        with self._located(table, occurrence=k):
             return [family.motion(dict(zip(axes, values, strict=True))) for values in itertools.product(*axes.values())]
 
     def _numbers(self, table: str, key: str, value: Any) -> Floats:
-        with self._line_told(table, key):
-            return _read(key, value, _QUANTITIES.get(key, quantities.number))
+        with self._located(table, key=key):
+            return _read(key, value)
 
     @contextlib.contextmanager
-    def _line_told(self, table: str, key: str, occurrence: int = 0) -> Iterator[None]:
-        """Give a mistake the line of the key that it is in."""
+    def _located(self, *tables: str, key: str | None = None, occurrence: int = 0) -> Iterator[None]:
+        """Give a mistake the line of this key, or of the first that it names in these tables, or of the heading."""
         try:
             yield
         except RockingError as error:
-            raise self._wrong(table, key, str(error), occurrence) from None
+            named = error.message.arguments if key is None else (key,)
+            places = [(table, name) for table in tables for name in named if name in self._table(table, occurrence)]
+            table, name = places[0] if places else (tables[0], None)
+            line = _line(self.text, table, name, occurrence)
+            raise _moved(error, StudyError, self.file, line) from None
 
     @contextlib.contextmanager
-    def _lines_told(self, *tables: str, occurrence: int = 0) -> Iterator[None]:
-        """Give a mistake the line of the key of these tables that its sentence names first, or of the first heading."""
-        try:
-            yield
-        except RockingError as error:
-            sentence = str(error)
-            places = [
-                (_position(key, sentence), table, key) for table in tables for key in self._keys(table, occurrence)
-            ]
-            named = sorted(place for place in places if place[0] >= 0)
-            _, table, key = named[0] if named else (0, tables[0], None)
-            raise self._wrong(table, key, sentence, occurrence) from None
-
-    @contextlib.contextmanager
-    def _record_told(self, name: str) -> Iterator[None]:
+    def _located_record(self, name: str) -> Iterator[None]:
         """Give what is wrong with a record the line that names it."""
         try:
             yield
@@ -447,32 +415,46 @@ class _Reader:
             first = _line(self.text, "motions", "records", 0)
             lines = self.text.splitlines()[first - 1 :]
             line = next((k for k, text in enumerate(lines, start=first) if name in text), first)
-            raise type(error)(f"{self.file}, line {line}: {error}") from None
+            raise _moved(error, type(error), self.file, line) from None
 
-    def _keys(self, table: str, occurrence: int) -> list[str]:
-        content: Any = self.tables
-        for name in table.split("."):
-            content = content.get(name, {})
-        return [*(content[occurrence] if isinstance(content, list) else content)]
-
-    def _wrong(self, table: str | None, key: str | None, sentence: str, occurrence: int = 0) -> StudyError:
-        return StudyError(f"{self.file}, line {_line(self.text, table, key, occurrence)}: {sentence}")
+    def _wrong(
+        self, message: str, *arguments: str, table: str, key: str | None = None, value: object = None
+    ) -> StudyError:
+        line = _line(self.text, table, key, 0)
+        return StudyError(message, *arguments, path=str(self.file), line=line, value=value)
 
 
-def _scalable(motion: Motion, scales: Scales) -> Motion:
-    """Return a motion, checked that it can be scaled."""
-    scales.factors(motion)
-    return motion
+def _moved(error: RockingError, kind: type[_Kept], file: Path, line: int) -> _Kept:
+    """Return an error as one of this line; what it says of a file of its own stays in the sentence."""
+    message, arguments = error.message.template, error.message.arguments
+    if error.path is not None:
+        message, arguments = error.text(), ()
+    return kind(message, *arguments, path=str(file), line=line, value=error.value)
 
 
-def _position(word: str, sentence: str) -> int:
-    """Where a word stands in a sentence; -1 if it does not."""
-    found = re.search(rf"\b{re.escape(word)}\b", sentence)
-    return found.start() if found else -1
+@contextlib.contextmanager
+def _in_table(table: Path, line: int) -> Iterator[None]:
+    """Give a mistake the line of a table of blocks."""
+    try:
+        yield
+    except RockingError as error:
+        raise _moved(error, StudyError, table, line) from None
 
 
-def _read(key: str, value: Any, quantity: quantities.Quantity) -> Floats:
+def _nearest(name: str, known: Iterable[str]) -> str:
+    """Say which known name is meant, or which there are."""
+    names = [*known]
+    close = difflib.get_close_matches(name, names, n=1)
+    return f"did you mean {close[0]}?" if close else f"there are {', '.join(names)}"
+
+
+def _number(key: str, text: str) -> float:
+    return _QUANTITIES.get(key, quantities.number)(text, key)
+
+
+def _read(key: str, value: Any, quantity: quantities.Quantity | None = None) -> Floats:
     """Numbers of a value: one, a list, or a range."""
+    quantity = quantity or _QUANTITIES.get(key, quantities.number)
     if isinstance(value, str):
         return quantities.values(value, key, quantity)
     each = value if isinstance(value, list) else [value]
@@ -492,19 +474,12 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def _cell(table: Path, line: int, name: str, text: str) -> float:
-    try:
-        return _QUANTITIES.get(name, quantities.number)(text, name)
-    except RockingError as error:
-        raise StudyError(f"{table}, line {line}: {error}") from None
-
-
-def _line(text: str, table: str | None, key: str | None, occurrence: int) -> int:
+def _line(text: str, table: str, key: str | None, occurrence: int) -> int:
     """Line of a key in a table, the occurrence-th of that name; of its heading where there is no key; 1 if unseen."""
-    if table is not None and "." in table and not re.search(rf"^\s*\[+\s*{re.escape(table)}\b", text, re.MULTILINE):
+    if "." in table and not re.search(rf"^\s*\[+\s*{re.escape(table)}\b", text, re.MULTILINE):
         parent, _, name = table.rpartition(".")  # it is written within its parent
         return _line(text, parent, name, 0)
-    here, seen, heading_line = None, -1, 1
+    here, seen, heading_line = "", -1, 1
     for number, line in enumerate(text.splitlines(), start=1):
         heading = re.match(r"\s*\[+\s*([\w.]+)\s*\]+", line)
         if heading:

@@ -9,25 +9,23 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rocking.analysis.fragility.curve import Band, FragilityCurve, fitted_curve, passed
 from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.levels import mean_one, only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
-from rocking.block import Blocks
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.product import Product, block_coordinates
 from rocking.progress import Progress
-from rocking.result import Result, table_of_some
-from rocking.studies.ratios import peak_ratios, require_limits
+from rocking.result import table_of_some
+from rocking.studies.spectrum import BlocksResult, peak_ratios, require_limits
 from rocking.studies.store import Store
 from rocking.tables import counted
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -123,12 +121,27 @@ def block_fragilities(
                     for quantity, value in _numbers(fitted.curves[0]).items():
                         kept[quantity][i, j] = value
                 bar.advance()
-    about = {"outcomes": motions * scales * polarities, "confidence": confidence, "model": store.product.model}
-    return BlockFragilities(_dataset(store.product.blocks, tuple(limits), kept, faults, about | _words(measure)))
+    import xarray as xr
+
+    dims = "limit_state", "block"
+    return BlockFragilities(
+        xr.Dataset(
+            {name: (dims, values, {"long_name": _KEPT[name]}) for name, values in kept.items()}
+            | {"fault": (dims, faults.astype(str), {"long_name": "why there is no curve"})},
+            {"limit_state": list(limits), **block_coordinates(store.product.blocks)},
+            {
+                "outcomes": motions * scales * polarities,
+                "confidence": confidence,
+                "model": store.product.model,
+                "measure": measure.name,
+                **measure.options(),
+            },
+        )
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BlockFragilities(Result):
+class BlockFragilities(BlocksResult):
     """Lognormal fragility curves, one for each block and limit state; from `Study.block_fragilities`.
 
     Attributes
@@ -152,8 +165,8 @@ class BlockFragilities(Result):
     def summary(self) -> str:
         """Medians and dispersions of some blocks, and how many have no curve."""
         data, scale = self.data, self.measure.scale
-        names = [str(name) for name in data.coords if data[name].dims == ("block",)]
-        header = ["limit state", "block", *names, "exceeded", "median", "between", "dispersion"]
+        parameters = self.block_parameters
+        header = ["limit state", "block", *parameters, "exceeded", "median", "between", "dispersion"]
         rows = []
         for i, j in itertools.product(range(data.sizes["limit_state"]), range(data.sizes["block"])):
             one = {name: values[i, j] for name, values in ((name, data[name].values) for name in _KEPT)}
@@ -162,7 +175,7 @@ class BlockFragilities(Result):
                 [
                     str(data.limit_state.values[i]),
                     j,
-                    *(float(data[name].values[j]) for name in names),
+                    *(float(values[j]) for values in parameters.values()),
                     f"{one['exceeded']:.0f} of {data.outcomes}",
                     scale * float(one["median"]),
                     "-" if data.fault.values[i, j] else between,
@@ -184,7 +197,7 @@ class BlockFragilities(Result):
             **data.attrs,
             "intensity_units": self.measure.units,
             "limit_state": data.limit_state.values,
-            "blocks": {str(name): data[name].values for name in data.coords if data[name].dims == ("block",)},
+            "blocks": self.block_parameters,
             **{str(name): data[name].values for name in data.data_vars},
         }
 
@@ -201,7 +214,7 @@ class BlockFragilities(Result):
         names = [str(name) for name in self.data.limit_state.values]
         medians = self.measure.scale * self.data["median"].values
         return blocks_figure(
-            *plane_of(self.data),
+            *self._plane(),
             panels=dict(zip(names, medians, strict=True)),
             value_label=f"median {self.measure.label}",
             missing_label="no curve fits",
@@ -211,16 +224,6 @@ class BlockFragilities(Result):
             ax=ax,
             figsize=figsize,
         )
-
-
-def plane_of(data: xr.Dataset) -> tuple[Floats, Floats]:
-    """Frequency parameters and slendernesses of blocks: means of unequal sides."""
-    return _mean_of_sides(data, "p"), _mean_of_sides(data, "alpha")
-
-
-def _mean_of_sides(data: xr.Dataset, name: str) -> Floats:
-    sides = [data[one].values for one in (name, f"{name}_plus", f"{name}_minus") if one in data.coords]
-    return np.asarray(np.mean(sides, axis=0))
 
 
 def _numbers(curve: FragilityCurve) -> dict[str, float]:
@@ -238,25 +241,3 @@ def _intensities(product: Product, measure: Measure) -> Floats:
         return np.tile(scales.values, (len(values), 1))  # as they were given, to the last bit
     factors = np.array([scales.factors(motion) for motion in product.motions])
     return np.asarray(np.abs(factors) * values[:, None])
-
-
-def _words(measure: Measure) -> dict[str, Any]:
-    return {"measure": measure.name, **measure.options()}
-
-
-def _dataset(
-    blocks: Blocks,
-    limits: tuple[str, ...],
-    kept: Mapping[str, Floats],
-    faults: NDArray[Any],
-    about: Mapping[str, Any],
-) -> xr.Dataset:
-    import xarray as xr
-
-    dims = "limit_state", "block"
-    return xr.Dataset(
-        {name: (dims, values, {"long_name": _KEPT[name]}) for name, values in kept.items()}
-        | {"fault": (dims, faults.astype(str), {"long_name": "why there is no curve"})},
-        {"limit_state": list(limits), **block_coordinates(blocks)},
-        dict(about),
-    )

@@ -1,4 +1,7 @@
-"""What a study computes, as a file that needs no script: blocks, motions, scales and rules, each part with its hash."""
+"""What a study computes, as a file that needs no script: blocks, motions, scales and rules, each part with its hash.
+
+And which outcomes of its simulations a study keeps, and whether they are enough for what is asked of it.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +9,69 @@ import hashlib
 import io
 import json
 import zipfile
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.errors import InvalidOption
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.product import Product, Scales
+from rocking.product import VARIABLES, Product, Scales
 from rocking.treatment import treatment
 
 #: A fixed time in archives, so that the same inputs make the same bytes.
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
+
+#: All outcomes of a simulation, in the order in which a store holds them.
+OUTCOMES: Final = tuple(VARIABLES)
+
+#: Kept whatever is chosen: without them nobody could tell an answer from one that was given up, stopped or not proven.
+ALWAYS_KEPT: Final = ("stalled", "unfinished", "stopped")
+
+
+def chosen_outcomes(outcomes: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the outcomes that a study of this choice keeps, in the order of the store; all without a choice."""
+    if outcomes is None:
+        return OUTCOMES
+    names = checks.several(outcomes, "outcomes", InvalidOption)
+    if not names:
+        raise InvalidOption(
+            f"{{}} must name one or more of {', '.join(OUTCOMES)}; leave it out to keep all", "outcomes"
+        )
+    for name in names:
+        if name not in OUTCOMES:
+            raise InvalidOption(
+                f"each of {{}} must be one of {', '.join(OUTCOMES)}, not {checks.shown(name)}", "outcomes", value=name
+            )
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    if repeated:
+        raise InvalidOption(f"{{}} names {repeated[0]} more than once: name it once", "outcomes", value=repeated[0])
+    return tuple(name for name in OUTCOMES if name in {*names, *ALWAYS_KEPT})
+
+
+def require(kept: Sequence[str], needed: Sequence[str], what: str, *arguments: str) -> None:
+    """Check that the outcomes that are kept are enough for something, which may name arguments."""
+    missing = [name for name in needed if name not in kept]
+    if missing:
+        choice = [name for name in OUTCOMES if name in {*kept, *needed} and name not in ALWAYS_KEPT]
+        raise InvalidOption(
+            f"{what} needs {' and '.join(missing)}, and the study keeps only {', '.join(kept)}: create one with "
+            f"{{}} = {json.dumps(choice)}",
+            *arguments,
+            "outcomes",
+        )
+
+
+def outcomes_text(kept: Sequence[str]) -> str:
+    """Write in a few words what is kept."""
+    return "all" if len(kept) == len(OUTCOMES) else ", ".join(kept)
 
 
 def hashes(product: Product) -> dict[str, Any]:

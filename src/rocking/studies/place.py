@@ -1,26 +1,42 @@
-"""Where a study is kept: objects that are put whole or not at all, listed, and got back."""
+"""Where a study is kept: objects that are put whole or not at all, listed, and got back.
+
+A folder holds them as files. An object store (S3 and what speaks like it, Google's, Azure's) holds the same objects.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import socket
 import tempfile
+import threading
 import time
+import uuid
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Final, Protocol
+from typing import IO, Any, Final, Protocol
 
 from rocking import checks
-from rocking.errors import OutputError, StudyError
-from rocking.studies import locks
+from rocking.errors import InvalidOption, OutputError, StudyError
 
 #: End of the names of files that are half-written; a crash leaves them, the next run removes them.
 _PART: Final = ".part"
 
-#: How often, and how long after one another, a lock is tried, s.
+#: The object that is locked; it names who holds it.
+_LOCK: Final = "lock"
+
+#: How often, and how long after one another, the lock of a folder is tried, s.
 _TRIES: Final = 3
-_MOMENT: Final = 0.02
+_BETWEEN_TRIES: Final = 0.02
+
+#: An object that is written to learn the store's own time.
+_CLOCK: Final = "clock"
+
+#: How often the lock of an object store is renewed, and how old it is when its holder is taken for dead, s.
+_RENEWAL: Final = 20.0
+_LEASE: Final = 120.0
 
 
 class Place(Protocol):
@@ -42,17 +58,26 @@ class Place(Protocol):
         """Keep everyone else from running the study; gives a note on a lock that was left behind, or nothing."""
 
     def holder(self) -> str:
-        """Say who runs the study now; empty where nobody does."""
+        """Return who runs the study now; empty where nobody does."""
+
+
+def place_of(where: str | Path) -> Place:
+    """Return the place that a path or a URL (``s3://bucket/prefix``) names; a StudyError where it can be none."""
+    checks.path(where, "the folder of a study", StudyError)
+    if "://" in str(where):
+        return ObjectStore(str(where))
+    if Path(where).is_file():
+        raise StudyError("this is a file, and a study is kept in a folder: name that", path=str(where))
+    return Folder(Path(where))
+
+
+def this_process() -> str:
+    """Name this process and its host."""
+    return f"process {os.getpid()} on {socket.gethostname()}"
 
 
 class Folder:
-    """A study in a folder of this machine, or of a file system that it shares.
-
-    Parameters
-    ----------
-    path : Path
-        The folder; made where there is none.
-    """
+    """A study in a folder of this machine, or of a file system that it shares; made where there is none."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -64,7 +89,7 @@ class Folder:
     def put(self, name: str, data: bytes) -> None:
         """Write beside the object, flush to the disk, rename, and flush the folder."""
         target = self.path / name
-        try:
+        with _refused("written", target, kept="; nothing of it was kept"):
             target.parent.mkdir(parents=True, exist_ok=True)
             written = _written(target.parent, data)
             try:
@@ -73,10 +98,6 @@ class Folder:
                 written.unlink(missing_ok=True)
                 raise
             _flush_folder(target.parent)
-        except OSError as error:
-            raise OutputError(
-                f"{target} cannot be written: {error.strerror or error}; nothing of it was kept"
-            ) from error
 
     def get(self, name: str) -> bytes | None:
         """Read the file of the object."""
@@ -86,7 +107,7 @@ class Folder:
         except FileNotFoundError:
             return None
         except OSError as error:
-            raise StudyError(f"{target} cannot be read: {error.strerror or error}") from error
+            raise StudyError(f"the file cannot be read: {error.strerror or error}", path=str(target)) from error
 
     def names(self, folder: str) -> Iterator[str]:
         """List the files of a folder, without those that are half-written."""
@@ -98,86 +119,74 @@ class Folder:
 
     def append(self, name: str, line: str) -> None:
         """Append the line to the file."""
-        try:
-            with (self.path / name).open("a", encoding="utf-8") as file:
-                file.write(line + "\n")
-        except OSError as error:
-            raise OutputError(f"{self.path / name} cannot be written: {error.strerror or error}") from error
+        with _refused("written", self.path / name), (self.path / name).open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[str]:
         """Hold the file `lock`, which names the process and host that hold it, for as long as the process lives."""
-        with self._lock_file() as file:
-            if not _taken(file):
-                raise StudyError(f"the study in {self.path} is being run by {_read(file) or 'another process'}")
-            before = _read(file)
-            file.truncate(0)
-            file.write(this_process())
-            file.flush()
-            for left in self.path.rglob(f"*{_PART}"):
-                left.unlink(missing_ok=True)
+        with contextlib.ExitStack() as stack:
+            with _refused("locked", self.path / _LOCK):
+                self.path.mkdir(parents=True, exist_ok=True)
+                file = stack.enter_context(self._lock_file())
+                if not _lock(file, _TRIES):
+                    raise StudyError(f"the study is being run by {_holder(file) or 'another process'}", path=str(self))
+                file.seek(0)
+                before = file.read().decode(errors="replace").strip()
+                file.truncate(0)
+                file.write(f" {this_process()}".encode())
+                for left in self.path.rglob(f"*{_PART}"):
+                    left.unlink(missing_ok=True)
             try:
                 yield f"took over from {before}, which did not finish" if before else ""
             finally:
-                file.truncate(0)
-                locks.leave(file)
+                with _refused("unlocked", self.path / _LOCK):
+                    file.truncate(0)
+                    _unlock(file)
 
     def holder(self) -> str:
         """Read the lock, where somebody holds it."""
-        try:
-            with (self.path / "lock").open("a+", encoding="utf-8") as file:
-                if not locks.take(file):
-                    return _read(file)
-                locks.leave(file)
-        except OSError:  # who may not write here does not run it
-            pass
+        with contextlib.suppress(OSError), self._lock_file() as file:  # who may not write here does not run it
+            if not _lock(file):
+                return _holder(file)
+            _unlock(file)
         return ""
 
-    @contextlib.contextmanager
-    def _lock_file(self) -> Iterator[IO[str]]:
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-            with (self.path / "lock").open("a+", encoding="utf-8") as file:
-                yield file
-        except OSError as error:
-            raise OutputError(f"{self.path / 'lock'} cannot be locked: {error.strerror or error}") from error
+    def _lock_file(self) -> IO[bytes]:
+        return (self.path / _LOCK).open("a+b", buffering=0)
 
 
-def place_of(where: str | Path) -> Place:
-    """Return the place that a path or a URL (``s3://bucket/prefix``) names.
-
-    Raises
-    ------
-    StudyError
-        If it is a file, or neither text nor a path.
-    """
-    checks.path(where, "the folder of a study", StudyError)
-    if "://" in str(where):
-        from rocking.studies.objects import ObjectStore
-
-        return ObjectStore(str(where))
-    if Path(where).is_file():
-        raise StudyError(f"{where} is a file, and a study is kept in a folder: name that")
-    return Folder(Path(where))
+@contextlib.contextmanager
+def _refused(done: str, target: Path, kept: str = "") -> Iterator[None]:
+    """Raise an OutputError where the system refuses to do something to a file."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"the file cannot be {done}: {error.strerror or error}{kept}", path=str(target)) from error
 
 
-def this_process() -> str:
-    """Name this process and its host."""
-    return f"process {os.getpid()} on {socket.gethostname()}"
-
-
-def _taken(file: IO[str]) -> bool:
+def _lock(file: IO[bytes], tries: int = 1) -> bool:
     """Lock a file; tried again, since somebody who only asks for the holder has it for a moment."""
-    for _ in range(_TRIES):
-        if locks.take(file):
+    from filelock import lock_descriptor
+
+    for k in range(tries):
+        if k:
+            time.sleep(_BETWEEN_TRIES)
+        if lock_descriptor(file.fileno(), blocking=False):
             return True
-        time.sleep(_MOMENT)
     return False
 
 
-def _read(file: IO[str]) -> str:
-    file.seek(0)
-    return file.read().strip()
+def _unlock(file: IO[bytes]) -> None:
+    from filelock import unlock_descriptor
+
+    unlock_descriptor(file.fileno())
+
+
+def _holder(file: IO[bytes]) -> str:
+    """Read who holds a lock; the first byte, a blank, is what Windows lets nobody else read."""
+    file.seek(1)
+    return file.read().decode(errors="replace").strip()
 
 
 def _written(folder: Path, data: bytes) -> Path:
@@ -188,14 +197,14 @@ def _written(folder: Path, data: bytes) -> Path:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-            _let_go(file.fileno())
+            _drop_from_cache(file.fileno())
     except OSError:
         Path(name).unlink(missing_ok=True)
         raise
     return Path(name)
 
 
-def _let_go(handle: int) -> None:
+def _drop_from_cache(handle: int) -> None:
     """Keep no copy of a file in memory: the next one would need new memory, which can cost more than the writing."""
     if hasattr(os, "posix_fadvise"):
         os.posix_fadvise(handle, 0, 0, os.POSIX_FADV_DONTNEED)
@@ -209,3 +218,184 @@ def _flush_folder(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+class ObjectStore:
+    """A study under a prefix of an object store.
+
+    Parameters
+    ----------
+    url : str
+        As ``s3://bucket/prefix``. Credentials, region and endpoint are taken from the environment (AWS_ACCESS_KEY_ID,
+        AWS_SECRET_ACCESS_KEY, AWS_REGION, AWS_ENDPOINT_URL and so on).
+
+    Raises
+    ------
+    InvalidOption
+        If obstore is not installed, or there is no such kind of store.
+    """
+
+    def __init__(self, url: str) -> None:
+        try:
+            import obstore
+            from obstore.store import from_url
+        except ImportError:
+            raise InvalidOption("an object store needs obstore: install rocking[objects]") from None
+        self._url, self._library, self._taken_over = url, obstore, False
+        try:
+            self._store = from_url(url)
+        except Exception as error:  # its own kinds, and those of the system
+            raise InvalidOption(f"this is no URL of an object store: {_first_line(error)}", path=url) from None
+
+    def __str__(self) -> str:
+        """Name the place."""
+        return self._url
+
+    def put(self, name: str, data: bytes) -> None:
+        """Store an object in one request, which is carried out whole or not at all."""
+        if self._taken_over:
+            raise StudyError("the study was taken over by another run while this one was not heard of", path=str(self))
+        try:
+            self._library.put(self._store, name, data)
+        except self._failures as error:
+            raise self._failed("written", name, error, OutputError) from error
+
+    def get(self, name: str) -> bytes | None:
+        """Get the object."""
+        try:
+            return bytes(self._library.get(self._store, name).bytes())
+        except FileNotFoundError:
+            return None
+        except self._failures as error:
+            raise self._failed("read", name, error) from error
+
+    def names(self, folder: str) -> Iterator[str]:
+        """List the objects whose names begin with that of the folder."""
+        try:
+            for chunk in self._library.list(self._store, folder or None):
+                yield from (one["path"].removeprefix(f"{folder}/") for one in chunk)
+        except self._failures as error:
+            raise self._failed("listed", folder, error) from error
+
+    def append(self, name: str, line: str) -> None:
+        """Store the object anew, with the line; only who holds the lock does."""
+        self.put(name, (self.get(name) or b"") + line.encode() + b"\n")
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[str]:
+        """Hold the object `lock`, put on the condition that there is none, and renewed as long as the process lives."""
+        held, note = self._acquired()
+        over = threading.Event()
+        renewal = threading.Thread(target=self._renew, args=(held, over), daemon=True)
+        renewal.start()
+        try:
+            yield note
+        finally:
+            over.set()
+            renewal.join()
+            if not self._taken_over:
+                with contextlib.suppress(*self._failures):  # it runs out by itself
+                    self._library.delete(self._store, _LOCK)
+
+    def holder(self) -> str:
+        """Read the lock, where somebody holds it that is not dead."""
+        lock = self._found_lock()
+        return "" if lock is None or lock.why_dead else lock.holder
+
+    @property
+    def _failures(self) -> tuple[type[Exception], ...]:
+        return self._library.exceptions.BaseError, OSError
+
+    def _failed(
+        self, done: str, name: str, error: Exception, kind: type[StudyError | OutputError] = StudyError
+    ) -> StudyError | OutputError:
+        """Return the error that says what cannot be done to an object, and why."""
+        return kind(f"the object cannot be {done}: {_first_line(error)}", path=f"{self}/{name}")
+
+    def _acquired(self) -> tuple[str, str]:
+        """Put the lock: its tag, and a note on the one whose place it took."""
+        exceptions = self._library.exceptions
+        try:
+            with contextlib.suppress(exceptions.AlreadyExistsError):
+                return self._put_lock("create"), ""
+            found = self._found_lock()
+            if found is None:  # given back in this moment
+                return self._put_lock("create"), ""
+            if not found.why_dead:
+                raise StudyError(
+                    f"the study is being run by {found.holder}, heard of {found.age:.0f} s ago; if that is dead, the "
+                    f"study is free {_LEASE:g} s after it was last heard of",
+                    path=str(self),
+                )
+            return self._put_lock({"e_tag": found.tag}), f"took over from {found.holder}, {found.why_dead}"
+        except (exceptions.AlreadyExistsError, exceptions.PreconditionError):
+            raise StudyError("the study is being run by somebody who came first", path=str(self)) from None
+        except self._failures as error:
+            raise self._failed("written", _LOCK, error, OutputError) from error
+
+    def _put_lock(self, condition: Any) -> str:
+        # Tags may be hashes of the content, so that it must be new every time.
+        about = {"holder": this_process(), "process": os.getpid(), "host": socket.gethostname()}
+        text = json.dumps(about | {"renewal": uuid.uuid4().hex})
+        return str(self._library.put(self._store, _LOCK, text.encode(), mode=condition)["e_tag"])
+
+    def _renew(self, tag: str, over: threading.Event) -> None:
+        """Show every few seconds that the holder lives, as long as the lock is still its own."""
+        while not over.wait(_RENEWAL):
+            try:
+                tag = self._put_lock({"e_tag": tag})
+            except self._library.exceptions.PreconditionError:
+                self._taken_over = True
+                return
+            except self._failures:  # the connection may come back before the lock runs out
+                continue
+
+    def _found_lock(self) -> _FoundLock | None:
+        try:
+            found = self._library.get(self._store, _LOCK)
+            text = bytes(found.bytes())
+        except FileNotFoundError:
+            return None
+        self._library.put(self._store, _CLOCK, uuid.uuid4().bytes)
+        now = self._library.head(self._store, _CLOCK)["last_modified"]
+        try:
+            about = dict(json.loads(text))
+        except (ValueError, TypeError):
+            about = {}
+        age = (now - found.meta["last_modified"]).total_seconds()
+        is_gone = about.get("host") == socket.gethostname() and not _is_alive(about["process"])
+        return _FoundLock(str(about.get("holder", "somebody")), is_gone, age, str(found.meta["e_tag"]))
+
+
+@dataclass(frozen=True)
+class _FoundLock:
+    """A lock as it is found: who holds it, whether that process is gone, how old it is (s), and its tag."""
+
+    holder: str
+    is_gone: bool
+    age: float
+    tag: str
+
+    @property
+    def why_dead(self) -> str:
+        """Why its holder must be dead; empty if it need not be."""
+        if self.age > _LEASE:
+            return f"which was not heard of for {self.age:.0f} s"
+        return "whose process is gone" if self.is_gone else ""
+
+
+def _is_alive(process: int) -> bool:
+    """Whether a process of this host lives; on Windows, where asking is not harmless, it is taken to."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        pass
+    return True
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).partition("\n")[0].strip()

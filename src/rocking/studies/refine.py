@@ -9,6 +9,7 @@ computes it, and however often it is killed, makes the same bytes. A round witho
 from __future__ import annotations
 
 import dataclasses
+import enum
 import functools
 import hashlib
 import io
@@ -20,14 +21,14 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking import checks
+from rocking import bisection, checks
 from rocking.arrays import Flags, Floats, Integers
 from rocking.errors import InvalidOption, StudyError
 from rocking.product import Product, block_coordinates
 from rocking.studies import inputs
-from rocking.studies.outcomes import require
-from rocking.studies.store import Store, readable, sealed, unsealed
-from rocking.studies.units import Key, Line, PointsWork, name_of
+from rocking.studies.inputs import require
+from rocking.studies.store import Store, UnitArray, sealed, unsealed
+from rocking.studies.units import Key, PointsWork, UnitGrid
 from rocking.tables import counted
 
 if TYPE_CHECKING:
@@ -50,17 +51,22 @@ _ABOVE: Final[Mapping[Verdict, tuple[str, str]]] = {
     "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not at the one below"),
 }
 
-#: Outcomes that a verdict is told from, besides those that are always kept.
+#: Outcomes that a verdict follows from, besides those that are always kept.
 _NEEDED: Final[Mapping[str, Sequence[str]]] = {
     "overturning": ("overturned",),
     "complete_chattering": ("rests", "complete_chattering"),
 }
 
-#: Neither: a simulation was given up or stopped before, or a rest is not proven.
-_UNKNOWN: Final = -1
-
 #: Widths over scale that are narrow enough, for each verdict that is refined.
 Tolerances = Mapping[str, float]
+
+
+class Finding(enum.IntEnum):
+    """What a simulation says on a verdict; nothing where it was given up or stopped before, or a rest is not proven."""
+
+    UNKNOWN = -1
+    NO = 0
+    YES = 1
 
 
 @dataclass(frozen=True)
@@ -93,14 +99,12 @@ class Brackets:
     @property
     def middle(self) -> Floats:
         """Scales halfway."""
-        return 0.5 * (self.low + self.high)
+        return bisection.middle(self.low, self.high)
 
     def wide(self, tolerances: Tolerances) -> Integers:
         """Which ones to halve, in the order in which they are simulated: those of one scaled motion together."""
-        middle, enough = self.middle, self._enough(tolerances)
-        splits = (middle > self.low) & (middle < self.high)
-        chosen = np.flatnonzero(self.known & splits & (self.high - self.low > enough * self.high))
-        keys = self.block, middle, self.polarity, self.motion
+        chosen = np.flatnonzero(self.known & bisection.is_wide(self.low, self.high, self._enough(tolerances)))
+        keys = self.block, self.middle, self.polarity, self.motion
         return chosen[np.lexsort([key[chosen] for key in keys])]
 
     def halvings(self, tolerances: Tolerances) -> int:
@@ -118,15 +122,15 @@ class Brackets:
         """Width over scale that is narrow enough for each."""
         return np.array([tolerances.get(verdict, math.inf) for verdict in VERDICTS])[self.verdict]
 
-    def halved(self, chosen: Integers, verdicts: NDArray[np.int8]) -> Brackets:
-        """Brackets after these verdicts on the middles of the chosen ones."""
-        low, high, known, middle = self.low.copy(), self.high.copy(), self.known.copy(), self.middle
-        as_above = verdicts == self.above[chosen]
-        unknown = verdicts == _UNKNOWN
-        high[chosen[as_above]] = middle[chosen[as_above]]
-        low[chosen[~as_above & ~unknown]] = middle[chosen[~as_above & ~unknown]]
-        known[chosen[unknown]] = False
-        return dataclasses.replace(self, low=low, high=high, known=known)
+    def halved(self, chosen: Integers, findings: NDArray[np.int8]) -> Brackets:
+        """Brackets after these findings on the middles of the chosen ones."""
+        found = np.full(len(self.low), Finding.UNKNOWN, dtype=np.int8)
+        found[chosen] = findings
+        is_chosen = np.zeros(len(self.low), dtype=bool)
+        is_chosen[chosen] = True
+        is_known, as_above = found != Finding.UNKNOWN, found == self.above
+        low, high = bisection.halved(self.low, self.high, is_known & ~as_above, is_known & as_above)
+        return dataclasses.replace(self, low=low, high=high, known=self.known & (is_known | ~is_chosen))
 
     def to_bytes(self) -> bytes:
         """Return an archive whose bytes depend on the brackets alone."""
@@ -139,10 +143,10 @@ class Brackets:
             return cls(**arrays)
 
 
-class Round:
-    """One round of a refinement, as a store of units: ranges of the middles of its brackets.
+class Round(UnitArray):
+    """One round of a refinement: simulations at the middles of its brackets.
 
-    Parameters
+    Attributes
     ----------
     store : Store
         The study's grid.
@@ -158,28 +162,17 @@ class Round:
         self.store, self.number, self.brackets, self.tolerances = store, number, brackets, tolerances
         self.chosen = brackets.wide(tolerances)
         count = len(self.chosen)
-        most = math.prod(store.grid.unit)
-        self.grid = Line(count, min(most, max(_LEAST, math.ceil(count / _UNITS))), store.grid.outcomes)
-        self._now = functools.cache(lambda motion: store.product.scales.now(store.product.motions[motion]))
+        width = min(math.prod(store.grid.unit), max(_LEAST, math.ceil(count / _UNITS)))
+        super().__init__(store.place, f"round.{number}", UnitGrid((count,), (width,), store.grid.outcomes))
+        self._measured = functools.cache(lambda motion: store.product.scales.now(store.product.motions[motion]))
 
     def create(self) -> None:
         """Write the round without its units; what describes it last."""
-        place, archive = self.store.place, self.brackets.to_bytes()
-        place.put(f"{self.name}/brackets.npz", archive)
-        for name, data in self.metadata.items():
-            place.put(name, data)
+        archive = self.brackets.to_bytes()
+        for name, data in {f"{self.array}/brackets.npz": archive, **self.metadata}.items():
+            self.place.put(name, data)
         about = {"round": self.number, "brackets": hashlib.sha256(archive).hexdigest(), "points": len(self.chosen)}
-        place.put(f"{self.name}/round.json", sealed(about))
-
-    @property
-    def metadata(self) -> dict[str, bytes]:
-        """What any reader of Zarr knows the array by; a round without points has none."""
-        return {f"{self.name}/zarr.json": self.grid.metadata().encode()} if len(self.chosen) else {}
-
-    @property
-    def name(self) -> str:
-        """Name of its array."""
-        return f"round.{self.number}"
+        self.place.put(f"{self.array}/round.json", sealed(about))
 
     @property
     def title(self) -> str:
@@ -192,73 +185,31 @@ class Round:
         """Whether nothing is left to halve."""
         return not len(self.chosen)
 
-    def done(self) -> set[Key]:
-        """Keys of the units that are done."""
-        there = set(self.store.place.names(self.name))
-        return {key for key in self.grid if name_of(key) in there}
-
-    def missing(self) -> Iterator[Key]:
-        """Keys of the units that are not done, in order."""
-        done = self.done()
-        return (key for key in self.grid if key not in done)
-
     def work(self, key: Key) -> PointsWork:
         """Return all that a worker needs for a unit."""
-        product = self.store.product
-        chosen = self.chosen[self.grid.range(key)]
+        product, (some,) = self.store.product, self.grid.ranges(key)
+        chosen = self.chosen[some]
         motions, which = np.unique(self.brackets.motion[chosen], return_inverse=True)
         signs = np.array(product.signs)[self.brackets.polarity[chosen]]
-        setup = dataclasses.replace(product.setup(), blocks=product.blocks.select(self.brackets.block[chosen]))
-        now = np.array([self._now(int(motion)) for motion in motions])
+        measured = np.array([self._measured(int(motion)) for motion in motions])
         return PointsWork(
-            setup=setup,
+            setup=dataclasses.replace(product.setup(), blocks=product.blocks.select(self.brackets.block[chosen])),
             motions=tuple(product.motions[motion] for motion in motions),
             which=which,
-            factors=signs * (self.brackets.middle[chosen] / now[which]),  # to the last bit as of `Scales.factors`
+            factors=signs * (self.brackets.middle[chosen] / measured[which]),  # to the last bit as of `Scales.factors`
             unit=self.grid.unit,
             outcomes=self.grid.outcomes,
         )
 
-    def label(self, key: Key) -> str:
-        """Name a unit among those of all rounds."""
-        return f"{self.name}/{name_of(key)}"
-
-    def put(self, key: Key, data: bytes) -> None:
-        """Store a unit."""
-        self.store.place.put(self.label(key), data)
-
-    def raw(self, key: Key) -> bytes | None:
-        """Bytes of a unit; None where it is not done."""
-        return self.store.place.get(self.label(key))
-
-    def outcomes(self, key: Key) -> Mapping[str, Floats] | None:
-        """Outcomes of a unit by name, shape (points,) each; None where it is not done.
-
-        Raises
-        ------
-        StudyError
-            If it is damaged; the message names it.
-        """
-        data = self.raw(key)
-        return None if data is None else readable(data, self.grid, (self.grid.simulations(key),), self.label(key))
-
     def after(self) -> Brackets:
-        """Brackets after this round, whose units are done.
-
-        Raises
-        ------
-        StudyError
-            If one is damaged or gone.
-        """
-        verdicts = np.full((len(VERDICTS), len(self.chosen)), _UNKNOWN, dtype=np.int8)
+        """Brackets after this round, whose units are done."""
+        findings = np.full((len(VERDICTS), len(self.chosen)), Finding.UNKNOWN, dtype=np.int8)
         for key in self.grid:
-            outcomes = self.outcomes(key)
-            if outcomes is None:
-                raise StudyError(f"{self.store.place}: unit {self.label(key)} is gone: run the study again")
+            outcomes, (some,) = self.present(key), self.grid.ranges(key)
             for verdict in self.tolerances:
-                verdicts[VERDICTS.index(verdict), self.grid.range(key)] = _verdict(verdict, outcomes)
+                findings[VERDICTS.index(verdict), some] = _finding(verdict, outcomes)
         which = self.brackets.verdict[self.chosen]
-        return self.brackets.halved(self.chosen, verdicts[which, np.arange(len(which))])
+        return self.brackets.halved(self.chosen, findings[which, np.arange(len(which))])
 
 
 @dataclass(frozen=True)
@@ -286,11 +237,11 @@ class Refinement:
     def __str__(self) -> str:
         """Write it in a few words."""
         if self.complete:
-            return f"refined to {_told(self.tolerances)} in {counted(self.rounds - 1, 'round')}"
+            return f"refined to {_text(self.tolerances)} in {counted(self.rounds - 1, 'round')}"
         if not self.rounds:
-            return f"to be refined to {_told(self.tolerances)}"
+            return f"to be refined to {_text(self.tolerances)}"
         far = f"round {self.rounds}: {self.done} of {counted(self.simulations, 'simulation')} done"
-        return f"being refined to {_told(self.tolerances)}, {far}"
+        return f"being refined to {_text(self.tolerances)}, {far}"
 
 
 def refinement(store: Store) -> Refinement | None:
@@ -307,74 +258,53 @@ def refinement(store: Store) -> Refinement | None:
 
 
 def tolerances_of(product: Product, refine: float | Mapping[str, float], kept: Sequence[str]) -> Tolerances:
-    """Return tolerances by verdict, checked; a number alone is one for overturning.
-
-    Raises
-    ------
-    InvalidOption
-        If one is out of its range, there is no such verdict, there are no scales to refine between, or the outcomes
-        that are kept do not tell the verdict.
-    """
+    """Return tolerances by verdict, checked, also against what the study keeps; a number alone is for overturning."""
     given = refine if isinstance(refine, Mapping) else {"overturning": refine}
     others = [name for name in given if name not in VERDICTS]
     if others or not given:
         what = f"not {others[0]!r}" if others else "none of which is given"
-        raise InvalidOption(f"refine takes a number, or tolerances for {' and '.join(VERDICTS)}, {what}")
+        raise InvalidOption(f"{{}} takes a number, or tolerances for {' and '.join(VERDICTS)}, {what}", "refine")
     _require_order(product)
     names = [verdict for verdict in VERDICTS if verdict in given]
     for verdict in names:
-        require(kept, _NEEDED[verdict], f"a refinement of {_worded(verdict)}")
+        require(kept, _NEEDED[verdict], f"a refinement of {_name(verdict)}")
     return {verdict: checks.within(given[verdict], "refine", InvalidOption, 1e-12, 0.5) for verdict in names}
 
 
 def keep_plan(store: Store, tolerances: Tolerances) -> None:
-    """Store to which tolerances a study is refined.
-
-    Raises
-    ------
-    StudyError
-        If it is refined to others.
-    """
+    """Store to which tolerances a study is refined; a StudyError if it is refined to others."""
     before = kept_plan(store)
     if before is None:
         store.place.put(_PLAN, sealed(dict(tolerances)))
     elif before != tolerances:
         raise StudyError(
-            f"{store.place} holds a study refined to {_told(before)}, not to {_told(tolerances)}: create this one "
-            "elsewhere"
+            f"this holds a study refined to {_text(before)}, not to {_text(tolerances)}: create this one elsewhere",
+            path=str(store.place),
         )
 
 
 def kept_plan(store: Store) -> Tolerances | None:
-    """Tolerances to which a study is refined; None where it is not.
-
-    Raises
-    ------
-    StudyError
-        If what says so is damaged.
-    """
+    """Tolerances to which a study is refined; None where it is not, a StudyError if what says so is damaged."""
     data = store.place.get(_PLAN)
     if data is None:
         return None
     plan = unsealed(data)
     if plan is None:
-        raise StudyError(f"{_PLAN} in {store.place} is damaged: remove it, and create the study again from its inputs")
+        raise StudyError(
+            f"{_PLAN} is damaged: remove it, and create the study again from its inputs", path=str(store.place)
+        )
     return {verdict: plan[verdict] for verdict in VERDICTS if verdict in plan}
 
 
 def rounds(store: Store, tolerances: Tolerances) -> Iterator[Round]:
-    """Give the rounds that have begun, in order.
-
-    Raises
-    ------
-    StudyError
-        If one is damaged.
-    """
+    """Give the rounds that have begun, in order; a StudyError if one is damaged."""
     number = 1
     while (data := store.place.get(f"round.{number}/round.json")) is not None:
         about, archive = unsealed(data), store.place.get(f"round.{number}/brackets.npz")
         if about is None or archive is None or hashlib.sha256(archive).hexdigest() != about["brackets"]:
-            raise StudyError(f"round.{number} in {store.place} is damaged: remove the folders round.* and run it again")
+            raise StudyError(
+                f"round.{number} is damaged: remove the folders round.* and run the study again", path=str(store.place)
+            )
         yield Round(store, number, Brackets.from_bytes(archive), tolerances)
         number += 1
 
@@ -393,75 +323,51 @@ def next_round(store: Store, tolerances: Tolerances) -> Round:
 
 
 def _require_order(product: Product) -> None:
-    """Check that there are scales to refine between.
-
-    Raises
-    ------
-    InvalidOption
-        If there is one only, or they do not increase.
-    """
+    """Check that there are scales to refine between."""
     if product.scales.count < 2 or not np.all(np.diff(product.scales.values) > 0.0):
         raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
 
 
-def found_brackets(store: Store, verdict: Verdict) -> Brackets:
-    """Return the changes of a verdict in a study whose units are done; refined, where it is to be refined.
-
-    Raises
-    ------
-    StudyError
-        If units are missing or damaged.
-    InvalidOption
-        If the study has no two scales in increasing order.
-    """
-    missing = len(store.grid) - len(store.done())
-    if missing:
-        raise StudyError(f"units are missing, {missing} of {len(store.grid)}: run the study to its end first")
+def _found_brackets(store: Store, verdict: Verdict) -> Brackets:
+    """Return the changes of a verdict in a study whose units are done; refined, where it is to be refined."""
+    store.require_complete()
     tolerances = kept_plan(store)
     if tolerances is None or verdict not in tolerances:
         return grid_brackets(store, [verdict])
     begun = [*rounds(store, tolerances)]
     if not begun or not begun[-1].is_last:
-        raise StudyError(f"{store.place}: the study is not yet refined to {_told(tolerances)}: run it to its end first")
+        raise StudyError(
+            f"the study is not yet refined to {_text(tolerances)}: run it to its end first", path=str(store.place)
+        )
     return begun[-1].brackets.of(verdict)
 
 
 def grid_brackets(store: Store, of: Collection[str]) -> Brackets:
     """Find changes of verdicts between neighbouring scales of the grid, all of whose units are done."""
     _require_order(store.product)
-    verdicts = np.full((len(VERDICTS), *store.grid.shape), _UNKNOWN, dtype=np.int8)
+    findings = np.full((len(VERDICTS), *store.grid.shape), Finding.UNKNOWN, dtype=np.int8)
     for key in store.grid:
-        outcomes = store.outcomes(key)
-        if outcomes is None:
-            raise StudyError(f"{store.place}: unit {name_of(key)} is gone: run the study again")
+        outcomes = store.present(key)
         for verdict in of:
-            verdicts[VERDICTS.index(verdict), *store.grid.ranges(key)] = _verdict(verdict, outcomes)
-    here, above = verdicts[:, :, :-1], verdicts[:, :, 1:]
-    found = np.nonzero((here != above) & (here != _UNKNOWN) & (above != _UNKNOWN))
+            findings[VERDICTS.index(verdict)][store.grid.ranges(key)] = _finding(verdict, outcomes)
+    here, above = findings[:, :, :-1], findings[:, :, 1:]
+    found = np.nonzero((here != above) & (here != Finding.UNKNOWN) & (above != Finding.UNKNOWN))
     which, motion, scale, polarity, block = found
     order = np.lexsort((scale, block, polarity, motion, which))
     which, motion, scale, polarity, block = (index[order] for index in found)
     levels = store.product.scales.values
-    holds = above[which, motion, scale, polarity, block] == 1
+    holds = above[which, motion, scale, polarity, block] == Finding.YES
     known = np.ones(len(motion), dtype=bool)
     return Brackets(which, motion, polarity, block, levels[scale], levels[scale + 1], holds, known)
 
 
 def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
-    """Label the changes of a verdict in a study whose units are done.
-
-    Raises
-    ------
-    StudyError
-        If units are missing or damaged.
-    InvalidOption
-        If there is no such verdict, the study does not keep its outcomes, or has no two scales in increasing order.
-    """
+    """Label the changes of a verdict in a study whose units are done, as `Study.critical_scales`."""
     import xarray as xr
 
     checks.one_of(verdict, "verdict", InvalidOption, VERDICTS)
-    require(store.grid.outcomes, _NEEDED[verdict], f"a critical scale of {_worded(verdict)}")
-    brackets = found_brackets(store, verdict)
+    require(store.grid.outcomes, _NEEDED[verdict], f"a critical scale of {_name(verdict)}")
+    brackets = _found_brackets(store, verdict)
     above, meaning = _ABOVE[verdict]
     product = store.product
     whole = product.dataset({})
@@ -488,23 +394,21 @@ def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
     )
 
 
-def _verdict(verdict: str, outcomes: Mapping[str, Floats]) -> NDArray[np.int8]:
-    """Verdict on each simulation from its outcomes; what was given up or stopped has not overturned yet."""
-    cut = (outcomes["unfinished"] != 0.0) | (outcomes["stopped"] != 0.0)
+def _finding(verdict: str, outcomes: Mapping[str, Floats]) -> NDArray[np.int8]:
+    """Return the `Finding` of each simulation; what was given up or stopped has not overturned yet."""
+    unknown = (outcomes["unfinished"] != 0.0) | (outcomes["stopped"] != 0.0)
     if verdict == "overturning":
-        return _where_known(outcomes["overturned"] != 0.0, cut)
-    unproven = (cut & (outcomes["rests"] == 0.0)) | (outcomes["stalled"] != 0.0)
-    return _where_known(outcomes["complete_chattering"] != 0.0, unproven)
+        holds = outcomes["overturned"] != 0.0
+    else:
+        holds = outcomes["complete_chattering"] != 0.0
+        unknown = (unknown & (outcomes["rests"] == 0.0)) | (outcomes["stalled"] != 0.0)
+    return np.where(unknown, Finding.UNKNOWN, holds).astype(np.int8)
 
 
-def _where_known(holds: Flags, unknown: Flags) -> NDArray[np.int8]:
-    return np.where(unknown, _UNKNOWN, holds).astype(np.int8)
-
-
-def _told(tolerances: Tolerances) -> str:
+def _text(tolerances: Tolerances) -> str:
     """Write tolerances in a few words."""
-    return ", ".join(f"{tolerance:g} ({_worded(verdict)})" for verdict, tolerance in tolerances.items())
+    return ", ".join(f"{tolerance:g} ({_name(verdict)})" for verdict, tolerance in tolerances.items())
 
 
-def _worded(verdict: str) -> str:
+def _name(verdict: str) -> str:
     return verdict.replace("_", " ")

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Final, Literal
 
 from rocking import checks
 from rocking.analysis.fragility.fit import OVERTURNING
@@ -13,20 +14,36 @@ from rocking.analysis.fragility.result import Fragility
 from rocking.errors import InvalidOption, StudyError
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
-from rocking.studies.ratios import require_limits, require_ratios
-from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
+from rocking.studies.spectrum import (
+    FRACTILES,
+    StudySpectrum,
+    checked_fractiles,
+    require_limits,
+    require_ratios,
+    study_spectrum,
+)
 from rocking.studies.store import Store
 
 #: What a report may hold: each with a summary, a figure and a table.
-Made = Fragility | BlockFragilities | StudySpectrum
+ReportPart = Fragility | BlockFragilities | StudySpectrum
 
-Whose = Literal["each", "together"]
+_NAME: Final = "report.json"
 
-_NAME = "report.json"
+
+class _Plan(ABC):
+    """A part of a report that is wanted."""
+
+    @abstractmethod
+    def check(self, kept: Sequence[str]) -> None:
+        """Raise an InvalidOption unless these names of outcomes, which a study keeps, are enough for it."""
+
+    @abstractmethod
+    def make(self, store: Store, progress: bool | None) -> ReportPart:
+        """Make it of a complete study."""
 
 
 @dataclass(frozen=True)
-class FragilityPlan:
+class FragilityPlan(_Plan):
     """Fragility curves that are wanted.
 
     Attributes
@@ -50,38 +67,35 @@ class FragilityPlan:
     period: float | None = None
     damping: float = 0.05
     limits: Mapping[str, float] = field(default_factory=lambda: dict(OVERTURNING))
-    blocks: Whose = "each"
+    blocks: Literal["each", "together"] = "each"
     confidence: float = 0.9
 
     def __post_init__(self) -> None:
         Measure(self.measure, self.period, self.damping)
         checks.share(self.confidence, "confidence", InvalidOption)
-        if self.blocks not in get_args(Whose):
-            raise InvalidOption(f"blocks must be one of {', '.join(get_args(Whose))}, not {self.blocks!r}")
-        if not isinstance(self.limits, Mapping) or not self.limits:
-            raise InvalidOption("limits must name limit states, as { overturning = inf, half = 0.5 }")
-        for name, limit in self.limits.items():
+        checks.one_of(self.blocks, "blocks", InvalidOption, ["each", "together"])
+        for name, limit in checks.mapping(self.limits, "limits", InvalidOption, '{"overturning": inf}').items():
             if not (isinstance(limit, (int, float)) and limit >= 0.0):
-                raise InvalidOption(f"limits.{name} must be a rotation over slenderness or inf, not {limit!r}")
+                raise InvalidOption(
+                    f"{{}}.{name} must be a rotation over slenderness or inf, not {checks.shown(limit)}",
+                    "limits",
+                    value=limit,
+                )
 
     def check(self, kept: Sequence[str]) -> None:
-        """Check that the outcomes that a study keeps are enough.
-
-        Parameters
-        ----------
-        kept : sequence of str
-            Names of the outcomes.
-
-        Raises
-        ------
-        InvalidOption
-            If they are not; the message says what is missing.
-        """
+        """Raise an InvalidOption unless these outcomes tell whether the limits are passed."""
         require_limits(kept, self.limits)
+
+    def make(self, store: Store, progress: bool | None) -> Fragility | BlockFragilities:
+        """Fit the curves to a complete study."""
+        measure = Measure(self.measure, self.period, self.damping)
+        if self.blocks == "together":
+            return pooled_fragility(store, measure, self.limits, self.confidence)
+        return block_fragilities(store, measure, self.limits, self.confidence, progress)
 
 
 @dataclass(frozen=True)
-class SpectrumPlan:
+class SpectrumPlan(_Plan):
     """Fractiles that are wanted.
 
     Attributes
@@ -98,76 +112,57 @@ class SpectrumPlan:
     fractiles: Sequence[float] = FRACTILES
 
     def __post_init__(self) -> None:
-        for value in checks.numbers(self.fractiles, "fractiles", InvalidOption).ravel():
-            checks.share(float(value), "each of fractiles", InvalidOption)
+        checked_fractiles(self.fractiles)
 
     def check(self, kept: Sequence[str]) -> None:
-        """Check that the outcomes that a study keeps are enough.
-
-        Parameters
-        ----------
-        kept : sequence of str
-            Names of the outcomes.
-
-        Raises
-        ------
-        InvalidOption
-            If they are not; the message says what is missing.
-        """
+        """Raise an InvalidOption unless these outcomes tell peak rotations."""
         require_ratios(kept, "a spectrum")
+
+    def make(self, store: Store, progress: bool | None) -> StudySpectrum:
+        """Read the spectrum of a complete study."""
+        return study_spectrum(store, self.fractiles, progress)
+
+
+#: Plans by the names of the parts of a report.
+PLANS: Final[Mapping[str, type[FragilityPlan | SpectrumPlan]]] = {"fragility": FragilityPlan, "spectrum": SpectrumPlan}
 
 
 @dataclass(frozen=True)
 class ReportPlan:
-    """All that is wanted."""
+    """All that is wanted.
+
+    Attributes
+    ----------
+    fragility : FragilityPlan or None
+        Fragility curves.
+    spectrum : SpectrumPlan or None
+        Fractiles of the peak rotation.
+    """
 
     fragility: FragilityPlan | None = None
     spectrum: SpectrumPlan | None = None
 
+    def make(self, store: Store, progress: bool | None) -> dict[str, ReportPart]:
+        """Make all that is wanted of a complete study, by name."""
+        plans: dict[str, _Plan | None] = {name: getattr(self, name) for name in PLANS}
+        return {name: plan.make(store, progress) for name, plan in plans.items() if plan is not None}
 
-def keep(store: Store, plan: ReportPlan) -> None:
+
+def keep_report(store: Store, plan: ReportPlan) -> None:
     """Store what is wanted beside the study, in place of what was."""
     data = json.dumps(asdict(plan), indent=2).encode()
     if store.place.get(_NAME) != data:
         store.place.put(_NAME, data)
 
 
-def is_kept(store: Store) -> bool:
-    """Whether anything is wanted of the results."""
-    return store.place.get(_NAME) is not None
-
-
-def kept(store: Store) -> ReportPlan:
-    """Read what is wanted.
-
-    Raises
-    ------
-    StudyError
-        If nothing is, or it is damaged.
-    """
+def kept_report(store: Store) -> ReportPlan | None:
+    """Read what is wanted; None if nothing is, a StudyError if it is damaged."""
     data = store.place.get(_NAME)
     if data is None:
-        raise StudyError(
-            f"{store.place}: the study says nothing of a report: add [report.fragility] to its file and create it again"
-        )
+        return None
     try:
-        told: dict[str, Any] = json.loads(data)
-        kinds = {"fragility": FragilityPlan, "spectrum": SpectrumPlan}
-        return ReportPlan(**{name: kinds[name](**words) for name, words in told.items() if words is not None})
-    except (ValueError, TypeError, KeyError, InvalidOption) as error:
+        given = {name: words for name, words in json.loads(data).items() if words is not None}
+        plans: dict[str, Any] = {name: PLANS[name](**words) for name, words in given.items()}
+        return ReportPlan(**plans)
+    except (ValueError, TypeError, KeyError, AttributeError, InvalidOption) as error:
         raise StudyError(f"{_NAME} is damaged ({error}): create the study again from its file") from None
-
-
-def report(store: Store, plan: ReportPlan, progress: bool | None = None) -> dict[str, Made]:
-    """Make all that is wanted, by name."""
-    made: dict[str, Made] = {}
-    if plan.fragility is not None:
-        wanted = plan.fragility
-        measure = Measure(wanted.measure, wanted.period, wanted.damping)
-        if wanted.blocks == "together":
-            made["fragility"] = pooled_fragility(store, measure, wanted.limits, wanted.confidence)
-        else:
-            made["fragility"] = block_fragilities(store, measure, wanted.limits, wanted.confidence, progress)
-    if plan.spectrum is not None:
-        made["spectrum"] = study_spectrum(store, plan.spectrum.fractiles)
-    return made

@@ -8,49 +8,41 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
 from dataclasses import dataclass
 from types import FrameType
-from typing import Final, Protocol
+from typing import Any, Final
 
 from rocking.compiling import SIMULATIONS, announce
+from rocking.engine import cores
+from rocking.errors import RockingError, StudyError
 from rocking.progress import Progress
-from rocking.studies.units import Grid, Key, Line, PointsWork, Work
-from rocking.studies.workers import LOST, Workers, sentence, workers_of
+from rocking.studies.store import UnitArray
+from rocking.studies.units import Key, Work, compute
 from rocking.tables import counted
+
+#: Errors of a unit whose worker went away, or that was lost with it; every other one is the unit's own.
+_LOST: Final = (CancelledError, BrokenExecutor, OSError, EOFError)
+
+#: How often a cluster is asked how many workers it has, s.
+_RECOUNT: Final = 1.0
 
 #: Units that are handed out for each worker: one that it computes, and the next.
 _AHEAD: Final = 2
 
 #: How often a unit is handed out again whose worker died.
-_AGAIN: Final = 3
+_RETRIES: Final = 3
 
 #: How often the workers are asked whether they still live, s.
-_PULSE: Final = 0.5
-
-
-class Job(Protocol):
-    """Units to compute: those of a study's grid, or of a round of its refinement."""
-
-    @property
-    def title(self) -> str:
-        """What is counted while it runs, in a few words."""
-
-    @property
-    def grid(self) -> Grid | Line:
-        """How the simulations are cut into units."""
-
-    def missing(self) -> Iterator[Key]:
-        """Keys of the units that are not done, in order."""
-
-    def work(self, key: Key) -> Work | PointsWork:
-        """Return all that a worker needs for a unit."""
-
-    def put(self, key: Key, data: bytes) -> None:
-        """Store a unit."""
-
-    def label(self, key: Key) -> str:
-        """Name a unit."""
+_POLL: Final = 0.5
 
 
 @dataclass(frozen=True)
@@ -124,7 +116,7 @@ class Stop:
 
 
 def run(
-    job: Job,
+    job: UnitArray,
     *,
     stop: Stop,
     threads: int | None,
@@ -132,23 +124,10 @@ def run(
     progress: bool | None,
     failing: Callable[[str, str], None],
 ) -> RunReport:
-    """Compute all units that are not done; in threads, or by any executor.
+    """Compute all units that are not done, in threads or by any executor, until `stop` is asked to.
 
-    Parameters
-    ----------
-    job : Job
-        The units.
-    stop : Stop
-        Who is asked whether to stop.
-    threads, executor, progress
-        As for `Study.run`.
-    failing : callable
-        Told the name of each unit that cannot be computed, and why, as it happens.
-
-    Raises
-    ------
-    StudyError
-        If the workers are gone.
+    `failing` gets the name of each unit that cannot be computed, and why, as it happens. A StudyError is raised if the
+    workers are gone.
     """
     announce(SIMULATIONS)
     start = time.monotonic()
@@ -176,7 +155,7 @@ def run(
 
 
 def _results(
-    job: Job, keys: Iterator[Key], workers: Workers, stop: Stop
+    job: UnitArray, keys: Iterator[Key], workers: Workers, stop: Stop
 ) -> Generator[tuple[Key, bytes | str], None, None]:
     """Give the bytes of every unit as they come, or a sentence where it failed."""
     pending: dict[Future[bytes], Key] = {}
@@ -193,17 +172,17 @@ def _results(
                 submit(key)
             if not pending:
                 return
-            finished = wait(pending, timeout=_PULSE, return_when=FIRST_COMPLETED).done
+            finished = wait(pending, timeout=_POLL, return_when=FIRST_COMPLETED).done
             workers.check()
             for future in finished:
                 key = pending.pop(future)
                 outcome = _outcome(future)
                 if isinstance(outcome, BaseException):
                     workers.check(outcome)
-                    if tries[key] <= _AGAIN:
+                    if tries[key] <= _RETRIES:
                         submit(key)
                         continue
-                    outcome = f"its worker died {tries[key]} times: {sentence(outcome)}"
+                    outcome = f"its worker died {tries[key]} times: {_reason(outcome)}"
                 yield key, outcome
     finally:
         for future in pending:
@@ -214,7 +193,73 @@ def _outcome(future: Future[bytes]) -> bytes | str | BaseException:
     """Bytes of a unit, why it cannot be computed, or with which error its worker went away."""
     try:
         return future.result()
-    except LOST as error:
+    except _LOST as error:
         return error
     except Exception as error:
-        return sentence(error)
+        return _reason(error)
+
+
+class Workers:
+    """An executor, as far as a run needs to know it; that of dask.distributed knows its workers, and whether it lives.
+
+    `stop` is what threads look at to stop in the middle of a unit.
+    """
+
+    def __init__(self, pool: Executor, stop: threading.Event | None = None) -> None:
+        self._pool, self._stop = pool, stop
+        self._client: Any = getattr(pool, "_client", None)
+        self._count, self._counted = 0, -_RECOUNT
+
+    @property
+    def count(self) -> int:
+        """How many units can be computed at a time, now; 0 of a cluster that has no worker yet."""
+        if self._client is None:
+            return getattr(self._pool, "_max_workers", None) or cores()
+        now = time.monotonic()
+        if now - self._counted >= _RECOUNT:
+            try:
+                self._count, self._counted = sum(self._client.nthreads().values()), now
+            except Exception as error:  # a client that loses its scheduler raises what its sockets raise
+                raise _gone(error) from error
+        return self._count
+
+    def submit(self, work: Work) -> Future[bytes]:
+        """Hand a unit to a worker, with all that it needs."""
+        try:
+            return self._pool.submit(compute, work, *([] if self._stop is None else [self._stop]))
+        except RuntimeError as error:
+            raise _gone(error) from error
+
+    def check(self, error: BaseException | None = None) -> None:
+        """Raise a StudyError if the executor knows that it is broken."""
+        broken: Any = getattr(self._pool, "_broken", False)
+        if (self._client is not None and self._client.status != "running") or broken:
+            raise _gone(broken or ("no connection to the scheduler" if self._client is not None else error))
+
+
+@contextlib.contextmanager
+def workers_of(executor: Executor | None, threads: int | None) -> Iterator[Workers]:
+    """Workers of an executor, or threads, which stop in the middle of their units when this is left by an error."""
+    if executor is not None:
+        yield Workers(executor)
+        return
+    stop = threading.Event()
+    with ThreadPoolExecutor(threads or cores()) as pool:
+        try:
+            yield Workers(pool, stop)
+        except BaseException:
+            stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _reason(error: BaseException) -> str:
+    """Say in one line why a unit was not computed."""
+    if type(error).__name__ == "KilledWorker":  # dask.distributed has handed it out again itself
+        return f"its worker died {getattr(error, 'allowed_failures', 0) + 1} times"
+    text = " ".join(str(error).split())
+    return text if isinstance(error, RockingError) else f"{type(error).__name__}: {text}".removesuffix(": ")
+
+
+def _gone(why: object) -> StudyError:
+    return StudyError(f"the workers are gone: {why}; what was computed is kept, run the study again")

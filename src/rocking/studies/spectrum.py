@@ -1,8 +1,9 @@
-"""Peak rotations of a study, by block and scale: fractiles over the motions, and the share that overturns."""
+"""Peak rotations of a study, read a range of blocks at a time: all that its post-processing needs; their fractiles."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
@@ -10,13 +11,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking import checks
+from rocking.analysis.fragility.curve import checked_limit
 from rocking.analysis.spectrum import fractiles_of
+from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption
+from rocking.engine import require_finished
+from rocking.errors import InvalidOption, StudyError
 from rocking.product import block_coordinates
+from rocking.progress import Progress
 from rocking.result import Result, table_of_some
-from rocking.studies.fragility import plane_of
-from rocking.studies.ratios import peak_ratios, require_ratios
+from rocking.studies.inputs import require
 from rocking.studies.store import Store
 from rocking.tables import counted
 
@@ -25,25 +29,116 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: Simulations that are held in memory at a time.
+_HELD: Final = 4_000_000
+
 #: Scales that a table or a figure shows.
 _SCALES: Final = 4
 
 FRACTILES: Final = (0.16, 0.5, 0.84)
 
 
-def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES) -> StudySpectrum:
+def require_ratios(kept: Sequence[str], what: str, *arguments: str) -> None:
+    """Check that peak rotations over slenderness follow from the outcomes that are kept."""
+    require(kept, ["overturned", "peak_rotation"], what, *arguments)
+
+
+def require_limits(kept: Sequence[str], limits: Mapping[str, float]) -> None:
+    """Check that it follows from these outcomes whether limits are passed: overturning needs no peak rotation."""
+    finite = [name for name, limit in limits.items() if math.isfinite(checked_limit(limit, name))]
+    if finite:
+        require_ratios(kept, f"{{}}.{finite[0]}", "limits")
+    else:
+        require(kept, ["overturned"], "a fragility")
+
+
+def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
+    """Peak rotation over the slenderness, infinite where a block overturned, for a range of blocks after the other.
+
+    Of blocks that stand it is NaN where the study keeps no peak rotation: whoever needs it asks `require_ratios` first.
+
+    Yields
+    ------
+    blocks : slice
+        Which blocks.
+    ratios : ndarray, shape (motions, scales, polarities, blocks of the range)
+        Over the smaller one of two slendernesses; of symmetric blocks under motions in both polarities only the first,
+        since the second is no other outcome.
+
+    Raises
+    ------
+    StudyError
+        If units are missing or damaged, or the study's duration stopped simulations before their end.
+    Unfinished
+        If simulations were given up, so that their verdicts are not known.
+    """
+    store.require_complete()
+    motions, scales, polarities, _ = store.grid.shape
+    shape = motions, scales, 1 if store.product.blocks.is_symmetric else polarities
+    width = max(1, _HELD // math.prod(shape))
+    for unit in range(store.grid.cells[-1]):
+        *_, whole = store.grid.ranges((0, 0, 0, unit))
+        for start in range(whole.start, whole.stop, width):
+            blocks = slice(start, min(start + width, whole.stop))
+            yield blocks, _read(store, shape, unit, blocks)
+
+
+def _read(store: Store, shape: tuple[int, int, int], unit: int, blocks: slice) -> Floats:
+    alpha = store.product.blocks.select(blocks).alpha.min(axis=1)
+    ratios = np.empty((*shape, len(alpha)))
+    for cell in np.ndindex(store.grid.cells[:3]):
+        key = *cell, unit
+        motions, scales, polarities, whole = store.grid.ranges(key)
+        some = slice(blocks.start - whole.start, blocks.stop - whole.start)
+        outcomes = {name: values[..., some] for name, values in store.present(key).items()}
+        require_finished(outcomes["unfinished"].astype(bool))
+        stopped = int(np.count_nonzero(outcomes["stopped"]))
+        if stopped:
+            raise StudyError(
+                f"{stopped} of {outcomes['stopped'].size} simulations of a unit were stopped by the study's duration, "
+                "while the block moved or the motion went on, so that their verdicts are not known: make the study "
+                "without a duration"
+            )
+        there = ratios[motions, scales, polarities]
+        found = np.where(outcomes["overturned"] != 0.0, np.inf, outcomes.get("peak_rotation", np.nan) / alpha)
+        there[...] = found[:, :, : there.shape[2]]
+    return ratios
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BlocksResult(Result):
+    """Result of a study that has a dimension ``block``, whose parameters are coordinates."""
+
+    @property
+    def block_parameters(self) -> dict[str, Floats]:
+        """Parameters of the blocks by name, SI units: those that tables list."""
+        return {str(name): one.values for name, one in self.data.coords.items() if one.dims == ("block",)}
+
+    def _plane(self) -> tuple[Floats, Floats]:
+        """Frequency parameters (rad/s) and slendernesses (rad) of the blocks: means of unequal sides."""
+        parameters = self.block_parameters
+        p, alpha = (
+            np.mean([parameters[one] for one in (name, f"{name}_plus", f"{name}_minus") if one in parameters], axis=0)
+            for name in ("p", "alpha")
+        )
+        return p, alpha
+
+
+def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progress: bool | None = None) -> StudySpectrum:
     """Fractiles over motions and polarities of peak rotation over slenderness, for each scale and block."""
     import xarray as xr
 
     require_ratios(store.grid.outcomes, "a spectrum")
-    shares = np.array([checks.share(value, "each of fractiles", InvalidOption) for value in fractiles])
-    product, count = store.product, store.grid.shape[3]
+    shares = checked_fractiles(fractiles)
+    product, count = store.product, len(store.product.blocks)
     values = np.empty((len(shares), product.scales.count, count))
     overturned = np.empty((product.scales.count, count))
-    for blocks, ratios in peak_ratios(store):
-        pooled = ratios.swapaxes(1, 2).reshape(-1, product.scales.count, ratios.shape[3])
-        values[:, :, blocks] = fractiles_of(pooled, shares)
-        overturned[:, blocks] = np.isinf(pooled).mean(axis=0)
+    with Progress("reading", count, show=progress) as bar:
+        for blocks, ratios in peak_ratios(store):
+            pooled = ratios.swapaxes(1, 2).reshape(-1, product.scales.count, ratios.shape[3])
+            values[:, :, blocks] = fractiles_of(pooled, shares)
+            overturned[:, blocks] = np.isinf(pooled).mean(axis=0)
+            bar.advance(blocks.stop - blocks.start)
     about = {name: product.scales.about[name] for name in ("measure", "units")}
     words = "peak rotation over the slenderness, infinite where that share overturns"
     return StudySpectrum(
@@ -62,8 +157,19 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES) -> Stud
     )
 
 
+def checked_fractiles(fractiles: Sequence[float]) -> Floats:
+    """Return shares between 0 and 1, checked."""
+    shares = checks.numbers(fractiles, "fractiles", InvalidOption).ravel()
+    for value in shares:
+        if not 0.0 < value < 1.0:
+            raise InvalidOption(
+                f"each of {{}} must be a number between 0 and 1, not {value:g}", "fractiles", value=value
+            )
+    return shares
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class StudySpectrum(Result):
+class StudySpectrum(BlocksResult):
     """Peak rotations of every block at every scale; from `Study.spectrum`.
 
     Attributes
@@ -78,13 +184,12 @@ class StudySpectrum(Result):
     def summary(self) -> str:
         """Medians (or the fractile next to it) of some blocks at up to four scales."""
         data, one = self.data, self._fractile(0.5)
-        names = [str(name) for name in data.coords if data[name].dims == ("block",)]
-        chosen = self._some_scales()
-        header = ["block", *names, *(self._scale_name(i) for i in chosen)]
+        parameters, chosen = self.block_parameters, self._some_scales()
+        header = ["block", *parameters, *(self._scale_name(i) for i in chosen)]
         rows = [
             [
                 j,
-                *(float(data[name].values[j]) for name in names),
+                *(float(values[j]) for values in parameters.values()),
                 *("overturns" if np.isinf(value) else float(value) for value in one.values[chosen, j]),
             ]
             for j in range(data.sizes["block"])
@@ -99,7 +204,7 @@ class StudySpectrum(Result):
             **data.attrs,
             "measure": data.scale.attrs["measure"],
             "scale": data.scale.values,
-            "blocks": {str(name): data[name].values for name in data.coords if data[name].dims == ("block",)},
+            "blocks": self.block_parameters,
             "fractile": data.fractile.values,
             "fractile_over_alpha": data.fractile_over_alpha.values,
             "overturned_share": data.overturned_share.values,
@@ -135,7 +240,7 @@ class StudySpectrum(Result):
 
         one = self._fractile(fractile)
         return blocks_figure(
-            *plane_of(self.data),
+            *self._plane(),
             panels={self._scale_name(i): one.values[i] for i in self._some_scales()},
             value_label=f"{100 * float(one.fractile):g} % fractile of peak rotation over slenderness",
             missing_label="so many motions overturn the block that there is none",

@@ -1,4 +1,4 @@
-"""Units of a study: one cell of a regular grid each, what it computes, and its bytes in the store."""
+"""Units of a study: one cell of a regular grid each, how large it is, what it computes, and its bytes in the store."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import math
 import re
 import socket
 import threading
+import time
 import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -18,12 +20,24 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking import checks
 from rocking.arrays import Floats, Integers
+from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import VERSION
-from rocking.engine import OUTCOME, Setup, Task, simulate_task
-from rocking.errors import StudyError
+from rocking.engine import Setup, Task, simulate_task
+from rocking.errors import InvalidOption, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
+from rocking.product import Product, Scales
+from rocking.studies.inputs import OUTCOMES
+
+#: Units are multiples of so many blocks, which the engine takes through a motion together.
+_GROUP: Final = 512
+
+#: How long a unit should take, s; how many units there should be at least, and simulations in one at most.
+_SECONDS: Final = 5.0
+_FEWEST: Final = 32
+LARGEST: Final = 1 << 18
 
 #: Checked, but not packed: packing would save two thirds of the bytes, and take 3 % of the time of the simulations.
 _LEVEL: Final = 0
@@ -34,10 +48,10 @@ _CACHED: Final = 4096
 #: What gzip writes first: no name, no time, an unknown system. Any other byte there is damage.
 _HEADER: Final = gzip.compress(b"", _LEVEL, mtime=0)[:10]
 
-_NAME: Final = re.compile(r"c\.0\.(\d+)\.(\d+)\.(\d+)\.(\d+)", re.ASCII)
+_NAME: Final = re.compile(r"c\.0((?:\.\d+)+)", re.ASCII)
 
-#: Four numbers, along motions, scales, polarities and blocks.
-Axes = tuple[int, int, int, int]
+#: Names of the axes of an array of units by their number: of a grid, and of simulations that are none.
+_DIMENSIONS: Final = {4: ("motion", "scale", "polarity", "block"), 1: ("point",)}
 
 #: Indices of a unit along the axes of its array.
 Key = tuple[int, ...]
@@ -48,28 +62,27 @@ class DamagedUnit(Exception):
 
 
 @dataclass(frozen=True)
-class Grid:
-    """How the simulations are cut into units.
+class UnitGrid:
+    """How simulations are cut into units.
 
     Attributes
     ----------
-    shape : (m, s, k, n)
-        Numbers of motions, scales, polarities and blocks.
-    unit : (um, us, uk, un)
-        How many of each a unit holds; the last one along an axis may hold fewer.
+    shape : tuple of int
+        Numbers of motions, scales, polarities and blocks; or, where the simulations are no grid, their number alone.
+    unit : tuple of int
+        How many a unit holds along each axis; the last one along an axis may hold fewer.
     outcomes : tuple of str
         What is kept of each simulation, in the order in which the array holds it.
     """
 
-    shape: Axes
-    unit: Axes
+    shape: tuple[int, ...]
+    unit: tuple[int, ...]
     outcomes: tuple[str, ...]
 
-    @property
-    def cells(self) -> Axes:
-        """Numbers of units along motions, scales, polarities and blocks."""
-        m, s, k, n = (math.ceil(size / part) for size, part in zip(self.shape, self.unit, strict=True))
-        return m, s, k, n
+    @functools.cached_property
+    def cells(self) -> tuple[int, ...]:
+        """Numbers of units along the axes."""
+        return tuple(math.ceil(size / part) for size, part in zip(self.shape, self.unit, strict=True))
 
     def __len__(self) -> int:
         return math.prod(self.cells)
@@ -80,96 +93,44 @@ class Grid:
         return math.prod(self.shape)
 
     def __iter__(self) -> Iterator[Key]:
-        """Give the keys of all units, blocks first."""
-        m, s, k, b = self.cells
-        return itertools.product(range(m), range(s), range(k), range(b))
+        """Give the keys of all units, the last axis first."""
+        return itertools.product(*map(range, self.cells))
 
-    def ranges(self, key: Key) -> tuple[slice, slice, slice, slice]:
-        """Motions, scales, polarities and blocks of a unit."""
+    def __contains__(self, key: Key | None) -> bool:
+        return key is not None and len(key) == len(self.cells) and all(map(int.__lt__, key, self.cells))
+
+    def ranges(self, key: Key) -> tuple[slice, ...]:
+        """Range of a unit along each axis."""
         starts = (index * part for index, part in zip(key, self.unit, strict=True))
         ends = zip(starts, self.unit, self.shape, strict=True)
-        m, s, k, n = (slice(start, min(start + part, size)) for start, part, size in ends)
-        return m, s, k, n
+        return tuple(slice(start, min(start + part, size)) for start, part, size in ends)
 
-    def counts(self, key: Key) -> Axes:
-        """Numbers of motions, scales, polarities and blocks of a unit."""
-        m, s, k, n = (part.stop - part.start for part in self.ranges(key))
-        return m, s, k, n
+    def counts(self, key: Key) -> tuple[int, ...]:
+        """Size of a unit along each axis."""
+        return tuple(part.stop - part.start for part in self.ranges(key))
 
     def simulations(self, key: Key) -> int:
         """Count the simulations of a unit."""
         return math.prod(self.counts(key))
 
-    def metadata(self) -> str:
+    def metadata(self) -> bytes:
         """Metadata of the array as Zarr 3 has it: one chunk a unit, in flat keys."""
-        return _metadata(self.outcomes, self.shape, self.unit, ("motion", "scale", "polarity", "block"))
-
-
-@dataclass(frozen=True)
-class Line:
-    """How simulations without a grid are cut into units.
-
-    Attributes
-    ----------
-    total : int
-        Number of simulations in all units.
-    width : int
-        How many a unit holds; the last one may hold fewer.
-    outcomes : tuple of str
-        What is kept of each simulation, in the order in which the array holds it.
-    """
-
-    total: int
-    width: int
-    outcomes: tuple[str, ...]
-
-    @property
-    def unit(self) -> tuple[int]:
-        """Shape of a unit."""
-        return (self.width,)
-
-    def __iter__(self) -> Iterator[Key]:
-        """Give the keys of all units."""
-        return ((k,) for k in range(math.ceil(self.total / self.width)))
-
-    def range(self, key: Key) -> slice:
-        """Range of the simulations of a unit."""
-        start = key[0] * self.width
-        return slice(start, min(start + self.width, self.total))
-
-    def simulations(self, key: Key) -> int:
-        """Count the simulations of a unit."""
-        return min(self.width, self.total - key[0] * self.width)
-
-    def metadata(self) -> str:
-        """Metadata of the array as Zarr 3 has it."""
-        return _metadata(self.outcomes, (self.total,), self.unit, ("point",))
-
-
-def _metadata(
-    outcomes: tuple[str, ...], shape: tuple[int, ...], unit: tuple[int, ...], dimensions: tuple[str, ...]
-) -> str:
-    return json.dumps(
-        {
+        about = {
             "zarr_format": 3,
             "node_type": "array",
-            "shape": [len(outcomes), *shape],
+            "shape": [len(self.outcomes), *self.shape],
             "data_type": "float64",
-            "chunk_grid": {
-                "name": "regular",
-                "configuration": {"chunk_shape": [len(outcomes), *unit]},
-            },
+            "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [len(self.outcomes), *self.unit]}},
             "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
             "fill_value": "NaN",
             "codecs": [
                 {"name": "bytes", "configuration": {"endian": "little"}},
                 {"name": "gzip", "configuration": {"level": _LEVEL}},
             ],
-            "dimension_names": ["outcome", *dimensions],
-            "attributes": {"outcomes": list(outcomes)},
-        },
-        indent=2,
-    )
+            "dimension_names": ["outcome", *_DIMENSIONS[len(self.shape)]],
+            "attributes": {"outcomes": list(self.outcomes)},
+        }
+        return json.dumps(about, indent=2).encode()
 
 
 def name_of(key: Key) -> str:
@@ -177,13 +138,44 @@ def name_of(key: Key) -> str:
     return "c.0." + ".".join(map(str, key))
 
 
-def key_of(name: str) -> Axes | None:
-    """Key of a unit of a grid from the name of its object; None of any other object."""
+def key_of(name: str) -> Key | None:
+    """Key of a unit from the name of its object; None of any other object."""
     found = _NAME.fullmatch(name)
-    if found is None:
-        return None
-    m, s, k, b = map(int, found.groups())
-    return m, s, k, b
+    return None if found is None else tuple(map(int, found[1][1:].split(".")))
+
+
+def width_of(unit_blocks: int) -> int:
+    """Return the number of blocks of a unit, checked."""
+    width = checks.whole(unit_blocks, "unit_blocks", InvalidOption, least=_GROUP)
+    if width % _GROUP:
+        raise InvalidOption(f"{{}} must be a multiple of {_GROUP}, not {width}", "unit_blocks", value=unit_blocks)
+    return width
+
+
+def fitting_unit(product: Product) -> tuple[int, int, int, int]:
+    """Units that take about five seconds, or less where there would be too few of them, or too many simulations in one.
+
+    How long one simulation takes is measured with a group of blocks spread over all, under the longest motion.
+    """
+    motions, scales, polarities, count = product.shape
+    some = product.blocks.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
+    motion = max(product.motions, key=lambda one: len(one.coefficients))
+    factors = np.array([[[product.scales.factors(motion).max()]]])
+    announce(SIMULATIONS)
+    setup = Product(some, (motion,), Scales(), "+", product.model, product.treatment, product.duration).setup()
+    work = GridWork(setup=setup, motions=(motion,), factors=factors, unit=(1, 1, 1, len(some)), outcomes=OUTCOMES)
+    compute(work)  # compiles
+    start = time.perf_counter()
+    compute(work)
+    each = (time.perf_counter() - start) / len(some)
+    most = min(_SECONDS / each, math.prod(product.shape) / _FEWEST, LARGEST)
+    width = min(_GROUP * max(1, int(most) // _GROUP), count)
+    left = most / width
+    held = []
+    for size in (scales, polarities, motions):
+        held.append(max(1, min(size, int(left))))
+        left /= held[-1]
+    return held[2], held[0], held[1], width
 
 
 @functools.cache
@@ -192,8 +184,8 @@ def program() -> str:
     return f"rocking {VERSION} (kernels {fingerprint()})"
 
 
-@dataclass(frozen=True)
-class Work:
+@dataclass(frozen=True, kw_only=True)
+class Work(ABC):
     """All that a worker needs for a unit.
 
     Attributes
@@ -202,10 +194,10 @@ class Work:
         The unit's blocks, and how to compute.
     motions : tuple of Motion
         What shakes them.
-    factors : ndarray, shape (motions, scales, polarities)
+    factors : ndarray
         Factors on the motions.
-    unit : (um, us, uk, un)
-        What a full unit holds.
+    unit : tuple of int
+        What a full unit holds along each axis.
     outcomes : tuple of str
         What is kept of each simulation.
     program : str
@@ -215,81 +207,79 @@ class Work:
     setup: Setup
     motions: tuple[Motion, ...]
     factors: Floats
-    unit: Axes
+    unit: tuple[int, ...]
     outcomes: tuple[str, ...]
     program: str = field(default_factory=program)
 
+    @property
+    @abstractmethod
+    def counts(self) -> tuple[int, ...]:
+        """What this unit holds along each axis."""
+
+    @abstractmethod
+    def parts(self) -> Iterator[tuple[tuple[Any, ...], Task]]:
+        """Give each task, and where its outcomes belong in the array of the unit."""
+
     def values(self, stop: threading.Event | None) -> Floats:
-        """Simulate, and return the outcomes."""
-        blocks = slice(0, len(self.setup.blocks))
-        values = blank(self.outcomes, self.unit, (*self.factors.shape, blocks.stop))
-        for m, s, k in np.ndindex(self.factors.shape):
-            task = Task(blocks, self.motions[m], float(self.factors[m, s, k]))
-            fill(values[:, m, s, k, blocks], self.outcomes, simulate_task(self.setup, task, stop))
+        """Simulate, and return the outcomes: NaN where the unit holds fewer simulations than a full one."""
+        shape = len(self.outcomes), *self.unit
+        values = np.empty(shape) if self.unit == self.counts else np.full(shape, np.nan)
+        for where, task in self.parts():
+            _fill(values[:, *where], self.outcomes, simulate_task(self.setup, task, stop))
         return values
 
 
-@dataclass(frozen=True)
-class PointsWork:
-    """All that a worker needs for a unit of simulations that are no grid: a block, a motion and a factor each.
+class GridWork(Work):
+    """A cell of the grid: `factors` are of shape (motions, scales, polarities)."""
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Numbers of motions, scales, polarities and blocks."""
+        return *self.factors.shape, len(self.setup.blocks)
+
+    def parts(self) -> Iterator[tuple[tuple[Any, ...], Task]]:
+        """Give a task for each motion, scale and polarity, of all blocks."""
+        blocks = slice(0, len(self.setup.blocks))
+        for m, s, k in np.ndindex(self.factors.shape):
+            yield (m, s, k, blocks), Task(blocks, self.motions[m], float(self.factors[m, s, k]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointsWork(Work):
+    """Simulations that are no grid: n blocks of `setup` and as many factors; equal ones of a motion stand together.
 
     Attributes
     ----------
-    setup : Setup
-        n blocks, one for each simulation, and how to compute.
-    motions : tuple of Motion
-        What shakes them.
     which : ndarray of int, shape (n,)
-        Which motion.
-    factors : ndarray, shape (n,)
-        Factors on it; those with the same motion and factor stand together.
-    unit : (int,)
-        How many a full unit holds.
-    outcomes : tuple of str
-        What is kept of each simulation.
-    program : str
-        Who must compute it.
+        Which motion shakes each block.
     """
 
-    setup: Setup
-    motions: tuple[Motion, ...]
     which: Integers
-    factors: Floats
-    unit: tuple[int]
-    outcomes: tuple[str, ...]
-    program: str = field(default_factory=program)
 
-    def values(self, stop: threading.Event | None) -> Floats:
-        """Simulate, and return the outcomes."""
-        count = len(self.factors)
-        values = blank(self.outcomes, self.unit, (count,))
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Number of simulations."""
+        return (len(self.factors),)
+
+    def parts(self) -> Iterator[tuple[tuple[Any, ...], Task]]:
+        """Give a task for each motion and factor."""
         changes = np.flatnonzero((np.diff(self.which) != 0) | (np.diff(self.factors) != 0.0)) + 1
-        for start, end in itertools.pairwise([0, *changes.tolist(), count]):
-            task = Task(slice(start, end), self.motions[self.which[start]], float(self.factors[start]))
-            fill(values[:, start:end], self.outcomes, simulate_task(self.setup, task, stop))
-        return values
+        for start, end in itertools.pairwise([0, *changes.tolist(), len(self.factors)]):
+            some = slice(start, end)
+            yield (some,), Task(some, self.motions[self.which[start]], float(self.factors[start]))
 
 
-def compute(work: Work | PointsWork, stop: threading.Event | None = None) -> bytes:
+def compute(work: Work, stop: threading.Event | None = None) -> bytes:
     """Simulate a unit, wherever its inputs have been sent, and return its bytes; of no use where `stop` is set.
 
-    Raises
-    ------
-    StudyError
-        If the program is another one here, whose bits may differ.
+    A StudyError is raised if the program is another one here, whose bits may differ.
     """
     if work.program != program():
         raise StudyError(f"the worker on {socket.gethostname()} has {program()}, the study needs {work.program}")
     return encoded(work.values(stop))
 
 
-def blank(names: tuple[str, ...], unit: tuple[int, ...], counts: tuple[int, ...]) -> Floats:
-    """Room for these outcomes of a unit, NaN where it holds fewer simulations than a full one."""
-    shape = len(names), *unit
-    return np.empty(shape) if unit == counts else np.full(shape, np.nan)
-
-
-def fill(values: Floats, names: tuple[str, ...], outcomes: NDArray[np.void]) -> None:
+def _fill(values: Floats, names: tuple[str, ...], outcomes: NDArray[np.void]) -> None:
     """Write these outcomes of n simulations into an array, shape (names, n): as many at a time as a cache holds."""
     for start in range(0, len(outcomes), _CACHED):
         some = slice(start, start + _CACHED)
@@ -303,13 +293,7 @@ def encoded(values: Floats) -> bytes:
 
 
 def decoded(data: bytes, names: tuple[str, ...], counts: tuple[int, ...], unit: tuple[int, ...]) -> dict[str, Floats]:
-    """Outcomes of a unit by their names, each of shape (*counts).
-
-    Raises
-    ------
-    DamagedUnit
-        If the bytes are damaged: every changed bit and every cut is seen.
-    """
+    """Outcomes of a unit by their names, each of shape (*counts); a DamagedUnit for any changed bit and any cut."""
     if data[: len(_HEADER)] != _HEADER:
         raise DamagedUnit("its header is damaged")
     try:
@@ -322,8 +306,3 @@ def decoded(data: bytes, names: tuple[str, ...], counts: tuple[int, ...], unit: 
     values = np.frombuffer(raw, "<f8").reshape(len(names), *unit)
     held = np.asarray(values[(slice(None), *(slice(0, count) for count in counts))], dtype=np.float64)
     return dict(zip(names, held, strict=True))
-
-
-def exact(name: str, values: Floats) -> NDArray[Any]:
-    """Values of an outcome in its own type."""
-    return values.astype(OUTCOME[name])
