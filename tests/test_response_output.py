@@ -13,9 +13,9 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
-from rocking.response import Sensitivity, digits
-from rocking.response.digits import time_text
+from rocking.response import Sensitivity, summary
 from rocking.response.forces import Contact
+from rocking.response.summary import time_text
 
 TABLES = {
     "events": ["time_s", "kind", "side"],
@@ -100,7 +100,7 @@ def test_a_time_has_the_digits_that_a_millionth_of_the_motion_leaves(time, chang
 @pytest.mark.parametrize("change", [math.inf, math.nan])
 def test_a_change_beyond_all_numbers_leaves_no_digit_that_is_told_as_known(change):
     assert time_text(230.7, change) == "about 231 s"
-    assert digits.digits_of(0.123, change) == 1
+    assert summary.digits_of(0.123, change) == 1
 
 
 def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():
@@ -242,16 +242,16 @@ def test_no_time_beside_another_has_more_digits_than_it():
     pulse = rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, critical * (1.0 + 1e-11))
     response = simulate(block, pulse, model="linear")
     assert response.overturned
-    assert digits.overturn_text(response).startswith("about ")
-    for text in (digits.tipping_text(response), digits.peak_time_text(response)):
+    assert summary.overturn_text(response).startswith("about ")
+    for text in (summary.tipping_text(response), summary.peak_time_text(response)):
         assert text == f"about {float(text.split()[1]):.0f} s"
     assert "AMBIGUOUS" in response.summary()
     (row,) = survey(block, {"pulse": pulse}, model="linear").rows()
     assert row["ambiguous"]
-    assert row["verdict"] == f"overturns at {digits.overturn_text(response)}, AMBIGUOUS"
+    assert row["verdict"] == f"overturns at {summary.overturn_text(response)}, AMBIGUOUS"
     known = simulate(block, rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, 1.2 * critical), model="linear")
-    assert re.fullmatch(r"\d+\.\d{4} s", digits.peak_time_text(known))
-    assert re.fullmatch(r"\d+\.\d{4} s", digits.tipping_text(known))
+    assert re.fullmatch(r"\d+\.\d{4} s", summary.peak_time_text(known))
+    assert re.fullmatch(r"\d+\.\d{4} s", summary.tipping_text(known))
 
 
 @pytest.mark.parametrize(
@@ -282,6 +282,6 @@ def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():
     motion = rocking.records.load("el-centro-meloland-270").scaled(pga=4.0)
     block = Block(width=0.6, height=2.1)
     one, other = (simulate(block, motion.scaled(factor)) for factor in (1.0, 1.0 + 1e-4))
-    decimals = len(digits.peak_time_text(one).partition(".")[2].removesuffix(" s"))
+    decimals = len(summary.peak_time_text(one).partition(".")[2].removesuffix(" s"))
     moved = 0.01 * abs(other.peak_time - one.peak_time)
     assert moved < 10.0**-decimals

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from rocking.block import Block
-from rocking.block.body import bodies_of
+from rocking.block.rigid_body import rigid_bodies
 from rocking.constants import STANDARD_GRAVITY
 from rocking.motion import measures, records
 from rocking.motion.motion import Motion
@@ -202,7 +202,7 @@ def _side_notes(block: Block) -> Iterator[str]:
     p, alpha, restitution = (
         np.array([[getattr(side, name) for side in block.sides]]) for name in ("p", "alpha", "restitution")
     )
-    found = bodies_of(p, alpha)
+    found = rigid_bodies(p, alpha)
     if np.array_equal(found.restitution, restitution) and found.uncertainty[0] > _UNCERTAIN:
         yield (
             f"the digits of p and alpha tell the restitution to +-{found.uncertainty[0]:.1g} only: give more of them, "

@@ -297,6 +297,17 @@ def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
         beside.write_bytes(content)
 
 
+def write_csv(path: str | Path, frame: pd.DataFrame, *, index: bool = False) -> None:
+    """Write a data frame as text columns with a header, whole or not at all; numbers to 15 digits.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    write_text(path, frame.to_csv(index=index, float_format="%.15g", lineterminator="\n"))
+
+
 def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
     """Write a dataset to a NetCDF file, whole or not at all.
 

@@ -17,11 +17,11 @@ from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion import accepted
 from rocking.motion.motion import Motion
 from rocking.result import Result
 from rocking.tables import counted, text_table
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

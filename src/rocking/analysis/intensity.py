@@ -13,8 +13,8 @@ from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.motion import Motion
-from rocking.treatment.base import Model
 
 MeasureName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
 

@@ -15,10 +15,10 @@ from rocking.block import Block, Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidMotion, InvalidOption
+from rocking.model import Model
 from rocking.motion import accepted
 from rocking.motion.motion import Motion
 from rocking.tables import counted
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

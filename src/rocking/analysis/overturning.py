@@ -18,6 +18,7 @@ from rocking.block import Block, Blocks, one_block
 from rocking.constants import VERSION
 from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_family
@@ -26,7 +27,6 @@ from rocking.result import Result, table_of_some
 from rocking.simulation import simulate
 from rocking.tables import cell, named, text_table
 from rocking.treatment import Certified
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -324,7 +324,7 @@ class _PulseProblem:
         factors = self.threshold * level
         ends = np.empty(len(blocks), dtype=OUTCOME)
         for task, outcomes in simulate_each(Setup(blocks, self.model, self.chattering), self.unit, factors):
-            ends[task.blocks] = outcomes
+            ends[task.bodies] = outcomes
             done(len(outcomes))
         modes = modes_of(ends, self.unit.duration)
         for k in np.flatnonzero(ends["overturned"] & (ends["uplifts"] > 1)):

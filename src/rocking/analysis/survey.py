@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any, Final
 from rocking import checks
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
-from rocking.contact import friction_coefficient
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.product import block_coordinates, names_of, verticals_of
+from rocking.product import body_coordinates, names_of, verticals_of
 from rocking.progress import Progress, note
-from rocking.response import Response
-from rocking.response.digits import ratio_text
-from rocking.response.verdict import in_brief
+from rocking.response import Response, in_brief, ratio_text
+from rocking.response.forces import friction_coefficient
 from rocking.simulation import simulate
 from rocking.tables import counted, decimal, frame_of, named, text_table, to_json, write_bytes, write_text
 
@@ -208,7 +206,7 @@ def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[di
 
 def block_columns(block: Block) -> dict[str, Any]:
     """Describe a block in the columns of a table."""
-    columns = block_coordinates(Blocks.of(block))
+    columns = body_coordinates(Blocks.of(block))
     numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
     return {"block": block.description, **numbers}
 

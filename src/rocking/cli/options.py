@@ -15,13 +15,13 @@ from rocking import checks
 from rocking.analysis.intensity import MeasureName
 from rocking.cli.wording import with_options
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, OutputError, UnreadableRecord
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.named_pulses import named_pulse
 from rocking.plausibility import block_notes, level_notes, motion_notes, vertical_notes
 from rocking.progress import Progress, note
 from rocking.quantities import Quantity, acceleration, length, number, sides, tilt, values, velocity
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     from rocking.block import Block

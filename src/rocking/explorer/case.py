@@ -21,13 +21,13 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.pulses import is_pulse, pulse_as_python, pulse_as_text, pulse_of
 from rocking.explorer.shelf import Shelf
+from rocking.model import Model
 from rocking.motion import records
 from rocking.motion.motion import Motion
 from rocking.quantities import acceleration, angle, length, number, sides
 from rocking.response import Response
 from rocking.simulation import simulate
 from rocking.treatment import Treatment, treatment
-from rocking.treatment.base import Model
 
 Texts = Mapping[str, str]
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from rocking.analysis.overturning import modes_of
 from rocking.arrays import Floats, Integers
-from rocking.block import Blocks
-from rocking.block.single import housner_restitution
+from rocking.block import Blocks, housner_restitution
 from rocking.chattering.maps import Outcome, hardly_lifts, outcomes_of
 from rocking.chattering.theory.amplitude import critical_amplitude
 from rocking.constants import STANDARD_GRAVITY
@@ -25,8 +24,7 @@ from rocking.explorer.pulses import arguments_of, is_pulse, pulse_of
 from rocking.motion.exceedance import exceedances
 from rocking.motion.motion import Motion
 from rocking.quantities import number
-from rocking.treatment import Certified
-from rocking.treatment.asymptotic_time import FITTED_FREQUENCIES, FITTED_RESTITUTIONS
+from rocking.treatment import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 
 #: Points of an axis.
 _FEWEST, _MOST = 8, 400
@@ -170,7 +168,7 @@ def parts(grid: Grid, threads: int | None = None) -> Iterator[Part]:
     setup = Setup(blocks, grid.case.model, Certified())
     later = _Later(grid)
     for task, ends in simulate_tasks(setup, _tasks(grid, factors), threads=threads):
-        chosen = task.blocks
+        chosen = task.bodies
         assert isinstance(chosen, np.ndarray)
         values = np.empty((len(QUANTITIES), len(chosen)), np.float32)
         alpha = blocks.alpha[chosen]

@@ -18,7 +18,7 @@ from rocking.analysis.levels import mean_one, only_block, pooled, several_motion
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption
-from rocking.product import Product, block_coordinates
+from rocking.product import Product, body_coordinates
 from rocking.progress import Progress
 from rocking.result import Result, table_of_some
 from rocking.studies.ratios import peak_ratios, require_limits
@@ -251,6 +251,6 @@ def _dataset(
     return xr.Dataset(
         {name: (dims, values, {"long_name": _KEPT[name]}) for name, values in kept.items()}
         | {"fault": (dims, faults.astype(str), {"long_name": "why there is no curve"})},
-        {"limit_state": list(limits), **block_coordinates(blocks)},
+        {"limit_state": list(limits), **body_coordinates(blocks)},
         dict(about),
     )

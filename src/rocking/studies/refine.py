@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
 from rocking.errors import InvalidOption, StudyError
-from rocking.product import Product, block_coordinates
+from rocking.product import Product, body_coordinates
 from rocking.studies import inputs
 from rocking.studies.outcomes import require
 from rocking.studies.store import Store, readable, sealed, unsealed
@@ -208,7 +208,7 @@ class Round:
         chosen = self.chosen[self.grid.range(key)]
         motions, which = np.unique(self.brackets.motion[chosen], return_inverse=True)
         signs = np.array(product.signs)[self.brackets.polarity[chosen]]
-        setup = dataclasses.replace(product.setup(), blocks=product.blocks.select(self.brackets.block[chosen]))
+        setup = dataclasses.replace(product.setup(), bodies=product.bodies.select(self.brackets.block[chosen]))
         now = np.array([self._now(int(motion)) for motion in motions])
         return PointsWork(
             setup=setup,
@@ -468,7 +468,7 @@ def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
     about = {"units": product.scales.units}
     named: dict[str, Any] = {
         name: ("change", np.asarray(values)[brackets.block], attributes)
-        for name, (_, values, attributes) in block_coordinates(product.blocks).items()
+        for name, (_, values, attributes) in body_coordinates(product.bodies).items()
     }
     names = whole.motion.values
     return xr.Dataset(

@@ -13,7 +13,7 @@ from rocking import checks
 from rocking.analysis.spectrum import fractiles_of
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
-from rocking.product import block_coordinates
+from rocking.product import body_coordinates
 from rocking.result import Result, table_of_some
 from rocking.studies.fragility import plane_of
 from rocking.studies.ratios import peak_ratios, require_ratios
@@ -55,7 +55,7 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES) -> Stud
             {
                 "fractile": shares,
                 "scale": ("scale", product.scales.values, about),
-                **block_coordinates(product.blocks),
+                **body_coordinates(product.bodies),
             },
             {"motions": len(product.motions), "model": product.model},
         )

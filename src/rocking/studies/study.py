@@ -20,11 +20,14 @@ from rocking import checks
 from rocking.analysis.fragility.curve import Fragility
 from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.intensity import Measure, MeasureName
-from rocking.block import Block, Blocks
+from rocking.block import Block
+from rocking.body import Bodies, Body
 from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import DamagedStudy, InvalidOption, StudyError
+from rocking.model import Model
 from rocking.motion.accepted import several_motions
 from rocking.motion.motion import Motion
+from rocking.problem import bodies_of
 from rocking.product import Polarity, Product, Scales, names_of
 from rocking.studies import store as stores
 from rocking.studies.export import export
@@ -50,7 +53,6 @@ from rocking.studies.store import Store
 from rocking.studies.units import Axes, Key, Work, compute
 from rocking.tables import counted
 from rocking.treatment import Treatment, treatment
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -540,7 +542,7 @@ def _fault(part: Store | Round, key: Key) -> str:
 
 def study(
     folder: str | Path,
-    blocks: Blocks | Block | Sequence[Block] | None = None,
+    blocks: Bodies | Body | Sequence[Block] | None = None,
     motions: Motion | Sequence[Motion] | None = None,
     *,
     model: Model = "nonlinear",
@@ -616,7 +618,7 @@ def study(
             keep_plan(found.store, tolerances_of(found.product, refine, found.store.grid.outcomes))
         return found
     product = Product(
-        Blocks.of(blocks),
+        bodies_of(blocks),
         tuple(several_motions(motions)),
         Scales.of(factor=factor, pga=pga, pgv=pgv, sa=sa, period=period, damping=damping),
         polarity,
@@ -701,7 +703,7 @@ def _pilot(product: Product) -> Axes:
     How long one simulation takes is measured with a group of blocks spread over all, under the longest motion.
     """
     motions, scales, polarities, count = product.shape
-    some = product.blocks.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
+    some = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
     motion = max(product.motions, key=lambda one: len(one.coefficients))
     factors = np.array([[[product.scales.factors(motion).max()]]])
     announce(SIMULATIONS)

@@ -221,7 +221,7 @@ class Work:
 
     def values(self, stop: threading.Event | None) -> Floats:
         """Simulate, and return the outcomes."""
-        blocks = slice(0, len(self.setup.blocks))
+        blocks = slice(0, len(self.setup.bodies))
         values = blank(self.outcomes, self.unit, (*self.factors.shape, blocks.stop))
         for m, s, k in np.ndindex(self.factors.shape):
             task = Task(blocks, self.motions[m], float(self.factors[m, s, k]))

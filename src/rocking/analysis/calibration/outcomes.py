@@ -27,9 +27,9 @@ from rocking.block import Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.tables import counted, named, text_table, write_text
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

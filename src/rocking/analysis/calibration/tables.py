@@ -13,10 +13,10 @@ import numpy as np
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import RockingError, UnreadableRecord
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
 from rocking.tables import counted, csv_rows, named
-from rocking.treatment.base import Model
 
 _FOLDER: Final = re.compile(r"[\w-][\w. -]*(?<![. ])")
 

@@ -22,9 +22,9 @@ from rocking.arrays import Floats, as_asked
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.progress import phrased
 from rocking.tables import counted, text_table, write_text
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -21,11 +21,11 @@ from rocking.block import Block, Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.product import Polarity
 from rocking.tables import counted
 from rocking.treatment import Treatment
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,13 +15,12 @@ from rocking.analysis.survey import block_columns, motion_of, record_columns
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
-from rocking.response import Response
-from rocking.response.verdict import in_brief
+from rocking.response import Response, in_brief
 from rocking.simulation import simulate
 from rocking.tables import decimal, frame_of, named, text_table, write_text
-from rocking.treatment.base import Model
 
 #: Names of the rules for people.
 TITLES: Final = MappingProxyType(

@@ -15,7 +15,7 @@ from rocking.compiling import AMPLITUDES, announce
 from rocking.errors import InvalidOption
 from rocking.kernels.paper import fitted_amplitudes
 from rocking.kernels.sine.critical import critical_amplitudes
-from rocking.treatment.asymptotic_time import warn_outside_fit
+from rocking.treatment import warn_outside_fit
 
 
 def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact") -> Floats:
