@@ -169,7 +169,7 @@ def test_every_table_is_a_data_frame_and_a_file_with_units(shaken, tmp_path, tab
 def test_tables_that_are_none_and_steps_that_mean_nothing_are_refused(shaken, tmp_path):
     with pytest.raises(InvalidOption, match="table must be one of histories, events, impacts, chattering, not 'nodes'"):
         shaken.to_dataframe("nodes")
-    with pytest.raises(InvalidOption, match="dt= is the step of the histories"):
+    with pytest.raises(InvalidOption, match="dt is the step of the histories"):
         shaken.to_csv(tmp_path / "impacts.csv", "impacts", dt=0.01)
     with pytest.raises(InvalidOption, match="dt"):
         shaken.to_dataframe(dt=-1.0)

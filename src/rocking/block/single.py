@@ -14,7 +14,7 @@ from rocking.arrays import Floats, Integers
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
 from rocking.body import ContactLaw, Coordinate
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
 from rocking.model import MODELS, Model
 
 if TYPE_CHECKING:
@@ -415,7 +415,7 @@ class Block:
     def _of_both_sides(self, name: str) -> float:
         plus, minus = (getattr(side, name) for side in self.sides)
         if plus != minus:
-            raise InvalidBlock(
+            raise UnequalSides(
                 f"{name} is {plus:g} on side + and {minus:g} on side - of this block: ask block.sides[0].{name} and "
                 f"block.sides[1].{name}"
             )
@@ -511,10 +511,10 @@ def one_block(block: Block) -> Block:
     return block
 
 
-def checked_sides(values: Floats, name: str, *, numbered: bool = False) -> Floats:
+def checked_sides(values: Floats, name: str, *, numbered: bool = False, origin: str = "") -> Floats:
     """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock where one is out of its range.
 
-    ``numbered``: whether the message says which block it is.
+    ``numbered``: whether the message says which block it is; ``origin``: what it says of where the value is from.
     """
     low, high, rule = _LIMITS[name]
     bad = np.argwhere(~((values >= low) & (values <= high)))
@@ -522,7 +522,7 @@ def checked_sides(values: Floats, name: str, *, numbered: bool = False) -> Float
         value = float(values[tuple(bad[0])])
         which = f" (block {bad[0][0]})" if numbered else ""
         hint = checks.hint_of_degrees(value) if name == "alpha" else ""
-        raise InvalidBlock(f"{{}} must be {rule}, not {value:g}{which}{hint}", name, value=value)
+        raise InvalidBlock(f"{{}}{origin} must be {rule}, not {value:g}{which}{hint}", name, value=value)
     return values
 
 
@@ -549,7 +549,7 @@ def _fill(
 ) -> None:
     """Fill in what a block is; of a rectangle also half its sizes and its offset, m."""
     for name in ("p", "alpha"):
-        checked_sides(np.array([[getattr(side, name) for side in sides]]), name)
+        checked_sides(np.array([[getattr(side, name) for side in sides]]), name, origin=" (from the sizes)")
     if mass is not None:
         mass = _within(mass, "mass", _MASS, "kg")
         sides = tuple(replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)  # type: ignore[assignment]
