@@ -13,9 +13,11 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
-from rocking.response import Sensitivity, summary
+from rocking.kernels import variation
+from rocking.response import QUANTITIES, Sensitivity, history, summary
 from rocking.response.forces import Contact
 from rocking.response.summary import time_text
+from rocking.tables import named
 
 TABLES = {
     "events": ["time_s", "kind", "side"],
@@ -70,6 +72,43 @@ def test_what_takes_a_pass_along_the_response_is_found_once(monkeypatch):
     monkeypatch.setattr(Contact, "first", None)
     assert response.to_dict() == first
     assert f"{response.required_friction:.4f}" in response.summary()
+
+
+def test_a_summary_and_a_dictionary_pass_once_along_the_response_for_each_quantity(monkeypatch):
+    """The sensitivity has six quantities; however often somebody asks, no pass is made twice."""
+    counted = {"vary": 0, "trace": 0}
+
+    def counting(name, kernel):
+        def call(*arguments):
+            counted[name] += 1
+            return kernel(*arguments)
+
+        return call
+
+    monkeypatch.setattr(variation, "vary", counting("vary", variation.vary))
+    monkeypatch.setattr(history, "trace", counting("trace", history.trace))
+    response = simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+    response.summary()
+    assert counted["vary"] == len(QUANTITIES) == 6
+    once = dict(counted)
+    for _ in range(2):
+        response.summary()
+        response.to_dict()
+        repr(response)
+    assert counted == once
+    assert counted["trace"] <= 70  # most of them find the instant of tipping
+
+
+def test_a_summary_is_its_rows(shaken):
+    rows = shaken.summary_rows(0.5)
+    assert shaken.summary(0.5) == "\n".join(f"{row.name:<20}{row.text}" for row in rows)
+    (peak,) = [row for row in rows if row.name == "peak rotation"]
+    assert peak.unit == "rad" and float(peak.value) == pytest.approx(
+        shaken.peak_rotation, rel=5e-3
+    )  # to its known digits
+    facts = {row.name: row for row in shaken.facts(0.5)}
+    assert facts["peak_rotation"] == ("peak_rotation", shaken.peak_rotation, "rad", "")
+    assert [*shaken.to_dict(0.5)] == [named(row.name, row.unit) for row in shaken.facts(0.5)]
 
 
 def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatch):

@@ -7,21 +7,25 @@ from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
-from .block import Block, Blocks
+from .block import Block, Blocks, Side
 from .ensemble import simulate_many
 from .errors import (
+    DamagedStudy,
     InvalidBlock,
     InvalidMotion,
     InvalidOption,
     OutputError,
+    OutsideFit,
     RockingError,
     StudyError,
+    UnequalSides,
+    Unfinished,
     UnreadableRecord,
 )
 from .explorer.notebook import explore
 from .motion import Motion, pulses, records
 from .motion.formats import read
-from .response import Response
+from .response import Response, Sensitivity
 from .simulation import simulate
 from .studies import Study, study
 from .treatment import AsymptoticTime, Certified, IntervalThreshold, VelocityThreshold
@@ -34,6 +38,7 @@ __all__ = [
     "Blocks",
     "Calibration",
     "Certified",
+    "DamagedStudy",
     "Fragility",
     "HazardCurve",
     "HistoryCalibration",
@@ -43,10 +48,15 @@ __all__ = [
     "InvalidOption",
     "Motion",
     "OutputError",
+    "OutsideFit",
     "Response",
     "RockingError",
+    "Sensitivity",
+    "Side",
     "Study",
     "StudyError",
+    "UnequalSides",
+    "Unfinished",
     "UnreadableRecord",
     "VelocityThreshold",
     "calibrate",

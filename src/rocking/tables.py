@@ -255,7 +255,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         target = wanted.resolve()  # a link is kept, and what it leads to is replaced
         if not target.parent.is_dir():
             raise OutputError(
-                f"{path} cannot be written: there is no folder {target.parent}; make it, or choose another"
+                f"cannot be written: there is no folder {target.parent}; make it, or choose another", path=str(path)
             )
         beside = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:_HASH]}.part{target.suffix}")
         try:
@@ -270,7 +270,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise OutputError(
-            f"{path} cannot be written: {reason}; nothing of it was kept; choose another place"
+            f"cannot be written: {reason}; nothing of it was kept; choose another place", path=str(path)
         ) from error
 
 
