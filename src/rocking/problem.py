@@ -73,7 +73,9 @@ def one_body(body: Body) -> Body:
     InvalidBlock
         If it is neither a block nor another body.
     """
-    return body if isinstance(body, Body) and not isinstance(body, type) else one_block(cast("Block", body))
+    if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # a protocol is slow to ask
+        return body
+    return one_block(body)
 
 
 def rules_of(

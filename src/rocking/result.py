@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -151,7 +150,7 @@ class Findings:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Findings, ABC):
+class Result(Findings):
     """Result of an analysis. The variables, coordinates and methods of its dataset are its own as well.
 
     Attributes
@@ -192,18 +191,6 @@ class Result(Findings, ABC):
                 f"there is nothing at {checks.shown(labels)}; the dimensions are {names}", value=labels
             ) from None
         return type(self)(data)
-
-    @abstractmethod
-    def summary(self) -> str:
-        """Return what was found, in words and a table."""
-
-    @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """Return what was found by name; units are in the names."""
-
-    @abstractmethod
-    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw what was found: in a new figure of this size (width and height, inches), or in `ax`."""
 
     def to_dataframe(self, table: str | None = None) -> pd.DataFrame:
         """Return one of the tables as a data frame: a row for each point, columns named with their units.

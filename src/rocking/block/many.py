@@ -80,7 +80,7 @@ class Blocks:
             ) from None  # fmt: skip
         object.__setattr__(self, "gravity", checked_gravity(gravity))
         for name, values in arrays.items():
-            checked_sides(values, name, numbered=True)
+            checked_sides(values, name)
         if restitution is None:
             arrays["restitution"] = _conserved(arrays["p"], arrays["alpha"])
         for name, values in arrays.items():
@@ -142,7 +142,18 @@ class Blocks:
         if len(gravities) != 1:
             raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same gravity")
         table = np.array([[(side.p, side.alpha, side.restitution) for side in block.sides] for block in gathered])
-        return cls(table[..., 0], table[..., 1], table[..., 2], gravity=gravities.pop())
+        return cls._of_checked(*np.moveaxis(table, 2, 0), gravity=gravities.pop())
+
+    @classmethod
+    def _of_checked(cls, p: Floats, alpha: Floats, restitution: Floats, *, gravity: float) -> Blocks:
+        """Make blocks of values that are known to be sound, each of shape (n, 2)."""
+        made = object.__new__(cls)
+        object.__setattr__(made, "gravity", gravity)
+        for name, values in (("p", p), ("alpha", alpha), ("restitution", restitution)):
+            held = np.ascontiguousarray(values)
+            held.flags.writeable = False
+            object.__setattr__(made, name, held)
+        return made
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         """Return p, alpha and restitution with their units, by name."""
@@ -211,14 +222,7 @@ class Blocks:
         """
         if not isinstance(index, slice):
             index = self._indices(index)
-        # Their values are checked already.
-        some = object.__new__(Blocks)
-        object.__setattr__(some, "gravity", self.gravity)
-        for name in ("p", "alpha", "restitution"):
-            held = getattr(self, name)[index]
-            held.flags.writeable = False
-            object.__setattr__(some, name, held)
-        return some
+        return self._of_checked(self.p[index], self.alpha[index], self.restitution[index], gravity=self.gravity)
 
     def _indices(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.int64]:
         """Positions of the blocks of a flat array of indices, or of a mask."""
@@ -259,7 +263,7 @@ def _conserved(p: Floats, alpha: Floats) -> Floats:
             "too stocky to rock that way; give {} a value or a pair in (0, 1]",
             "restitution",
         )
-    return checked_sides(kept, "restitution", numbered=True)
+    return checked_sides(kept, "restitution")
 
 
 KINDS[Blocks.kind] = Blocks

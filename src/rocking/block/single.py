@@ -179,7 +179,7 @@ class Block:
                 (b - s, b + s), h, gyration_squared(b, h, s), g, restitution, _perhaps_swapped(b, h)
             )
             text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
-        _fill(self, sides, g, text, (b, h, s), mass)
+        _filled(self, sides, g, text, mass, (b, h, s))
 
     @classmethod
     def from_parameters(
@@ -232,12 +232,13 @@ class Block:
         [0.95, 0.914]
         """
         g = checked_gravity(gravity)
-        both = checked_sides(_pair(p, "p"), "p"), checked_sides(_pair(alpha, "alpha"), "alpha")
-        rates, angles = (values[0].tolist() for values in both)
+        rates = [_checked(value, "p") for value in _pair(p, "p")]
+        angles = [_checked(value, "alpha") for value in _pair(alpha, "alpha")]
         radii, text = [0.75 * g / rate**2 for rate in rates], "block from its parameters"
         if rates[0] == rates[1] and angles[0] == angles[1]:
             e = _restitutions(restitution, (housner_restitution(angles[0]),) * 2)
         else:
+            both = np.array([rates]), np.array([angles])
             found = rigid_bodies(*both)
             if restitution is None and (reason := refusal(found, *both)):
                 raise InvalidBlock(reason, "restitution")
@@ -249,7 +250,7 @@ class Block:
                 k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
                 text = f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
         sides = tuple(Side(rates[i], angles[i], e[i], radii[i]) for i in range(2))
-        return _made(cls, (sides[0], sides[1]), g, text)
+        return _filled(cls.__new__(cls), (sides[0], sides[1]), g, text)
 
     @classmethod
     def from_pivots(
@@ -298,13 +299,13 @@ class Block:
         >>> abs(body.p - rectangle.p) < 1e-15, abs(body.restitution - rectangle.restitution) < 1e-15
         (True, True)
         """
-        plus, minus = (_length(value, "distances") for value in _pair(distances, "distances")[0].tolist())
+        plus, minus = (_length(value, "distances") for value in _pair(distances, "distances"))
         h = _length(height, "height")
         k = _length(radius_of_gyration, "radius_of_gyration")
         g = checked_gravity(gravity)
         sides = _sides_on_pivots((plus, minus), h, k * k, g, restitution)
         text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
-        return _made(cls, sides, g, text, mass)
+        return _filled(cls.__new__(cls), sides, g, text, mass)
 
     @classmethod
     def from_frame(
@@ -354,7 +355,9 @@ class Block:
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
         sides = _even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), _perhaps_swapped(b, h))
-        return _made(cls, sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}")
+        return _filled(
+            cls.__new__(cls), sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
+        )
 
     def __str__(self) -> str:
         """Return description and parameters in one line."""
@@ -511,19 +514,22 @@ def one_block(block: Block) -> Block:
     return block
 
 
-def checked_sides(values: Floats, name: str, *, numbered: bool = False, origin: str = "") -> Floats:
-    """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock where one is out of its range.
-
-    ``numbered``: whether the message says which block it is; ``origin``: what it says of where the value is from.
-    """
-    low, high, rule = _LIMITS[name]
+def checked_sides(values: Floats, name: str) -> Floats:
+    """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock for the first out of its range."""
+    low, high, _ = _LIMITS[name]
     bad = np.argwhere(~((values >= low) & (values <= high)))
     if len(bad):
-        value = float(values[tuple(bad[0])])
-        which = f" (block {bad[0][0]})" if numbered else ""
+        _checked(float(values[tuple(bad[0])]), name, which=f" (block {bad[0][0]})")
+    return values
+
+
+def _checked(value: float, name: str, *, origin: str = "", which: str = "") -> float:
+    """Return p, alpha or restitution of a side, or raise InvalidBlock; the message says where it is from, and whose."""
+    low, high, rule = _LIMITS[name]
+    if not low <= value <= high:
         hint = checks.hint_of_degrees(value) if name == "alpha" else ""
         raise InvalidBlock(f"{{}}{origin} must be {rule}, not {value:g}{which}{hint}", name, value=value)
-    return values
+    return value
 
 
 def checked_gravity(gravity: object) -> float:
@@ -531,35 +537,26 @@ def checked_gravity(gravity: object) -> float:
     return _within(gravity, "gravity", GRAVITY, "m/s^2")
 
 
-def _made(
-    cls: type[Block], sides: tuple[Side, Side], gravity: float, description: str, mass: float | None = None
-) -> Block:
-    block = cls.__new__(cls)
-    _fill(block, sides, gravity, description, None, mass)
-    return block
-
-
-def _fill(
+def _filled(
     block: Block,
     sides: tuple[Side, Side],
     gravity: float,
     description: str,
-    rectangle: tuple[float, float, float] | None,
-    mass: float | None,
-) -> None:
-    """Fill in what a block is; of a rectangle also half its sizes and its offset, m."""
-    for name in ("p", "alpha"):
-        checked_sides(np.array([[getattr(side, name) for side in sides]]), name, origin=" (from the sizes)")
+    mass: float | None = None,
+    rectangle: tuple[float | None, float | None, float] = (None, None, 0.0),
+) -> Block:
+    """Fill in what a block is, and return it; of a rectangle also half its sizes and its offset, m."""
+    for side in sides:
+        _checked(side.p, "p", origin=" (from the sizes)")
+        _checked(side.alpha, "alpha", origin=" (from the sizes)")
     if mass is not None:
         mass = _within(mass, "mass", _MASS, "kg")
-        sides = tuple(replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)  # type: ignore[assignment]
-    b, h, offset = (None, None, 0.0) if rectangle is None else rectangle
-    fields = {
-        "sides": sides, "gravity": gravity, "description": description,
-        "half_width": b, "half_height": h, "offset": offset, "mass": mass,
-    }  # fmt: skip
-    for name, value in fields.items():
+        first, second = (replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)
+        sides = first, second
+    names = ("sides", "gravity", "description", "mass", "half_width", "half_height", "offset")
+    for name, value in zip(names, (sides, gravity, description, mass, *rectangle), strict=True):
         object.__setattr__(block, name, value)
+    return block
 
 
 def _within(value: object, name: str, limits: tuple[float, float], unit: str) -> float:
@@ -616,12 +613,15 @@ def _half_sizes(
     )  # fmt: skip
 
 
-def _pair(value: Any, name: str) -> Floats:
-    """Return a number or a pair (side +, side -) as an array of shape (1, 2)."""
+def _pair(value: Any, name: str) -> tuple[float, float]:
+    """Return a number, or a pair (side +, side -), as two numbers."""
+    if type(value) is float:
+        return value, value
     values = checks.numbers(value, name, InvalidBlock)
     if values.shape not in ((), (2,)):
         raise InvalidBlock(f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name)
-    return np.broadcast_to(values, (1, 2))
+    plus, minus = np.broadcast_to(values, 2).tolist()
+    return plus, minus
 
 
 def _perhaps_swapped(half_width: float, half_height: float) -> str:
@@ -641,5 +641,5 @@ def _restitutions(given: object, conserved: Sequence[float], advice: str = "") -
                 "restitution",
             )
         return conserved[0], conserved[1]
-    plus, minus = checked_sides(_pair(given, "restitution"), "restitution")[0].tolist()
+    plus, minus = (_checked(value, "restitution") for value in _pair(given, "restitution"))
     return plus, minus
