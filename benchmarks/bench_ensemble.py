@@ -24,9 +24,9 @@ from rocking.kernels.ground import Ground, last_piece
 from rocking.kernels.lanes import pool, scheduler
 from rocking.kernels.lanes.steps import step_linear
 from rocking.kernels.state import Record
-from rocking.problem import ground_of, records_of, rules_of
+from rocking.model import Model
+from rocking.problem import ground_of, rules_of
 from rocking.treatment import Certified
-from rocking.treatment.base import Model
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -101,7 +101,7 @@ def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     """March every block to its end, as where lanes cannot be taken."""
     how = Certified()
     ground = ground_of(motion, blocks.gravity)
-    bodies = records_of(blocks, model, how.limits(blocks, motion, model))
+    bodies = blocks.kernel_records(model, how.limits(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
     whole = pool.pool_of(bodies, states, len(ground.pieces) - 1, 1.0, 0)
     scheduler.march_each(ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole)
@@ -188,7 +188,7 @@ def lane_steps(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     """Block-steps in which a block sits in a lane."""
     how = Certified()
     ground = ground_of(motion, blocks.gravity)
-    bodies = records_of(blocks, model, how.limits(blocks, motion, model))
+    bodies = blocks.kernel_records(model, how.limits(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
     assert motion.step is not None, "lanes take even samples"
     width = motion.step * float(blocks.p.max())

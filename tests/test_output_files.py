@@ -59,7 +59,7 @@ def test_a_full_disk_leaves_no_part_of_a_file_and_keeps_the_old_one(response, an
     for old in (None, b"old"):
         if old is not None:
             path.write_bytes(old)
-        with full_disk(1000), pytest.raises(rocking.OutputError, match=f"{name} cannot be written"):
+        with full_disk(1000), pytest.raises(rocking.OutputError, match=f"{name}: cannot be written"):
             WRITERS[name](response, analysis, path)
         assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == ([] if old is None else [(name, old)])
     WRITERS[name](response, analysis, path)

@@ -212,9 +212,9 @@ def test_blocks_that_each_have_their_own_scaling_do_what_simulate_says():
     motion = rocking.pulses.sine(1.0, 0.9, cycles=2.5)
     for model in ("linear", "nonlinear"):
         played = list(simulate_each(Setup(blocks, model, Certified()), motion, factors))
-        assert sorted(np.concatenate([task.blocks for task, _ in played])) == list(range(40))
+        assert sorted(np.concatenate([task.bodies for task, _ in played])) == list(range(40))
         for task, outcomes in played:
-            for k, outcome in zip(task.blocks, outcomes, strict=True):
+            for k, outcome in zip(task.bodies, outcomes, strict=True):
                 response = rocking.simulate(blocks[k], motion.scaled(factors[k]), model=model)
                 assert outcome["overturned"] == response.overturned
                 assert outcome["peak_rotation"] == response.peak_rotation

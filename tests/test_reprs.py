@@ -88,7 +88,7 @@ def parts_of(value: object, name: str, seen: set[int]) -> Iterator[tuple[str, ob
     seen.add(id(value))
     yield name, value
     for each in [*vars(type(value)), *getattr(value, "__dict__", {})]:
-        if not each.startswith("_") and not callable(getattr(value, each)):
+        if not each.startswith("_") and hasattr(value, each) and not callable(getattr(value, each)):
             yield from parts_of(getattr(value, each), f"{name}.{each}", seen)
 
 

@@ -13,9 +13,11 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
-from rocking.response import Sensitivity, digits
-from rocking.response.digits import time_text
+from rocking.kernels import variation
+from rocking.response import QUANTITIES, Sensitivity, history, summary
 from rocking.response.forces import Contact
+from rocking.response.summary import time_text
+from rocking.tables import named
 
 TABLES = {
     "events": ["time_s", "kind", "side"],
@@ -72,6 +74,43 @@ def test_what_takes_a_pass_along_the_response_is_found_once(monkeypatch):
     assert f"{response.required_friction:.4f}" in response.summary()
 
 
+def test_a_summary_and_a_dictionary_pass_once_along_the_response_for_each_quantity(monkeypatch):
+    """The sensitivity has six quantities; however often somebody asks, no pass is made twice."""
+    counted = {"vary": 0, "trace": 0}
+
+    def counting(name, kernel):
+        def call(*arguments):
+            counted[name] += 1
+            return kernel(*arguments)
+
+        return call
+
+    monkeypatch.setattr(variation, "vary", counting("vary", variation.vary))
+    monkeypatch.setattr(history, "trace", counting("trace", history.trace))
+    response = simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+    response.summary()
+    assert counted["vary"] == len(QUANTITIES) == 6
+    once = dict(counted)
+    for _ in range(2):
+        response.summary()
+        response.to_dict()
+        repr(response)
+    assert counted == once
+    assert counted["trace"] <= 70  # most of them find the instant of tipping
+
+
+def test_a_summary_is_its_rows(shaken):
+    rows = shaken.summary_rows(0.5)
+    assert shaken.summary(0.5) == "\n".join(f"{row.name:<20}{row.text}" for row in rows)
+    (peak,) = [row for row in rows if row.name == "peak rotation"]
+    assert peak.unit == "rad" and float(peak.value) == pytest.approx(
+        shaken.peak_rotation, rel=5e-3
+    )  # to its known digits
+    facts = {row.name: row for row in shaken.facts(0.5)}
+    assert facts["peak_rotation"] == ("peak_rotation", shaken.peak_rotation, "rad", "")
+    assert [*shaken.to_dict(0.5)] == [named(row.name, row.unit) for row in shaken.facts(0.5)]
+
+
 def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatch):
     """A sensitivity is a pass along all steps."""
     monkeypatch.setattr(Sensitivity, "along", None)
@@ -100,7 +139,7 @@ def test_a_time_has_the_digits_that_a_millionth_of_the_motion_leaves(time, chang
 @pytest.mark.parametrize("change", [math.inf, math.nan])
 def test_a_change_beyond_all_numbers_leaves_no_digit_that_is_told_as_known(change):
     assert time_text(230.7, change) == "about 231 s"
-    assert digits.digits_of(0.123, change) == 1
+    assert summary.digits_of(0.123, change) == 1
 
 
 def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():
@@ -169,7 +208,7 @@ def test_every_table_is_a_data_frame_and_a_file_with_units(shaken, tmp_path, tab
 def test_tables_that_are_none_and_steps_that_mean_nothing_are_refused(shaken, tmp_path):
     with pytest.raises(InvalidOption, match="table must be one of histories, events, impacts, chattering, not 'nodes'"):
         shaken.to_dataframe("nodes")
-    with pytest.raises(InvalidOption, match="dt= is the step of the histories"):
+    with pytest.raises(InvalidOption, match="dt is the step of the histories"):
         shaken.to_csv(tmp_path / "impacts.csv", "impacts", dt=0.01)
     with pytest.raises(InvalidOption, match="dt"):
         shaken.to_dataframe(dt=-1.0)
@@ -242,16 +281,16 @@ def test_no_time_beside_another_has_more_digits_than_it():
     pulse = rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, critical * (1.0 + 1e-11))
     response = simulate(block, pulse, model="linear")
     assert response.overturned
-    assert digits.overturn_text(response).startswith("about ")
-    for text in (digits.tipping_text(response), digits.peak_time_text(response)):
+    assert summary.overturn_text(response).startswith("about ")
+    for text in (summary.tipping_text(response), summary.peak_time_text(response)):
         assert text == f"about {float(text.split()[1]):.0f} s"
     assert "AMBIGUOUS" in response.summary()
     (row,) = survey(block, {"pulse": pulse}, model="linear").rows()
     assert row["ambiguous"]
-    assert row["verdict"] == f"overturns at {digits.overturn_text(response)}, AMBIGUOUS"
+    assert row["verdict"] == f"overturns at {summary.overturn_text(response)}, AMBIGUOUS"
     known = simulate(block, rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, 1.2 * critical), model="linear")
-    assert re.fullmatch(r"\d+\.\d{4} s", digits.peak_time_text(known))
-    assert re.fullmatch(r"\d+\.\d{4} s", digits.tipping_text(known))
+    assert re.fullmatch(r"\d+\.\d{4} s", summary.peak_time_text(known))
+    assert re.fullmatch(r"\d+\.\d{4} s", summary.tipping_text(known))
 
 
 @pytest.mark.parametrize(
@@ -282,6 +321,6 @@ def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():
     motion = rocking.records.load("el-centro-meloland-270").scaled_to(4.0)
     block = Block(width=0.6, height=2.1)
     one, other = (simulate(block, motion.scaled(factor)) for factor in (1.0, 1.0 + 1e-4))
-    decimals = len(digits.peak_time_text(one).partition(".")[2].removesuffix(" s"))
+    decimals = len(summary.peak_time_text(one).partition(".")[2].removesuffix(" s"))
     moved = 0.01 * abs(other.peak_time - one.peak_time)
     assert moved < 10.0**-decimals

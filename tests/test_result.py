@@ -260,5 +260,5 @@ def test_why_a_file_cannot_be_written_is_said_without_the_library_s_internals(tm
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (
         done.stdout
-        == f"{tmp_path / 'large.nc'} cannot be written: File too large; nothing of it was kept; choose another place\n"
+        == f"{tmp_path / 'large.nc'}: cannot be written: File too large; nothing of it was kept; choose another place\n"
     )

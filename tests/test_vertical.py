@@ -24,7 +24,7 @@ from rocking.kernels import state
 from rocking.kernels.certificate import arc_bounds, bounds_on_motion, prove_rest, side_bounds
 from rocking.motion.exceedance import exceedances, lifting_factors
 from rocking.plausibility import vertical_notes
-from rocking.problem import ground_of, records_of, rules_of
+from rocking.problem import ground_of, rules_of
 from rocking.tables import plain
 from rocking.treatment import treatment
 
@@ -130,7 +130,7 @@ def problem_of(block: rocking.Block, motion: Motion, model: str) -> tuple[object
     """Ground, block and rules as kernels take them."""
     blocks = Blocks.of([block])
     rules = rules_of(blocks, model, treatment("certified"), None, record=True)
-    return ground_of(motion, block.gravity), records_of(blocks, model, np.zeros((1, 2)))[0], rules
+    return ground_of(motion, block.gravity), blocks.kernel_records(model, np.zeros((1, 2)))[0], rules
 
 
 @st.composite

@@ -7,7 +7,7 @@ from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
-from .block import Block, Blocks
+from .block import Block, Blocks, Side
 from .ensemble import simulate_many
 from .errors import (
     DamagedStudy,
@@ -18,6 +18,7 @@ from .errors import (
     OutsideFit,
     RockingError,
     StudyError,
+    UnequalSides,
     Unfinished,
     UnreadableRecord,
 )
@@ -25,7 +26,7 @@ from .explorer.notebook import explore
 from .motion import Motion, pulses, records
 from .motion.formats import read
 from .motion.scaling import Measure
-from .response import Response
+from .response import Response, Sensitivity
 from .simulation import simulate
 from .studies import Study, study
 from .treatment import AsymptoticTime, Certified, IntervalThreshold, VelocityThreshold
@@ -52,8 +53,11 @@ __all__ = [
     "OutsideFit",
     "Response",
     "RockingError",
+    "Sensitivity",
+    "Side",
     "Study",
     "StudyError",
+    "UnequalSides",
     "Unfinished",
     "UnreadableRecord",
     "VelocityThreshold",

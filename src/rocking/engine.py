@@ -1,4 +1,4 @@
-"""The one engine for many simulations: any tasks of blocks under a scaled motion, on any executor."""
+"""The one engine for many simulations: any tasks of bodies under a scaled motion, on any executor."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers
-from rocking.block import Blocks
+from rocking.body import Bodies
 from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import Unfinished
 from rocking.kernels import state
@@ -24,13 +24,13 @@ from rocking.kernels.lanes import scheduler
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
+from rocking.model import Model
 from rocking.motion.motion import Motion
-from rocking.problem import ground_of, records_of, rules_of, step_of
+from rocking.problem import ground_of, rules_of, step_of
 from rocking.treatment import Treatment
-from rocking.treatment.base import Model
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
-#: it while the block moved or the motion went on. All else is then as far as it came. ``complete_chattering``: it
+#: it while the body moved or the motion went on. All else is then as far as it came. ``complete_chattering``: it
 #: rested after its first uplift before the motion passed a threshold again. ``stalled`` counts the rests that were not
 #: proven. Times of what never happened are 0.
 OUTCOME = np.dtype(
@@ -48,14 +48,14 @@ Found = TypeVar("Found")
 BUDGET: Final = 3_000_000
 _BUDGET_OF_A_PIECE: Final = 4
 
-#: Steps of one call of a kernel, for one block and for each of many: some milliseconds until an interrupt is seen.
+#: Steps of one call of a kernel, for one body and for each of many: some milliseconds until an interrupt is seen.
 SLICE: Final = 50_000
 _FIRST_SLICE: Final = 5_000
 
-#: Blocks that go through a motion together: as many as the fastest cache holds.
+#: Bodies that go through a motion together: as many as the fastest cache holds.
 _TOGETHER: Final = 16 * lanes.WIDTH
 
-#: Block-steps of one task: enough to pay for the call, few enough to stop soon when interrupted.
+#: Steps of all bodies of one task: enough to pay for the call, few enough to stop soon when interrupted.
 _TASK: Final = 8_000_000
 
 #: Tasks that are handed out ahead of the results, for each thread.
@@ -64,17 +64,17 @@ _AHEAD: Final = 2
 
 @dataclass(frozen=True)
 class Setup:
-    """What all simulations share: n blocks, and how to compute.
+    """What all simulations share: n bodies, and how to compute.
 
     Attributes
     ----------
-    blocks : Blocks
-        n blocks.
+    bodies : Bodies
+        n bodies.
     model, treatment, duration
         As for `rocking.simulate`.
     """
 
-    blocks: Blocks
+    bodies: Bodies
     model: Model
     treatment: Treatment
     duration: float | None = None
@@ -82,12 +82,12 @@ class Setup:
 
 @dataclass(frozen=True)
 class Task:
-    """Some of the blocks under one motion times a factor.
+    """Some of the bodies under one motion times a factor.
 
     Attributes
     ----------
-    blocks : slice or ndarray of int
-        Which blocks.
+    bodies : slice or ndarray of int
+        Which bodies.
     motion : Motion
         What shakes them.
     factor : float
@@ -96,7 +96,7 @@ class Task:
         Where the outcomes belong, for the caller.
     """
 
-    blocks: slice | Integers
+    bodies: slice | Integers
     motion: Motion
     factor: float = 1.0
     key: tuple[int, ...] = ()
@@ -105,12 +105,12 @@ class Task:
 def simulate_tasks(
     setup: Setup, tasks: Iterable[Task], *, threads: int | None = None, executor: Executor | None = None
 ) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Outcomes of every task, as they are finished: structured arrays (`OUTCOME`), one row a block.
+    """Outcomes of every task, as they are finished: structured arrays (`OUTCOME`), one row a body.
 
     Parameters
     ----------
     setup : Setup
-        Blocks and rules.
+        Bodies and rules.
     tasks : iterable of Task
         Taken as they are needed, a few ahead of the results.
     threads : int, optional
@@ -120,7 +120,7 @@ def simulate_tasks(
 
     Notes
     -----
-    What becomes of a block depends on the block and its motion alone, bit for bit, whatever shares its task. An
+    What becomes of a body depends on the body and its motion alone, bit for bit, whatever shares its task. An
     interrupt leaves the rest undone.
     """
     announce(SIMULATIONS)
@@ -161,7 +161,7 @@ def in_threads(work: Callable[[Item], Found], items: Sequence[Item], *, threads:
 
 
 def parts_of(count: int, motion: Motion) -> Iterator[slice]:
-    """Ranges of ``count`` blocks, each as large as a task should be."""
+    """Ranges of ``count`` bodies, each as large as a task should be."""
     size = _TOGETHER * max(1, _TASK // (_TOGETHER * len(motion.coefficients)))
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))
@@ -170,7 +170,7 @@ def parts_of(count: int, motion: Motion) -> Iterator[slice]:
 def simulate_each(
     setup: Setup, motion: Motion, factors: Floats, *, threads: int | None = None
 ) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Outcomes for block k under the motion times factor k; those that share a factor are simulated together.
+    """Outcomes for body k under the motion times factor k; those that share a factor are simulated together.
 
     Raises
     ------
@@ -223,28 +223,28 @@ def _in_flight(
 
 def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None) -> NDArray[np.void]:
     """Outcomes of one task; where ``stop`` is set on the way, of no use."""
-    blocks = setup.blocks.select(task.blocks)
-    limits = setup.treatment.limits(blocks, task.motion, setup.model, task.factor)
-    rules = rules_of(blocks, setup.model, setup.treatment, setup.duration, record=False)
-    ground = ground_of(task.motion, blocks.gravity, task.factor)
-    bodies = records_of(blocks, setup.model, limits)
-    states = state.new_states(len(blocks), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))
+    bodies = setup.bodies.select(task.bodies)
+    limits = setup.treatment.limits(bodies, task.motion, setup.model, task.factor)
+    rules = rules_of(bodies, setup.model, setup.treatment, setup.duration, record=False)
+    ground = ground_of(task.motion, bodies.gravity, task.factor)
+    records = bodies.kernel_records(setup.model, limits)
+    states = state.new_states(len(bodies), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))
     step = step_of(task.motion)
-    for chosen, substeps in _companies(ground, bodies, step, setup.model):
+    for chosen, substeps in _groups(ground, records, step, setup.model):
         if stop is not None and stop.is_set():
             break
-        _march_together(ground, rules, (bodies, states), chosen, step, substeps)
-    _march_on(ground, rules, bodies, states, stop)
+        _march_together(ground, rules, (records, states), chosen, step, substeps)
+    _march_on(ground, rules, records, states, stop)
     outcomes = _outcomes(states, task.motion.end)
-    outcomes["complete_chattering"] = complete_chattering(ground, bodies, states)
+    outcomes["complete_chattering"] = complete_chattering(ground, records, states)
     return outcomes
 
 
-def _companies(ground: Ground, bodies: Records, step: float | None, model: Model) -> Iterator[tuple[Integers, int]]:
-    """Blocks that go together, with the substeps that they need; -1 for those that march alone."""
-    substeps = np.full(len(bodies), -1)
+def _groups(ground: Ground, records: Records, step: float | None, model: Model) -> Iterator[tuple[Integers, int]]:
+    """Bodies that go together, with the substeps that they need; -1 for those that march alone."""
+    substeps = np.full(len(records), -1)
     if step is not None:
-        width = step * np.sqrt(np.abs(bodies["stiffness"]).max(axis=1) * greatest_weight(ground))
+        width = step * np.sqrt(np.abs(records["stiffness"]).max(axis=1) * greatest_weight(ground))
         substeps = np.where(width <= lanes.LONGEST_STEP, _substeps(ground, width, model), -1.0).astype(np.int64)
     for count in np.unique(substeps):
         chosen = np.flatnonzero(substeps == count)
@@ -267,11 +267,11 @@ def _march_together(
     step: float | None,
     substeps: int,
 ) -> None:
-    """Take some of the blocks through the motion in lanes, or one after the other where they cannot."""
-    bodies, states = whole
+    """Take some of the bodies through the motion in lanes, or one after the other where they cannot."""
+    records, states = whole
     pieces = len(ground.pieces) - 1
     finer = max(substeps, 0) if rules["nonlinear"] else 0
-    together = lanes.pool_of(bodies[chosen], states[chosen], pieces, step or 1.0, finer)
+    together = lanes.pool_of(records[chosen], states[chosen], pieces, step or 1.0, finer)
     if substeps < 0:
         scheduler.march_each(ground, rules, state.new_scratch(), together)
     else:
@@ -279,7 +279,7 @@ def _march_together(
     states[chosen] = together.states
 
 
-def _march_on(ground: Ground, rules: Record, bodies: Records, states: Records, stop: threading.Event | None) -> None:
+def _march_on(ground: Ground, rules: Record, records: Records, states: Records, stop: threading.Event | None) -> None:
     """Take those on that have used up their first slice of steps, until their budget is spent."""
     nothing, scratch = state.new_table(0), state.new_scratch()
     for k in np.flatnonzero(np.isin(states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
@@ -289,7 +289,7 @@ def _march_on(ground: Ground, rules: Record, bodies: Records, states: Records, s
             if stop is not None and stop.is_set():
                 return
             one["budget"] = SLICE
-            one["ending"] = march(ground, bodies[k], rules, nothing, scratch, one)
+            one["ending"] = march(ground, records[k], rules, nothing, scratch, one)
             if int(one["ending"]) != state.Ending.PAUSED:
                 break
         else:
@@ -301,10 +301,10 @@ def slices(ground: Ground) -> int:
     return math.ceil((BUDGET + _BUDGET_OF_A_PIECE * len(ground.pieces)) / SLICE)
 
 
-def complete_chattering(ground: Ground, bodies: Records, states: Records) -> Flags:
+def complete_chattering(ground: Ground, records: Records, states: Records) -> Flags:
     """Whether the chattering after the first uplift was complete, by the times of that uplift and the first rest."""
     complete = np.empty(len(states), dtype=bool)
-    note_complete(ground, bodies, states, state.new_scratch(), complete)
+    note_complete(ground, records, states, state.new_scratch(), complete)
     return complete
 
 

@@ -10,22 +10,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.block import Block, Blocks
+from rocking.block import Block
+from rocking.body import Bodies, Body
 from rocking.engine import OUTCOME, cores, simulate_tasks
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.scaling import Measure, MeasureName
+from rocking.problem import bodies_of
 from rocking.product import VARIABLES, Polarity, Product, Scales
 from rocking.progress import Progress
 from rocking.treatment import Treatment, treatment
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 def simulate_many(
-    blocks: Blocks | Block | Sequence[Block],
+    blocks: Bodies | Body | Sequence[Block],
     motions: Motions,
     *,
     model: Model = "nonlinear",
@@ -42,7 +44,7 @@ def simulate_many(
     Parameters
     ----------
     blocks : Blocks, Block or sequence of Block
-        n blocks.
+        n blocks, or bodies of another kind (`rocking.body.Bodies`).
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
     model, chattering, duration
@@ -91,7 +93,7 @@ def simulate_many(
     [[True, False, True, False]]
     """
     product = Product(
-        Blocks.of(blocks),
+        bodies_of(blocks),
         tuple(several_motions(motions)),
         Scales.of(levels, measure),
         polarity,
@@ -104,6 +106,6 @@ def simulate_many(
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:
         for task, outcomes in simulate_tasks(product.setup(), product.tasks(), threads=count):
             for name, values in results.items():
-                values[(*task.key, task.blocks)] = outcomes[name]
+                values[(*task.key, task.bodies)] = outcomes[name]
             bar.advance(len(outcomes))
     return product.dataset(results)

@@ -115,6 +115,10 @@ class InvalidBlock(RockingError):
     """The block's sizes or parameters cannot describe a block that stands and rocks."""
 
 
+class UnequalSides(InvalidBlock, AttributeError):
+    """One value was asked of a block whose sides have two: `Block.sides` has them."""
+
+
 class InvalidMotion(RockingError):
     """The ground motion's samples, step or parameters are not usable."""
 

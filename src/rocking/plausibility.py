@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from rocking.block import Block
-from rocking.block.body import bodies_of
+from rocking.block.rigid_body import rigid_bodies
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import Message
 from rocking.motion import measures
@@ -194,7 +194,7 @@ def _side_notes(block: Block) -> Iterator[Message | str]:
     p, alpha, restitution = (
         np.array([[getattr(side, name) for side in block.sides]]) for name in ("p", "alpha", "restitution")
     )
-    found = bodies_of(p, alpha)
+    found = rigid_bodies(p, alpha)
     if np.array_equal(found.restitution, restitution) and found.uncertainty[0] > _UNCERTAIN:
         yield Message(
             f"the digits of {{}} and {{}} tell the restitution to +-{found.uncertainty[0]:.1g} only: give more of "

@@ -1,23 +1,25 @@
-"""Blocks, a motion and the rules of a simulation as the records and arrays that kernels take."""
+"""Bodies, a motion and the rules of a simulation, as the records and arrays that kernels take."""
 
 from __future__ import annotations
 
 import functools
 import math
-from typing import get_args
+from collections.abc import Iterable
+from typing import cast
 
 import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block import Blocks
+from rocking.block import Block, Blocks, one_block
+from rocking.body import Bodies, Body
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
 from rocking.kernels.ground import Ground
+from rocking.model import MODELS, Model
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.treatment import Treatment
-from rocking.treatment.base import Model
 
 
 @functools.lru_cache(maxsize=8)
@@ -48,24 +50,36 @@ def step_of(motion: Motion) -> float | None:
     return None if None in steps else steps[0]
 
 
-def records_of(blocks: Blocks, model: Model, limits: Floats) -> state.Records:
-    """Every block as the kernels take it (`state.BLOCK`), shape (n,)."""
-    p, alpha = blocks.p, blocks.alpha
-    made = state.records(len(blocks), state.BLOCK)
-    made["stiffness"] = p * p
-    made["slenderness"] = alpha
-    made["sine"], made["cosine"] = np.sin(alpha), np.cos(alpha)
-    made["threshold"] = alpha if model == "linear" else np.tan(alpha)
-    made["gain"] = p * p if model == "linear" else p * p * np.cos(alpha)
-    made["restitution"] = blocks.restitution
-    made["limit"] = limits
-    made["entered"] = (1, 0)
-    made["fallen"] = 0.5 * math.pi
-    return made
+def bodies_of(given: Bodies | Body | Iterable[Block]) -> Bodies:
+    """Return bodies as they are, a single one as `Bodies` of which it is the only one, and blocks as `Blocks`.
+
+    Raises
+    ------
+    InvalidBlock
+        As `Blocks.of`.
+    """
+    if isinstance(given, type):  # has what its objects have, but is none
+        return Blocks.of(cast("Iterable[Block]", given))
+    if isinstance(given, Bodies):
+        return given
+    return given.alone() if isinstance(given, Body) else Blocks.of(given)
+
+
+def one_body(body: Body) -> Body:
+    """Return the body.
+
+    Raises
+    ------
+    InvalidBlock
+        If it is neither a block nor another body.
+    """
+    if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # a protocol is slow to ask
+        return body
+    return one_block(cast("Block", body))
 
 
 def rules_of(
-    blocks: Blocks, model: Model, treatment: Treatment, duration: float | None, *, record: bool
+    bodies: Bodies, model: Model, treatment: Treatment, duration: float | None, *, record: bool
 ) -> state.Record:
     """Rules of a simulation, checked.
 
@@ -74,9 +88,9 @@ def rules_of(
     InvalidOption
         If the model is unknown, the duration is not positive, or it is not given where nothing comes to rest.
     """
-    checks.one_of(model, "model", InvalidOption, get_args(Model))
+    checks.one_of(model, "model", InvalidOption, MODELS)
     if duration is None:
-        if np.any(np.prod(blocks.restitution, axis=1) == 1.0):
+        if np.any(np.prod(bodies.restitution, axis=1) == 1.0):
             raise InvalidOption(
                 "a block with {} 1 never comes to rest; give {} to say when to stop", "restitution", "duration"
             )

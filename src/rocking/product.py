@@ -1,4 +1,4 @@
-"""The full product of blocks, motions, scales and polarities: what is simulated, and how its outcomes are labelled."""
+"""The full product of bodies, motions, scales and polarities: what is simulated, and how its outcomes are labelled."""
 
 from __future__ import annotations
 
@@ -7,21 +7,22 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.body import Bodies
 from rocking.constants import VERSION
 from rocking.engine import Setup, Task, parts_of
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.arguments import names_of
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.problem import rules_of
 from rocking.treatment import Treatment
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,12 +104,12 @@ class Scales:
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """Every block under every motion at every scale and polarity.
+    """Every body under every motion at every scale and polarity.
 
     Attributes
     ----------
-    blocks : Blocks
-        n blocks.
+    bodies : Bodies
+        n bodies.
     motions : tuple of Motion
         m motions.
     scales : Scales
@@ -124,7 +125,7 @@ class Product:
         If a rule is out of its range.
     """
 
-    blocks: Blocks
+    bodies: Bodies
     motions: tuple[Motion, ...]
     scales: Scales
     polarity: Polarity
@@ -134,7 +135,7 @@ class Product:
 
     def __post_init__(self) -> None:
         checks.one_of(self.polarity, "polarity", InvalidOption, list(_SIGNS))
-        rules_of(self.blocks, self.model, self.treatment, self.duration, record=False)  # checked before any work
+        rules_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # checked before any work
 
     @property
     def signs(self) -> tuple[int, ...]:
@@ -143,12 +144,25 @@ class Product:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """Numbers of motions, scales, polarities and blocks."""
-        return len(self.motions), self.scales.count, len(self.signs), len(self.blocks)
+        """Numbers of motions, scales, polarities and bodies."""
+        return len(self.motions), self.scales.count, len(self.signs), len(self.bodies)
 
-    def setup(self, blocks: slice | None = None) -> Setup:
-        """Return how to simulate the blocks, or some of them."""
-        chosen = self.blocks if blocks is None else self.blocks.select(blocks)
+    @property
+    def blocks(self) -> Blocks:
+        """The bodies, for what only blocks can answer.
+
+        Raises
+        ------
+        InvalidOption
+            If they are of another kind.
+        """
+        if not isinstance(self.bodies, Blocks):
+            raise InvalidOption(f"this is known of blocks alone, not of {self.bodies.kind}")
+        return self.bodies
+
+    def setup(self, bodies: slice | None = None) -> Setup:
+        """Return how to simulate the bodies, or some of them."""
+        chosen = self.bodies if bodies is None else self.bodies.select(bodies)
         return Setup(chosen, self.model, self.treatment, self.duration)
 
     def tasks(self) -> Iterator[Task]:
@@ -156,7 +170,7 @@ class Product:
         for m, motion in enumerate(self.motions):
             for s, factor in enumerate(self.scales.factors(motion).tolist()):
                 for k, sign in enumerate(self.signs):
-                    for part in parts_of(len(self.blocks), motion):
+                    for part in parts_of(len(self.bodies), motion):
                         yield Task(part, motion, sign * factor, (m, s, k))
 
     def dataset(self, outcomes: Mapping[str, Any]) -> xr.Dataset:
@@ -182,7 +196,7 @@ class Product:
             **verticals_of(self.motions),
             "scale": ("scale", self.scales.values, self.scales.about),
             "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in self.signs]),
-            **block_coordinates(self.blocks),
+            **body_coordinates(self.bodies),
         }
 
     def _attributes(self) -> dict[str, Any]:
@@ -191,7 +205,7 @@ class Product:
             "model": self.model,
             "chattering": repr(self.treatment),
             "polarity": self.polarity,
-            "gravity": self.blocks.gravity,
+            "gravity": self.bodies.gravity,
             "motions": [f"{motion.name}: {motion.description.text}" for motion in self.motions],
             "histories": ["; ".join(motion.history) for motion in self.motions],
         }
@@ -203,14 +217,10 @@ def verticals_of(motions: Sequence[Motion]) -> dict[str, Any]:
     return {"vertical": ("motion", names)} if any(motion.vertical for motion in motions) else {}
 
 
-def block_coordinates(blocks: Blocks) -> dict[str, Any]:
-    """Parameters of blocks as coordinates of the dimension ``block``, with units; of unequal sides one for each."""
-    columns: dict[str, tuple[NDArray[Any], str]] = {
-        "p": (blocks.p, "rad/s"),
-        "alpha": (blocks.alpha, "rad"),
-        "restitution": (blocks.restitution, "1"),
-    }
-    if blocks.is_symmetric:
+def body_coordinates(bodies: Bodies) -> dict[str, Any]:
+    """Parameters of bodies as coordinates of the dimension ``block``, with units; of unequal sides one for each."""
+    columns = bodies.parameters()
+    if bodies.is_symmetric:
         return {name: ("block", values[:, 0], {"units": units}) for name, (values, units) in columns.items()}
     return {
         f"{name}_{side}": ("block", values[:, k], {"units": units})

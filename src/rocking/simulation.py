@@ -1,23 +1,23 @@
-"""The main job: one block, one motion, an exact response."""
+"""The main job: one body, one motion, an exact response."""
 
 from __future__ import annotations
 
 import math
 
 from rocking import checks
-from rocking.block import Block, Blocks, one_block
+from rocking.body import Body
 from rocking.compiling import SIMULATIONS, announce
 from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
+from rocking.model import Model
 from rocking.motion.arguments import one_motion
 from rocking.motion.motion import Motion
-from rocking.problem import ground_of, records_of, rules_of
+from rocking.problem import ground_of, one_body, rules_of
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
-from rocking.treatment.base import Model
 
 #: Rows of the first table per piece of the motion.
 _FIRST_ROWS = 1.25
@@ -27,7 +27,7 @@ _FASTEST = 1e6
 
 
 def simulate(
-    block: Block,
+    block: Body,
     motion: Motion | None,
     *,
     model: Model = "nonlinear",
@@ -41,7 +41,7 @@ def simulate(
     Parameters
     ----------
     block : Block
-        What rocks.
+        What rocks, or another body (`rocking.body.Body`).
     motion : Motion or None
         Horizontal ground acceleration; None for free rocking.
     model : {"nonlinear", "linear"}
@@ -53,7 +53,7 @@ def simulate(
         Time to stop at, s. By default to the end of the motion, and on until rest or overturning. Where it ends the
         response while the block still moves or the motion goes on, the response is `stopped`, and has no verdict.
     initial_rotation : float
-        Rotation at time 0, rad; positive leans to side +.
+        Rotation at time 0, rad; positive leans to side +. Of another body its coordinate.
     initial_velocity : float
         Angular velocity at time 0, rad/s.
 
@@ -65,7 +65,7 @@ def simulate(
     Raises
     ------
     InvalidBlock, InvalidMotion
-        If the block is no `Block`, or the motion no `Motion`.
+        If the block is no body, or the motion no `Motion`.
     InvalidOption
         If an argument is out of its range, or the block would never come to rest and no duration is given.
 
@@ -88,16 +88,12 @@ def simulate(
     (False, True, '4.235818')
     """
     announce(SIMULATIONS)
-    how, blocks, motion = treatment(chattering), Blocks.of([one_block(block)]), one_motion(motion)
-    rules = rules_of(blocks, model, how, duration, record=True)
-    trail = Trail(
-        ground_of(motion, block.gravity),
-        records_of(blocks, model, how.limits(blocks, motion, model))[0],
-        rules,
-        NO_NODES,
-    )
+    how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
+    rules = rules_of(alone, model, how, duration, record=True)
+    record = alone.kernel_records(model, how.limits(alone, motion, model))[0]
+    trail = Trail(ground_of(motion, block.gravity), record, rules, NO_NODES)
     start = state.new_states(1, 0)[0]
-    start["side"], start["u"], start["v"] = _initial_state(initial_rotation, initial_velocity)
+    start["side"], start["u"], start["v"] = _initial_state(block, record, initial_rotation, initial_velocity)
     start["peak"] = start["u"]
     ending, table = _marched(trail, start)
     if ending == state.Ending.BALANCED:
@@ -124,20 +120,26 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     return state.Ending.UNFINISHED, table
 
 
-def _initial_state(rotation: float, velocity: float) -> tuple[int, float, float]:
-    """Side index, rotation and velocity in that side's frame; at rest where both are zero."""
-    theta = checks.finite(rotation, "initial_rotation", InvalidOption)
-    rate = checks.finite(velocity, "initial_velocity", InvalidOption)
-    if abs(rate) > _FASTEST:
-        sentence = f"{{}} must be at most {_FASTEST:g} rad/s in size, not {rate:g}"
-        raise InvalidOption(sentence, "initial_velocity", value=velocity)
-    if abs(theta) >= 0.5 * math.pi:
+def _initial_state(body: Body, record: state.Record, rotation: float, velocity: float) -> tuple[int, float, float]:
+    """Index of the side, coordinate and velocity in that side's frame; at rest where both are zero."""
+    u = checks.finite(rotation, "initial_rotation", InvalidOption)
+    v = checks.finite(velocity, "initial_velocity", InvalidOption)
+    unit, fallen = body.coordinate.unit, float(record["fallen"])
+    if abs(v) > _FASTEST:
         raise InvalidOption(
-            f"{{}} must be below pi/2 rad in size, not {theta:g}{checks.hint_of_degrees(theta)}",
-            "initial_rotation",
-            value=rotation,
+            f"{{}} must be at most {_FASTEST:g} {unit}/s in size, not {v:g}", "initial_velocity", value=v
         )
-    if theta == 0.0 and rate == 0.0:
+    if abs(u) >= fallen:
+        limit = "pi/2" if fallen == 0.5 * math.pi else f"{fallen:g}"
+        hint = checks.hint_of_degrees(u) if unit == "rad" else ""
+        raise InvalidOption(
+            f"{{}} must be below {limit} {unit} in size, not {u:g}{hint}", "initial_rotation", value=rotation
+        )
+    if u == 0.0 and v == 0.0:
         return state.AT_REST, 0.0, 0.0
-    sign = math.copysign(1.0, theta if theta != 0.0 else rate)
-    return (0 if sign > 0.0 else 1), abs(theta), sign * rate
+    sign = math.copysign(1.0, u if u != 0.0 else v)
+    if sign < 0.0 and record["entered"][0] == 0:
+        raise InvalidOption(
+            "{} and {} must lead to side +, the only one of this body", "initial_rotation", "initial_velocity"
+        )
+    return (0 if sign > 0.0 else 1), abs(u), sign * v

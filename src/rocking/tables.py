@@ -255,7 +255,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         target = wanted.resolve()  # a link is kept, and what it leads to is replaced
         if not target.parent.is_dir():
             raise OutputError(
-                f"{path} cannot be written: there is no folder {target.parent}; make it, or choose another"
+                f"cannot be written: there is no folder {target.parent}; make it, or choose another", path=str(path)
             )
         beside = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:_HASH]}.part{target.suffix}")
         try:
@@ -270,7 +270,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise OutputError(
-            f"{path} cannot be written: {reason}; nothing of it was kept; choose another place"
+            f"cannot be written: {reason}; nothing of it was kept; choose another place", path=str(path)
         ) from error
 
 
@@ -295,6 +295,17 @@ def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
     """
     with whole_file(path) as beside:
         beside.write_bytes(content)
+
+
+def write_csv(path: str | Path, frame: pd.DataFrame, *, index: bool = False) -> None:
+    """Write a data frame as text columns with a header, whole or not at all; numbers to 15 digits.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    write_text(path, frame.to_csv(index=index, float_format="%.15g", lineterminator="\n"))
 
 
 def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:

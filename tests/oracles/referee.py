@@ -69,11 +69,11 @@ class Batch:
         return rocking.simulate(self.blocks[k], self.motions[sign], model=self.model, duration=self.duration)
 
     def describe(self, sign: int, k: int) -> str:
-        block = self.blocks[k]
+        p, alpha, restitution = (values[k].tolist() for values, _ in self.blocks.parameters().values())
         return (
             f"batch({self.seed}, {self.number}{', vertical=True' * (self.motion.vertical is not None)}), "
             f"polarity {sign}, block {k}: {self.kind}, {self.model}, "
-            f"p={block.p!r}, alpha={block.alpha!r}, restitution={block.restitution!r}, "
+            f"p={p!r}, alpha={alpha!r}, restitution={restitution!r}, "
             f"step={self.motion.breakpoints[1]:.6g}, pga={self.motions[sign].pga:.6g}, duration={self.duration!r}"
         )
 

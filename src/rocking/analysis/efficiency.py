@@ -17,11 +17,11 @@ from rocking.analysis.report import Drawn
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.scaling import Measure
 from rocking.result import Result
 from rocking.tables import counted, text_table
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

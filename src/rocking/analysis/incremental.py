@@ -18,6 +18,7 @@ from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
 from rocking.motion.exceedance import lifting_factors
@@ -26,7 +27,6 @@ from rocking.motion.scaling import IntensityName, Measure
 from rocking.result import Result
 from rocking.tables import counted, named, text_table
 from rocking.treatment import Certified
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -141,7 +141,7 @@ def incremental_dynamic_analysis(
             factor = level[here] * factors[m, block[here]]
             setup = Setup(many.select(block[here]), model, _VERDICT)
             for task, outcomes in simulate_each(setup, shaken[m], factor, threads=threads):
-                verdicts[np.flatnonzero(here)[task.blocks]] = outcomes["overturned"]
+                verdicts[np.flatnonzero(here)[task.bodies]] = outcomes["overturned"]
         return verdicts
 
     grid = table.overturned.transpose("level", "motion", "block").values

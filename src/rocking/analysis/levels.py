@@ -14,10 +14,10 @@ from rocking.block import Block, Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.tables import counted
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

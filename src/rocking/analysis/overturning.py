@@ -16,9 +16,11 @@ from rocking import checks
 from rocking.analysis.boundaries import Boundaries, boundaries
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks, one_block
+from rocking.body import Body
 from rocking.constants import VERSION
 from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_family
@@ -27,7 +29,6 @@ from rocking.result import Result, table_of_some
 from rocking.simulation import simulate
 from rocking.tables import cell, named, text_table
 from rocking.treatment import Certified
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -319,7 +320,7 @@ class _PulseProblem:
 
     def grid(self, levels: Floats, progress: bool | None) -> tuple[Integers, Floats]:
         """Modes and peak rotations at every level, shape (levels, blocks)."""
-        shape = levels.size, len(self.setup.blocks)
+        shape = levels.size, len(self.setup.bodies)
         row, column = (index.ravel() for index in np.indices(shape))
         with Progress("mapping", row.size, show=progress) as bar:
             modes, peaks = self._followed(column, levels[row], bar.advance)
@@ -330,17 +331,17 @@ class _PulseProblem:
         return self._followed(column, level, lambda count: None)[0]
 
     def _followed(self, column: Integers, level: Floats, done: Callable[[int], None]) -> tuple[Integers, Floats]:
-        setup = replace(self.setup, blocks=self.setup.blocks.select(column))
+        setup = replace(self.setup, bodies=self.setup.bodies.select(column))
         ends = np.empty(column.size, dtype=OUTCOME)
         for task, outcomes in simulate_each(setup, self.unit, self.threshold * level, threads=self.threads):
-            ends[task.blocks] = outcomes
+            ends[task.bodies] = outcomes
             done(len(outcomes))
         modes = modes_of(ends, self.unit.duration)
         for k in np.flatnonzero(ends["overturned"] & (ends["uplifts"] > 1)):
-            modes[k] = self._last_impacts(setup.blocks[int(k)], float(level[k]))
+            modes[k] = self._last_impacts(setup.bodies[int(k)], float(level[k]))
         return modes, ends["peak_rotation"]
 
-    def _last_impacts(self, block: Block, level: float) -> int:
+    def _last_impacts(self, block: Body, level: float) -> int:
         """Impacts since the last uplift, of a block that had been at rest in between."""
         response = simulate(block, self.unit.scaled(self.threshold * level), model=self.setup.model)
         uplifts = response.events["time"][response.events["kind"] == "uplift"]

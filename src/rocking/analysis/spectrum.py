@@ -19,12 +19,12 @@ from rocking.block.many import rates_of
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
 from rocking.motion.motion import Motion
 from rocking.result import Result, table_of_some
 from rocking.treatment import Treatment
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
-from rocking.contact import friction_coefficient
 from rocking.motion.arguments import Motions, motions_by_name, names_of
 from rocking.motion.motion import Motion
-from rocking.product import block_coordinates, verticals_of
+from rocking.product import body_coordinates, verticals_of
 from rocking.progress import Progress, note
-from rocking.response import Response
-from rocking.response.digits import ratio_text
-from rocking.response.verdict import in_brief
+from rocking.response import Response, in_brief, ratio_text
+from rocking.response.forces import friction_coefficient
 from rocking.simulation import simulate
 from rocking.tables import counted, decimal, frame_of, named, text_table, to_json, write_bytes, write_text
 
@@ -84,7 +82,7 @@ class BlockUnderRecords(ABC):
 
     def _labels(self) -> list[dict[str, Any]]:
         """First columns of each row: the record, its motion, the block."""
-        columns = block_coordinates(Blocks.of(self.block))
+        columns = body_coordinates(Blocks.of(self.block))
         numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
         labels = record_columns(self.records, [motion_of(response) for response in self.responses])
         return [{**label, "block": self.block.description, **numbers} for label in labels]

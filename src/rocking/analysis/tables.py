@@ -14,11 +14,11 @@ from rocking.analysis.hazard import HEADINGS, heading_of
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
 from rocking.motion.scaling import Measure
 from rocking.tables import counted, csv_rows, named
-from rocking.treatment.base import Model
 
 _FOLDER: Final = re.compile(r"[\w-][\w. -]*(?<![. ])")
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block.body import bodies_of, refusal
-from rocking.block.single import ALPHA, GRAVITY, RESTITUTION, Block, Limits, P, one_block, within
+from rocking.block.rigid_body import refusal, rigid_bodies
+from rocking.block.single import Block, checked_gravity, checked_sides, one_block
+from rocking.body import KINDS
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
+from rocking.kernels import state
+from rocking.model import Model
 from rocking.tables import range_text
 
 
@@ -53,6 +57,8 @@ class Blocks:
     (2, 3.0, True)
     """
 
+    kind: ClassVar[str] = "blocks"
+
     p: Floats
     alpha: Floats
     restitution: Floats
@@ -72,23 +78,21 @@ class Blocks:
             given["restitution"] = restitution
         try:
             columns = [_columns(checks.numbers(values, name, InvalidBlock)) for name, values in given.items()]
-            arrays = list(np.broadcast_arrays(*columns))
+            arrays = dict(zip(given, np.broadcast_arrays(*columns), strict=True))
         except ValueError:
             raise InvalidBlock(
-                "p, alpha and restitution must be numbers, or arrays of shape (n,) or (n, 2) with one n"
-            ) from None
-        g = within(gravity, "gravity", GRAVITY, "m/s^2")
-        _check(arrays[0], P, "p", "must be positive, from {:g} to {:g} rad/s")
-        below = ALPHA._replace(high=np.nextafter(ALPHA.high, 0.0))
-        _check(arrays[1], below, "alpha", "must be from {:g} to below pi/2 rad")
+                "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with one n",
+                "p", "alpha", "restitution",
+            ) from None  # fmt: skip
+        object.__setattr__(self, "gravity", checked_gravity(gravity))
+        for name, values in arrays.items():
+            checked_sides(values, name)
         if restitution is None:
-            arrays.append(_conserved(*arrays))
-        _check(arrays[2], RESTITUTION, "restitution", "must be in (0, 1], at least {:g}; give restitution=")
-        for name, array in zip(("p", "alpha", "restitution"), arrays, strict=True):
-            held = np.array(array)
+            arrays["restitution"] = _conserved(arrays["p"], arrays["alpha"])
+        for name, values in arrays.items():
+            held = np.array(values)
             held.flags.writeable = False
             object.__setattr__(self, name, held)
-        object.__setattr__(self, "gravity", g)
 
     @classmethod
     def grid(
@@ -163,25 +167,62 @@ class Blocks:
         gravities = {block.gravity for block in gathered}
         if len(gravities) != 1:
             raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same gravity")
-        rows = [[(side.p, side.alpha, side.restitution) for side in block.sides] for block in gathered]
-        table = np.array(rows)
-        return cls(table[..., 0], table[..., 1], table[..., 2], gravity=gravities.pop())
+        table = np.array([[(side.p, side.alpha, side.restitution) for side in block.sides] for block in gathered])
+        return cls._of_checked(*np.moveaxis(table, 2, 0), gravity=gravities.pop())
+
+    @classmethod
+    def _of_checked(cls, p: Floats, alpha: Floats, restitution: Floats, *, gravity: float) -> Blocks:
+        """Make blocks of values that are known to be sound, each of shape (n, 2)."""
+        made = object.__new__(cls)
+        object.__setattr__(made, "gravity", gravity)
+        for name, values in (("p", p), ("alpha", alpha), ("restitution", restitution)):
+            held = np.ascontiguousarray(values)
+            held.flags.writeable = False
+            object.__setattr__(made, name, held)
+        return made
+
+    def parameters(self) -> Mapping[str, tuple[Floats, str]]:
+        """Return p, alpha and restitution with their units, by name."""
+        return {"p": (self.p, "rad/s"), "alpha": (self.alpha, "rad"), "restitution": (self.restitution, "1")}
+
+    def speed_limits(self, share: float) -> Floats:
+        """Return a share of p alpha on every side, rad/s, shape (n, 2)."""
+        return share * self.p * self.alpha
+
+    def kernel_records(self, model: Model, limits: Floats) -> state.Records:
+        """Return every block as kernels take it (`kernels.state.BLOCK`), shape (n,).
+
+        Parameters
+        ----------
+        model : {"nonlinear", "linear"}
+            Equation of motion.
+        limits : ndarray, shape (n, 2)
+            Limits of a treatment of chattering.
+        """
+        p, alpha = self.p, self.alpha
+        made = state.records(len(self), state.BLOCK)
+        made["stiffness"] = p * p
+        made["slenderness"] = alpha
+        made["sine"], made["cosine"] = np.sin(alpha), np.cos(alpha)
+        made["threshold"] = alpha if model == "linear" else np.tan(alpha)
+        made["gain"] = p * p if model == "linear" else p * p * np.cos(alpha)
+        made["restitution"] = self.restitution
+        made["limit"] = limits
+        made["entered"] = (1, 0)
+        made["fallen"] = 0.5 * math.pi
+        return made
 
     @property
     def is_symmetric(self) -> bool:
         """Whether both sides of every block are equal."""
-        return all(np.array_equal(array[:, 0], array[:, 1]) for array in (self.p, self.alpha, self.restitution))
+        return all(np.array_equal(values[:, 0], values[:, 1]) for values, _ in self.parameters().values())
 
     def __repr__(self) -> str:
         if not len(self):
             return "<Blocks: none>"
         ranges = [
-            f"{name} {range_text(values)}{unit}"
-            for name, values, unit in (
-                ("p", self.p, " rad/s"),
-                ("alpha", self.alpha, " rad"),
-                ("restitution", self.restitution, ""),
-            )
+            f"{name} {range_text(values)}{'' if unit == '1' else f' {unit}'}"
+            for name, (values, unit) in self.parameters().items()
         ]
         return f"<Blocks: {len(self)}; {', '.join(ranges)}>"
 
@@ -207,14 +248,7 @@ class Blocks:
         """
         if not isinstance(index, slice):
             index = self._indices(index)
-        # Their values are checked already.
-        some = object.__new__(Blocks)
-        object.__setattr__(some, "gravity", self.gravity)
-        for name in ("p", "alpha", "restitution"):
-            held = getattr(self, name)[index]
-            held.flags.writeable = False
-            object.__setattr__(some, name, held)
-        return some
+        return self._of_checked(self.p[index], self.alpha[index], self.restitution[index], gravity=self.gravity)
 
     def _indices(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.int64]:
         """Positions of the blocks of a flat array of indices, or of a mask."""
@@ -254,17 +288,19 @@ def _conserved(p: Floats, alpha: Floats) -> Floats:
     """Restitutions that conserve angular momentum, of the rigid bodies whose sides have these p and alpha."""
     kept: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
     sided = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
-    found = bodies_of(p[sided], alpha[sided])
+    found = rigid_bodies(p[sided], alpha[sided])
     if not found.known.all():
         first = int(np.argmin(found.known))
-        raise InvalidBlock(f"{refusal(found, p[sided], alpha[sided], first)} (block {sided[first]})")
+        raise InvalidBlock(f"{refusal(found, p[sided], alpha[sided], first)} (block {sided[first]})", "restitution")
     kept[sided] = found.restitution
-    return kept
+    stocky = np.flatnonzero(~(kept > 0.0).all(axis=1))
+    if len(stocky):
+        raise InvalidBlock(
+            f"conserving angular momentum gives block {stocky[0]} a restitution of {kept[stocky[0]].min():.3g}: it is "
+            "too stocky to rock that way; give {} a value or a pair in (0, 1]",
+            "restitution",
+        )
+    return checked_sides(kept, "restitution")
 
 
-def _check(values: Floats, limits: Limits, name: str, rule: str) -> None:
-    bad = np.argwhere(~((values >= limits.low) & (values <= limits.high)))
-    if len(bad):
-        value = float(values[tuple(bad[0])])
-        hint = checks.hint_of_degrees(value) if name == "alpha" else ""
-        raise InvalidBlock(f"{{}} {rule.format(*limits)}, not {value:g} (block {bad[0][0]}){hint}", name, value=value)
+KINDS[Blocks.kind] = Blocks

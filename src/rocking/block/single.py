@@ -4,36 +4,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Final, NamedTuple, Never
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, Never
 
 import numpy as np
 
 from rocking import checks, svg
-from rocking.block.body import bodies_of, gyration_squared, refusal
+from rocking.arrays import Floats, Integers
+from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
+from rocking.body import ContactLaw, Coordinate
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
+from rocking.model import MODELS, Model
+
+if TYPE_CHECKING:
+    from rocking.block.many import Blocks
 
 Number = float | int
-Sided = float | tuple[float, float]
 
+#: The coordinate of every block.
+ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
 
-class Limits(NamedTuple):
-    """Lowest and highest value of a parameter, both included."""
-
-    low: float
-    high: float
-
-
-# Far beyond any block, and far enough from the ends of double precision for fourth powers of p, for the quotients of
-# a motion's largest acceleration with gravity and slenderness, and for products of all of them.
-P: Final = Limits(1e-6, 1e6)
-ALPHA: Final = Limits(1e-9, 0.5 * math.pi)
-GRAVITY: Final = Limits(1e-6, 1e6)
-#: Restitution; below it one impact is the end of rocking, to double precision.
-RESTITUTION: Final = Limits(1e-9, 1.0)
-_LENGTH: Final = Limits(1e-20, 1e20)
-_MASS: Final = Limits(1e-30, 1e30)
+# Lowest and highest values, both included: far beyond any block, and far enough from the ends of double precision for
+# fourth powers of p, for the quotients of a motion's largest acceleration with gravity and slenderness, and for
+# products of all of them. Below the least restitution one impact is the end of rocking, to double precision.
+GRAVITY: Final = (1e-6, 1e6)
+_LENGTH: Final = (1e-20, 1e20)
+_MASS: Final = (1e-30, 1e30)
+_STEEPEST: Final = 0.5 * math.pi
+_LIMITS: Final = {
+    "p": (1e-6, 1e6, "positive, from 1e-06 to 1e+06 rad/s"),
+    "alpha": (1e-9, math.nextafter(_STEEPEST, 0.0), "from 1e-09 to below pi/2 rad"),
+    "restitution": (1e-9, 1.0, "in (0, 1], at least 1e-09"),
+}
 #: Rounding of a length that was computed, relative.
 _ROUNDING: Final = 1e-12
 #: Restitutions so near are one: that of a body, from p and alpha or from itself.
@@ -57,12 +60,15 @@ class Side:
         Factor on the angular speed when the block leaves this side at an impact.
     radius : float
         Distance R from the pivot to the centre of mass, m.
+    inertia : float or None
+        Moment of inertia about the pivot, m g R/p^2, kg m^2; None while the mass is not known.
     """
 
     p: float
     alpha: float
     restitution: float
     radius: float
+    inertia: float | None = None
 
     def __str__(self) -> str:
         """Return the parameters as people read them."""
@@ -121,8 +127,8 @@ class Block:
     1.96133
     >>> Block(width=0.4, height=2.0)
     <Block: rectangular block, 0.4 m x 2 m; p = 2.6855 rad/s, alpha = 0.1974 rad, restitution = 0.94231>
-    >>> print("%.6f on leaving side +, %.6f on leaving side -" % Block(width=0.4, height=2.0, offset=0.03).restitution)
-    0.934223 on leaving side +, 0.950533 on leaving side -
+    >>> [round(side.restitution, 6) for side in Block(width=0.4, height=2.0, offset=0.03).sides]
+    [0.934223, 0.950533]
     """
 
     sides: tuple[Side, Side]
@@ -145,9 +151,15 @@ class Block:
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        _refuse_unnamed(unnamed)
+        if unnamed:
+            shown = ", ".join(map(checks.shown, unnamed))
+            raise InvalidBlock(
+                f"the sizes of a block are given by name, not as {shown}: {{}} and {{}} "
+                "for the full sizes, {} and {} for half of them, in m",
+                "width", "height", "half_width", "half_height",
+            )  # fmt: skip
         b, h = _half_sizes((half_width, half_height), (width, height))
-        g = within(gravity, "gravity", GRAVITY, "m/s^2")
+        g = checked_gravity(gravity)
         text = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
         s = checks.finite(offset, "offset", InvalidBlock)
         if abs(s) > 0.5 * b * (1.0 + _ROUNDING):
@@ -158,16 +170,16 @@ class Block:
                 value=offset,
             )
         if s == 0.0:
-            alpha, radius = math.atan2(b, h), math.hypot(b, h)
-            p = math.sqrt(0.75 * g / radius)
-            e = _restitutions(restitution, (housner_restitution(alpha),) * 2, _perhaps_swapped(b, h))
-            sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
+            alpha = math.atan2(b, h)
+            sides = _even_sides(
+                g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha), _perhaps_swapped(b, h)
+            )
         else:
             sides = _sides_on_pivots(
                 (b - s, b + s), h, gyration_squared(b, h, s), g, restitution, _perhaps_swapped(b, h)
             )
             text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
-        _fill(self, sides, g, text, (b, h, s), mass)
+        _filled(self, sides, g, text, mass, (b, h, s))
 
     @classmethod
     def from_parameters(
@@ -213,23 +225,23 @@ class Block:
         --------
         >>> Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92).restitution
         0.92
-        >>> Block.from_parameters(p=(2.5, 2.2), alpha=(0.12, 0.2), restitution=(0.9, 0.85)).alpha
-        (0.12, 0.2)
+        >>> [side.alpha for side in Block.from_parameters((2.5, 2.2), (0.12, 0.2), (0.9, 0.85)).sides]
+        [0.12, 0.2]
         >>> statue = Block.from_parameters(p=(2.9858, 3.0053), alpha=(0.27417, 0.155))
-        >>> print("%.3f on leaving side +, %.3f on leaving side -" % statue.restitution)
-        0.950 on leaving side +, 0.914 on leaving side -
+        >>> [round(side.restitution, 3) for side in statue.sides]
+        [0.95, 0.914]
         """
-        g = within(gravity, "gravity", GRAVITY, "m/s^2")
-        rates = [within(value, "p", P, "rad/s") for value in _pair(p, "p")]
-        angles = [_angle(value) for value in _pair(alpha, "alpha")]
+        g = checked_gravity(gravity)
+        rates = [_checked(value, "p") for value in _pair(p, "p")]
+        angles = [_checked(value, "alpha") for value in _pair(alpha, "alpha")]
         radii, text = [0.75 * g / rate**2 for rate in rates], "block from its parameters"
         if rates[0] == rates[1] and angles[0] == angles[1]:
             e = _restitutions(restitution, (housner_restitution(angles[0]),) * 2)
         else:
             both = np.array([rates]), np.array([angles])
-            found = bodies_of(*both)
+            found = rigid_bodies(*both)
             if restitution is None and (reason := refusal(found, *both)):
-                raise InvalidBlock(reason)
+                raise InvalidBlock(reason, "restitution")
             conserved = found.restitution[0].tolist()
             e = _restitutions(restitution, conserved)
             if not found.alike[0] and all(abs(e[i] - conserved[i]) <= _SAME_RESTITUTION for i in range(2)):
@@ -238,7 +250,7 @@ class Block:
                 k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
                 text = f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
         sides = tuple(Side(rates[i], angles[i], e[i], radii[i]) for i in range(2))
-        return _made(cls, (sides[0], sides[1]), g, text)
+        return _filled(cls.__new__(cls), (sides[0], sides[1]), g, text)
 
     @classmethod
     def from_pivots(
@@ -290,10 +302,10 @@ class Block:
         plus, minus = (_length(value, "distances") for value in _pair(distances, "distances"))
         h = _length(height, "height")
         k = _length(radius_of_gyration, "radius_of_gyration")
-        g = within(gravity, "gravity", GRAVITY, "m/s^2")
+        g = checked_gravity(gravity)
         sides = _sides_on_pivots((plus, minus), h, k * k, g, restitution)
         text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
-        return _made(cls, sides, g, text, mass)
+        return _filled(cls.__new__(cls), sides, g, text, mass)
 
     @classmethod
     def from_frame(
@@ -337,15 +349,15 @@ class Block:
         """
         b = _length(half_width, "half_width")
         h = _length(half_height, "half_height")
-        g = within(gravity, "gravity", GRAVITY, "m/s^2")
-        gamma = checks.within(mass_ratio, "mass_ratio (0: no beam)", InvalidBlock, 0.0, _HEAVIEST_BEAM)
+        g = checked_gravity(gravity)
+        gamma = checks.within(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _HEAVIEST_BEAM)
         alpha = math.atan2(b, h)
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
-        e = _restitutions(restitution, (kept / (1.0 + 3.0 * gamma),) * 2, _perhaps_swapped(b, h))
-        p = math.sqrt(0.75 * g / radius)
-        sides = (Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius))
-        return _made(cls, sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}")
+        sides = _even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), _perhaps_swapped(b, h))
+        return _filled(
+            cls.__new__(cls), sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
+        )
 
     def __str__(self) -> str:
         """Return description and parameters in one line."""
@@ -357,59 +369,92 @@ class Block:
         return f"<Block: {self}>"
 
     def _repr_html_(self) -> str:
-        return svg.captioned(f"Block: {self}", self._picture())
-
-    def _picture(self) -> str:
-        """Block to scale: a rectangle, or the triangle of the pivots and the centre of mass."""
         if self.half_width is not None and self.half_height is not None:
             b, top = self.half_width, 2.0 * self.half_height
-            return svg.outline([(-b, 0.0), (b, 0.0), (b, top), (-b, top)], _PICTURED, f"{2.0 * b:.4g} m x {top:.4g} m")
-        (right, left), (up, _) = zip(
-            *((side.radius * math.sin(side.alpha), side.radius * math.cos(side.alpha)) for side in self.sides),
-            strict=True,
-        )
-        return svg.outline([(-left, 0.0), (right, 0.0), (0.0, up)], _PICTURED, "pivots and centre of mass")
+            corners, label = [(-b, 0.0), (b, 0.0), (b, top), (-b, top)], f"{2.0 * b:.4g} m x {top:.4g} m"
+        else:
+            (right, left), (up, _) = zip(
+                *((side.radius * math.sin(side.alpha), side.radius * math.cos(side.alpha)) for side in self.sides),
+                strict=True,
+            )
+            corners, label = [(-left, 0.0), (right, 0.0), (0.0, up)], "pivots and centre of mass"
+        return svg.captioned(f"Block: {self}", svg.outline(corners, _PICTURED, label))
 
     @property
-    def p(self) -> Sided:
-        """Frequency parameter, rad/s; a pair (side +, side -) where the sides differ."""
-        return _sided(self.sides[0].p, self.sides[1].p)
+    def p(self) -> float:
+        """Frequency parameter, rad/s, of a block whose sides are equal; else ask its `sides`."""
+        return self._of_both_sides("p")
 
     @property
-    def alpha(self) -> Sided:
-        """Slenderness, rad; a pair (side +, side -) where the sides differ."""
-        return _sided(self.sides[0].alpha, self.sides[1].alpha)
+    def alpha(self) -> float:
+        """Slenderness, rad, of a block whose sides are equal; else ask its `sides`."""
+        return self._of_both_sides("alpha")
 
     @property
-    def radius(self) -> Sided:
-        """Distance R from pivot to centre of mass, m; a pair (side +, side -) where the sides differ."""
-        return _sided(self.sides[0].radius, self.sides[1].radius)
+    def radius(self) -> float:
+        """Distance R from pivot to centre of mass, m, of a block whose sides are equal; else ask its `sides`."""
+        return self._of_both_sides("radius")
 
     @property
-    def restitution(self) -> Sided:
-        """Factor on the angular speed at an impact; a pair (on leaving side +, side -) where the sides differ."""
-        return _sided(self.sides[0].restitution, self.sides[1].restitution)
+    def restitution(self) -> float:
+        """Factor on the angular speed at an impact, of a block whose sides are equal; else ask its `sides`."""
+        return self._of_both_sides("restitution")
+
+    @property
+    def inertia(self) -> float | None:
+        """Moment of inertia about the pivot, kg m^2, of a block whose sides are equal; None while `mass` is None."""
+        return None if self.mass is None else self._of_both_sides("inertia")
+
+    @property
+    def minimum_acceleration(self) -> float:
+        """Least ground acceleration that lifts the block, g tan(alpha), m/s^2 (paper, Eq. 1)."""
+        return min(self.uplift_thresholds())
 
     @property
     def is_symmetric(self) -> bool:
         """Whether both sides are equal."""
         return self.sides[0] == self.sides[1]
 
-    @property
-    def minimum_acceleration(self) -> Sided:
-        """Ground acceleration g tan(alpha) that lifts the block to a side, m/s^2 (paper, Eq. 1)."""
-        plus, minus = self.uplift_thresholds("nonlinear")
-        return _sided(plus, minus)
+    def _of_both_sides(self, name: str) -> float:
+        plus, minus = (getattr(side, name) for side in self.sides)
+        if plus != minus:
+            raise UnequalSides(
+                f"{name} is {plus:g} on side + and {minus:g} on side - of this block: ask block.sides[0].{name} and "
+                f"block.sides[1].{name}"
+            )
+        value: float = plus
+        return value
 
     @property
-    def inertia(self) -> Sided | None:
-        """Moment of inertia about the pivot, m g R/p^2, kg m^2; None while the mass is not known."""
-        if self.mass is None:
-            return None
-        plus, minus = (self.mass * self.gravity * side.radius / side.p**2 for side in self.sides)
-        return _sided(plus, minus)
+    def coordinate(self) -> Coordinate:
+        """Names and unit of its coordinate, the rotation."""
+        return ROTATION
 
-    def uplift_thresholds(self, model: str = "nonlinear") -> tuple[float, float]:
+    @property
+    def balance(self) -> tuple[float, float]:
+        """Rotation of the unstable balance on each side, rad: the slenderness."""
+        return self.sides[0].alpha, self.sides[1].alpha
+
+    @property
+    def contact(self) -> ContactLaw:
+        """Forces of the ground over the weight, from rotation and ground acceleration (see `rocking.body`)."""
+        return self._contact_forces
+
+    def _contact_forces(
+        self, motion: tuple[Floats, Floats, Floats], ground_over_g: tuple[Floats, Floats], side: Integers
+    ) -> tuple[Floats, Floats]:
+        leaning = np.maximum(side, 0)
+        alpha, radius = (np.array([getattr(s, name) for s in self.sides])[leaning] for name in ("alpha", "radius"))
+        sign = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning)
+        return contact_forces(motion, ground_over_g, sign, alpha, radius / self.gravity)
+
+    def alone(self) -> Blocks:
+        """Return `Blocks` of which this is the only one."""
+        from rocking.block.many import Blocks
+
+        return Blocks.of([self])
+
+    def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Ground accelerations, m/s^2, that lift the block: to side + when -a passes the first, to - when a the second.
 
         Parameters
@@ -427,11 +472,8 @@ class Block:
         >>> Block.from_parameters(p=1.0, alpha=0.2, restitution=0.9, gravity=10.0).uplift_thresholds("linear")
         (2.0, 2.0)
         """
-        steepness = math.tan if _checked_model(model) == "nonlinear" else float
-        return (
-            self.gravity * steepness(self.sides[0].alpha),
-            self.gravity * steepness(self.sides[1].alpha),
-        )
+        steepness = math.tan if checks.one_of(model, "model", InvalidOption, MODELS) == "nonlinear" else float
+        return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
 def housner_restitution(alpha: float) -> float:
@@ -448,54 +490,6 @@ def housner_restitution(alpha: float) -> float:
     0.940796
     """
     return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", InvalidBlock)) ** 2
-
-
-def _made(
-    cls: type[Block], sides: tuple[Side, Side], gravity: float, description: str, mass: float | None = None
-) -> Block:
-    block = cls.__new__(cls)
-    _fill(block, sides, gravity, description, None, mass)
-    return block
-
-
-def _fill(
-    block: Block,
-    sides: tuple[Side, Side],
-    gravity: float,
-    description: str,
-    rectangle: tuple[float, float, float] | None,
-    mass: float | None,
-) -> None:
-    """Fill in what a block is; of a rectangle also half its sizes and its offset, m."""
-    for side in sides:
-        within(side.p, "p (from the sizes)", P, "rad/s")
-        within(side.alpha, "alpha (from the sizes)", ALPHA, "rad")
-    fields = {
-        "sides": sides,
-        "gravity": gravity,
-        "description": description,
-        "half_width": None if rectangle is None else rectangle[0],
-        "half_height": None if rectangle is None else rectangle[1],
-        "offset": 0.0 if rectangle is None else rectangle[2],
-        "mass": None if mass is None else within(mass, "mass", _MASS, "kg"),
-    }
-    for name, value in fields.items():
-        object.__setattr__(block, name, value)
-
-
-def _sided(plus: float, minus: float) -> Sided:
-    return plus if plus == minus else (plus, minus)
-
-
-def within(value: object, name: str, limits: Limits, unit: str) -> float:
-    """Return a positive number within its limits as a float.
-
-    Raises
-    ------
-    InvalidBlock
-        If it is anything else.
-    """
-    return checks.within(checks.positive(value, name, InvalidBlock, unit), name, InvalidBlock, *limits, unit)
 
 
 def one_block(block: Block) -> Block:
@@ -520,17 +514,67 @@ def one_block(block: Block) -> Block:
     return block
 
 
-def _checked_model(model: str) -> str:
-    return checks.one_of(model, "model", InvalidOption, ("nonlinear", "linear"))
+def checked_sides(values: Floats, name: str) -> Floats:
+    """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock for the first out of its range."""
+    low, high, _ = _LIMITS[name]
+    bad = np.argwhere(~((values >= low) & (values <= high)))
+    if len(bad):
+        _checked(float(values[tuple(bad[0])]), name, which=f" (block {bad[0][0]})")
+    return values
 
 
-def _refuse_unnamed(sizes: Sequence[object]) -> None:
-    """Refuse sizes without names, of which nobody sees whether they are halves."""
-    if sizes:
-        raise InvalidBlock(
-            f"the sizes of a block are given by name, not as {', '.join(map(checks.shown, sizes))}: width= and height= "
-            "for the full sizes, half_width= and half_height= for half of them, in m"
-        )
+def _checked(value: float, name: str, *, origin: str = "", which: str = "") -> float:
+    """Return p, alpha or restitution of a side, or raise InvalidBlock; the message says where it is from, and whose."""
+    low, high, rule = _LIMITS[name]
+    if not low <= value <= high:
+        hint = checks.hint_of_degrees(value) if name == "alpha" else ""
+        raise InvalidBlock(f"{{}}{origin} must be {rule}, not {value:g}{which}{hint}", name, value=value)
+    return value
+
+
+def checked_gravity(gravity: object) -> float:
+    """Return an acceleration of gravity, m/s^2, or raise InvalidBlock."""
+    return _within(gravity, "gravity", GRAVITY, "m/s^2")
+
+
+def _filled(
+    block: Block,
+    sides: tuple[Side, Side],
+    gravity: float,
+    description: str,
+    mass: float | None = None,
+    rectangle: tuple[float | None, float | None, float] = (None, None, 0.0),
+) -> Block:
+    """Fill in what a block is, and return it; of a rectangle also half its sizes and its offset, m."""
+    for side in sides:
+        _checked(side.p, "p", origin=" (from the sizes)")
+        _checked(side.alpha, "alpha", origin=" (from the sizes)")
+    if mass is not None:
+        mass = _within(mass, "mass", _MASS, "kg")
+        first, second = (replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)
+        sides = first, second
+    names = ("sides", "gravity", "description", "mass", "half_width", "half_height", "offset")
+    for name, value in zip(names, (sides, gravity, description, mass, *rectangle), strict=True):
+        object.__setattr__(block, name, value)
+    return block
+
+
+def _within(value: object, name: str, limits: tuple[float, float], unit: str) -> float:
+    """Return a positive number within its limits as a float, or raise InvalidBlock."""
+    return checks.within(checks.positive(value, name, InvalidBlock, unit), name, InvalidBlock, *limits, unit)
+
+
+def _length(value: object, name: str) -> float:
+    return _within(value, name, _LENGTH, "m")
+
+
+def _even_sides(
+    gravity: float, radius: float, alpha: float, restitution: object, conserved: float, advice: str
+) -> tuple[Side, Side]:
+    """Both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
+    plus, minus = _restitutions(restitution, (conserved, conserved), advice)
+    p = math.sqrt(0.75 * gravity / radius)
+    return Side(p, alpha, plus, radius), Side(p, alpha, minus, radius)
 
 
 def _sides_on_pivots(
@@ -539,14 +583,14 @@ def _sides_on_pivots(
     gyration_squared: float,
     gravity: float,
     restitution: object,
-    mend: str = "",
+    advice: str = "",
 ) -> tuple[Side, Side]:
     """Sides of a body from the distances of its pivots from the centre of mass, its height, m, and k^2, m^2."""
     plus, minus = distances
     radii = math.hypot(plus, height), math.hypot(minus, height)
     inertias = [gyration_squared + radius * radius for radius in radii]
     kept = gyration_squared + height * height - plus * minus
-    e = _restitutions(restitution, (kept / inertias[1], kept / inertias[0]), mend)
+    e = _restitutions(restitution, (kept / inertias[1], kept / inertias[0]), advice)
     first, second = (
         Side(math.sqrt(gravity * radius / inertia), math.atan2(distance, height), factor, radius)
         for distance, radius, inertia, factor in zip(distances, radii, inertias, e, strict=True)
@@ -565,31 +609,19 @@ def _half_sizes(
         return 0.5 * _length(full[0], "width"), 0.5 * _length(full[1], "height")
     raise InvalidBlock(
         "a block takes either {} and {}, or {} and {} (the full sizes), all in m",
-        *("half_width", "half_height", "width", "height"),
-    )
+        "half_width", "half_height", "width", "height",
+    )  # fmt: skip
 
 
-def _length(value: object, name: str) -> float:
-    return within(value, name, _LENGTH, "m")
-
-
-def _angle(value: object) -> float:
-    number = checks.positive(value, "alpha", InvalidBlock, "rad")
-    if number >= ALPHA.high:
-        hint = checks.hint_of_degrees(number)
-        sentence = f"{{}} must be below pi/2 rad for a block that can stand, not {number:g}{hint}"
-        raise InvalidBlock(sentence, "alpha", value=value)
-    return within(number, "alpha", ALPHA, "rad")
-
-
-def _pair(value: Any, name: str) -> tuple[object, object]:
-    if isinstance(value, (str, bytes)) or not hasattr(value, "__len__") or getattr(value, "ndim", 1) == 0:
+def _pair(value: Any, name: str) -> tuple[float, float]:
+    """Return a number, or a pair (side +, side -), as two numbers."""
+    if type(value) is float:
         return value, value
-    values = tuple(value)
-    if len(values) != 2:
-        sentence = f"{{}} must be a number or a pair (side +, side -), not {len(values)} values"
-        raise InvalidBlock(sentence, name, value=value)
-    return values[0], values[1]
+    values = checks.numbers(value, name, InvalidBlock)
+    if values.shape not in ((), (2,)):
+        raise InvalidBlock(f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name)
+    plus, minus = np.broadcast_to(values, 2).tolist()
+    return plus, minus
 
 
 def _perhaps_swapped(half_width: float, half_height: float) -> str:
@@ -599,16 +631,15 @@ def _perhaps_swapped(half_width: float, half_height: float) -> str:
     return f"swap its sizes, {2.0 * half_width:g} m wide and {2.0 * half_height:g} m high, if that is a slip, or "
 
 
-def _restitutions(given: object, default: Sequence[float], mend: str = "") -> tuple[float, float]:
+def _restitutions(given: object, conserved: Sequence[float], advice: str = "") -> tuple[float, float]:
+    """Return the factors that are given, or those that conserve angular momentum; advice for a block too stocky."""
     if given is None:
-        if min(default) <= 0.0:
+        if min(conserved) <= 0.0:
             raise InvalidBlock(
-                f"conserving angular momentum gives this block a restitution of {min(default):.3g}: it is too stocky "
-                f"to rock that way; {mend}give {{}} a value in (0, 1]",
+                f"conserving angular momentum gives this block a restitution of {min(conserved):.3g}: it is too stocky "
+                f"to rock that way; {advice}give {{}} a value in (0, 1]",
                 "restitution",
             )
-        return default[0], default[1]
-    plus, minus = (
-        checks.within(value, "restitution", InvalidBlock, *RESTITUTION) for value in _pair(given, "restitution")
-    )
+        return conserved[0], conserved[1]
+    plus, minus = (_checked(value, "restitution") for value in _pair(given, "restitution"))
     return plus, minus

@@ -24,7 +24,7 @@ from rocking.kernels.sine.sequence import critical_amplitudes
 from rocking.motion import pulses
 from rocking.progress import Progress
 from rocking.simulation import simulate
-from rocking.treatment.asymptotic_time import warn_outside_fit
+from rocking.treatment import warn_outside_fit
 
 #: Where the Chebyshev expansion holds.
 FREQUENCIES: Final = (0.4, 10.0)

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 from rocking.block import Block
+from rocking.model import Model
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
-from rocking.treatment.base import Model
 
 
 class SimulationInput(NamedTuple):

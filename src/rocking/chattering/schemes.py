@@ -15,13 +15,13 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.engine import in_threads, require_finished
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response
 from rocking.simulation import simulate
 from rocking.tables import counted, rows_of, text_table
 from rocking.treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
-from rocking.treatment.base import Model
 
 #: Thresholds from harmless to harmful, the two of the paper's Figs 10 and 11 among them, and the paper's own scheme.
 SCHEMES: Final[tuple[Treatment, ...]] = (

@@ -18,10 +18,10 @@ from rocking.analysis.tables import History, Outcomes, read_calibration
 from rocking.cli import batch
 from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledPulseOptions
 from rocking.errors import InvalidOption, RockingError
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.quantities import bounds, number, tilt
 from rocking.tables import counted, text_table
-from rocking.treatment.base import Model
 
 
 def calibrate(

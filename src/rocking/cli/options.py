@@ -15,6 +15,7 @@ from cyclopts import Group, Parameter
 from rocking.cli.batch import output_folder
 from rocking.cli.wording import option_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.motion.scaling import IntensityName, Measure
@@ -22,7 +23,6 @@ from rocking.named_pulses import named_pulse
 from rocking.plausibility import block_notes, level_notes, motion_notes, vertical_notes
 from rocking.progress import Progress, note
 from rocking.quantities import Quantity, acceleration, length, number, scaling, sides, tilt, values, velocity
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     from rocking.block import Block

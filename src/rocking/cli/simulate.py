@@ -23,10 +23,10 @@ from rocking.cli.options import (
     OutputOptions,
     TreatmentOptions,
 )
-from rocking.contact import friction_coefficient
 from rocking.errors import InvalidOption
 from rocking.quantities import tilt
 from rocking.response import Response
+from rocking.response.forces import friction_coefficient
 from rocking.simulation import simulate as run
 
 

@@ -21,6 +21,7 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.pulses import is_pulse, pulse_as_python, pulse_as_text, pulse_of
 from rocking.explorer.shelf import Shelf
+from rocking.model import Model
 from rocking.motion import records
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -28,7 +29,6 @@ from rocking.quantities import angle, length, number, scaling, sides
 from rocking.response import Response
 from rocking.simulation import simulate
 from rocking.treatment import Treatment, treatment
-from rocking.treatment.base import Model
 
 Texts = Mapping[str, str]
 

@@ -24,9 +24,7 @@ from rocking.explorer.case import BLOCK_NAMES, Case, Texts, as_command, as_pytho
 from rocking.explorer.shelf import Shelf
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
-from rocking.response import Response
-from rocking.response.figure import active_span
-from rocking.response.verdict import in_words
+from rocking.response import Response, active_span, in_words
 from rocking.treatment import Certified
 
 #: Times at which a rotation is evaluated across a window, and points of a line that are sent.
@@ -204,8 +202,7 @@ class Explorer:
 
     def words(self, texts: Texts) -> list[list[str]]:
         """Return the summary of a response line by line: what, and how much."""
-        lines = self.show(texts).response.summary().splitlines()
-        return [[line[:20].strip(), line[20:].strip()] for line in lines]
+        return [[row.name, row.text] for row in self.show(texts).response.summary_rows()]
 
     def schemes(self, texts: Texts) -> list[dict[str, Any]]:
         """Return what each treatment of chattering makes of a case, against the proven response."""

@@ -23,8 +23,7 @@ from rocking.explorer.case import BLOCK_NAMES, Case, Texts
 from rocking.explorer.pulses import arguments_of, is_pulse, pulse_of
 from rocking.motion.motion import Motion
 from rocking.quantities import number
-from rocking.treatment import Certified
-from rocking.treatment.asymptotic_time import FITTED_FREQUENCIES, FITTED_RESTITUTIONS
+from rocking.treatment import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 
 #: Points of an axis.
 _FEWEST, _MOST = 8, 400
@@ -142,7 +141,7 @@ def parts(grid: MapGrid, threads: int | None = None) -> Iterator[Part]:
     setup = Setup(blocks, grid.case.model, Certified())
     last: dict[tuple[tuple[float, float], float], float | None] = {}
     for task, ends in simulate_tasks(setup, _tasks(grid, factors), threads=threads):
-        chosen = task.blocks
+        chosen = task.bodies
         assert isinstance(chosen, np.ndarray)
         alpha = blocks.alpha[chosen]
         thresholds = _thresholds(alpha, grid)

@@ -75,7 +75,7 @@ def figure_for(
     """
     if ax is not None:
         if not hasattr(ax, "get_figure"):
-            raise InvalidOption(f"ax must be axes of Matplotlib's to draw in, not {ax!r}")
+            raise InvalidOption(f"{{}} must be axes of Matplotlib's to draw in, not {ax!r}", "ax", value=ax)
         figure = ax.get_figure(root=True)
         assert figure is not None
         yield figure
@@ -167,7 +167,9 @@ def _in_lines(text: str, width: int) -> str:
 def _size(figsize: tuple[float, float]) -> tuple[float, float]:
     sides = checks.positive_numbers(figsize, "figsize", InvalidOption)
     if sides.size != 2:
-        raise InvalidOption(f"figsize must be (width, height), in inches, not {sides.size} numbers")
+        raise InvalidOption(
+            f"{{}} must be (width, height), in inches, not {sides.size} numbers", "figsize", value=figsize
+        )
     return float(sides[0]), float(sides[1])
 
 

@@ -64,6 +64,7 @@ def response_figure(
     duration: float | None = None,
     chattering: DrawnSequence | None = None,
     units: RotationUnits = "slenderness",
+    label: str = "",
     title: str = "",
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
@@ -99,6 +100,8 @@ def response_figure(
     units : {"slenderness", "rad", "deg"}
         What rotations are drawn in: over the slenderness of their side, or as they are. Beside the first two stands an
         axis in degrees. Where the sides differ they are named, with what 1 is on each.
+    label : str
+        Name and unit of a coordinate that is no rotation: it is drawn as it is.
     title : str
         Title of the figure.
     ax : matplotlib.axes.Axes, optional
@@ -123,7 +126,7 @@ def response_figure(
     ['rotation / slenderness', 'ground\nacceleration (g)']
     """
     shown = float(time[0]), float(time[-1])
-    scale = _scale(units, slenderness)
+    scale = _scale("rad" if label else units, slenderness)
     drawn = scale.of(rotation)
     zoom = chattering if ax is None and chattering and _can_be_zoomed(chattering) else None
     histories = 1 if not motion_time.size else 2 if vertical_acceleration_g is None else 3
@@ -131,7 +134,9 @@ def response_figure(
         (main, *grounds), sequence = _panels(figure, ax, histories, zoomed=zoom is not None)
         _shade_rest(main, np.clip(rest_intervals, *shown))
         _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])))
-        _add_degrees(main, scale, units)
+        if units != "deg" and not label:
+            to_degrees = (lambda y: np.degrees(scale.back(y)), lambda y: scale.of(np.radians(y)))
+            main.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
         if slenderness[0] != slenderness[1]:
             _tell_sides(main, grounds[0] if grounds else None, thresholds_g, scale)
         _mark_impacts(main, _within(impact_times, shown), _within(uplift_times, shown))
@@ -143,11 +148,11 @@ def response_figure(
         if vertical_acceleration_g is not None and len(grounds) > 1:
             _draw_vertical(grounds[1], motion_time, vertical_acceleration_g)
         histories_shown = main, *grounds
-        labels = _Y_LABELS[units], "ground acceleration (g)", "vertical (g)"
-        for axes, label in zip(histories_shown, labels, strict=False):
+        labels = label or _Y_LABELS[units], "ground acceleration (g)", "vertical (g)"
+        for axes, name in zip(histories_shown, labels, strict=False):
             is_last = axes is histories_shown[-1]
             axes.tick_params(labelbottom=is_last)
-            add_labels(axes, _time_label(shown, duration) if is_last else "", label)
+            add_labels(axes, _time_label(shown, duration) if is_last else "", name)
         if zoom and sequence is not None:
             _mark_sequence(main, zoom)
             _draw_sequence(sequence, zoom)
@@ -206,12 +211,6 @@ def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats) -> 
     for level in tipping[(tipping > low) & (tipping < high)]:
         axes.axhline(level, color=ABOVE, linewidth=0.8, linestyle=(0, (6, 2, 1, 2)), label=label)
         label = ""
-
-
-def _add_degrees(axes: Axes, scale: _Scale, units: RotationUnits) -> None:
-    if units != "deg":
-        to_degrees = (lambda y: np.degrees(scale.back(y)), lambda y: scale.of(np.radians(y)))
-        axes.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
 
 
 def _tell_sides(
@@ -293,9 +292,11 @@ def _draw_motion(
         if np.any(beyond):
             axes.fill_between(time, acceleration, threshold, where=beyond, label=label, **above)
             label = ""
-    moves = bool(np.ptp(plus) or np.ptp(minus))
+    moves = any(bool(np.ptp(threshold)) for threshold in (plus, minus) if np.isfinite(threshold).all())
     label = "uplift thresholds" + (", which change with the weight" if moves else "")
     for threshold in (minus, -plus):
+        if not np.isfinite(threshold).all():
+            continue  # nothing lifts it to that side
         if moves:
             axes.plot(time, threshold, color=INK, linewidth=0.5, label=label)
         else:

@@ -1,6 +1,18 @@
 """What one simulation found, and what a practitioner asks of it."""
 
+from rocking.response.export import active_span, drawing_times
+from rocking.response.history import AMBIGUITY, QUANTITIES, Sensitivity
 from rocking.response.response import Response
-from rocking.response.sensitivity import AMBIGUITY, QUANTITIES, Sensitivity
+from rocking.response.summary import in_brief, in_words, ratio_text
 
-__all__ = ["AMBIGUITY", "QUANTITIES", "Response", "Sensitivity"]
+__all__ = [
+    "AMBIGUITY",
+    "QUANTITIES",
+    "Response",
+    "Sensitivity",
+    "active_span",
+    "drawing_times",
+    "in_brief",
+    "in_words",
+    "ratio_text",
+]

@@ -1,4 +1,4 @@
-"""Contact forces along a response: at any time, their extremes, and the first time that they pass a level."""
+"""Forces of the ground along a response: at any time, their extremes, and the first time that they pass a level."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
-from rocking.block import Block
-from rocking.contact import contact_forces
+from rocking.body import ContactLaw
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import components
@@ -32,11 +31,40 @@ _MOST_REFINED: Final = 64
 _SLOWEST: Final = 1e-10
 _MOST_IMPACTS: Final = 10_000
 
+#: Coefficients of friction beyond those of any two materials.
+_ROUGHEST: Final = 3.0
+
 #: What is asked of the horizontal and the vertical force over the weight.
 Measure = Callable[[Floats, Floats], Floats]
 
 
-def with_all_impacts(trail: Trail, block: Block, *, cut: bool) -> Trail:
+def friction_coefficient(value: object) -> float:
+    """Return a coefficient of friction.
+
+    Raises
+    ------
+    InvalidOption
+        If it is not positive, or larger than that of any two materials.
+    """
+    coefficient = checks.positive(value, "friction", InvalidOption)
+    if coefficient > _ROUGHEST:
+        raise InvalidOption(
+            "{} must be a coefficient (friction over normal force, about 0.6 of stone on stone) of at most "
+            f"{_ROUGHEST:g}, not {coefficient:g}; of an angle of friction take the tangent",
+            "friction",
+            value=value,
+        )
+    return coefficient
+
+
+def friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
+    """Friction coefficient that sticking needs: |H|/N, infinite where the block would leave the ground, NaN of NaN."""
+    demand = np.where(np.isnan(vertical), np.nan, np.inf)
+    np.divide(np.abs(horizontal), vertical, out=demand, where=vertical > 0.0)
+    return demand
+
+
+def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     """Return the trail with the impacts between the last resolved one of each chattering sequence and its rest.
 
     ``cut``: whether the response ends within a sequence that is closed already. A sequence is closed where its end is
@@ -46,7 +74,7 @@ def with_all_impacts(trail: Trail, block: Block, *, cut: bool) -> Trail:
     # A duration that ends within a sequence that is closed leaves no rest behind its last impact.
     rests = np.append(nodes["side"][1:] == state.AT_REST, cut)
     closing = np.flatnonzero(rests & (nodes["side"] != state.AT_REST) & (nodes["u"] == 0.0))
-    slowest = np.array([_SLOWEST * side.p for side in block.sides])
+    slowest = _SLOWEST * np.sqrt(np.abs(trail.block["stiffness"]))
     closing = closing[nodes["v"][closing] > slowest[nodes["side"][closing]]]
     if not len(closing):
         return trail
@@ -78,7 +106,7 @@ class Contact:
     """
 
     history: History
-    block: Block
+    law: ContactLaw
     until: float
 
     def forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
@@ -145,14 +173,9 @@ class Contact:
     def _forces_in(self, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
         """Compute the forces in the steps that start at these rows: on the side and under the piece of each."""
         theta, rate, acceleration = self.history.states_in(times, rows).T
-        leaning = self.history.trail.nodes["side"][rows]
-        side = np.maximum(leaning, 0)
-        alpha = np.array([s.alpha for s in self.block.sides])[side]
-        radius = np.array([s.radius for s in self.block.sides])[side]
-        at_rest = leaning == state.AT_REST
-        sign = np.where(at_rest, 0.0, 1.0 - 2.0 * side)
-        ground = self._ground_in(times, rows, at_rest)
-        return contact_forces((theta, rate, acceleration), ground, sign, alpha, radius / self.block.gravity)
+        side = self.history.trail.nodes["side"][rows]
+        ground = self._ground_in(times, rows, side == state.AT_REST)
+        return self.law((theta, rate, acceleration), ground, side)
 
     def _ground_in(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
         """Both ground accelerations in g: in the piece where a step starts; at rest, which may span many, anywhere."""

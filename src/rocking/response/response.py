@@ -1,30 +1,20 @@
-"""The response of one block to one motion: its state, and short answers; each longer one has a room of its own."""
+"""The response of one body to one motion."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from rocking import svg
-from rocking.arrays import Floats, as_asked
-from rocking.block import Block
-from rocking.contact import friction_coefficient, friction_demand
-from rocking.kernels import state
-from rocking.kernels.trace import Trail
-from rocking.motion.motion import Motion
 from rocking.plot import RotationUnits
-from rocking.response import data, figure, summary
-from rocking.response.forces import Contact, with_all_impacts
-from rocking.response.history import History
-from rocking.response.sensitivity import Sensitivity
-from rocking.treatment import Treatment
-from rocking.treatment.base import Model
+from rocking.response import export, summary
+from rocking.response.answers import Answers
+from rocking.result import Findings, Row, dictionary_of, text_of
+from rocking.tables import write_csv, write_netcdf
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,23 +22,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
-IMPACT = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
-CHATTERING = np.dtype([("start", "f8"), ("end", "f8"), ("lower", "f8"), ("upper", "f8"), ("impacts", "i8")])
-
-_KINDS = np.array(["uplift", "rest", "overturn"])
-
 #: Rotations beyond this multiple of the slenderness are cut in a notebook's picture: past it a block only falls.
 _HIGHEST_PICTURED = 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class Response:
-    """Response of one block to one motion, made by `rocking.simulate`.
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(Answers, Findings):
+    """Response of one body to one motion, made by `rocking.simulate`.
 
     Attributes
     ----------
-    block, motion, model, treatment
+    body, motion, model, treatment
         What was simulated, and how.
     overturned : bool
         Whether the rotation reached pi/2.
@@ -57,7 +41,7 @@ class Response:
     overturn_time : float
         When it first did, s; NaN otherwise.
     peak_rotation, peak_time : float
-        Largest |theta|, rad, and when, s; pi/2 when overturned.
+        Largest |theta|, rad, and when, s; pi/2 when overturned. Of another body its coordinate.
     duration : float
         End of the response, s.
     events : structured array
@@ -75,241 +59,39 @@ class Response:
         Times that the last digits decided whether a block that nothing weighs down touches the ground.
     """
 
-    block: Block
-    motion: Motion | None
-    model: Model
-    treatment: Treatment
-    overturned: bool
-    unfinished: bool
-    overturn_time: float
-    peak_rotation: float
-    peak_time: float
-    duration: float
-    events: NDArray[np.void]
-    impacts: NDArray[np.void]
-    chattering: NDArray[np.void]
-    stalled: int
-    near_ties: int
-    trail: Trail = field(repr=False)
-
-    @classmethod
-    def from_march(
-        cls,
-        block: Block,
-        motion: Motion | None,
-        model: Model,
-        treatment: Treatment,
-        trail: Trail,
-        table: state.Records,
-        end: state.Record,
-    ) -> Response:
-        """Response from the table and the last state of a march."""
-        events = table["event"][: end["events"]]
-        overturned = bool(len(events)) and int(events["kind"][-1]) == state.EventKind.OVERTURN
-        return cls(
-            block=block,
-            motion=motion,
-            model=model,
-            treatment=treatment,
-            overturned=bool(overturned),
-            unfinished=int(end["ending"]) == state.Ending.UNFINISHED,
-            overturn_time=float(events["time"][-1]) if overturned else math.nan,
-            peak_rotation=float(end["peak"]),
-            peak_time=float(end["peak_time"]),
-            duration=float(end["end"]),
-            events=_events(events),
-            impacts=_public(table["impact"][: end["impacts"]], IMPACT),
-            chattering=_public(table["sequence"][: end["sequences"]], CHATTERING),
-            stalled=int(end["stalled"]),
-            near_ties=int(end["near_ties"]),
-            trail=trail._replace(nodes=state.attributed(np.array(table["node"][: end["nodes"]]))),
-        )
-
-    def __repr__(self) -> str:
-        return f"<Response: {summary.line(self)}>"
+    def _headline(self) -> str:
+        return summary.line(self)
 
     def _repr_html_(self) -> str:
-        start, end = figure.active_span(self)
-        times = figure.drawing_times(self, start, end)
-        alpha = min(side.alpha for side in self.block.sides)
-        drawn = np.clip(self.rotation(times) / alpha, -_HIGHEST_PICTURED, _HIGHEST_PICTURED)
-        return svg.captioned(f"Response: {summary.line(self)}", svg.history(times, drawn, "rotation / slenderness"))
+        start, end = export.active_span(self)
+        times = export.drawing_times(self, start, end)
+        coordinate, balance = self.body.coordinate, min(self.body.balance)
+        drawn, label = self.states(times)[:, 0], f"{coordinate.name} ({coordinate.unit})"
+        if coordinate.limit:
+            drawn = np.clip(drawn / balance, -_HIGHEST_PICTURED, _HIGHEST_PICTURED)
+            label = f"{coordinate.name} / {coordinate.limit}"
+        return svg.captioned(f"Response: {self._headline()}", svg.history(times, drawn, label))
 
-    @property
-    def _history(self) -> History:
-        return History(self.trail, self.duration)
-
-    @property
-    def peak_over_slenderness(self) -> float:
-        """Peak rotation over the slenderness of the side where it is reached; infinite where the block overturns."""
-        if self.overturned:
-            return math.inf
-        if self.peak_rotation == 0.0:
-            return 0.0
-        leaning = float(self.rotation(self.peak_time))
-        return self.peak_rotation / self.block.sides[0 if leaning > 0.0 else 1].alpha
-
-    @property
-    def moves_at_end(self) -> bool:
-        """Whether the block is not at rest at the end of the response."""
-        return bool(self.trail.nodes["side"][-1] != state.AT_REST)
-
-    @property
-    def stopped(self) -> bool:
-        """Whether `duration` ended the simulation before a verdict: the block still moved, or the motion went on.
-
-        What became of the block is then not known, and `overturned` says no more than "not by then".
-        """
-        over = self.motion is None or self.duration >= self.motion.end
-        return not (self.overturned or self.unfinished) and (self.moves_at_end or not over)
-
-    @property
-    def tipping_time(self) -> float:
-        """Last time, s, at which the block passes its balance point, |theta| = alpha; NaN if it ends within it.
-
-        From then on a block that overturns only falls; one that is beyond it where the simulation was `stopped` may yet
-        be caught by the motion.
-        """
-        plus, minus = self.block.sides
-        return self._history.tipping_time((plus.alpha, minus.alpha))
-
-    @property
-    def sensitivity(self) -> Sensitivity:
-        """How the peak and the times of events and impacts change with the motion, the initial state and the block."""
-        return Sensitivity.along(
-            self.trail, self.peak_time, len(self.impacts), len(self.events), overturned=self.overturned
-        )
-
-    @property
-    def ambiguous(self) -> bool:
-        """Whether no double-precision program can know this response: one ulp of what was given changes it visibly."""
-        return bool(self.ambiguities)
-
-    @property
-    def ambiguities(self) -> tuple[str, ...]:
-        """What makes the response ambiguous: "peak", "events" (a time of one, or of an impact) and "touch".
-
-        The last is that of a block that nothing weighs down, which may just reach the ground, or just not.
-
-        An ambiguous response is one of those that are possible. Scale the motion, or the initial state, by 1 plus some
-        millionths, simulate each, and take the spread of the results for the answer.
-        """
-        return self.sensitivity.ambiguities(self.peak_rotation, self.near_ties)
-
-    @property
-    def time_at_rest(self) -> float:
-        """Time that the block spends at rest, s."""
-        starts, ends = self.rest_intervals.T
-        return float(np.sum(ends - starts))
-
-    @property
-    def rest_intervals(self) -> Floats:
-        """Start and end of each interval at rest, shape (n, 2), s."""
-        return self._history.rests()
-
-    def rotation(self, time: ArrayLike) -> Floats:
-        """Rotation theta, rad, at any time, from the series of the arc in which it lies.
+    def summary_rows(self, friction: float | None = None) -> Sequence[Row]:
+        """Return what happened for people, as rows of name, value, unit and note: the lines of `summary`.
 
         Parameters
         ----------
-        time : array_like
-            Times, s, of any shape.
-
-        Returns
-        -------
-        ndarray
-            Same shape, a number for a number; NaN outside [0, duration].
-
-        Raises
-        ------
-        InvalidOption
-            If a time is not a number.
-        """
-        return as_asked(self._history.states(time)[..., 0])
-
-    def angular_velocity(self, time: ArrayLike) -> Floats:
-        """Angular velocity, rad/s, at any time (just after an impact, at one); NaN outside [0, duration]."""
-        return as_asked(self._history.states(time)[..., 1])
-
-    def angular_acceleration(self, time: ArrayLike) -> Floats:
-        """Angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
-        return as_asked(self._history.states(time)[..., 2])
-
-    def normal_force(self, time: ArrayLike) -> Floats:
-        """Return the normal force over the weight at any time; impulses at impacts are not part of it."""
-        return as_asked(self._contact.forces(time)[1])
-
-    def friction_demand(self, time: ArrayLike) -> Floats:
-        """Friction coefficient that sticking needs at any time: infinite where the normal force is not positive.
-
-        NaN outside the response.
-        """
-        return as_asked(friction_demand(*self._contact.forces(time)))
-
-    @cached_property
-    def required_friction(self) -> float:
-        """Largest friction coefficient that sticking needs, between impacts and until the block tips (`tipping_time`).
-
-        Infinite if the normal force does not stay positive.
-        """
-        return self._contact.largest(friction_demand)
-
-    @cached_property
-    def minimum_normal_force(self) -> float:
-        """Smallest normal force over the weight, between impacts and until the block tips (`tipping_time`)."""
-        return -self._contact.largest(_pull)
-
-    def sliding_time(self, friction: float) -> float:
-        """Return the first time, s, at which sticking needs more than a friction coefficient; NaN if it never does.
-
-        Parameters
-        ----------
-        friction : float
-            Coefficient of friction between block and ground, positive and at most 3.
-
-        Raises
-        ------
-        InvalidOption
-            If it is no such number.
-
-        Notes
-        -----
-        Only until the block tips (`tipping_time`), and without the impulses at impacts, at which a block may slip by
-        itself. What happens after a slip is not part of the model: the response goes on as if the block stuck.
+        friction : float, optional
+            Coefficient of friction: says whether the block would slide, and when first.
 
         Examples
         --------
         >>> import rocking
-        >>> block = rocking.Block(width=0.24, height=1.1)
-        >>> response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090"))
-        >>> f"{response.required_friction:.4f}, {response.sliding_time(0.24):.4f} s, {response.sliding_time(0.3)}"
-        '0.2489, 234.3559 s, nan'
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response.summary_rows()[-1]
+        Row(name='verdict', value='overturns at 1.532021 s', unit='1', note='')
         """
-        level = friction_coefficient(friction)
-        return self._contact.first(friction_demand, lambda demand: demand > level)
+        return summary.summary_rows(self, friction)
 
-    @cached_property
-    def lift_off_time(self) -> float:
-        """First time, s, at which the normal force is no longer positive, so that the base would leave the ground.
-
-        NaN if that never happens; as for `sliding_time`, until the block tips and between impacts.
-        """
-        return self._contact.first(_pull, lambda pull: pull >= 0.0)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what is kept of the response: the impacts that its forces need are followed again."""
-        return {name: value for name, value in self.__dict__.items() if name != "_contact"}
-
-    @cached_property
-    def _contact(self) -> Contact:
-        cut = bool(len(self.chattering)) and bool(self.chattering["end"][-1] >= self.duration) and self.moves_at_end
-        history = History(with_all_impacts(self.trail, self.block, cut=cut), self.duration)
-        return Contact(history, self.block, self._end_of_contact)
-
-    @property
-    def _end_of_contact(self) -> float:
-        """Time up to which contact is looked at, s: until the block tips, or to the end."""
-        return self.duration if math.isnan(self.tipping_time) else self.tipping_time
+    def facts(self, friction: float | None = None) -> Sequence[Row]:
+        """Return what happened for machines, as rows of name, value and unit: the entries of `to_dict`."""
+        return summary.facts(self, friction)
 
     def summary(self, friction: float | None = None) -> str:
         """Return what happened in words, line by line, as ``rocking simulate`` prints it.
@@ -343,7 +125,7 @@ class Response:
         least normal force  0.8919 of the weight, until it tips at 0.9319 s
         verdict             overturns at 1.532021 s
         """
-        return summary.text(self, friction)
+        return text_of(self.summary_rows(friction), self.WIDTH)
 
     def to_dict(self, friction: float | None = None) -> dict[str, Any]:
         """Return the result in plain values for machines, as ``rocking simulate --json`` prints it.
@@ -363,7 +145,7 @@ class Response:
         >>> result["overturned"], result["lift_off_time_s"], result["events"][0]["kind"]
         (True, None, 'uplift')
         """
-        return summary.values(self, friction)
+        return dictionary_of(self.facts(friction))
 
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
         """Time histories and events as a dataset.
@@ -386,9 +168,9 @@ class Response:
         InvalidOption
             If `dt` is not positive.
         """
-        return data.dataset(self, dt)
+        return export.dataset(self, dt)
 
-    def to_dataframe(self, table: data.Table = "histories", *, dt: float | None = None) -> pd.DataFrame:
+    def to_dataframe(self, table: export.Table = "histories", *, dt: float | None = None) -> pd.DataFrame:
         """Return one of the response's tables as a data frame; columns are named with their units.
 
         Parameters
@@ -413,7 +195,7 @@ class Response:
         >>> list(response.to_dataframe("impacts").columns)
         ['time_s', 'side', 'speed_before_rad_s', 'speed_after_rad_s']
         """
-        return data.frame(self, table, dt)
+        return export.frame(self, table, dt)
 
     def to_netcdf(self, path: str | Path, dt: float | None = None) -> None:
         """Write `to_xarray` to a NetCDF file.
@@ -423,9 +205,9 @@ class Response:
         OutputError
             If the file cannot be written.
         """
-        data.write_netcdf(self, path, dt)
+        write_netcdf(path, export.dataset(self, dt))
 
-    def to_csv(self, path: str | Path, table: data.Table = "histories", *, dt: float | None = None) -> None:
+    def to_csv(self, path: str | Path, table: export.Table = "histories", *, dt: float | None = None) -> None:
         """Write one of the tables of `to_dataframe` as text columns with a header.
 
         Raises
@@ -435,7 +217,7 @@ class Response:
         OutputError
             If the file cannot be written.
         """
-        data.write_csv(self, path, table, dt)
+        write_csv(path, export.frame(self, table, dt), index=table == "histories")
 
     def plot(
         self,
@@ -444,6 +226,7 @@ class Response:
         units: RotationUnits = "slenderness",
         window: tuple[float, float] | None = None,
         chattering: bool = False,
+        title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
         """Figure of the rotation with impacts and rests, and of the motion with thresholds.
@@ -458,6 +241,8 @@ class Response:
             Stretch of time to draw, s; by default from a little before the first event to a little after the last.
         chattering : bool
             Whether to show the longest chattering sequence, impact by impact, in a panel of its own.
+        title : str
+            Title; by default what was simulated.
         figsize : (float, float), optional
             Width and height of a new figure, inches.
 
@@ -466,22 +251,4 @@ class Response:
         InvalidOption
             If there is no such unit, the window is not a stretch of the response, or the size is not one.
         """
-        return figure.figure(self, units, window, chattering, ax, figsize)
-
-
-def _pull(_: Floats, vertical: Floats) -> Floats:
-    """Return how much the ground would have to pull: the normal force's opposite."""
-    return -vertical
-
-
-def _public(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    public = np.empty(len(rows), dtype=dtype)
-    for name in dtype.names or ():
-        public[name] = rows[name]
-    return public
-
-
-def _events(rows: state.Records) -> NDArray[np.void]:
-    events = np.empty(len(rows), dtype=EVENT)
-    events["time"], events["side"], events["kind"] = rows["time"], rows["side"], _KINDS[rows["kind"]]
-    return events
+        return export.figure(self, units, window, title, ax, figsize, chattering=chattering)

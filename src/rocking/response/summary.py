@@ -1,161 +1,266 @@
-"""A response in words for people, and in plain values for machines."""
+"""A response in words for people, to the digits that are known, and in plain values for machines."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import numpy as np
 
-from rocking.response import data, digits
-from rocking.response.verdict import in_words
-from rocking.tables import counted, named, plain
+from rocking.response.answers import Answers
+from rocking.response.export import records
+from rocking.result import Row
+from rocking.tables import counted, named
 
-if TYPE_CHECKING:
-    from rocking.response.response import Response
-    from rocking.response.sensitivity import Sensitivity
+#: What drives a body (the motion, or the initial state) is taken to be known to this part of itself, about what the
+#: usual record formats print: digits of times and of the peak that it would change are not shown.
+KNOWN: Final = 1e-6
+
+#: Decimals of a time, and digits of a peak, at most.
+_MOST_DECIMALS: Final = 9
+_MOST_DIGITS: Final = 6
+
+#: Decimals of a time in a table, and of one beside others in a summary.
+_BRIEF: Final = 2
+_SHORT: Final = 4
+
+#: From so much on, s, the unknown part of a time is shown with it.
+_SHOWN: Final = 1e-3
 
 #: Events that a summary lists.
 _LISTED: Final = 12
 
+#: What is not known where a response is ambiguous.
+_AFFECTED: Final = {
+    "peak": "the peak rotation",
+    "events": "times of events or impacts",
+    "touch": "whether a block without weight touches the ground",
+}
 
-def text(response: Response, friction: float | None) -> str:
+
+def summary_rows(response: Answers, friction: float | None) -> list[Row]:
     """Return what happened, line by line; with a coefficient of friction, whether it is enough."""
-    known = response.sensitivity
+    body = response.body
+    sides = body.sides[:1] if body.sides[0] == body.sides[-1] else body.sides
     sliding = math.nan if friction is None else response.sliding_time(friction)
-    lines = [
-        ("block", response.block.description),
-        ("parameters", _parameters(response)),
-        ("motion", _motion_text(response)),
-        ("uplift above", _thresholds_text(response)),
-        *_event_lines(response, known),
-        ("impacts resolved", f"{len(response.impacts)}"),
-        ("peak rotation", _peak_text(response)),
-        ("friction needed", f"{response.required_friction:.4f}{_before_tipping(response)}"),
-        ("least normal force", f"{response.minimum_normal_force:.4f} of the weight{_before_tipping(response)}"),
-        *_contact_lines(response, friction, sliding),
-        ("verdict", _verdict(response, known) + ("" if math.isnan(sliding) else " (as if it did not slide)")),
+    rows = [
+        Row("block", body.description),
+        Row("parameters", "; ".join(map(str, sides))),
+        Row("motion", _motion_text(response)),
+        Row("uplift above", _thresholds_text(response)),
+        *_event_rows(response),
+        Row("impacts resolved", f"{len(response.impacts)}"),
+        _peak_row(response),
     ]
-    if any(" +- " in entry for _, entry in lines):
-        lines.append(("+-", "what a millionth more or less of what drives the block changes"))
-    return "\n".join(f"{name:<20}{entry}" for name, entry in lines)
+    if body.contact is not None:
+        tips = "" if math.isnan(response.tipping_time) else f", until it tips at {tipping_text(response)}"
+        rows += [
+            Row("friction needed", f"{response.required_friction:.4f}", note=tips),
+            Row("least normal force", f"{response.minimum_normal_force:.4f}", "of the weight", tips),
+            *_contact_rows(response, friction, sliding),
+        ]
+    rows.append(Row("verdict", _verdict(response), note="" if math.isnan(sliding) else " (as if it did not slide)"))
+    if any(" +- " in row.text for row in rows):
+        rows.append(Row("+-", "what a millionth more or less of what drives the block changes"))
+    return rows
 
 
-def line(response: Response) -> str:
+def line(response: Answers) -> str:
     """Return what happened, in one line."""
-    shaken = "no motion" if response.motion is None else response.motion.label
-    peak = "" if response.overturned else f", peak {response.peak_over_slenderness:.4g} of the slenderness"
+    motion, limit = response.motion, response.body.coordinate.limit
+    peak = ""
+    if limit and not response.overturned:
+        peak = f", peak {response.peak_over_slenderness:.4g} of the {limit}"
     return (
-        f"{response.block.description} under {shaken}: {in_words(response, f'{response.overturn_time:.4f} s')}{peak}; "
+        f"{response.body.description} under {'no motion' if motion is None else motion.label}: "
+        f"{in_words(response, f'{response.overturn_time:.4f} s')}{peak}; "
         f"{counted(len(response.events), 'event')}, {counted(len(response.impacts), 'impact')} resolved, "
         f"{response.duration:.5g} s"
     )
 
 
-def values(response: Response, friction: float | None) -> dict[str, Any]:
-    """Return the result for machines: plain values, units in the names, null where there is no number."""
-    sides, motion = response.block.sides, response.motion
-    ambiguities = response.ambiguities
-    result: dict[str, Any] = plain(
-        {
-            "block": {
-                "description": response.block.description,
-                named("p", "rad/s"): [side.p for side in sides],
-                named("alpha", "rad"): [side.alpha for side in sides],
-                "restitution": [side.restitution for side in sides],
-                named("gravity", "m/s^2"): response.block.gravity,
-            },
-            "motion": motion
-            and {
-                "name": motion.name,
-                named("duration", "s"): motion.duration,
-                named("pga", "m/s^2"): motion.pga,
-                "history": motion.history,
-                "vertical": motion.vertical
-                and {"name": motion.vertical.name, named("pga", "m/s^2"): motion.vertical.pga},
-            },
-            "model": response.model,
-            "chattering_treatment": repr(response.treatment),
-            "overturned": response.overturned,
-            "unfinished": response.unfinished,
-            "stopped": response.stopped,
-            named("overturn_time", "s"): response.overturn_time,
-            named("tipping_time", "s"): response.tipping_time,
-            named("peak_rotation", "rad"): response.peak_rotation,
-            "peak_over_slenderness": response.peak_over_slenderness,
-            named("peak_time", "s"): response.peak_time,
-            "required_friction": response.required_friction,
-            "minimum_normal_force_over_weight": response.minimum_normal_force,
-            named("lift_off_time", "s"): response.lift_off_time,
-            **_sliding(response, friction),
-            "impacts_resolved": len(response.impacts),
-            named("duration", "s"): response.duration,
-            named("time_at_rest", "s"): response.time_at_rest,
-            "ambiguous": bool(ambiguities),
-            "ambiguities": ambiguities,
-            "events": data.records(response, "events"),
-            "chattering": data.records(response, "chattering"),
-        }
-    )
-    return result
+def facts(response: Answers, friction: float | None) -> list[Row]:
+    """Return the result for machines, by name."""
+    body, motion, (name, _, _, unit, limit) = response.body, response.motion, response.body.coordinate
+    block = {
+        "description": body.description,
+        **{named(key, of): values[0] for key, (values, of) in body.alone().parameters().items()},
+        named("gravity", "m/s^2"): body.gravity,
+    }
+    shaken = motion and {
+        "name": motion.name,
+        named("duration", "s"): motion.duration,
+        named("pga", "m/s^2"): motion.pga,
+        "history": motion.history,
+        "vertical": motion.vertical and {"name": motion.vertical.name, named("pga", "m/s^2"): motion.vertical.pga},
+    }
+    rows = [
+        Row("block", block),
+        Row("motion", shaken),
+        Row("model", response.model),
+        Row("chattering_treatment", repr(response.treatment)),
+        Row("overturned", response.overturned),
+        Row("unfinished", response.unfinished),
+        Row("stopped", response.stopped),
+        Row("overturn_time", response.overturn_time, "s"),
+        Row("tipping_time", response.tipping_time, "s"),
+        Row(f"peak_{name}", response.peak_rotation, unit),
+    ]
+    if limit:
+        rows.append(Row(f"peak_over_{limit}", response.peak_over_slenderness))
+    rows.append(Row("peak_time", response.peak_time, "s"))
+    if body.contact is not None:
+        rows += [
+            Row("required_friction", response.required_friction),
+            Row("minimum_normal_force_over_weight", response.minimum_normal_force),
+            Row("lift_off_time", response.lift_off_time, "s"),
+        ]
+    if friction is not None:
+        rows += [Row("friction", friction), Row("sliding_time", response.sliding_time(friction), "s")]
+    return [
+        *rows,
+        Row("impacts_resolved", len(response.impacts)),
+        Row("duration", response.duration, "s"),
+        Row("time_at_rest", response.time_at_rest, "s"),
+        Row("ambiguous", response.ambiguous),
+        Row("ambiguities", response.ambiguities),
+        Row("events", records(response, "events")),
+        Row("chattering", records(response, "chattering")),
+    ]
 
 
-def _parameters(response: Response) -> str:
-    sides = response.block.sides[:1] if response.block.is_symmetric else response.block.sides
-    return "; ".join(map(str, sides))
+def in_words(response: Answers, overturn_time: str) -> str:
+    """Return what became of the body, for its summary; the time at which it overturns is given as text."""
+    if response.overturned:
+        return f"overturns at {overturn_time}"
+    if response.unfinished:
+        return f"UNFINISHED: given up at {response.duration:.4f} s, after too many steps"
+    if response.stopped:
+        motion = response.motion
+        goes_on = motion is not None and response.duration < motion.end
+        to_come = f"; the motion goes on to {motion.end:.6g} s" if motion is not None and goes_on else ""
+        return f"{_when_stopped(response)}, where the simulation was stopped{to_come}"
+    return "rocks and does not overturn" if _has_moved(response) else "does not move"
 
 
-def _motion_text(response: Response) -> str:
-    motion = response.motion
+def in_brief(response: Answers) -> str:
+    """Return what became of the body, for a row of a table."""
+    doubtful = ", AMBIGUOUS" if response.ambiguous else ""
+    if response.overturned:
+        is_known = _decimals(KNOWN * _change_of_fall(response)) >= _BRIEF
+        time = f"{response.overturn_time:.{_BRIEF}f} s" if is_known else overturn_text(response)
+        return f"overturns at {time}{doubtful}"
+    if response.unfinished:
+        return f"unfinished, given up at {response.duration:.2f} s{doubtful}"
+    if response.stopped:
+        return f"{_when_stopped(response)}{doubtful}"
+    return f"{'rocks' if _has_moved(response) else 'does not move'}{doubtful}"
+
+
+def ratio_text(response: Answers) -> str:
+    """Peak rotation over slenderness, to the digits that are known."""
+    return f"{response.peak_over_slenderness:.{min(_peak_digits(response), 4)}g}"
+
+
+def time_text(time: float, change: float) -> str:
+    """Time in s, as far as it is known where what drives the block is known to `KNOWN` of itself.
+
+    Parameters
+    ----------
+    time : float
+        Time, s.
+    change : float
+        Change of the time per relative change of what drives the block, s.
+
+    Examples
+    --------
+    >>> time_text(230.726244377, 0.0), time_text(230.726244377, 3.0), time_text(230.726244377, 4e5)
+    ('230.726244377 s', '230.72624 s', '230.7 +- 0.4 s')
+    """
+    unknown = KNOWN * change
+    text = f"{time:.{_decimals(unknown)}f}"
+    if unknown < _SHOWN:
+        return f"{text} s"
+    return f"{text} +- {unknown:.1g} s" if unknown < 0.5 * time else f"about {text} s"
+
+
+def overturn_text(response: Answers) -> str:
+    """Time at which the block overturns, as far as it is known."""
+    return time_text(response.overturn_time, _change_of_fall(response))
+
+
+def tipping_text(response: Answers) -> str:
+    """Time at which the block tips, as far as it is known: it falls as late or as early as it tips."""
+    return _short_text(response.tipping_time, KNOWN * _change_of_fall(response) if response.overturned else 0.0)
+
+
+def peak_time_text(response: Answers) -> str:
+    """Time of the peak: that of a swing which is uncertain by a share of itself, by this share of its duration."""
+    if response.overturned:
+        return _short_text(response.peak_time, KNOWN * _change_of_fall(response))
+    change = response.sensitivity.driving()[0]
+    bend = response.peak_rotation * abs(float(response.states(response.peak_time)[2]))
+    return _short_text(response.peak_time, KNOWN * change / math.sqrt(bend) if bend > 0.0 else 0.0)
+
+
+def digits_of(value: float, change: float) -> int:
+    """Digits that are known of a value, which changes so much per relative change of what drives the body."""
+    if not math.isfinite(change):
+        return 1
+    if not (change > 0.0 and value > 0.0):
+        return _MOST_DIGITS
+    return min(max(math.floor(-math.log10(KNOWN * change / value)), 1), _MOST_DIGITS)
+
+
+def _motion_text(response: Answers) -> str:
+    motion, gravity = response.motion, response.body.gravity
     if motion is None:
         return "none: free rocking"
-    gravity = response.block.gravity
     parts = [f"{motion.name}, {motion.duration:.2f} s, peak {motion.pga / gravity:.4f} g", *motion.history]
     if motion.vertical is not None:
         parts.append(f"vertical {motion.vertical.name}, peak {motion.vertical.pga / gravity:.4f} g")
     return "; ".join(parts)
 
 
-def _thresholds_text(response: Response) -> str:
-    """Say what lifts the block; under a vertical motion it changes with the weight."""
-    gravity, motion = response.block.gravity, response.motion
-    plus, minus = (threshold / gravity for threshold in response.block.uplift_thresholds(response.model))
-    text = f"{plus:.4f} g" if plus == minus else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"
+def _thresholds_text(response: Answers) -> str:
+    """Return what lifts the body; under a vertical motion it changes with the weight."""
+    gravity, motion = response.body.gravity, response.motion
+    plus, minus = (threshold / gravity for threshold in response.body.uplift_thresholds(response.model))
+    one = plus == minus or math.isinf(minus)
+    text = f"{plus:.4f} g" if one else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"
     if motion is None or motion.vertical is None:
         return text
     low, high = (1.0 + lift / gravity for lift in motion.vertical.extremes)
     return f"{text}, times the weight over that at rest, {low:.4f} to {high:.4f}"
 
 
-def _event_lines(response: Response, known: Sensitivity) -> list[tuple[str, str]]:
+def _event_rows(response: Answers) -> list[Row]:
     sequences = {float(row["end"]): row for row in response.chattering}
-    changes = known.driving()[1]
-    lines = []
+    changes = response.sensitivity.driving()[1]
+    rows = []
     for event, change in zip(response.events[:_LISTED], changes, strict=False):
-        time = float(event["time"])
-        entry = digits.time_text(time, float(change))
-        sequence = sequences.get(time)
-        if event["kind"] == "uplift":
-            entry += f", to side {'+' if event['side'] > 0 else '-'}"
-        elif event["kind"] == "rest" and sequence is not None:
-            entry = _rest_text(response, time, float(change), sequence)
-        lines.append((str(event["kind"]), entry))
+        time, kind = float(event["time"]), str(event["kind"])
+        if kind == "rest" and time in sequences:
+            rows.append(Row(kind, _rest_text(response, time, float(change), sequences[time])))
+        else:
+            side = f", to side {'+' if event['side'] > 0 else '-'}" if kind == "uplift" else ""
+            rows.append(Row(kind, time_text(time, float(change)), note=side))
     if len(response.events) > _LISTED:
-        lines.append(("...", f"{len(response.events) - _LISTED} more events"))
-    return lines or [("uplift", "none")]
+        rows.append(Row("...", f"{len(response.events) - _LISTED} more events"))
+    return rows or [Row("uplift", "none")]
 
 
-def _rest_text(response: Response, time: float, change: float, sequence: np.void) -> str:
-    """Say when the block comes to rest, and how that is known: no more of it than the record's digits tell."""
-    unknown, width = digits.KNOWN * change, sequence["upper"] - sequence["lower"]
-    decimals = digits.decimals(unknown)
-    if unknown < digits.TOLD:
-        text = digits.time_text(time, change)
+def _rest_text(response: Answers, time: float, change: float, sequence: np.void) -> str:
+    """Return when the body comes to rest, and how that is known: no more of it than the record's digits tell."""
+    unknown, width = KNOWN * change, sequence["upper"] - sequence["lower"]
+    decimals = _decimals(unknown)
+    if unknown < _SHOWN:
+        text = time_text(time, change)
         if not width >= 0.0:
             return f"{text}, by the treatment, not proven"
         start = f"{sequence['start']:.{min(decimals, 4)}f}"
         # The bracket is for the motion to the last place: beside a time with fewer digits it would say too much.
-        bracket = f", bracket {width:.1e} s wide" if decimals >= digits.MOST_DECIMALS else ""
+        bracket = f", bracket {width:.1e} s wide" if decimals >= _MOST_DECIMALS else ""
         return f"{text}, complete chattering proven from {start} s on{bracket}"
     driver = "the initial state" if response.motion is None else "the motion"
     off = f"+- {unknown:.1g} s" if unknown < 0.5 * time else "far from it"
@@ -163,52 +268,78 @@ def _rest_text(response: Response, time: float, change: float, sequence: np.void
     return f"at about {time:.{decimals}f} s ({off} if {driver} is off by a millionth); {known}"
 
 
-def _peak_text(response: Response) -> str:
-    reached = f"{digits.peak_text(response)} at {digits.peak_time_text(response)}"
+def _peak_row(response: Answers) -> Row:
+    """Peak and its time, each as far as it is known."""
+    name, _, _, unit, limit = response.body.coordinate
+    note = f" at {peak_time_text(response)}"
     if response.overturned:
-        return f"{reached}, where the block has fallen"
-    return f"{reached}, {digits.ratio_text(response)} of the slenderness"
+        note += ", where the block has fallen"
+    elif limit:
+        note += f", {ratio_text(response)} of the {limit}"
+    return Row(f"peak {name}", f"{response.peak_rotation:.{_peak_digits(response)}g}", unit, note)
 
 
-def _before_tipping(response: Response) -> str:
-    return "" if math.isnan(response.tipping_time) else f", until it tips at {digits.tipping_text(response)}"
-
-
-def _contact_lines(response: Response, friction: float | None, sliding: float) -> list[tuple[str, str]]:
-    """Say whether the block slides at a coefficient of friction, and when its base leaves the ground if it does."""
-    lines = []
+def _contact_rows(response: Answers, friction: float | None, sliding: float) -> list[Row]:
+    """Return whether the body slides at a coefficient of friction, and when its base leaves the ground if it does."""
+    rows = []
     if friction is not None:
         text = (
             "is enough: the block does not slide"
             if math.isnan(sliding)
             else f"is not enough: the block slides, first at {sliding:.4f} s; what follows is not this response"
         )
-        lines.append((f"friction {friction:g}", text))
+        rows.append(Row(f"friction {friction:g}", text))
     if not math.isnan(response.lift_off_time):
-        lines.append(("base lifts off", f"at {response.lift_off_time:.4f} s; what follows is not this response"))
-    return lines
+        rows.append(Row("base lifts off", f"at {response.lift_off_time:.4f} s; what follows is not this response"))
+    return rows
 
 
-def _sliding(response: Response, friction: float | None) -> dict[str, Any]:
-    return (
-        {} if friction is None else {"friction": friction, named("sliding_time", "s"): response.sliding_time(friction)}
-    )
-
-
-def _verdict(response: Response, known: Sensitivity) -> str:
-    verdict = in_words(response, digits.overturn_text(response) if response.overturned else "")
+def _verdict(response: Answers) -> str:
+    verdict = in_words(response, overturn_text(response) if response.overturned else "")
     if response.stalled:
         verdict += f"; {counted(response.stalled, 'rest')} not proven"
-    ambiguities = known.ambiguities(response.peak_rotation, response.near_ties)
-    if ambiguities:
-        affected = {
-            "peak": "the peak rotation",
-            "events": "times of events or impacts",
-            "touch": "whether a block without weight touches the ground",
-        }
+    if response.ambiguous:
         verdict += (
             f"; AMBIGUOUS: one unit in the last place of the input changes "
-            f"{' and '.join(affected[name] for name in ambiguities)}: scale the motion (or the initial state) "
-            "by 1 plus some millionths, several times, and take the spread for the answer"
+            f"{' and '.join(_AFFECTED[name] for name in response.ambiguities)}: scale the motion (or the initial "
+            "state) by 1 plus some millionths, several times, and take the spread for the answer"
         )
     return verdict
+
+
+def _when_stopped(response: Answers) -> str:
+    end = f"{response.duration:.6g} s"
+    if not math.isnan(response.tipping_time):
+        return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
+    if response.moves_at_end:
+        return f"still rocking at {end}"
+    return f"at rest at {end}" if _has_moved(response) else f"has not moved by {end}"
+
+
+def _has_moved(response: Answers) -> bool:
+    return bool(len(response.events) or len(response.impacts) or response.peak_rotation > 0.0)
+
+
+def _change_of_fall(response: Answers) -> float:
+    """Change of the time at which the block overturns per relative change of what drives it, s."""
+    return float(response.sensitivity.driving()[1][-1])
+
+
+def _peak_digits(response: Answers) -> int:
+    return digits_of(response.peak_rotation, response.sensitivity.driving()[0])
+
+
+def _decimals(unknown: float) -> int:
+    """Decimals of a number of which so much is unknown: where that is shown as well, the first uncertain one too."""
+    if not math.isfinite(unknown):
+        return 0
+    if unknown <= 0.0:
+        return _MOST_DECIMALS
+    known = -math.log10(unknown)
+    return min(max(math.ceil(known) if unknown >= _SHOWN else math.floor(known), 0), _MOST_DECIMALS)
+
+
+def _short_text(time: float, unknown: float) -> str:
+    """Time to four decimals at most, of which so much is unknown, s."""
+    about = "" if unknown < _SHOWN else "about "
+    return f"{about}{time:.{min(_decimals(unknown), _SHORT)}f} s"

@@ -18,7 +18,7 @@ from rocking.analysis.levels import mean_one, only_block, pooled, units_of, valu
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
-from rocking.product import Product, block_coordinates
+from rocking.product import Product, body_coordinates
 from rocking.progress import Progress
 from rocking.result import table_of_some
 from rocking.studies.spectrum import BlocksResult, peak_ratios, require_limits
@@ -128,7 +128,7 @@ def block_fragilities(
         xr.Dataset(
             {name: (dims, values, {"long_name": _KEPT[name]}) for name, values in kept.items()}
             | {"fault": (dims, faults.astype(str), {"long_name": "why there is no curve"})},
-            {"limit_state": list(limits), **block_coordinates(store.product.blocks)},
+            {"limit_state": list(limits), **body_coordinates(store.product.blocks)},
             {
                 "outcomes": motions * scales * polarities,
                 "confidence": confidence,

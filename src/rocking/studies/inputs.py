@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block import Blocks
-from rocking.errors import InvalidOption
+from rocking.body import KINDS, Bodies
+from rocking.errors import InvalidOption, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -78,7 +78,7 @@ def hashes(product: Product) -> dict[str, Any]:
     """Hash of every part of the inputs by its name; those of the motions in a list."""
     scales = product.scales
     return {
-        "blocks": _hash(_block_arrays(product.blocks).values()),
+        "blocks": _hash(_body_arrays(product.bodies).values()),
         "motions": [_hash(_motion_arrays(motion).values()) for motion in product.motions],
         "scales": _hash([scales.values, _text(json.dumps([*_measured(scales).values()]))]),
         "rules": _hash([_text(json.dumps(_rules(product)))]),
@@ -87,7 +87,7 @@ def hashes(product: Product) -> dict[str, Any]:
 
 def to_bytes(product: Product) -> bytes:
     """Return all inputs as an archive of arrays (NPZ), whose bytes depend on them alone."""
-    arrays = {f"blocks/{name}": values for name, values in _block_arrays(product.blocks).items()}
+    arrays = {f"{product.bodies.kind}/{name}": values for name, values in _body_arrays(product.bodies).items()}
     for k, motion in enumerate(product.motions):
         arrays |= {f"motions/{k}/{name}": values for name, values in _motion_arrays(motion).items()}
     arrays["scales/values"] = product.scales.values
@@ -100,7 +100,7 @@ def from_bytes(data: bytes) -> Product:
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
         words = json.loads(_words(arrays["words"]))
         return Product(
-            blocks=_blocks(arrays),
+            bodies=_bodies(arrays),
             motions=tuple(_motion(arrays, f"motions/{k}") for k in range(words["motions"])),
             scales=Scales(
                 None if words["measure"] is None else Measure(words["measure"], **words["options"]),
@@ -152,18 +152,17 @@ def _hash(arrays: Iterable[NDArray[Any]]) -> str:
     return digest.hexdigest()
 
 
-def _block_arrays(blocks: Blocks) -> dict[str, NDArray[Any]]:
-    return {
-        "p": blocks.p,
-        "alpha": blocks.alpha,
-        "restitution": blocks.restitution,
-        "gravity": np.array(blocks.gravity),
-    }
+def _body_arrays(bodies: Bodies) -> dict[str, NDArray[Any]]:
+    return {name: values for name, (values, _) in bodies.parameters().items()} | {"gravity": np.array(bodies.gravity)}
 
 
-def _blocks(arrays: Mapping[str, Floats]) -> Blocks:
-    p, alpha, restitution = (arrays[f"blocks/{name}"] for name in ("p", "alpha", "restitution"))
-    return Blocks(p, alpha, restitution, gravity=float(arrays["blocks/gravity"]))
+def _bodies(arrays: Mapping[str, Floats]) -> Bodies:
+    """Make the bodies again; the names of their arrays begin with their kind."""
+    kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in KINDS), "")
+    if not kind:
+        raise StudyError("the bodies of this study are of a kind that is not known here: import its module first")
+    values = {name.partition("/")[2]: arrays[name] for name in arrays if name.startswith(f"{kind}/")}
+    return KINDS[kind](**{**values, "gravity": float(values["gravity"])})
 
 
 def _motion_arrays(motion: Motion) -> dict[str, NDArray[Any]]:

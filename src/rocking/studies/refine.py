@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rocking import bisection, checks
 from rocking.arrays import Flags, Floats, Integers
 from rocking.errors import InvalidOption, StudyError
-from rocking.product import Product, block_coordinates
+from rocking.product import Product, body_coordinates
 from rocking.studies import inputs
 from rocking.studies.inputs import require
 from rocking.studies.store import Store, UnitArray, sealed, unsealed
@@ -193,7 +193,7 @@ class Round(UnitArray):
         signs = np.array(product.signs)[self.brackets.polarity[chosen]]
         measured = np.array([self._measured(int(motion)) for motion in motions])
         return PointsWork(
-            setup=dataclasses.replace(product.setup(), blocks=product.blocks.select(self.brackets.block[chosen])),
+            setup=dataclasses.replace(product.setup(), bodies=product.bodies.select(self.brackets.block[chosen])),
             motions=tuple(product.motions[motion] for motion in motions),
             which=which,
             factors=signs * (self.brackets.middle[chosen] / measured[which]),  # to the last bit as of `Scales.factors`
@@ -374,7 +374,7 @@ def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
     about = {"units": product.scales.about["units"]}
     named: dict[str, Any] = {
         name: ("change", np.asarray(values)[brackets.block], attributes)
-        for name, (_, values, attributes) in block_coordinates(product.blocks).items()
+        for name, (_, values, attributes) in body_coordinates(product.bodies).items()
     }
     names = whole.motion.values
     return xr.Dataset(

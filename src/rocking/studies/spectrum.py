@@ -17,7 +17,7 @@ from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import require_finished
 from rocking.errors import InvalidOption, StudyError
-from rocking.product import block_coordinates
+from rocking.product import body_coordinates
 from rocking.progress import Progress
 from rocking.result import Result, table_of_some
 from rocking.studies.inputs import require
@@ -150,7 +150,7 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
             {
                 "fractile": shares,
                 "scale": ("scale", product.scales.values, about),
-                **block_coordinates(product.blocks),
+                **body_coordinates(product.bodies),
             },
             {"motions": len(product.motions), "model": product.model},
         )

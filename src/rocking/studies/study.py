@@ -16,8 +16,10 @@ from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.fragility.result import Fragility
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption, StudyError
+from rocking.model import Model
 from rocking.motion.arguments import Motions, names_of, several_motions
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
+from rocking.problem import bodies_of
 from rocking.product import Polarity, Product, Scales
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
@@ -32,7 +34,6 @@ from rocking.studies.store import Store, exists
 from rocking.studies.units import fitting_unit, width_of
 from rocking.tables import counted
 from rocking.treatment import Treatment, treatment
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -400,7 +401,7 @@ def study(
             keep_plan(found.store, tolerances_of(found.product, refine, found.store.grid.outcomes))
         return found
     product = Product(
-        Blocks.of(blocks),
+        bodies_of(blocks),
         tuple(several_motions(motions)),
         Scales.of(levels, measure),
         polarity,

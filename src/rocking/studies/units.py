@@ -235,11 +235,11 @@ class GridWork(Work):
     @property
     def counts(self) -> tuple[int, ...]:
         """Numbers of motions, scales, polarities and blocks."""
-        return *self.factors.shape, len(self.setup.blocks)
+        return *self.factors.shape, len(self.setup.bodies)
 
     def parts(self) -> Iterator[tuple[tuple[Any, ...], Task]]:
         """Give a task for each motion, scale and polarity, of all blocks."""
-        blocks = slice(0, len(self.setup.blocks))
+        blocks = slice(0, len(self.setup.bodies))
         for m, s, k in np.ndindex(self.factors.shape):
             yield (m, s, k, blocks), Task(blocks, self.motions[m], float(self.factors[m, s, k]))
 

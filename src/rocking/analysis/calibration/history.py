@@ -24,13 +24,12 @@ from rocking.analysis.report import Report
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
-from rocking.response import Response
-from rocking.response.figure import drawing_times
+from rocking.response import Response, drawing_times
 from rocking.simulation import simulate
 from rocking.tables import counted, text_table
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

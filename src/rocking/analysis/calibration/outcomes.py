@@ -23,11 +23,11 @@ from rocking.block import Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.tables import counted, named, text_table
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import pandas as pd

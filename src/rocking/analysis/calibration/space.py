@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block import Blocks
-from rocking.block.body import eccentric_rectangles
-from rocking.block.single import housner_restitution
+from rocking.block import Blocks, housner_restitution
+from rocking.block.rigid_body import eccentric_rectangles
 from rocking.errors import InvalidOption
 
 #: Parameters of a block's side, in the order of the coordinates.

@@ -18,12 +18,12 @@ from rocking.block import Block, Blocks
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.product import Polarity
 from rocking.tables import counted
 from rocking.treatment import Treatment
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -23,9 +23,9 @@ from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.scaling import Measure
 from rocking.tables import write_text
-from rocking.treatment.base import Model
 
 NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
 

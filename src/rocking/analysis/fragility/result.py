@@ -23,10 +23,10 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Message
+from rocking.model import Model
 from rocking.motion.scaling import Measure
 from rocking.progress import spelled
 from rocking.tables import counted, text_table
-from rocking.treatment.base import Model
 
 if TYPE_CHECKING:
     import pandas as pd

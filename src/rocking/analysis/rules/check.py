@@ -13,14 +13,13 @@ from rocking.analysis.survey import BlockUnderRecords, motion_of
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
+from rocking.model import Model
 from rocking.motion.arguments import Motions, motions_by_name
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
-from rocking.response import Response
-from rocking.response.verdict import in_brief
+from rocking.response import Response, in_brief
 from rocking.simulation import simulate
 from rocking.tables import decimal, named, text_table
-from rocking.treatment.base import Model
 
 #: Width, relative to it, of the level that overturns first: a margin is read to three digits.
 _TOLERANCE: Final = 1e-4

@@ -1,4 +1,4 @@
-"""The rigid body that two sides belong to: from their p and alpha, or from their slenderness alone."""
+"""Mechanics of rigid bodies on two pivots: the body behind p and alpha, its restitution, its contact forces."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _NEAR: Final = 1e-14
 #: A restitution less certain than this is none.
 _UNCERTAIN: Final = 0.05
 
-#: How the sides may be corrected.
-_MEND: Final = "or give restitution= a value or a pair in (0, 1]"
+#: How the sides may be corrected; "{}" stands for the name of the argument.
+_GIVE_RESTITUTION: Final = "or give {} a value or a pair in (0, 1]"
 
 
-class Bodies(NamedTuple):
+class RigidBodies(NamedTuple):
     """Rigid bodies that have the p and alpha of their sides; of n.
 
     Attributes
@@ -58,7 +58,7 @@ class Bodies(NamedTuple):
         return self.alike | ((self.differing < self.most) & (self.uncertainty <= _UNCERTAIN))
 
 
-def bodies_of(p: Floats, alpha: Floats) -> Bodies:
+def rigid_bodies(p: Floats, alpha: Floats) -> RigidBodies:
     """Find the rigid bodies whose sides have these parameters, arrays of shape (n, 2).
 
     Notes
@@ -85,7 +85,7 @@ def bodies_of(p: Floats, alpha: Floats) -> Bodies:
         uncertainty = off * np.max(1.0 - kept, axis=1)
         depth = slope / tangent.sum(axis=1)
     kept[differing >= most] = np.nan
-    return Bodies(
+    return RigidBodies(
         np.where(alike[:, None], 1.0 - 1.5 * np.sin(alpha) ** 2, kept),
         np.where(alike, 0.75 * np.mean(cosine / p**2, axis=1), depth),
         np.where(alike, 0.0, uncertainty),
@@ -96,27 +96,30 @@ def bodies_of(p: Floats, alpha: Floats) -> Bodies:
     )
 
 
-def refusal(found: Bodies, p: Floats, alpha: Floats, index: int = 0) -> str:
-    """Say why a restitution does not follow from p and alpha, arrays of shape (n, 2); nothing where it does."""
+def refusal(found: RigidBodies, p: Floats, alpha: Floats, index: int = 0) -> str:
+    """Say why a restitution does not follow from p and alpha, arrays of shape (n, 2); nothing where it does.
+
+    A "{}" in the sentence stands for the name of the argument restitution.
+    """
     if found.known[index]:
         return ""
     (p_plus, p_minus), (plus, minus) = p[index].tolist(), alpha[index].tolist()
     if plus == minus:
         return (
             f"no rigid body has p = {p_plus:g} and {p_minus:g} rad/s on sides of one slenderness, {plus:g} rad; "
-            f"correct p, {_MEND}"
+            f"correct p, {_GIVE_RESTITUTION}"
         )
     fits = bool(found.differing[index] < found.most[index])
     if not fits and found.differing[index] > found.most[index] + found.margin[index]:
         differ, most = (math.expm1(value[index]) * 100.0 for value in (found.differing, found.most))
         return (
             f"no rigid body has p = {p_plus:g} and {p_minus:g} rad/s on sides of alpha = {plus:g} and {minus:g} rad: "
-            f"its p would differ by less than {most:.2g} %, not by {differ:.2g} %; correct p, {_MEND}"
+            f"its p would differ by less than {most:.2g} %, not by {differ:.2g} %; correct p, {_GIVE_RESTITUTION}"
         )
     best = f" better than to +-{found.uncertainty[index]:.1g}" if fits else ""
     return (
         f"p = {p_plus:g} and {p_minus:g} rad/s on sides of alpha = {plus:g} and {minus:g} rad have too few digits to "
-        f"tell the restitution{best}: give more of them, {_MEND}"
+        f"tell the restitution{best}: give more of them, {_GIVE_RESTITUTION}"
     )
 
 
@@ -151,6 +154,41 @@ def gyration_squared(half_width: Number, half_height: float, offset: Number) -> 
     the width is of a heavier material than the other.
     """
     return (half_width * half_width + half_height * half_height) / 3.0 - offset * offset
+
+
+def contact_forces(
+    motion: tuple[Floats, Floats, Floats],
+    ground_over_g: tuple[Floats, Floats],
+    side: Floats,
+    slenderness: Floats,
+    radius_over_g: Floats,
+) -> tuple[Floats, Floats]:
+    """Horizontal and vertical force on the block over its weight, all arrays of one shape.
+
+    Parameters
+    ----------
+    motion : tuple of ndarray
+        theta (rad), and its first and second rate.
+    ground_over_g : tuple of ndarray
+        Ground acceleration in units of g, horizontal and vertical.
+    side : ndarray
+        +1 or -1, the side that the block leans to; 0 at rest.
+    slenderness, radius_over_g : ndarray
+        alpha (rad) and R/g (s^2) of that side.
+
+    Notes
+    -----
+    On side i = +-1, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
+    pivot; forces are m (a + x'') and m (g + a_v + y''). At rest they are (a/g, 1 + a_v/g).
+    """
+    rotation, velocity, acceleration = motion
+    psi = slenderness - np.abs(rotation)
+    towards_pivot = side * acceleration
+    speed = np.abs(side) * velocity**2
+    horizontal = side * radius_over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
+    vertical = radius_over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)
+    push, lift = ground_over_g
+    return push + horizontal, 1.0 + lift + vertical
 
 
 def _half_a_digit(values: Floats) -> Floats:

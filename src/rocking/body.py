@@ -1,0 +1,125 @@
+"""What the engine moves: a body with one coordinate, or many of one kind. A block is one kind.
+
+The equation of motion between impacts is that of `kernels.state.BLOCK`: u'' = lambda u - gain (threshold + side a/g),
+of any stiffness lambda, with one side or two. Everything above the kernels knows a body by these protocols alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final, NamedTuple, Protocol, Self, runtime_checkable
+
+from rocking.arrays import Floats, Integers
+from rocking.kernels.state import Records
+from rocking.model import Model
+
+
+class Coordinate(NamedTuple):
+    """How texts, columns and figures name the coordinate of a body.
+
+    Attributes
+    ----------
+    name, rate, acceleration : str
+        Names of the coordinate and its rates, as "rotation", "angular_velocity" and "angular_acceleration".
+    unit : str
+        Unit of the coordinate.
+    limit : str
+        Name of the value at which the body is in unstable balance, as "slenderness"; empty where there is none.
+    """
+
+    name: str
+    rate: str
+    acceleration: str
+    unit: str
+    limit: str = ""
+
+
+#: Forces of the ground on a body over its weight, horizontal and vertical: from the coordinate and its two rates, from
+#: the ground acceleration over g (horizontal, vertical), and from the side (0, 1, or -1 at rest); arrays of one shape.
+ContactLaw = Callable[[tuple[Floats, Floats, Floats], tuple[Floats, Floats], Integers], tuple[Floats, Floats]]
+
+
+@runtime_checkable
+class Body(Protocol):
+    """One body, as simulations and responses know it."""
+
+    @property
+    def description(self) -> str:
+        """What it is, in words."""
+
+    @property
+    def gravity(self) -> float:
+        """Acceleration of gravity, m/s^2."""
+
+    @property
+    def coordinate(self) -> Coordinate:
+        """Its coordinate."""
+
+    @property
+    def sides(self) -> Sequence[object]:
+        """Its sides, one or two; the text of each states its parameters."""
+
+    @property
+    def balance(self) -> tuple[float, float]:
+        """Coordinate of the unstable balance on each side; infinite where there is none."""
+
+    @property
+    def contact(self) -> ContactLaw | None:
+        """Forces of the ground; None where nothing is known of them."""
+
+    def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
+        """Ground accelerations, m/s^2, that lift it to side + and to side -; infinite where there is no such side."""
+
+    def alone(self) -> Bodies:
+        """Bodies of which it is the only one."""
+
+
+@runtime_checkable
+class Bodies(Protocol):
+    """Any number n of bodies of one kind under one gravity."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the kind, by which `KINDS` finds it."""
+
+    @property
+    def gravity(self) -> float:
+        """Acceleration of gravity, m/s^2."""
+
+    @property
+    def restitution(self) -> Floats:
+        """Factors on the speed on leaving each side, shape (n, 2); of one side twice the same."""
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether both sides of every body are equal, or there is only one."""
+
+    def __len__(self) -> int:
+        """Return their number."""
+
+    def __getitem__(self, index: int) -> Body:
+        """Return one of them."""
+
+    def select(self, index: slice | Integers) -> Self:
+        """Return some of them: a slice, indices, or a mask."""
+
+    def parameters(self) -> Mapping[str, tuple[Floats, str]]:
+        """Return what they are made from: arrays of shape (n, 2) and units, by name."""
+
+    def speed_limits(self, share: float) -> Floats:
+        """Return a share of the speed that is natural to each side (of a block p alpha), shape (n, 2)."""
+
+    def kernel_records(self, model: Model, limits: Floats) -> Records:
+        """Return them as kernels take them (`kernels.state.BLOCK`), shape (n,).
+
+        Parameters
+        ----------
+        model : {"nonlinear", "linear"}
+            Equation of motion.
+        limits : ndarray, shape (n, 2)
+            Limits of a treatment of chattering.
+        """
+
+
+#: Makes the bodies of a kind from their `parameters`, by name, and from gravity; studies read their inputs so.
+KINDS: Final[dict[str, Callable[..., Bodies]]] = {}

@@ -1,0 +1,310 @@
+"""What was simulated, what the march found, and short answers from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rocking.arrays import Floats, as_asked
+from rocking.block import Block
+from rocking.body import Body
+from rocking.errors import InvalidOption
+from rocking.kernels import state
+from rocking.kernels.trace import Trail
+from rocking.model import Model
+from rocking.motion.motion import Motion
+from rocking.response.forces import Contact, friction_coefficient, friction_demand, with_all_impacts
+from rocking.response.history import History, Sensitivity
+from rocking.treatment import Treatment
+
+EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
+IMPACT = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
+CHATTERING = np.dtype([("start", "f8"), ("end", "f8"), ("lower", "f8"), ("upper", "f8"), ("impacts", "i8")])
+
+#: Kinds of events by their codes, see `rocking.kernels.state`.
+_KINDS = np.array(["uplift", "rest", "overturn"])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Answers:
+    """Data of a response and answers that follow from them; `Response` is the public class and lists them."""
+
+    body: Body
+    motion: Motion | None
+    model: Model
+    treatment: Treatment
+    overturned: bool
+    unfinished: bool
+    overturn_time: float
+    peak_rotation: float
+    peak_time: float
+    duration: float
+    events: NDArray[np.void]
+    impacts: NDArray[np.void]
+    chattering: NDArray[np.void]
+    stalled: int
+    near_ties: int
+    trail: Trail
+
+    @classmethod
+    def from_march(
+        cls,
+        body: Body,
+        motion: Motion | None,
+        model: Model,
+        treatment: Treatment,
+        trail: Trail,
+        table: state.Records,
+        end: state.Record,
+    ) -> Self:
+        """Response from the table and the last state of a march."""
+        events = table["event"][: end["events"]]
+        overturned = bool(len(events)) and int(events["kind"][-1]) == state.EventKind.OVERTURN
+        return cls(
+            body=body,
+            motion=motion,
+            model=model,
+            treatment=treatment,
+            overturned=bool(overturned),
+            unfinished=int(end["ending"]) == state.Ending.UNFINISHED,
+            overturn_time=float(events["time"][-1]) if overturned else math.nan,
+            peak_rotation=float(end["peak"]),
+            peak_time=float(end["peak_time"]),
+            duration=float(end["end"]),
+            events=_events(events),
+            impacts=_public(table["impact"][: end["impacts"]], IMPACT),
+            chattering=_public(table["sequence"][: end["sequences"]], CHATTERING),
+            stalled=int(end["stalled"]),
+            near_ties=int(end["near_ties"]),
+            trail=trail._replace(nodes=state.attributed(np.array(table["node"][: end["nodes"]]))),
+        )
+
+    @property
+    def block(self) -> Block:
+        """The body, for what only blocks can answer.
+
+        Raises
+        ------
+        InvalidOption
+            If it is of another kind.
+        """
+        if not isinstance(self.body, Block):
+            raise InvalidOption(f"this is known of blocks alone, not of a {type(self.body).__name__}")
+        return self.body
+
+    @cached_property
+    def _history(self) -> History:
+        return History(self.trail, self.duration)
+
+    @cached_property
+    def peak_over_slenderness(self) -> float:
+        """Peak rotation over the slenderness of the side where it is reached; infinite where the block overturns."""
+        if self.overturned:
+            return math.inf
+        if self.peak_rotation == 0.0:
+            return 0.0
+        leaning = float(self.rotation(self.peak_time))
+        return self.peak_rotation / self.body.balance[0 if leaning > 0.0 else 1]
+
+    @property
+    def moves_at_end(self) -> bool:
+        """Whether the block is not at rest at the end of the response."""
+        return bool(self.trail.nodes["side"][-1] != state.AT_REST)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether `duration` ended the simulation before a verdict: the block still moved, or the motion went on.
+
+        What became of the block is then not known, and `overturned` says no more than "not by then".
+        """
+        over = self.motion is None or self.duration >= self.motion.end
+        return not (self.overturned or self.unfinished) and (self.moves_at_end or not over)
+
+    @cached_property
+    def tipping_time(self) -> float:
+        """Last time, s, at which the block passes its balance point, |theta| = alpha; NaN if it ends within it.
+
+        From then on a block that overturns only falls; one that is beyond it where the simulation was `stopped` may yet
+        be caught by the motion.
+        """
+        return self._history.tipping_time(self.body.balance)
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity:
+        """How the peak and the times of events and impacts change with the motion, the initial state and the block."""
+        return Sensitivity.along(
+            self.trail, self.peak_time, len(self.impacts), len(self.events), overturned=self.overturned
+        )
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether no double-precision program can know this response: one ulp of what was given changes it visibly."""
+        return bool(self.ambiguities)
+
+    @cached_property
+    def ambiguities(self) -> tuple[str, ...]:
+        """What makes the response ambiguous: "peak", "events" (a time of one, or of an impact) and "touch".
+
+        The last is that of a block that nothing weighs down, which may just reach the ground, or just not.
+
+        An ambiguous response is one of those that are possible. Scale the motion, or the initial state, by 1 plus some
+        millionths, simulate each, and take the spread of the results for the answer.
+        """
+        return self.sensitivity.ambiguities(self.peak_rotation, self.near_ties)
+
+    @property
+    def time_at_rest(self) -> float:
+        """Time that the block spends at rest, s."""
+        starts, ends = self.rest_intervals.T
+        return float(np.sum(ends - starts))
+
+    @property
+    def rest_intervals(self) -> Floats:
+        """Start and end of each interval at rest, shape (n, 2), s."""
+        return self._history.rests()
+
+    def states(self, time: ArrayLike) -> Floats:
+        """Coordinate of the body, its velocity and its acceleration at any time: of a block those of its rotation.
+
+        Parameters
+        ----------
+        time : array_like
+            Times, s, of any shape.
+
+        Returns
+        -------
+        ndarray
+            One more dimension, of length 3, in the unit of the coordinate, over s and over s^2; NaN outside
+            [0, duration].
+
+        Raises
+        ------
+        InvalidOption
+            If a time is not a number.
+        """
+        return self._history.states(time)
+
+    def rotation(self, time: ArrayLike) -> Floats:
+        """Rotation theta, rad, at any time, from the series of the arc in which it lies.
+
+        Parameters
+        ----------
+        time : array_like
+            Times, s, of any shape.
+
+        Returns
+        -------
+        ndarray
+            Same shape, a number for a number; NaN outside [0, duration].
+
+        Raises
+        ------
+        InvalidOption
+            If a time is not a number.
+        """
+        return as_asked(self.states(time)[..., 0])
+
+    def angular_velocity(self, time: ArrayLike) -> Floats:
+        """Angular velocity, rad/s, at any time (just after an impact, at one); NaN outside [0, duration]."""
+        return as_asked(self.states(time)[..., 1])
+
+    def angular_acceleration(self, time: ArrayLike) -> Floats:
+        """Angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
+        return as_asked(self.states(time)[..., 2])
+
+    def normal_force(self, time: ArrayLike) -> Floats:
+        """Return the normal force over the weight at any time; impulses at impacts are not part of it."""
+        return as_asked(self._contact.forces(time)[1])
+
+    def friction_demand(self, time: ArrayLike) -> Floats:
+        """Friction coefficient that sticking needs at any time: infinite where the normal force is not positive.
+
+        NaN outside the response.
+        """
+        return as_asked(friction_demand(*self._contact.forces(time)))
+
+    @cached_property
+    def required_friction(self) -> float:
+        """Largest friction coefficient that sticking needs, between impacts and until the block tips (`tipping_time`).
+
+        Infinite if the normal force does not stay positive.
+        """
+        return self._contact.largest(friction_demand)
+
+    @cached_property
+    def minimum_normal_force(self) -> float:
+        """Smallest normal force over the weight, between impacts and until the block tips (`tipping_time`)."""
+        return -self._contact.largest(_pull)
+
+    def sliding_time(self, friction: float) -> float:
+        """Return the first time, s, at which sticking needs more than a friction coefficient; NaN if it never does.
+
+        Parameters
+        ----------
+        friction : float
+            Coefficient of friction between block and ground, positive and at most 3.
+
+        Raises
+        ------
+        InvalidOption
+            If it is no such number.
+
+        Notes
+        -----
+        Only until the block tips (`tipping_time`), and without the impulses at impacts, at which a block may slip by
+        itself. What happens after a slip is not part of the model: the response goes on as if the block stuck.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block = rocking.Block(width=0.24, height=1.1)
+        >>> response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090"))
+        >>> f"{response.required_friction:.4f}, {response.sliding_time(0.24):.4f} s, {response.sliding_time(0.3)}"
+        '0.2489, 234.3559 s, nan'
+        """
+        level = friction_coefficient(friction)
+        return self._contact.first(friction_demand, lambda demand: demand > level)
+
+    @cached_property
+    def lift_off_time(self) -> float:
+        """First time, s, at which the normal force is no longer positive, so that the base would leave the ground.
+
+        NaN if that never happens; as for `sliding_time`, until the block tips and between impacts.
+        """
+        return self._contact.first(_pull, lambda pull: pull >= 0.0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the data alone: answers are found again."""
+        return {entry.name: getattr(self, entry.name) for entry in fields(self)}
+
+    @cached_property
+    def _contact(self) -> Contact:
+        cut = bool(len(self.chattering)) and bool(self.chattering["end"][-1] >= self.duration) and self.moves_at_end
+        law = self.body.contact
+        if law is None:
+            raise InvalidOption(f"the forces of the ground on a {type(self.body).__name__} are not known")
+        until = self.duration if math.isnan(self.tipping_time) else self.tipping_time
+        return Contact(History(with_all_impacts(self.trail, cut=cut), self.duration), law, until)
+
+
+def _pull(_: Floats, vertical: Floats) -> Floats:
+    """Return how much the ground would have to pull: the normal force's opposite."""
+    return -vertical
+
+
+def _public(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    public = np.empty(len(rows), dtype=dtype)
+    for name in dtype.names or ():
+        public[name] = rows[name]
+    return public
+
+
+def _events(rows: state.Records) -> NDArray[np.void]:
+    events = np.empty(len(rows), dtype=EVENT)
+    events["time"], events["side"], events["kind"] = rows["time"], rows["side"], _KINDS[rows["kind"]]
+    return events

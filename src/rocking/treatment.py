@@ -1,0 +1,329 @@
+"""How a sequence of impacts is brought to rest: by proof, or by one of the thresholds in use."""
+
+from __future__ import annotations
+
+import warnings
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import ClassVar, Final, Literal, get_args
+
+import numpy as np
+
+from rocking import checks
+from rocking.arrays import Flags, Floats
+from rocking.block import Blocks
+from rocking.body import Bodies
+from rocking.errors import InvalidOption, OutsideFit
+from rocking.kernels import state
+from rocking.model import Model
+from rocking.motion.motion import Motion
+
+Critical = Literal["eq76", "eq77", "exact"]
+
+#: Frequencies and restitutions to which the paper fitted Eqs 76 and 77.
+FITTED_FREQUENCIES: Final = (0.5, 8.0)
+FITTED_RESTITUTIONS: Final = (0.5, 0.97)
+
+_BY_NAME: dict[str, type[Treatment]] = {}
+
+
+@dataclass(frozen=True)
+class Treatment(ABC):
+    """How a sequence of impacts ends. A class of its own is found by its `name` as soon as it is imported.
+
+    What is compared with its limits at an impact is one of the measures that kernels know (`rocking.kernels.state`).
+    """
+
+    #: Name in ``chattering=`` and on the command line.
+    name: ClassVar[str]
+    #: What the kernels compare with the limits, a code of `rocking.kernels.state`.
+    code: ClassVar[int]
+
+    def __init_subclass__(cls) -> None:
+        _BY_NAME[cls.name] = cls
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """Short name with the parameter and its unit, for tables and figures."""
+
+    @property
+    def bracket(self) -> float:
+        """Width, s, of the bracket on the time of rest that is asked for; 0 where nothing is proven."""
+        return 0.0
+
+    @abstractmethod
+    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+        """Limits of both sides of every body under a motion times a factor, shape (n, 2)."""
+
+    def __str__(self) -> str:
+        """Write the treatment so that `treatment` reads it back."""
+        values = [str(getattr(self, parameter.name)) for parameter in fields(self)]
+        return "=".join([self.name, *values])
+
+    @classmethod
+    def from_text(cls, value: str) -> Treatment:
+        """Make the treatment of its one parameter as it is written after "NAME=".
+
+        Raises
+        ------
+        InvalidOption
+            If it takes no parameter, or the text is not one.
+        """
+        if not fields(cls):
+            raise InvalidOption(f"the chattering treatment {cls.name} takes no parameter, not {value!r}")
+        try:
+            return cls(float(value))  # type: ignore[call-arg]
+        except ValueError:
+            raise InvalidOption(f"the chattering treatment {cls.name} takes one number, not {value!r}") from None
+
+
+@dataclass(frozen=True)
+class AsymptoticTime(Treatment):
+    """Rest once the asymptotic chattering time (paper, Eq. 65) has passed since uplift (paper, Fig. 8a).
+
+    For sinusoidal motions and symmetric blocks only. Above the critical amplitude the block never rests; where Eq. 65
+    exceeds the true time, it rests once time no longer advances between impacts, which a response counts as `stalled`.
+
+    Parameters
+    ----------
+    critical : {"eq76", "eq77", "exact"}
+        Critical amplitude that the scheme trusts: the paper's fits, or the exact one. Between a fit and the exact one
+        the scheme rests falsely, or not at all.
+
+    Raises
+    ------
+    InvalidOption
+        If `critical` is none of these.
+
+    Warns
+    -----
+    OutsideFit
+        Where a fit is asked beyond the frequencies (0.5 to 8, over p) and restitutions (0.5 to 0.97) it was made for.
+
+    Notes
+    -----
+    Amplitudes count in the acceleration that lifts the block: g alpha in the linear model, as in the paper, and
+    g tan(alpha) in the nonlinear one.
+    """
+
+    name: ClassVar[str] = "time"
+    code: ClassVar[int] = state.RestRule.TIME
+
+    critical: Critical = "eq76"
+
+    def __post_init__(self) -> None:
+        checks.one_of(self.critical, "critical", InvalidOption, get_args(Critical))
+
+    @property
+    def label(self) -> str:
+        """Name and equations."""
+        return f"time (Eq. 65, {'exact a_cr' if self.critical == 'exact' else f'Eq. {self.critical[2:]}'})"
+
+    @classmethod
+    def from_text(cls, value: str) -> Treatment:
+        """Make the treatment from the name of a critical amplitude."""
+        return cls(value)  # type: ignore[arg-type]
+
+    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+        """Chattering time of every side, s; infinite where chattering is not complete."""
+        from rocking.kernels import paper
+
+        if motion is None or motion.description.family != "sine":
+            raise InvalidOption(
+                '{} "time" is the scheme for sinusoidal motions (rocking.pulses.sine), not for '
+                f'{"free rocking" if motion is None else motion.description.family}; use "certified"',
+                "chattering",
+            )
+        if motion.vertical is not None:
+            raise InvalidOption('{} "time" knows no vertical motion; use "certified"', "chattering")
+        if not isinstance(bodies, Blocks) or not bodies.is_symmetric:
+            raise InvalidOption('{} "time" is for symmetric blocks; use "certified"', "chattering")
+        parameters, eta = motion.description.parameters, bodies.restitution
+        threshold = bodies.alpha if model == "linear" else np.tan(bodies.alpha)
+        amplitude = abs(factor * parameters["amplitude"]) / (bodies.gravity * threshold)
+        frequency = 2.0 * np.pi * parameters["frequency"] / bodies.p
+        complete = (amplitude >= 1.0) & (amplitude < self._critical(frequency, eta))
+        cases = zip(amplitude.flat, frequency.flat, eta.flat, strict=True)
+        times = np.reshape([paper.eq65_time(*case) for case in cases], amplitude.shape)
+        return np.where(complete, times / bodies.p, np.inf)
+
+    def _critical(self, frequency: Floats, restitution: Floats) -> Floats:
+        from rocking.kernels import paper
+        from rocking.kernels.sine.sequence import critical_amplitudes
+
+        found = np.ones(frequency.size)
+        lossy = np.flatnonzero(restitution.ravel() < 1.0)
+        omega, eta = frequency.ravel()[lossy], restitution.ravel()[lossy]
+        there = np.zeros(lossy.size)
+        if self.critical == "exact":
+            critical_amplitudes(omega, eta, there)
+        else:
+            warn_outside_fit(self.critical, omega, eta)
+            paper.fitted_amplitudes(omega, eta, self.critical == "eq76", there)
+        found[lossy] = there
+        return found.reshape(frequency.shape)
+
+
+@dataclass(frozen=True)
+class Certified(Treatment):
+    """Rest where, and only where, the certificate proves complete chattering; the default.
+
+    Parameters
+    ----------
+    tolerance : float
+        Impacts are resolved until the bracket on the time of rest is narrower than this, s.
+
+    Raises
+    ------
+    InvalidOption
+        If the tolerance is not positive and finite.
+
+    Examples
+    --------
+    >>> Certified(tolerance=1e-9)
+    Certified(tolerance=1e-09)
+    """
+
+    name: ClassVar[str] = "certified"
+    code: ClassVar[int] = state.RestRule.CERTIFIED
+
+    tolerance: float = 1e-12
+
+    def __post_init__(self) -> None:
+        checks.positive(self.tolerance, "tolerance", InvalidOption, "s")
+
+    @property
+    def label(self) -> str:
+        """Name and tolerance."""
+        return f"certified {self.tolerance:g} s"
+
+    @property
+    def bracket(self) -> float:
+        """The tolerance."""
+        return self.tolerance
+
+    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+        """Nothing to compare with: zeros."""
+        return np.zeros((len(bodies), 2))
+
+
+@dataclass(frozen=True)
+class VelocityThreshold(Treatment):
+    """Rest as soon as an impact leaves less than a threshold of angular speed (paper, Fig. 8b).
+
+    Parameters
+    ----------
+    threshold : float
+        VelTol/(p alpha), the threshold over the side's p and alpha, dimensionless.
+
+    Raises
+    ------
+    InvalidOption
+        If the threshold is not positive and finite.
+    """
+
+    name: ClassVar[str] = "velocity"
+    code: ClassVar[int] = state.RestRule.VELOCITY
+
+    threshold: float = 5e-10
+
+    def __post_init__(self) -> None:
+        checks.positive(self.threshold, "threshold", InvalidOption, "fractions of p alpha")
+
+    @property
+    def label(self) -> str:
+        """Name and threshold."""
+        return f"velocity {self.threshold:g}"
+
+    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+        """Threshold of every side, of a block in rad/s."""
+        return bodies.speed_limits(self.threshold)
+
+
+@dataclass(frozen=True)
+class IntervalThreshold(Treatment):
+    """Rest as soon as two impacts follow each other within a threshold of time.
+
+    Parameters
+    ----------
+    threshold : float
+        Shortest interval between impacts that is resolved, s.
+
+    Raises
+    ------
+    InvalidOption
+        If the threshold is not positive and finite.
+    """
+
+    name: ClassVar[str] = "interval"
+    code: ClassVar[int] = state.RestRule.INTERVAL
+
+    threshold: float = 1e-9
+
+    def __post_init__(self) -> None:
+        checks.positive(self.threshold, "threshold", InvalidOption, "s")
+
+    @property
+    def label(self) -> str:
+        """Name and threshold."""
+        return f"interval {self.threshold:g} s"
+
+    def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
+        """Threshold of every side, s."""
+        return np.full((len(bodies), 2), self.threshold)
+
+
+def treatment(chattering: str | Treatment) -> Treatment:
+    """Treatment of a name, or of a name and its parameter, or the treatment itself.
+
+    Raises
+    ------
+    InvalidOption
+        If there is none of that name, or its parameter is out of its range.
+
+    Examples
+    --------
+    >>> treatment("certified")
+    Certified(tolerance=1e-12)
+    >>> treatment("velocity=1e-6")
+    VelocityThreshold(threshold=1e-06)
+    >>> str(treatment("interval"))
+    'interval=1e-09'
+    """
+    if isinstance(chattering, Treatment):
+        return chattering
+    name, given, value = chattering.partition("=") if isinstance(chattering, str) else ("", "", "")
+    if name not in _BY_NAME:
+        kinds = "" if isinstance(chattering, str) else " or a treatment"
+        raise InvalidOption(f"{{}} must be one of {', '.join(_BY_NAME)}{kinds}, not {chattering!r}", "chattering")
+    if not given:
+        return _BY_NAME[name]()
+    try:
+        return _BY_NAME[name].from_text(value)
+    except InvalidOption as error:
+        sentence = f'{{}} "{chattering}": {error.message.template}'
+        raise InvalidOption(sentence, "chattering", *error.message.arguments) from None
+
+
+def warn_outside_fit(fit: str, omega: Floats, eta: Floats) -> None:
+    """Warn where one of the paper's fits is asked beyond what it was made for.
+
+    Parameters
+    ----------
+    fit : str
+        "eq76" or "eq77".
+    omega, eta : ndarray
+        Frequencies over p, and restitutions.
+    """
+    low, high = FITTED_FREQUENCIES
+    least, most = FITTED_RESTITUTIONS
+    outside: Flags = (omega < low) | (omega > high) | (eta < least) | (eta > most)
+    if outside.any():
+        k = int(np.argmax(outside))
+        warnings.warn(
+            f"Eq. {fit[2:]} was fitted for omega from {low:g} to {high:g} and eta from {least:g} to {most:g}; "
+            f'at omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g} it means nothing: use "exact"',
+            OutsideFit,
+            stacklevel=3,
+        )
