@@ -18,7 +18,7 @@ from .errors import (
     StudyError,
     UnreadableRecord,
 )
-from .explorer.notebook import explore
+from .explorer.launch import explore
 from .motion import Motion, pulses, records
 from .motion.formats import read
 from .response import Response

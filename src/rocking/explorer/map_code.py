@@ -7,9 +7,8 @@ import shlex
 from typing import Any, Final
 
 from rocking.constants import STANDARD_GRAVITY
-from rocking.explorer.case import BLOCK_NAMES, NAMES, block_as_python
+from rocking.explorer.inputs import BLOCK_NAMES, NAMES, arguments_of, block_as_python, is_pulse, pulse_call
 from rocking.explorer.maps import QUANTITIES, Axis, Grid
-from rocking.explorer.pulses import arguments_of, is_pulse, pulse_call
 from rocking.named_pulses import pulse_values
 
 #: Pulses that have an amplitude and a frequency, over which `rocking map` maps them.

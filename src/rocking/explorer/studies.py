@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -15,9 +15,10 @@ import rocking
 from rocking.analysis.intensity import Measure, MeasureName
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption, StudyError
-from rocking.explorer.case import texts_of_motion
 from rocking.explorer.core import Payload
-from rocking.explorer.shelf import Shelf
+from rocking.explorer.inputs import texts_of_motion
+from rocking.explorer.parameters import PARAMETERS
+from rocking.explorer.uploads import UploadStore
 from rocking.quantities import number
 
 #: Largest map, points.
@@ -26,16 +27,8 @@ _MOST: Final = 1_000_000
 #: Values of an axis that are named, or offered to choose from, at most.
 _NAMED: Final = 1000
 
-_LABELS: Final = {
-    "p": ("Frequency parameter p", "rad/s"),
-    "alpha": ("Slenderness α", "rad"),
-    "restitution": ("Restitution η", ""),
-    "block": ("Block, by its number", ""),
-    "motion": ("Motion, by its number", ""),
-}
-
-#: Parameters of a block.
-_PARAMETERS: Final = ("p", "alpha", "restitution")
+#: Parameters of a block, and the units in which a study has them.
+_PARAMETERS: Final = {"p": "rad/s", "alpha": "rad", "restitution": ""}
 
 #: What is drawn for a block of which it is not known whether it overturns: the simulation was given up, or stopped.
 OPEN: Final = -1.0
@@ -78,7 +71,11 @@ class StudyView:
                 f"the study in {folder} keeps only {', '.join(kept)}; a map needs one of {', '.join(QUANTITIES)}. See "
                 f"its numbers: rocking study export {folder} results.csv"
             )
-        blocks = self.study.product.blocks
+        product = self.study.product
+        blocks = product.blocks
+        self._chosen_from: dict[str, Sized] = {
+            "scale_index": product.scales.values, "motion_index": product.motions, "polarity_index": product.signs
+        }  # fmt: skip
         self._columns: dict[str, Floats] = {name: getattr(blocks, name)[:, 0] for name in _PARAMETERS}
         if not (blocks.is_symmetric and _is_grid(list(self._columns.values()))):
             self._columns = {"block": np.arange(1.0, len(blocks) + 1.0)}
@@ -134,8 +131,8 @@ class StudyView:
         values = np.full((axes[y].size, axes[x].size), np.nan)
         blocks = self._blocks(texts, {x, y})
         results, product = self._drawn(quantity), self.study.product
-        scales = range(len(product.scales.values)) if "scale" in (x, y) else [self._scale(texts)]
-        motions = range(len(product.motions)) if "motion" in (x, y) else [self._motion(texts)]
+        scales = range(len(product.scales.values)) if "scale" in (x, y) else [self._index(texts, "scale_index")]
+        motions = range(len(product.motions)) if "motion" in (x, y) else [self._index(texts, "motion_index")]
         at = {
             name: np.searchsorted(axes[name], self._columns[name][blocks]) for name in (x, y) if name in self._columns
         }
@@ -153,18 +150,18 @@ class StudyView:
         }
         return Payload(header, {"values": values.ravel()})
 
-    def texts_at(self, texts: Mapping[str, str], shelf: Shelf) -> dict[str, str]:
+    def texts_at(self, texts: Mapping[str, str], uploads: UploadStore) -> dict[str, str]:
         """Return the texts of the simulation at a point of a slice."""
         product = self.study.product
         at = {texts.get(which, ""): number(texts.get(f"at_{which}", ""), f"at_{which}") for which in ("x", "y")}
         scales = np.asarray(product.scales.values, dtype=float)
-        scale = self._scale(texts) if "scale" not in at else int(np.argmin(np.abs(scales - at["scale"])))
-        motion = product.motions[self._motion(texts) if "motion" not in at else round(at["motion"]) - 1]
-        sign = product.signs[self._index(texts, "polarity_index", len(product.signs))]
+        scale = self._index(texts, "scale_index") if "scale" not in at else int(np.argmin(np.abs(scales - at["scale"])))
+        motion = product.motions[self._index(texts, "motion_index") if "motion" not in at else round(at["motion"]) - 1]
+        sign = product.signs[self._index(texts, "polarity_index")]
         factor = sign * float(product.scales.factors(motion)[scale])
         chosen = {name: at.get(name, self._value(name, texts)) for name in self._columns}
         found = self._texts_of_block(chosen)
-        found |= texts_of_motion(motion if factor == 1.0 else motion.scaled(factor), shelf)
+        found |= texts_of_motion(motion if factor == 1.0 else motion.scaled(factor), uploads)
         found |= {"model": product.model, "chattering": str(product.treatment)}
         return found if product.duration is None else found | {"duration": repr(product.duration)}
 
@@ -186,7 +183,7 @@ class StudyView:
 
     def _outcomes(self, results: Any, texts: Mapping[str, str], scale: int, motion: int) -> Floats:
         """Outcomes of all blocks under one motion at one scale."""
-        polarity = self._index(texts, "polarity_index", len(self.study.product.signs))
+        polarity = self._index(texts, "polarity_index")
         chosen = {"motion": motion, "scale": scale, "polarity": polarity}
         found = results.isel({name: k for name, k in chosen.items() if name in results.dims})
         return np.asarray(found.values, dtype=float)
@@ -205,16 +202,14 @@ class StudyView:
         wanted = texts.get(f"fix_{name}")
         return float(values[0] if not wanted else values[np.argmin(np.abs(values - number(wanted, name)))])
 
-    def _scale(self, texts: Mapping[str, str]) -> int:
-        return self._index(texts, "scale_index", len(self.study.product.scales.values))
-
-    def _motion(self, texts: Mapping[str, str]) -> int:
-        return self._index(texts, "motion_index", len(self.study.product.motions))
-
-    def _index(self, texts: Mapping[str, str], name: str, count: int) -> int:
+    def _index(self, texts: Mapping[str, str], name: str) -> int:
+        """Return the number of the scale, the motion or the polarity that a text chooses, or 0."""
+        count = len(self._chosen_from[name])
         wanted = number(texts.get(name) or "0", name)
         if not (0 <= wanted < count and math.floor(wanted) == wanted):
-            raise InvalidOption(f"{name} must be a whole number from 0 to {count - 1}, not {wanted:g}")
+            raise InvalidOption(
+                f"{{}} must be a whole number from 0 to {count - 1}, not {wanted:g}", name, value=wanted
+            )
         return int(wanted)
 
     def _axis(self, name: str, axes: Mapping[str, Floats]) -> str:
@@ -223,8 +218,10 @@ class StudyView:
         return name
 
     def _label(self, name: str) -> tuple[str, str]:
+        if name in _PARAMETERS:
+            return PARAMETERS[name].label, _PARAMETERS[name]
         if name != "scale":
-            return _LABELS[name]
+            return f"{name.capitalize()}, by its number", ""
         scales = self.study.product.scales
         if scales.measure in (None, "factor"):
             return "Factor of the motion", ""

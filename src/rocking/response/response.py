@@ -345,6 +345,28 @@ class Response:
         """
         return summary.text(self, friction)
 
+    def summary_rows(self, friction: float | None = None) -> list[tuple[str, str]]:
+        """Return the rows of `summary`: what, and how much.
+
+        Parameters
+        ----------
+        friction : float, optional
+            Coefficient of friction, as for `summary`.
+
+        Returns
+        -------
+        list of (str, str)
+            Name and words of each row.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block = rocking.Block(width=0.24, height=1.1)
+        >>> rocking.simulate(block, rocking.pulses.one_sine(3.0, 1.0)).summary_rows()[-1]
+        ('verdict', 'overturns at 1.532021 s')
+        """
+        return summary.rows(self, friction)
+
     def to_dict(self, friction: float | None = None) -> dict[str, Any]:
         """Return the result in plain values for machines, as ``rocking simulate --json`` prints it.
 

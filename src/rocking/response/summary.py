@@ -21,6 +21,11 @@ _LISTED: Final = 12
 
 def text(response: Response, friction: float | None) -> str:
     """Return what happened, line by line; with a coefficient of friction, whether it is enough."""
+    return "\n".join(f"{name:<20}{entry}" for name, entry in rows(response, friction))
+
+
+def rows(response: Response, friction: float | None) -> list[tuple[str, str]]:
+    """Return the rows of `text`: what, and how much."""
     known = response.sensitivity
     sliding = math.nan if friction is None else response.sliding_time(friction)
     lines = [
@@ -38,7 +43,7 @@ def text(response: Response, friction: float | None) -> str:
     ]
     if any(" +- " in entry for _, entry in lines):
         lines.append(("+-", "what a millionth more or less of what drives the block changes"))
-    return "\n".join(f"{name:<20}{entry}" for name, entry in lines)
+    return lines
 
 
 def line(response: Response) -> str:

@@ -227,18 +227,21 @@ export class Histories {
     const {x, y} = this.sources[`${NAMES[0]}-ground`].data;
     const [plus, minus] = this.thresholds ?? [Infinity, Infinity];
     const still = sign > 0 ? minus : plus;
-    const level = (/** @type {number} */ k) => (weight ? still * weight[k] : still);
-    const over = (/** @type {number} */ k) => sign * y[k] > level(k);
     /** @type {number[]} */
     const seen = [], cut = [], line = [], levels = [];
+    let before = false, over = x.length > 0 && sign * y[0] > still * (weight?.[0] ?? 1);
     for (let k = 0; k < x.length; k += 1) {
-      if (!over(k) && !over(k - 1) && !over(k + 1)) continue;
-      // Between two stretches the area is of no height, and the line has a gap.
-      if (seen.length && !over(k) && !over(k - 1)) { seen.push(x[k]); cut.push(sign * level(k)); levels.push(sign * level(k)); line.push(NaN); }
-      seen.push(x[k]);
-      cut.push(over(k) ? y[k] : sign * level(k));
-      levels.push(sign * level(k));
-      line.push(cut[cut.length - 1]);
+      const after = k + 1 < x.length && sign * y[k + 1] > still * (weight?.[k + 1] ?? 1);
+      if (before || over || after) {
+        const level = sign * still * (weight?.[k] ?? 1);
+        // Between two stretches the area is of no height, and the line has a gap.
+        if (seen.length && !over && !before) { seen.push(x[k]); cut.push(level); levels.push(level); line.push(NaN); }
+        seen.push(x[k]);
+        cut.push(over ? y[k] : level);
+        levels.push(level);
+        line.push(cut[cut.length - 1]);
+      }
+      [before, over] = [over, after];
     }
     const [xs, ys, lines, bases] = [seen, cut, line, levels].map((each) => Float64Array.from(each));
     this.sources[`beyond${sign}`].data = {x: xs, y: ys, line: lines, level: bases};

@@ -250,7 +250,7 @@ def _listed(found: Sequence[Channel]) -> str:
 def _choose(source: Source, found: list[Channel], wanted: int | str | None) -> Channel:
     listed = _listed(found)
     if wanted is None and len(found) > 1:
-        raise source.error(f"the file holds {len(found)} channels; give channel= as one of {listed}")
+        raise source.error(f"the file holds {len(found)} channels; give {{}}= as one of {listed}", None, "channel")
     matching = found if wanted is None else _matching(found, wanted)
     if not matching:
         raise source.error(f"there is no channel {wanted!r}; {_hint(found, wanted)}give one of {listed}")

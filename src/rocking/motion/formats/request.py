@@ -67,7 +67,9 @@ class Request:
         """
         unit = stated or self.unit
         if unit is None:
-            raise source.error(f"the file does not say its units; give units= as one of {', '.join(CHOICES)}", at)
+            raise source.error(
+                f"the file does not say its units; give {{}}= as one of {', '.join(CHOICES)}", at, "units"
+            )
         if self.unit is not None and not self.several and unit != self.unit:
             raise source.error(f"the units are {unit.name}, not units = {self.unit.name!r}; leave units out", at)
         return unit

@@ -99,11 +99,9 @@ class Source:
             return None
         return min(position for position in map(self.data.find, _each(_CONTROL)) if position >= 0)
 
-    def error(self, message: str, at: int | None = None) -> UnreadableRecord:
+    def error(self, message: str, at: int | None = None, *arguments: str) -> UnreadableRecord:
         """Return the error that says `message` about this file, at the line that holds the offset `at`."""
-        if at is None:
-            return UnreadableRecord(f"{self.path}: {message}")
-        return UnreadableRecord(f"{self.path}, line {self.line_number(at)}: {message}")
+        return UnreadableRecord(message, *arguments, path=self.path, line=None if at is None else self.line_number(at))
 
 
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:

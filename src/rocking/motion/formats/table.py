@@ -162,7 +162,7 @@ def read(source: Source, request: Request) -> list[Channel]:
     heading = shape.heading(source)
     held = _channels(source, heading)
     if not heading.places("time") and request.dt is None:
-        raise source.error("the file does not say its sampling step; give dt= in seconds", shape.start)
+        raise source.error("the file does not say its sampling step; give {}= in seconds", shape.start, "dt")
     for place in heading.places("time"):
         _refuse_strange_times(source, heading, place)
     units = [_unit(source, request, heading, place, shape.start) for place in held]
@@ -208,9 +208,10 @@ def _unit(source: Source, request: Request, heading: Heading, place: int, at: in
         )
     if request.unit is None and column.strange:
         raise source.error(
-            f"the heading says {column.strange!r}, which is no unit of acceleration that is known here; give units= as "
+            f"the heading says {column.strange!r}, which is no unit of acceleration that is known here; give {{}}= as "
             f"one of {', '.join(CHOICES)}",
             heading.at,
+            "units",
         )
     return request.units_by_heading(source, column.unit, at)
 
