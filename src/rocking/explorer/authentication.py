@@ -40,16 +40,9 @@ _OTHER_PAGE: Final = "only the page of this server may send this"
 
 
 class RequestAuthentication:
-    """ASGI application that passes on to another what it lets through.
+    """ASGI application that passes on to another one what it lets through.
 
-    Parameters
-    ----------
-    application
-        What answers the requests that are let through.
-    port : int
-        Where the server listens.
-    hosts : iterable of str
-        Names by which it may be called, without the port.
+    The server listens at ``port``, and may be called by the names ``hosts``, which are without it.
     """
 
     def __init__(self, application: Application, port: int, hosts: Iterable[str] = LOOPBACK) -> None:

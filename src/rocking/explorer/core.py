@@ -8,7 +8,7 @@ import sys
 import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -59,6 +59,7 @@ EXPORTS: Final[Mapping[str, str]] = {
     "impacts.csv": "text/csv; charset=utf-8",
     "nc": "application/x-netcdf",
 }
+_TABLES: Final[Mapping[str, Any]] = {"csv": "histories", "events.csv": "events", "impacts.csv": "impacts"}
 
 
 @dataclass(frozen=True)
@@ -115,13 +116,7 @@ class Explorer:
         self._kept: OrderedDict[tuple[tuple[str, str], ...], Simulated] = OrderedDict()
 
     def show(self, texts: Texts) -> Simulated:
-        """Return a case with its response.
-
-        Raises
-        ------
-        RockingError
-            As `read_input` and `rocking.simulate`.
-        """
+        """Return a case with its response."""
         key = tuple(sorted((name, value) for name, value in texts.items() if value))
         with self._lock:
             if key in self._kept:
@@ -136,13 +131,7 @@ class Explorer:
         return shown
 
     def case(self, texts: Texts, window: tuple[float, float] | None = None) -> Payload:
-        """Return all that the page says of a case, and its arrays in a window (s; by default where it moves).
-
-        Raises
-        ------
-        RockingError
-            As `show`, or if the window is no stretch of time; so do the other methods.
-        """
+        """Return all that the page says of a case, and its arrays in a window (s; by default where it moves)."""
         shown = self.show(texts)
         response = shown.response
         start, end = active_span(response) if window is None else _checked(window, response)
@@ -161,13 +150,7 @@ class Explorer:
         return Payload({"window": _window(shown, start, end)}, arrays)
 
     def compare(self, texts: Texts, changed: Texts, window: tuple[float, float] | None = None) -> Payload:
-        """Return two cases in one window: one, and the same with some texts changed.
-
-        Parameters
-        ----------
-        changed : mapping of str to str
-            What the other one has in place of the first one's texts; a block or a motion is changed as a whole.
-        """
+        """Return two cases in one window: one, and the same with some texts changed; blocks and motions as a whole."""
         first = self.show(texts)
         second = self.show(_changed(first.case.texts, changed))
         spans = [active_span(shown.response) for shown in (first, second)]
@@ -197,13 +180,8 @@ class Explorer:
     def schemes(self, texts: Texts) -> list[dict[str, Any]]:
         """Return what each treatment of chattering makes of a case, against the proven response."""
         case = self.show(texts).case
-        found = compare_schemes(
-            case.block,
-            case.motion,
-            model=case.model,
-            initial_rotation=case.initial_rotation,
-            initial_velocity=case.initial_velocity,
-        )
+        start: dict[str, Any] = {"initial_rotation": case.initial_rotation, "initial_velocity": case.initial_velocity}
+        found = compare_schemes(case.block, case.motion, model=case.model, **start)
         rows = [(each.treatment, each.is_right, each.verdict, _plain(each.largest_error)) for each in found.outcomes]
         unfit = [(scheme, None, reason, None) for scheme, reason in found.not_applicable]
         return [
@@ -212,32 +190,19 @@ class Explorer:
         ]
 
     def export(self, texts: Texts, form: str, window: tuple[float, float] | None = None) -> bytes:
-        """Return a figure or a table of a response as a file's content.
-
-        Parameters
-        ----------
-        form : str
-            One of `EXPORTS`.
-        window : (start, end), optional
-            Stretch of time that a figure shows, s.
-        """
+        """Return a response as the content of a file of one of `EXPORTS`; a figure shows a window (s)."""
         if form not in EXPORTS:
             raise InvalidOption(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
         response = self.show(texts).response
         with tempfile.TemporaryDirectory(prefix="rocking-") as folder:
             file = Path(folder) / f"response.{form}"
-            writers: dict[str, Callable[[], None]] = {
-                "csv": lambda: response.to_csv(file),
-                "events.csv": lambda: response.to_csv(file, "events"),
-                "impacts.csv": lambda: response.to_csv(file, "impacts"),
-                "nc": lambda: response.to_netcdf(file),
-            }
-            if form in writers:
-                writers[form]()
+            if form in _TABLES:
+                response.to_csv(file, _TABLES[form])
+            elif form == "nc":
+                response.to_netcdf(file)
             else:
-                stretch = None if window is None else _checked(window, response)
                 with self._drawing:
-                    _draw(response, file, stretch)
+                    _draw(response, file, None if window is None else _checked(window, response))
             return file.read_bytes()
 
     def _steps(self) -> int:
@@ -406,15 +371,7 @@ def _facts(shown: Simulated) -> dict[str, Any]:
 
 
 def verdict(response: Response, thresholds: tuple[float, float]) -> str:
-    """Say what becomes of a block in one sentence.
-
-    Parameters
-    ----------
-    response : Response
-        What happened.
-    thresholds : pair of float
-        Ground accelerations that lift the block, m/s^2.
-    """
+    """Say in one sentence what becomes of a block that these ground accelerations (m/s^2) lift."""
     if response.stopped:
         words = in_words(response, "")
         return f"{words[0].upper()}{words[1:]}."

@@ -58,16 +58,8 @@ _ARGUMENTS: Final = {"pivots": "distances", "height_of_mass": "height", "gyratio
 class SimulationInput:
     """What `rocking.simulate` takes, with the texts from which it was read.
 
-    Attributes
-    ----------
-    texts : mapping of str to str
-        What it was read from.
-    block, motion, model, treatment, duration, initial_rotation, initial_velocity
-        As for `rocking.simulate`.
-    python : str
-        Python expression that makes the motion.
-    words : tuple of str
-        Arguments of the command line that name the motion; empty where it cannot.
+    ``python`` is the expression that makes the motion, ``words`` are the arguments that name it on the command line;
+    there are none where it cannot be named.
     """
 
     texts: Texts
@@ -105,11 +97,6 @@ def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
         is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a channel of the motion's own file.
     uploads : UploadStore
         Where the files and motions of keys are.
-
-    Raises
-    ------
-    RockingError
-        If a text cannot be read, or the block, the motion or their combination is impossible.
 
     Examples
     --------

@@ -37,13 +37,7 @@ _WAITING: Final = 128
 
 
 def require_packages() -> None:
-    """Check that what the explorer needs is installed.
-
-    Raises
-    ------
-    InvalidOption
-        If it is not.
-    """
+    """Raise `InvalidOption` unless what the explorer needs is installed."""
     if any(util.find_spec(name) is None for name in ("starlette", "uvicorn", "bokeh")):
         raise InvalidOption("the explorer needs packages that are not installed: pip install 'rocking[explorer]'")
 
@@ -94,21 +88,9 @@ def served(
     port: int = 0,
     framed_by: str = "'none'",
 ) -> Server:
-    """Bind the explorer to an address and a port.
+    """Bind the explorer's application (`rocking.explorer.server.App`) to an address of this machine and a port.
 
-    Parameters
-    ----------
-    explorer, opening, study, framed_by
-        As for `rocking.explorer.server.App`.
-    address : str
-        Address of this machine.
-    port : int
-        Port; 0 takes one that is free.
-
-    Raises
-    ------
-    InvalidOption
-        If the address cannot be bound, or a package is missing.
+    Port 0 takes one that is free. `InvalidOption` is raised if it cannot be bound, or if a package is missing.
     """
     require_packages()
     import uvicorn

@@ -37,28 +37,10 @@ _SUFFIXES: Final = {"°": "deg", "g": "g"}
 class Parameter:
     """A parameter of a case, and the field of the page that sets it.
 
-    Attributes
-    ----------
-    name : str
-        Its name in the address, which is that of the command line's option.
-    label : str
-        What the page calls it.
-    group : str
-        Form that it belongs to.
-    kind : str
-        How its text is read.
-    unit : str
-        Unit that the page shows.
-    default : str
-        Text that its field starts with.
-    low, high : float
-        Ends of its slider, in `unit`.
-    logarithmic : bool
-        Whether equal distances on the slider are equal ratios.
-    values : {"one", "one or two", "two"}
-        Whether it may differ between the sides of a block.
-    explanation : str
-        What it is, in a sentence or two.
+    ``name`` is that of the address, and of the command line's option; ``label`` is what the page calls it; ``kind``
+    says how its text is read, ``unit`` what the page shows it in, ``default`` with which text its field starts. Its
+    slider goes from ``low`` to ``high``, in ``unit``; where it is ``logarithmic``, equal distances are equal ratios.
+    ``values`` says whether the sides of a block may differ in it.
     """
 
     name: str
@@ -75,11 +57,6 @@ class Parameter:
 
     def read(self, text: str) -> Any:
         """Return the value of a text in SI units: the text itself, a number, or a tuple of two numbers.
-
-        Raises
-        ------
-        InvalidOption
-            If the text is not of the parameter's kind.
 
         Examples
         --------
@@ -231,23 +208,19 @@ _PERIOD: Final = Parameter(
 )
 
 
-def _of_pulse(
-    name: str, label: str, unit: str, default: str, low: float, high: float, logarithmic: bool, explanation: str
-) -> Parameter:
-    return Parameter(
-        name, label, "pulse", "text", unit, default, low, high, logarithmic, explanation=explanation
-    )  # `named_pulses` reads it
+def _of_pulse(name: str, label: str, unit: str, default: str, ends: tuple[float, float], words: str) -> Parameter:
+    """Return a parameter of a pulse, which `named_pulses` reads; its slider is logarithmic where it can be."""
+    logarithmic = ends[0] > 0.0 and name not in ("cycles", "gamma")
+    return Parameter(name, label, "pulse", "text", unit, default, *ends, logarithmic, explanation=words)
 
 
-_AMPLITUDE = _of_pulse("amplitude", "Amplitude", "g", "0.3g", 0.02, 2.0, True, "Largest acceleration of the pulse.")
-_FREQUENCY = _of_pulse("frequency", "Frequency", "Hz", "1", 0.1, 10.0, True, "Cycles per second.")
-_DURATION = _of_pulse("duration", "Duration", "s", "0.5", 0.05, 5.0, True, "How long the pulse lasts.")
-_CYCLES = _of_pulse("cycles", "Cycles", "", "2.5", 0.5, 20.0, False, "Duration times frequency; any number.")
-_PHASE = _of_pulse("phase", "Phase", "°", "0deg", 0.0, 360.0, False, "Where in its cycle the pulse begins.")
-_VELOCITY = _of_pulse(
-    "amplitude", "Velocity amplitude", "m/s", "0.6", 0.05, 3.0, True, "Amplitude of the velocity pulse."
-)
-_GAMMA = _of_pulse("gamma", "Length γ", "cycles", "2", 1.0, 6.0, False, "How many cycles its envelope holds.")
+_AMPLITUDE = _of_pulse("amplitude", "Amplitude", "g", "0.3g", (0.02, 2.0), "Largest acceleration of the pulse.")
+_FREQUENCY = _of_pulse("frequency", "Frequency", "Hz", "1", (0.1, 10.0), "Cycles per second.")
+_DURATION = _of_pulse("duration", "Duration", "s", "0.5", (0.05, 5.0), "How long the pulse lasts.")
+_CYCLES = _of_pulse("cycles", "Cycles", "", "2.5", (0.5, 20.0), "Duration times frequency; any number.")
+_PHASE = _of_pulse("phase", "Phase", "°", "0deg", (0.0, 360.0), "Where in its cycle the pulse begins.")
+_VELOCITY = _of_pulse("amplitude", "Velocity amplitude", "m/s", "0.6", (0.05, 3.0), "Amplitude of the velocity pulse.")
+_GAMMA = _of_pulse("gamma", "Length γ", "cycles", "2", (1.0, 6.0), "How many cycles its envelope holds.")
 
 #: Label and parameters of each pulse, and choices.
 PULSES: Final[Mapping[str, dict[str, Any]]] = {

@@ -70,13 +70,7 @@ def page_files() -> dict[str, bytes]:
 
 
 def library_folder() -> Path:
-    """Return where the plotting library lies in its installed package, without importing that.
-
-    Raises
-    ------
-    InvalidOption
-        If it is incomplete, or of a version for which the page was not made.
-    """
+    """Return where the plotting library lies in its installed package, without importing that."""
     version = metadata.version("bokeh")
     if version.split(".")[0] != "3":
         raise InvalidOption(f"the explorer needs bokeh 3.9 or a later 3, not {version}: pip install 'bokeh>=3.9,<4'")
@@ -129,16 +123,8 @@ class Query:
 class App:
     """The explorer's application.
 
-    Parameters
-    ----------
-    explorer : Explorer
-        What computes.
-    opening : mapping of str to str
-        Texts with which the page opens where its address has none.
-    study : StudyView, optional
-        A study to show as a map.
-    framed_by : str
-        Sources of pages that may show this one in a frame, as a content security policy writes them.
+    The page opens with the texts of ``opening`` where its address has none, and shows a study as a map. ``framed_by``
+    are the sources of pages that may show it in a frame, as a content security policy writes them.
     """
 
     def __init__(
@@ -212,7 +198,10 @@ class App:
         """Return what answers a request with a payload, or with plain values, made in a thread."""
 
         async def answer(request: Request) -> Response:
-            return await self._in_thread(lambda: _packed(work(Query(request.query_params))))
+            found = await anyio.to_thread.run_sync(work, Query(request.query_params), limiter=self._threads)
+            if isinstance(found, Payload):
+                return Response(pack(found), media_type="application/octet-stream", headers=_FRESH)
+            return JSONResponse(plain(found), headers=_FRESH)
 
         return answer
 
@@ -287,13 +276,15 @@ class App:
         except ClientDisconnect:
             return Response(status_code=400)
         name, uploads = request.query_params.get("name", ""), self.explorer.uploads
-        return await self._in_thread(lambda: _packed(uploads.contents(uploads.add_file(name, bytes(data)))))
+        found = await self._in_thread(lambda: uploads.contents(uploads.add_file(name, bytes(data))))
+        return JSONResponse(found, headers=_FRESH)
 
     async def record(self, request: Request) -> Response:
         """Say what a file that is kept is, read with the step and the units that are given now."""
         query, uploads = Query(request.query_params), self.explorer.uploads
         key, units = request.path_params["key"], query.given.get("units") or None
-        return await self._in_thread(lambda: _packed(uploads.contents(key, query.number("dt"), units)))
+        found = await self._in_thread(lambda: uploads.contents(key, query.number("dt"), units))
+        return JSONResponse(found, headers=_FRESH)
 
 
 def pack(payload: Payload) -> bytes:
@@ -311,12 +302,6 @@ def pack(payload: Payload) -> bytes:
     header += b" " * (-(4 + len(header)) % 8)
     arrays = (np.ascontiguousarray(values, "<f8").tobytes() for values in payload.arrays.values())
     return b"".join([struct.pack("<I", len(header)), header, *arrays])
-
-
-def _packed(value: Payload | Any) -> Response:
-    if isinstance(value, Payload):
-        return Response(pack(value), media_type="application/octet-stream", headers=_FRESH)
-    return JSONResponse(plain(value), headers=_FRESH)
 
 
 def _next(found: Iterator[maps.Part]) -> bytes | None:

@@ -53,13 +53,7 @@ class UploadStore:
         self._motions: dict[str, Motion] = {}
 
     def add_file(self, name: str, data: bytes) -> str:
-        """Keep a file, and return its key.
-
-        Raises
-        ------
-        UnreadableRecord
-            If it is too large.
-        """
+        """Keep a file, and return its key."""
         upload = Upload(bare_name(name), data)
         if len(data) > LARGEST:
             raise UnreadableRecord(
@@ -84,25 +78,13 @@ class UploadStore:
         return key
 
     def motion(self, key: str) -> Motion:
-        """Return a motion of the program's own.
-
-        Raises
-        ------
-        UnreadableRecord
-            If there is none of that key.
-        """
+        """Return a motion of the program's own."""
         if key not in self._motions:
             raise UnreadableRecord("this link names a motion of another program: open the page from there again")
         return self._motions[key]
 
     def file(self, key: str) -> Upload:
-        """Return a file that is kept.
-
-        Raises
-        ------
-        UnreadableRecord
-            If there is none of that key.
-        """
+        """Return a file that is kept."""
         with self._lock:
             if key not in self._files:
                 raise UnreadableRecord("this record is not here any more: drop its file on the page again")
@@ -110,13 +92,7 @@ class UploadStore:
             return self._files[key]
 
     def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
-        """Return the motion of a file; arguments as for `rocking.read`.
-
-        Raises
-        ------
-        UnreadableRecord, InvalidMotion
-            As for `rocking.read`, or if the record is too long.
-        """
+        """Return the motion of a file; arguments as for `rocking.read`."""
         upload = self.file(key)
         request = (key, str(channel), str(dt), str(units))
         with self._lock:
@@ -133,13 +109,7 @@ class UploadStore:
         return motion
 
     def contents(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
-        """Say what a file is: its format, its channels, and which arguments it needs before it can be read.
-
-        Raises
-        ------
-        UnreadableRecord, InvalidMotion
-            If it cannot be read, whatever is given.
-        """
+        """Say what a file is: its format, its channels, and which arguments it needs before it can be read."""
         upload = self.file(key)
         given: dict[str, Any] = {"dt": dt, "units": units}
         missing: list[str] = []

@@ -5,7 +5,7 @@ import {ends} from "./address.js";
 import {BlockForm, MotionForm, TreatmentForm} from "./forms.js";
 import {Histories} from "./histories.js";
 import {namesOf, parameter, specification} from "./parameters.js";
-import {counted, fill, make, one, short} from "./words.js";
+import {counted, fill, legend, make, one, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
@@ -63,17 +63,16 @@ export class View {
     if (!header) return;
     const [one_, other] = header.cases;
     const none = new Float64Array(0);
-    const lines = (/** @type {string} */ name) => Object.fromEntries(["time", "rotation", "ground_time", "ground_g", "impact"].map((key) => [key, arrays[`${name}_${key}`] ?? none]));
-    const first = {lines: lines("first"), rest: arrays.first_rest, uplift: none, sides: one_.block.sides};
-    const weight = arrays.first_weight;
-    if (weight) first.lines.weight = weight;
-    const second = {lines: lines("second"), rest: arrays.second_rest, uplift: none, sides: other.block.sides};
+    const [first, second] = ["first", "second"].map((name, k) => {
+      const lines = /** @type {any} */ (Object.fromEntries(["time", "rotation", "ground_time", "ground_g", "impact"].map((key) => [key, arrays[`${name}_${key}`] ?? none])));
+      return {lines, rest: arrays[`${name}_rest`], uplift: none, block: header.cases[k].block};
+    });
+    first.lines.weight = arrays.first_weight;
     if (this.with.value !== "motion") second.lines.ground_time = second.lines.ground_g = none;
-    this.histories.draw([header.window.from, header.window.to], header.duration, /** @type {any} */ (first), /** @type {any} */ (second), one_.block.thresholds_g);
+    this.histories.draw(header, first, second);
     this.block?.show(this.page.state.other, other.block.sides);
     one("compare-verdict").textContent = `The other${this.with.value === "treatment" ? ` (${other.treatment})` : ""}: ${other.verdict} ${difference(one_, other)}`;
-    const legend = [["line", "this case"], ["second", "the other"], ["rest", "this case at rest"], ["impact", "impacts: below, this case; above, the other"]];
-    one("compare-legend").replaceChildren(...legend.map(([name, text]) => make("span", {}, [make("i", {className: `key ${name}`}), text])));
+    legend("compare-legend", [["line", "this case"], ["second", "the other"], ["rest", "this case at rest"], ["impact", "impacts: below, this case; above, the other"]]);
   }
 
   async schemes() {

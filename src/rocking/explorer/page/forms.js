@@ -6,17 +6,19 @@ import {make, one, sent, explained} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {import("./parameters.js").Parameter} Parameter */
-/** @typedef {(texts: Texts, gone: string[]) => void} Changed the new texts, and all names that they replace */
+/** @typedef {(texts: Texts, replaced: string[]) => void} Changed the new texts, and all names that they replace */
+/** @typedef {{tell: () => void}} Form */
 
 const STEPS = 1000;
 const G = 9.80665;
+const BLOCK = namesOf("block"), MOTION = namesOf("motion", "start");
 
 /** A number with a slider, a field, its unit and its explanation. */
 class NumberControl {
-  /** @param {Parameter} spec @param {() => void} changed @param {string} [prefix] */
-  constructor(spec, changed, prefix = "") {
+  /** @param {Parameter} spec @param {Form} form is told when the number changes @param {string} [prefix] */
+  constructor(spec, form, prefix = "") {
     this.spec = spec;
-    this.changed = changed;
+    this.form = form;
     const id = `${prefix}${spec.name}`;
     this.slider = /** @type {HTMLInputElement} */ (make("input", {
       type: "range", id: `${id}-slider`, min: "0", max: String(STEPS), step: "1", "aria-label": `${spec.label}, slider`, on: {input: () => this.slid()},
@@ -60,13 +62,13 @@ class NumberControl {
     this.text = number + suffix;
     this.field.value = number;
     this.slider.setAttribute("aria-valuetext", `${number} ${unit}`.trim());
-    this.changed();
+    this.form.tell();
   }
 
   typed() {
     const given = this.field.value.trim().replace("−", "-").replace(",", ".");
     this.show(given !== "" && !Number.isNaN(Number(given)) ? given + this.spec.suffix : given);
-    this.changed();
+    this.form.tell();
   }
 }
 
@@ -99,16 +101,15 @@ export class BlockForm {
     this.texts = {};
     /** @type {any[] | undefined} sides as they are, for what the texts leave out */
     this.known = undefined;
-    const tell = () => this.tell();
     this.shape = choice(prefix, "shape", "Given by", specification.shapes.map((/** @type {any} */ each) => [each.name, each.label]), () => this.reshape());
     this.two = check(`${prefix}two`, "Two different sides", () => this.part());
     this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => { this.reveal(); this.tell(); });
-    this.specs = namesOf("block").map(parameter);
+    this.specs = BLOCK.map(parameter);
     /** Controls by name: one for both sides, and one for each. @type {Record<string, {both: NumberControl, pair: NumberControl[]}>} */
     this.controls = Object.fromEntries(this.specs.map((spec) => [spec.name, {
-      both: new NumberControl(spec, tell, prefix),
+      both: new NumberControl(spec, this, prefix),
       pair: spec.values === "one" ? [] : ["right (side +)", "left (side −)"].map((side, k) =>
-        new NumberControl({...spec, label: `${spec.label}, ${side}`, explanation: k ? "" : spec.explanation}, tell, `${prefix}${k}`)),
+        new NumberControl({...spec, label: `${spec.label}, ${side}`, explanation: k ? "" : spec.explanation}, this, `${prefix}${k}`)),
     }]));
     const before = /** @type {Record<string, HTMLElement>} */ ({p: this.two.element, restitution: this.housner.element});
     element.replaceChildren(this.shape.element, ...this.specs.flatMap(({name}) => {
@@ -202,10 +203,10 @@ export class BlockForm {
   tell() {
     const texts = Object.fromEntries(this.names().map((name) => {
       const {both, pair} = this.controls[name];
-      return [name, this.sided(parameter(name)) ? pair.map((each) => each.text).join(",") : both.text];
+      return [name, this.sided(both.spec) ? pair.map((each) => each.text).join(",") : both.text];
     }));
     if (Number(texts.offset) === 0) delete texts.offset;
-    this.changed(texts, namesOf("block"));
+    this.changed(texts, BLOCK);
   }
 }
 
@@ -240,11 +241,11 @@ export class MotionForm {
     const {label, unit, default: step} = parameter("dt");
     const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, value: step, "data-argument": "dt", on: {change: tell}}));
     this.dt = {field: dt, element: make("div", {className: "choice"}, [make("label", {className: "field", for: dt.id}, [`${label}, ${unit}`]), dt])};
-    this.start = new NumberControl(parameter("initial_rotation"), tell, prefix);
+    this.start = new NumberControl(parameter("initial_rotation"), this, prefix);
     this.scale = choice(prefix, "scaled", "Scaled", specification.scalings, revealed);
     /** @type {NumberControl[]} */
-    this.scales = specification.scalings.slice(1).map((/** @type {string[]} */ [name]) => new NumberControl(parameter(name), tell, prefix));
-    this.period = new NumberControl(specification.period, tell, prefix);
+    this.scales = specification.scalings.slice(1).map((/** @type {string[]} */ [name]) => new NumberControl(parameter(name), this, prefix));
+    this.period = new NumberControl(specification.period, this, prefix);
     element.replaceChildren(
       this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.channel.element, this.vertical.element, this.units.element,
       this.dt.element, this.start.element, this.scale.element, ...this.scales.map((each) => each.element), this.period.element,
@@ -257,7 +258,7 @@ export class MotionForm {
     const {parameters, choices} = specification.pulses[name];
     this.family = name;
     /** @type {NumberControl[]} */
-    this.controls = parameters.map((/** @type {Parameter} */ spec) => new NumberControl(spec, () => this.tell(), `${this.prefix}pulse-`));
+    this.controls = parameters.map((/** @type {Parameter} */ spec) => new NumberControl(spec, this, `${this.prefix}pulse-`));
     this.choices = Object.entries(choices ?? {}).map(([each, values]) => ({
       name: each, ...choice(`${this.prefix}pulse-`, each, "Kind", values.map((/** @type {string} */ value) => [value, value]), () => this.tell()),
     }));
@@ -397,7 +398,7 @@ export class MotionForm {
     if (this.needs("dt")) texts.dt = this.dt.field.value;
     const control = this.scales.find(({spec}) => spec.name === scaled);
     if (control && kind !== "none" && kind !== "pulse") texts[scaled] = scaled === "sa" ? `${control.text}@${this.period.text}` : control.text;
-    this.changed(texts, namesOf("motion", "start"));
+    this.changed(texts, MOTION);
   }
 }
 
@@ -411,7 +412,7 @@ export class TreatmentForm {
     this.about = make("p", {className: "derived"});
     /** @type {Record<string, NumberControl>} */
     this.limits = {};
-    for (const {name, limit} of treatments) if (limit) this.limits[name] = new NumberControl(limit, () => this.tell(), `${prefix}${name}-`);
+    for (const {name, limit} of treatments) if (limit) this.limits[name] = new NumberControl(limit, this, `${prefix}${name}-`);
     element.append(this.kind.element, this.about, ...Object.values(this.limits).map((each) => each.element));
     this.reveal();
   }

@@ -9,7 +9,7 @@ import {Histories} from "./histories.js";
 import {specification} from "./parameters.js";
 import {coarse} from "./theme.js";
 import {acceptFiles} from "./upload.js";
-import {counted, make, one, say, short} from "./words.js";
+import {counted, legend, make, one, say, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
@@ -38,10 +38,13 @@ function problem(error, place = "settings") {
   if (error && !(error instanceof Problem)) console.error(error);
   problems[place] = error instanceof Problem ? error.message : error ? `The page has a fault: ${error}` : null;
   for (const each of one(place).querySelectorAll("[aria-invalid]")) each.removeAttribute("aria-invalid");
+  for (const each of one(place).querySelectorAll("[data-problem]")) each.removeAttribute("data-problem");
   const argument = error instanceof Problem && error.argument;
   for (const each of argument ? one(place).querySelectorAll(`[data-argument="${CSS.escape(argument)}"]`) : []) {
+    if (!each.checkVisibility()) continue;
     each.setAttribute("aria-invalid", "true");
     each.setAttribute("aria-errormessage", "problem");
+    each.closest(".number, .choice")?.setAttribute("data-problem", problems[place] ?? "");
   }
   const sentence = Object.values(problems).find(Boolean);
   one("problem").hidden = !sentence;
@@ -87,7 +90,7 @@ const look = new Latest(async () => {
   const {header, arrays} = await payload("/api/window", {...state.texts, ...address.ends(state)});
   page.shown.header.window = header.window;
   Object.assign(page.shown.arrays, arrays);
-  drawHistories();
+  draw();
   chattering.window(header.window);
   showFiles(state);
   counted("drawn");
@@ -146,21 +149,18 @@ async function go(name) {
 /** Draw what a slider changes. */
 function draw() {
   if (!page.shown) return;
-  const {header} = page.shown;
+  const {header, arrays} = page.shown;
   put(one("verdict"), header.verdict);
   showFigures(header);
   const [plus, minus] = header.block.thresholds_g;
   const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
     `p = ${short(side.p)} rad/s, α = ${short((side.alpha * 180) / Math.PI)}°, η = ${short(side.restitution)}; lifts above ${short([plus, minus][k])} g`);
   one("derived").textContent = right === left ? `${right}.` : `To the right ${right}. To the left ${left}.`;
-  if (state.view === "response" || state.view === "block") drawHistories();
+  if (state.view === "response" || state.view === "block") {
+    const lines = /** @type {any} */ (arrays);
+    histories.draw(header, {lines, rest: arrays.rest, uplift: arrays.uplift, block: header.block});
+  }
   views[state.view]?.draw?.();
-}
-
-function drawHistories() {
-  if (!page.shown) return;
-  const {header, arrays} = page.shown;
-  histories.draw([header.window.from, header.window.to], header.duration, {lines: /** @type {any} */ (arrays), rest: arrays.rest, uplift: arrays.uplift, sides: header.block.sides}, null, header.block.thresholds_g);
 }
 
 /** Write a text where it is another one. @param {Node} node @param {string} text */
@@ -172,7 +172,7 @@ function put(node, text) {
 function showLegend(vertical) {
   const entries = [["line", "rotation"], ["rest", "at rest"], ["impact", "impact"], ["uplift", "uplift"], ["ground", "ground acceleration"], ["beyond", "beyond the threshold of uplift"]];
   if (vertical) entries.push(["up", `vertical acceleration (${vertical.name}, peak ${short(vertical.pga_g)} g), with which the thresholds move`]);
-  one("legend").replaceChildren(...entries.map(([name, words]) => make("span", {}, [make("i", {className: `key ${name}`}), words])));
+  legend("legend", entries);
 }
 
 /** @param {any} header */

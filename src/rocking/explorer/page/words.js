@@ -57,6 +57,11 @@ export function explained(words, about) {
   return [button, text];
 }
 
+/** @param {string} id @param {string[][]} entries kinds of marks, and what they mean */
+export function legend(id, entries) {
+  one(id).replaceChildren(...entries.map(([kind, words]) => make("span", {}, [make("i", {className: `key ${kind}`}), words])));
+}
+
 /** @param {HTMLTableElement} table @param {string[]} head @param {(string | Node)[][]} rows */
 export function fill(table, head, rows) {
   table.replaceChildren(
