@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 LESS_STRICT := $(addprefix --allow-,untyped-defs untyped-calls incomplete-defs untyped-decorators any-generics) --no-warn-return-any
 PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1
-EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_guard.py explorer_server.py)
+EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_authentication.py explorer_server.py)
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test browser slow lowest latest .bounds doctest lint types docs bench clean distclean

@@ -51,7 +51,7 @@ def main():
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.goto(f"{here.link()}&{CASE}")
         wait(page, "document.body.dataset.rested")
-        wait(page, "fetch('/api/start').then((found) => found.json()).then((found) => found.warming.done)")
+        wait(page, "fetch('/api/start').then((found) => found.json()).then((found) => found.compilation.done)")
         ready = []
         for _ in range(5):
             page.reload()

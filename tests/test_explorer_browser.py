@@ -34,6 +34,8 @@ DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
 #: All models of the plotting library on the page.
 MODELS = "Bokeh.documents.flatMap((each) => [...each._all_models.values()])"
 VIEWS = ("response", "block", "map", "compare")
+#: Fields that are marked as wrong.
+MARKED = "Array.from(document.querySelectorAll('[aria-invalid=true]'), (each) => each.id)"
 
 
 @pytest.fixture(scope="module")
@@ -143,9 +145,11 @@ def test_a_number_may_be_typed_and_a_bad_one_is_answered_with_a_sentence(opened)
     width.fill("-1")
     width.press("Enter")
     page.until("!document.getElementById('problem').hidden")
-    assert "positive" in page.text("#problem")
+    assert page.text("#problem").startswith("“Width” must be a positive number")
+    assert page.js(MARKED) == ["width"]
     page.rested(lambda: (width.fill("0.24"), width.press("Enter")))
     assert page.js("document.getElementById('problem').hidden")
+    assert page.js(MARKED) == []
 
 
 def test_a_link_reproduces_what_is_shown(opened):
@@ -404,6 +408,26 @@ def test_a_record_shakes_upwards_as_well(opened, tmp_path):
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, abs=6e-4)
     page.rested(lambda: page.page.select_option("#record", "ridgecrest-clc-360"))
     assert "vertical" not in query_of(page)
+
+
+def test_a_mistake_in_a_map_or_in_a_comparison_is_marked_there_and_gone_with_the_view(opened):
+    page = opened(f"view=map&{SINE}&points=8", allowed=["422"])
+    complete(page)
+    end = page.page.locator("#map-x-to")
+    end.fill("nothing")
+    end.press("Enter")
+    page.until("!document.getElementById('problem').hidden")
+    assert page.text("#problem")
+    page.page.click("[data-view=compare]")
+    page.until("document.body.dataset.compared && document.getElementById('problem').hidden")
+    before = page.js("Number(document.body.dataset.compared)")
+    page.page.select_option("#compare-with", "block")
+    page.until(f"Number(document.body.dataset.compared) > {before} && document.getElementById('other-p')")
+    other = page.page.locator("#other-p")
+    other.fill("-1")
+    other.press("Enter")
+    page.until("!document.getElementById('problem').hidden")
+    assert page.js(MARKED) == ["other-p"]
 
 
 def test_a_broken_file_is_answered_with_a_sentence(opened):

@@ -15,11 +15,12 @@ import rocking
 from rocking.chattering import chattering_map, critical_amplitude, families
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
 from rocking.explorer import map_code, maps
-from rocking.explorer.case import DEFAULT, NAMES, as_command, as_python, read_case, texts_of
-from rocking.explorer.core import Explorer, thinned
-from rocking.explorer.pulses import FAMILIES, pulse_as_text, pulse_of
-from rocking.explorer.shelf import LARGEST, MOST, Shelf, bare_name
+from rocking.explorer.core import Explorer, extremes
+from rocking.explorer.inputs import NAMES, as_command, as_python, pulse_as_text, pulse_of, read_input, texts_of
+from rocking.explorer.parameters import DEFAULT
+from rocking.explorer.parameters import PULSES as OFFERED
 from rocking.explorer.studies import StudyView
+from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
 from rocking.motion.exceedance import exceedances
 
 STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
@@ -51,7 +52,7 @@ def explorer():
 
 
 def test_a_case_is_what_the_package_makes_of_the_same_numbers():
-    case = read_case({**STATUE, "model": "linear", "chattering": "velocity=1e-3"}, Shelf())
+    case = read_input({**STATUE, "model": "linear", "chattering": "velocity=1e-3"}, UploadStore())
     expected = rocking.simulate(
         rocking.Block(width=0.24, height=1.1),
         rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665),
@@ -74,13 +75,13 @@ def test_a_case_is_what_the_package_makes_of_the_same_numbers():
 )
 def test_a_motion_is_scaled_to_what_the_text_says(scale, measure):
     texts = {name: value for name, value in STATUE.items() if name != "pga"}
-    motion = read_case({**texts, **scale}, Shelf()).motion
+    motion = read_input({**texts, **scale}, UploadStore()).motion
     assert measure(motion) == pytest.approx(1.0, rel=1e-9)
 
 
 @pytest.mark.parametrize("family", PULSES)
 def test_every_pulse_of_the_package_can_be_written_and_read_back(family):
-    assert set(PULSES) == set(FAMILIES)
+    assert set(PULSES) == set(OFFERED)
     motion = pulse_of(f"{family}:{PULSES[family]}")
     again = pulse_of(pulse_as_text(motion))
     assert np.array_equal(again.coefficients, motion.coefficients)
@@ -92,13 +93,13 @@ def test_a_record_has_a_vertical_component(vertical, tmp_path, monkeypatch):
     times = np.arange(len(upwards.samples[1])) * upwards.step
     table = np.column_stack([times, horizontal.acceleration(times), upwards.samples[1]])
     files = {"up.csv": table[:, [0, 2]], "both.csv": table}
-    shelf, keys = Shelf(), {}
+    uploads, keys = UploadStore(), {}
     monkeypatch.chdir(tmp_path)
     for name, columns in files.items():
         heading = "time (s),along (m/s2),up (m/s2)" if columns.shape[1] == 3 else "time (s),up (m/s2)"
         np.savetxt(tmp_path / name, columns, "%.17g", ",", header=heading, comments="")
-        keys[name.removesuffix(".csv")] = shelf.put(name, (tmp_path / name).read_bytes())
-    case = read_case({**STATUE, "vertical": vertical.format(**keys)}, shelf)
+        keys[name.removesuffix(".csv")] = uploads.add_file(name, (tmp_path / name).read_bytes())
+    case = read_input({**STATUE, "vertical": vertical.format(**keys)}, uploads)
     expected = rocking.simulate(
         rocking.Block(width=0.24, height=1.1), horizontal.with_vertical(upwards).scaled_to(0.4 * 9.80665)
     )
@@ -113,10 +114,10 @@ def test_a_record_has_a_vertical_component(vertical, tmp_path, monkeypatch):
 
 
 def test_a_vertical_component_is_a_channel_of_the_same_file(tmp_path, monkeypatch):
-    shelf = Shelf()
+    uploads = UploadStore()
     file = Path(__file__).parent / "data" / "formats" / "two.v2"
-    key = shelf.put(file.name, file.read_bytes())
-    case = read_case({**STATUE, "motion": f"file:{key}", "channel": "1", "vertical": "2"}, shelf)
+    key = uploads.add_file(file.name, file.read_bytes())
+    case = read_input({**STATUE, "motion": f"file:{key}", "channel": "1", "vertical": "2"}, uploads)
     expected = rocking.read(file, channel=1).with_vertical(rocking.read(file, channel=2)).scaled_to(0.4 * 9.80665)
     assert np.array_equal(case.motion.vertical.coefficients, expected.vertical.coefficients)
     assert as_command(case).startswith("rocking simulate two.v2 --vertical 2 ")
@@ -133,9 +134,9 @@ def test_a_vertical_component_is_a_channel_of_the_same_file(tmp_path, monkeypatc
 )
 def test_a_vertical_component_that_cannot_be_is_answered(texts, says):
     with pytest.raises(RockingError, match=says):
-        read_case(
+        read_input(
             {"width": "0.24", "height": "1.1", "motion": DEFAULT["motion"], "vertical": "ridgecrest-clc-up"} | texts,
-            Shelf(),
+            UploadStore(),
         )
 
 
@@ -182,12 +183,12 @@ def test_a_motion_that_is_no_pulse_any_more_is_not_written_as_one():
 )
 def test_an_impossible_case_is_refused_with_one_sentence(texts, error, words):
     with pytest.raises(error, match=words) as caught:
-        read_case(texts, Shelf()).simulate()
+        read_input(texts, UploadStore()).simulate()
     assert "\n" not in str(caught.value)
 
 
 def test_the_default_case_chatters():
-    response = read_case(DEFAULT, Shelf()).simulate()
+    response = read_input(DEFAULT, UploadStore()).simulate()
     assert len(response.chattering) >= 3
     assert not response.overturned
 
@@ -220,7 +221,7 @@ CASES = [
     "texts", [*CASES, {**SINE, "initial_rotation": "1deg"}, {**SINE, "motion": "none", "initial_rotation": "2deg"}]
 )
 def test_the_case_as_python_runs_and_has_the_same_peak(texts, tmp_path, capsys):
-    case = read_case(texts, Shelf())
+    case = read_input(texts, UploadStore())
     script = tmp_path / "case.py"
     script.write_text(as_python(case), "utf-8")
     found = runpy.run_path(str(script))
@@ -230,7 +231,7 @@ def test_the_case_as_python_runs_and_has_the_same_peak(texts, tmp_path, capsys):
 
 @pytest.mark.parametrize("texts", CASES)
 def test_the_case_as_a_command_runs_and_has_the_same_peak(texts, run):
-    case = read_case(texts, Shelf())
+    case = read_input(texts, UploadStore())
     program, *arguments = shlex.split(as_command(case))
     code, out, err = run(*arguments, "--json")
     assert (program, code, err) == ("rocking", 0, "")
@@ -242,9 +243,11 @@ def test_a_file_is_named_in_code_as_it_was_called(tmp_path, monkeypatch, run):
     record = rocking.records.load("el-centro-meloland-270")
     text = "\n".join(f"{value:.10g}" for value in record.samples[1])
     (tmp_path / "my record.txt").write_text(text, "utf-8")
-    shelf = Shelf()
-    key = shelf.put("C:\\data\\my record.txt", text.encode())
-    case = read_case({"width": "0.24", "height": "1.1", "motion": f"file:{key}", "dt": "0.01", "units": "m/s2"}, shelf)
+    uploads = UploadStore()
+    key = uploads.add_file("C:\\data\\my record.txt", text.encode())
+    case = read_input(
+        {"width": "0.24", "height": "1.1", "motion": f"file:{key}", "dt": "0.01", "units": "m/s2"}, uploads
+    )
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.py").write_text(as_python(case), "utf-8")
     assert runpy.run_path("case.py")["response"].peak_rotation == case.simulate().peak_rotation
@@ -253,8 +256,8 @@ def test_a_file_is_named_in_code_as_it_was_called(tmp_path, monkeypatch, run):
 
 
 def test_what_the_command_line_cannot_do_is_not_given_as_a_command():
-    assert as_command(read_case({**SINE, "motion": "none", "initial_rotation": "2deg"}, Shelf())) is None
-    assert as_command(read_case({**STATUE, "gravity": "1.62"}, Shelf())) is None
+    assert as_command(read_input({**SINE, "motion": "none", "initial_rotation": "2deg"}, UploadStore())) is None
+    assert as_command(read_input({**STATUE, "gravity": "1.62"}, UploadStore())) is None
 
 
 RESPONSES = {
@@ -287,9 +290,9 @@ RESPONSES = {
 @pytest.mark.parametrize("name", RESPONSES)
 def test_a_response_written_as_a_case_is_the_same_response_bit_for_bit(name):
     response = RESPONSES[name]()
-    shelf = Shelf()
-    texts = texts_of(response, shelf)
-    again = read_case(texts, shelf).simulate()
+    uploads = UploadStore()
+    texts = texts_of(response, uploads)
+    again = read_input(texts, uploads).simulate()
     assert np.array_equal(again.impacts, response.impacts)
     assert np.array_equal(again.events, response.events)
     assert again.peak_rotation == response.peak_rotation
@@ -344,7 +347,8 @@ def test_peaks_survive_the_thinning_of_a_wide_window(explorer):
 def test_a_thinned_line_keeps_its_extremes_and_its_order():
     rng = np.random.default_rng(1)
     time, values = np.sort(rng.uniform(size=50_001)), rng.normal(size=50_001)
-    kept_time, kept = thinned(time, values, 1000)
+    chosen = extremes(values, 1000)
+    kept_time, kept = time[chosen], values[chosen]
     assert len(kept) <= 1000
     assert (kept.min(), kept.max()) == (values.min(), values.max())
     assert (np.diff(kept_time) > 0.0).all()
@@ -431,36 +435,36 @@ def test_responses_are_kept_so_many_at_most():
 
 def test_a_file_that_needs_no_word_is_read_at_once(explorer):
     text = "time (s), a (g)\n" + "\n".join(f"{0.01 * k:.2f}, {math.sin(0.1 * k):.6f}" for k in range(500))
-    found = explorer.shelf.contents(explorer.shelf.put("pulse.csv", text.encode()))
+    found = explorer.uploads.contents(explorer.uploads.add_file("pulse.csv", text.encode()))
     assert [each["number"] for each in found["channels"]] == [1]
     assert "dt" not in found["missing"]
 
 
 def test_a_file_says_what_must_be_told(explorer):
-    key = explorer.shelf.put("one column.txt", "\n".join(["0.1", "-0.2", "0.3"] * 50).encode())
-    assert explorer.shelf.contents(key)["missing"] == ["units", "dt"] or set(
-        explorer.shelf.contents(key)["missing"]
+    key = explorer.uploads.add_file("one column.txt", "\n".join(["0.1", "-0.2", "0.3"] * 50).encode())
+    assert explorer.uploads.contents(key)["missing"] == ["units", "dt"] or set(
+        explorer.uploads.contents(key)["missing"]
     ) == {"units", "dt"}
     texts = {"width": "0.24", "height": "1.1", "motion": f"file:{key}", "dt": "0.02", "units": "g"}
-    assert read_case(texts, explorer.shelf).motion.duration == pytest.approx(149 * 0.02)
+    assert read_input(texts, explorer.uploads).motion.duration == pytest.approx(149 * 0.02)
 
 
 def test_messages_about_a_file_name_it_and_no_path(explorer):
-    key = explorer.shelf.put("/home/somebody/bad.txt", b"1.0\n2.0\nthree\n")
+    key = explorer.uploads.add_file("/home/somebody/bad.txt", b"1.0\n2.0\nthree\n")
     with pytest.raises(RockingError) as caught:
-        explorer.shelf.contents(key)
+        explorer.uploads.contents(key)
     assert "bad.txt" in str(caught.value)
     assert "/" not in str(caught.value).replace("m/s2", "").replace("m/s", "").replace("cm/s2", "")
 
 
 def test_files_are_known_by_their_content_and_so_many_at_most():
-    shelf = Shelf()
-    assert shelf.put("a.txt", b"1 2 3") == shelf.put("b.txt", b"1 2 3")
+    uploads = UploadStore()
+    assert uploads.add_file("a.txt", b"1 2 3") == uploads.add_file("b.txt", b"1 2 3")
     for k in range(3 * MOST):
-        shelf.put("x", str(k).encode())
-    assert len(shelf._files) == MOST
+        uploads.add_file("x", str(k).encode())
+    assert len(uploads._files) == MOST
     with pytest.raises(UnreadableRecord, match="larger than 16 MiB"):
-        shelf.put("big", bytes(LARGEST + 1))
+        uploads.add_file("big", bytes(LARGEST + 1))
 
 
 @pytest.mark.parametrize("name", ["../../x", "..\\..\\x", "/etc/x", "C:\\x", "a/b/../x", "\x00x\n"])
@@ -482,7 +486,7 @@ def filled(grid):
 
 
 def test_a_map_of_a_sine_is_the_packages_chattering_map():
-    case = read_case(SINE, Shelf())
+    case = read_input(SINE, UploadStore())
     grid = maps.grid_of(
         case, {"x": "omega", "y": "a", "x_from": "0.7", "x_to": "5", "y_from": "0.95", "y_to": "1.3", "points": "12"}
     )
@@ -495,7 +499,9 @@ def test_a_map_of_a_sine_is_the_packages_chattering_map():
 
 
 def test_a_map_of_a_record_is_the_packages_chattering_map():
-    case = read_case({"p": "3", "alpha": "0.2", "restitution": "0.9", "motion": "el-centro-meloland-270"}, Shelf())
+    case = read_input(
+        {"p": "3", "alpha": "0.2", "restitution": "0.9", "motion": "el-centro-meloland-270"}, UploadStore()
+    )
     grid = maps.grid_of(
         case, {"x": "p", "y": "a", "x_from": "2", "x_to": "6", "y_from": "0.9", "y_to": "2", "points": "8"}
     )
@@ -506,7 +512,7 @@ def test_a_map_of_a_record_is_the_packages_chattering_map():
 
 
 def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
-    case = read_case({**SINE, "motion": "one-sine:amplitude=2,frequency=0.5"}, Shelf())
+    case = read_input({**SINE, "motion": "one-sine:amplitude=2,frequency=0.5"}, UploadStore())
     grid = maps.grid_of(
         case, {"x": "omega", "y": "a", "x_from": "1", "x_to": "4", "y_from": "0.9", "y_to": "6", "points": "8"}
     )
@@ -526,12 +532,12 @@ def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
     [("omega", "a"), ("alpha", "pga"), ("restitution", "a"), ("omega", "restitution"), ("p", "alpha"), ("alpha", "a")],
 )
 def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
-    case = read_case({**SINE, "model": "nonlinear"}, Shelf())
+    case = read_input({**SINE, "model": "nonlinear"}, UploadStore())
     grid = maps.grid_of(case, {"x": x, "y": y, "points": "8"})
     found = filled(grid)
     for row, column in ((1, 2), (5, 6), (7, 0)):
         texts = maps.texts_at(grid, float(grid.x.values[column]), float(grid.y.values[row]))
-        response = read_case(texts, Shelf()).simulate()
+        response = read_input(texts, UploadStore()).simulate()
         peak = math.inf if response.overturned else response.peak_over_slenderness
         assert found["peak"][row, column] == pytest.approx(peak, rel=1e-5, abs=1e-12)
         if len(response.chattering):
@@ -542,12 +548,12 @@ def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
 @pytest.mark.parametrize("block", ECCENTRIC)
 @pytest.mark.parametrize("x", ["p", "restitution"])
 def test_the_case_at_a_point_of_a_map_of_an_eccentric_block(block, x):
-    case = read_case({**block, "motion": "one-sine:amplitude=4,frequency=1"}, Shelf())
+    case = read_input({**block, "motion": "one-sine:amplitude=4,frequency=1"}, UploadStore())
     grid = maps.grid_of(case, {"x": x, "y": "a", "x_from": "0.7", "x_to": "0.95", "y_to": "3", "points": "8"})
     found = filled(grid)
     for row, column in ((1, 2), (5, 6)):
         texts = maps.texts_at(grid, float(grid.x.values[column]), float(grid.y.values[row]))
-        response = read_case(texts, Shelf()).simulate()
+        response = read_input(texts, UploadStore()).simulate()
         if x == "p":
             assert [side.restitution for side in response.block.sides] == pytest.approx(
                 [side.restitution for side in case.block.sides], rel=1e-12
@@ -560,13 +566,13 @@ def test_the_case_at_a_point_of_a_map_of_an_eccentric_block(block, x):
 def test_an_eccentric_block_is_not_mapped_over_one_slenderness_of_both_sides(block):
     texts = {**block, "motion": "one-sine:amplitude=4,frequency=1"}
     with pytest.raises(InvalidOption, match="is mapped over omega, p, restitution, a, pga, not over 'alpha'"):
-        maps.grid_of(read_case(texts, Shelf()), {"x": "alpha", "y": "a"})
-    assert "alpha" in maps.axes_of(read_case({**texts, "restitution": "0.9"}, Shelf()))
+        maps.grid_of(read_input(texts, UploadStore()), {"x": "alpha", "y": "a"})
+    assert "alpha" in maps.axes_of(read_input({**texts, "restitution": "0.9"}, UploadStore()))
 
 
 def test_a_map_of_an_eccentric_block_is_written_with_all_of_it(run):
     for block in ECCENTRIC:
-        case = read_case({**block, "motion": "one-sine:amplitude=4,frequency=1"}, Shelf())
+        case = read_input({**block, "motion": "one-sine:amplitude=4,frequency=1"}, UploadStore())
         grid = maps.grid_of(case, {"x": "omega", "y": "a", "x_from": "2", "x_to": "3", "points": "8"})
         program, *arguments = shlex.split(map_code.as_command(grid))
         code, out, _ = run(*arguments, "--json")
@@ -585,14 +591,14 @@ def test_a_map_of_an_eccentric_block_is_written_with_all_of_it(run):
 )
 def test_a_block_that_is_half_described_is_refused(texts):
     with pytest.raises(InvalidBlock, match="a block has either width and height"):
-        read_case({**texts, "motion": "none"}, Shelf())
+        read_input({**texts, "motion": "none"}, UploadStore())
 
 
 def test_the_case_at_a_point_of_a_map_of_a_record():
-    case = read_case(STATUE, Shelf())
+    case = read_input(STATUE, UploadStore())
     grid = maps.grid_of(case, {"x": "p", "y": "pga", "points": "8"})
     texts = maps.texts_at(grid, float(grid.x.values[3]), float(grid.y.values[2]))
-    response = read_case(texts, Shelf()).simulate()
+    response = read_input(texts, UploadStore()).simulate()
     assert response.motion.pga == pytest.approx(grid.y.values[2] * 9.80665)
     assert response.block.p == pytest.approx(grid.x.values[3])
     peak = math.inf if response.overturned else response.peak_over_slenderness
@@ -600,7 +606,7 @@ def test_the_case_at_a_point_of_a_map_of_a_record():
 
 
 def test_the_curves_over_a_map_are_the_critical_amplitudes():
-    case = read_case(SINE, Shelf())
+    case = read_input(SINE, UploadStore())
     grid = maps.grid_of(case, {"x": "omega", "y": "a", "x_from": "0.3", "x_to": "9", "points": "20"})
     found = maps.curves(grid)
     assert np.array_equal(found["exact"], critical_amplitude(grid.x.values, 0.92))
@@ -624,11 +630,11 @@ def test_the_curves_over_a_map_are_the_critical_amplitudes():
 )
 def test_axes_that_are_none_are_refused(axes, words):
     with pytest.raises(InvalidOption, match=words):
-        maps.grid_of(read_case(SINE, Shelf()), axes)
+        maps.grid_of(read_input(SINE, UploadStore()), axes)
 
 
 def test_a_map_that_is_not_read_on_stops():
-    grid = maps.grid_of(read_case(SINE, Shelf()), {"x": "omega", "y": "a", "points": "400"})
+    grid = maps.grid_of(read_input(SINE, UploadStore()), {"x": "omega", "y": "a", "points": "400"})
     found = maps.parts(grid)
     next(found)
     found.close()
@@ -690,9 +696,9 @@ def test_a_verdict_that_the_duration_left_open_is_not_drawn_as_standing(tmp_path
 
 def test_a_point_of_a_study_is_its_simulation(study):
     payload = study.slice({"x": "p", "y": "scale", "quantity": "peak_rotation", "motion_index": "1"})
-    shelf = Shelf()
-    texts = study.texts_at({"x": "p", "y": "scale", "at_x": "3.5", "at_y": "4", "motion_index": "1"}, shelf)
-    response = read_case(texts, shelf).simulate()
+    uploads = UploadStore()
+    texts = study.texts_at({"x": "p", "y": "scale", "at_x": "3.5", "at_y": "4", "motion_index": "1"}, uploads)
+    response = read_input(texts, uploads).simulate()
     rows, columns = payload.header["shape"]
     column = int(np.argmin(np.abs(np.array(payload.header["x"]["values"]) - 3.5)))
     assert payload.arrays["values"].reshape(rows, columns)[1, column] == pytest.approx(
@@ -732,8 +738,8 @@ def test_a_study_of_a_list_of_blocks_is_a_map_over_their_numbers(tmp_path):
     over_motions = view.slice({"x": "motion", "y": "block", "quantity": "peak_rotation", "scale_index": "2"})
     expected = results.peak_rotation.isel(scale=2).transpose("block", "motion", ...).values.reshape(3, 2)
     assert np.array_equal(over_motions.arrays["values"].reshape(3, 2), expected)
-    texts = view.texts_at({"x": "block", "y": "motion", "at_x": "1", "at_y": "2", "scale_index": "2"}, Shelf())
-    response = read_case(texts, Shelf()).simulate()
+    texts = view.texts_at({"x": "block", "y": "motion", "at_x": "1", "at_y": "2", "scale_index": "2"}, UploadStore())
+    response = read_input(texts, UploadStore()).simulate()
     assert response.peak_rotation == pytest.approx(over_motions.arrays["values"][1], rel=1e-12)
 
 
@@ -752,7 +758,7 @@ def _ran(command, folder):
 
 
 def _mapped(texts, axes):
-    grid = maps.grid_of(read_case(texts, Shelf()), {"points": "8", **axes})
+    grid = maps.grid_of(read_input(texts, UploadStore()), {"points": "8", **axes})
     found = np.empty((len(maps.QUANTITIES), 64), np.float32)
     for part in maps.parts(grid):
         found[:, part.points] = part.values

@@ -23,14 +23,14 @@ from explorer_client import Client, clients
 
 import rocking
 from rocking.errors import InvalidOption, StudyError
-from rocking.explorer import assets
-from rocking.explorer.background import behind_others
+from rocking.explorer import launch, server
+from rocking.explorer.authentication import RequestAuthentication
+from rocking.explorer.background import low_priority
 from rocking.explorer.core import Explorer
-from rocking.explorer.guard import Guard
 from rocking.explorer.launch import served
 from rocking.explorer.server import App
-from rocking.explorer.shelf import LARGEST, MOST
 from rocking.explorer.studies import StudyView
+from rocking.explorer.uploads import LARGEST, MOST
 
 PORT = 8123
 OURS = f"http://127.0.0.1:{PORT}"
@@ -49,9 +49,9 @@ def opened():
     with clients() as portal:
 
         def open_page(app):
-            guard = Guard(app.asgi, PORT)
-            browser = Client(portal, guard, OURS, {"sec-fetch-site": "same-origin"}, follow=True)
-            assert browser.get("/", params={"token": guard.new_token()}).status_code == 200
+            application = RequestAuthentication(app.asgi, PORT)
+            browser = Client(portal, application, OURS, {"sec-fetch-site": "same-origin"}, follow=True)
+            assert browser.get("/", params={"token": application.new_token()}).status_code == 200
             return browser
 
         yield open_page
@@ -91,7 +91,9 @@ def test_a_case_comes_as_header_and_aligned_arrays(page, explorer):
     response = explorer.show(STATUE).response
     assert header["peak_rotation"] == response.peak_rotation
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])
-    assert header["command"].startswith("rocking simulate ridgecrest-clc-090")
+    code = page.get("/api/code", params=STATUE).json()
+    assert code["command"].startswith("rocking simulate ridgecrest-clc-090")
+    assert "rocking.records.load('ridgecrest-clc-090')" in code["python"]
 
 
 def test_a_window_comes_with_times_from_its_start(page, explorer):
@@ -165,7 +167,9 @@ def test_the_page_has_a_policy_with_a_nonce_of_its_own(page):
 
 
 def test_the_page_loads_nothing_from_elsewhere():
-    for name, content in assets.page_files().items():
+    files = server.page_files()
+    assert len(files) >= 15
+    for name, content in files.items():
         text = content.decode()
         addresses = set(re.findall(r"https?://[^\s\"'`)]+", text)) - {"http://www.w3.org/2000/svg"}
         assert not addresses, name
@@ -174,7 +178,8 @@ def test_the_page_loads_nothing_from_elsewhere():
 
 
 def test_every_module_that_is_imported_is_served(page):
-    files = assets.page_files()
+    files = server.page_files()
+    assert len(files) >= 15
     for name, content in files.items():
         for imported in re.findall(r'from "\./([\w.]+)"|import\(`\./\$\{name\}\.js`\)', content.decode()):
             assert not imported or imported in files, name
@@ -184,20 +189,28 @@ def test_every_module_that_is_imported_is_served(page):
         assert answer.headers["x-content-type-options"] == "nosniff"
 
 
-def test_an_error_is_one_sentence(page):
-    answer = page.get("/api/case", params={**STATUE, "width": "-1"})
+@pytest.mark.parametrize(
+    ("texts", "argument", "words"),
+    [
+        ({"width": "-1"}, "width", "“Width” must be a positive number"),
+        ({"restitution": "0.9999"}, "restitution", "“Restitution η”"),
+        ({"pgv": "1"}, "pga", "“Peak acceleration” and “Peak velocity” scale the same motion"),
+        ({"vertical": "nothing-up"}, "vertical", "“Vertical component”: there is no shipped record"),
+    ],
+)
+def test_an_error_names_the_field_by_its_label_and_the_argument_that_is_wrong(page, texts, argument, words):
+    answer = page.get("/api/case", params={**STATUE, **texts})
     assert answer.status_code == 422
-    assert (
-        answer.json()["problem"] == "width must be a positive number in m, not -1"
-        or "width" in answer.json()["problem"]
-    )
+    assert answer.json()["argument"] == argument
+    assert words in answer.json()["problem"]
 
 
 def test_what_went_wrong_inside_says_nothing_of_the_inside(page, explorer, monkeypatch):
-    monkeypatch.setattr(explorer, "words", lambda texts: 1 / 0)
-    answer = page.get("/api/words", params=STATUE)
+    monkeypatch.setattr(explorer, "summary", lambda texts: 1 / 0)
+    answer = page.get("/api/summary", params=STATUE)
     assert answer.status_code == 500
-    assert answer.json() == {"problem": "this could not be computed (ZeroDivisionError); please report it"}
+    problem = "this could not be computed (ZeroDivisionError); please report it"
+    assert answer.json() == {"problem": problem, "argument": None}
 
 
 # Uploads
@@ -319,7 +332,7 @@ def test_a_thousand_malformed_files_links_and_headers(page, explorer, tmp_path, 
     paths = [
         "/api/case",
         "/api/window",
-        "/api/words",
+        "/api/summary",
         "/api/schemes",
         "/api/compare",
         "/api/map",
@@ -353,7 +366,7 @@ def test_a_thousand_malformed_files_links_and_headers(page, explorer, tmp_path, 
         statuses.add(answer.status_code)
         if answer.status_code == 422:
             assert str(tmp_path) not in answer.text
-            assert set(answer.json()) == {"problem"}
+            assert set(answer.json()) == {"problem", "argument"}
     for _ in range(350):
         texts = dict(STATUE) if rng.random() < 0.5 else {}
         texts |= {rng.choice(keys): rng.choice(values) for _ in range(rng.randrange(1, 4))}
@@ -391,7 +404,7 @@ def test_a_thousand_malformed_files_links_and_headers(page, explorer, tmp_path, 
         statuses.add(answer.status_code)
     assert statuses <= {200, 303, 400, 403, 404, 405, 413, 422}, statuses
     assert 200 in statuses and 422 in statuses
-    assert len(explorer.shelf._files) <= MOST
+    assert len(explorer.uploads._files) <= MOST
     assert len(explorer._kept) <= 48
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["private"]
 
@@ -429,10 +442,10 @@ def test_the_server_answers_over_a_socket_and_compiles_ahead(running, browser):
     start = browser.get(f"{base}/api/start").json()
     assert start["opening"] == {"motion": "one-sine:amplitude=0.3g,frequency=1"}
     deadline = time.monotonic() + 240.0
-    while not start["warming"]["done"] and time.monotonic() < deadline:
+    while not start["compilation"]["done"] and time.monotonic() < deadline:
         time.sleep(0.2)
         start = browser.get(f"{base}/api/start").json()
-    assert start["warming"]["done"]
+    assert start["compilation"]["done"]
 
 
 def test_a_map_that_nobody_reads_any_more_stops(running, browser):
@@ -526,15 +539,15 @@ def test_the_command_refuses_with_one_line(run, arguments, words):
 
 
 def test_a_missing_package_is_named(run, monkeypatch):
-    monkeypatch.setattr(assets.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(launch.util, "find_spec", lambda name: None)
     code, _, err = run("explore", "--no-open")
     assert code == 2
     assert "pip install 'rocking[explorer]'" in err
 
 
 def test_the_library_is_found_without_importing_it():
-    assert (assets.library_folder() / "bokeh.min.js").is_file()
-    code = "import sys; from rocking.explorer import assets; assets.library_folder(); print('bokeh' in sys.modules)"
+    assert (server.library_folder() / "bokeh.min.js").is_file()
+    code = "import sys; from rocking.explorer import server; server.library_folder(); print('bokeh' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 
@@ -596,7 +609,7 @@ def test_a_response_is_explored_in_a_frame():
         header, arrays = unpacked(client.get(f"{base}/api/case", params=texts).content)
     assert header["peak_rotation"] == response.peak_rotation
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])
-    with pytest.raises(InvalidOption, match="a Response is needed"):
+    with pytest.raises(InvalidOption, match="must be a Response"):
         rocking.explore(response.motion)
 
 
@@ -610,6 +623,6 @@ def test_long_work_and_the_threads_that_it_starts_give_way():
             return niceness(), others.submit(niceness).result()
 
     before = niceness()
-    with behind_others() as thread:
+    with low_priority() as thread:
         assert thread.submit(started).result() == (19, 19)
     assert niceness() == before

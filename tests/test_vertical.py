@@ -17,9 +17,9 @@ from rocking import InvalidMotion, InvalidOption, Motion
 from rocking.block import Blocks
 from rocking.chattering.families import SimulationInput
 from rocking.chattering.maps import chattering_map
-from rocking.explorer.case import read_case, texts_of
+from rocking.explorer.inputs import read_input, texts_of
 from rocking.explorer.maps import grid_of, parts
-from rocking.explorer.shelf import Shelf
+from rocking.explorer.uploads import UploadStore
 from rocking.kernels import state
 from rocking.kernels.certificate import arc_bounds, bounds_on_motion, prove_rest, side_bounds
 from rocking.motion.exceedance import exceedances, lifting_factors
@@ -423,9 +423,9 @@ def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:
 
 
 def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_component() -> None:
-    shelf = Shelf()
-    key = shelf.give(wave(20.0, 5).with_vertical(wave(40.0, 6)))
-    case = read_case({"p": "2", "alpha": "0.2", "restitution": "0.5", "motion": f"given:{key}"}, shelf)
+    uploads = UploadStore()
+    key = uploads.give(wave(20.0, 5).with_vertical(wave(40.0, 6)))
+    case = read_input({"p": "2", "alpha": "0.2", "restitution": "0.5", "motion": f"given:{key}"}, uploads)
     axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "0.3", "points": "16"}
     grid = grid_of(case, axes)
     found = np.empty(grid.x.values.size * grid.y.values.size)
@@ -441,12 +441,12 @@ def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_com
 
 def test_a_page_of_a_response_shows_its_vertical_component_too() -> None:
     """Neither a pulse's nor a shipped record's name says it, and two motions may differ in nothing else."""
-    shelf, block = Shelf(), block_for(2.0, 0.2)
+    uploads, block = UploadStore(), block_for(2.0, 0.2)
     pulse, record = rocking.pulses.one_sine(4.0, 1.0), rocking.records.load("el-centro-meloland-270")
     for horizontal in (pulse, record):
         for vertical in (wave(3.0, 1), wave(3.0, 2)):
             response = rocking.simulate(block, horizontal.with_vertical(vertical))
-            shown = read_case(texts_of(response, shelf), shelf).simulate()
+            shown = read_input(texts_of(response, uploads), uploads).simulate()
             assert shown.peak_rotation == response.peak_rotation
             assert shown.impacts["time"].tolist() == response.impacts["time"].tolist()
 

@@ -22,7 +22,7 @@ from .errors import (
     Unfinished,
     UnreadableRecord,
 )
-from .explorer.notebook import explore
+from .explorer.launch import explore
 from .motion import Motion, pulses, records
 from .motion.formats import read
 from .motion.scaling import Measure

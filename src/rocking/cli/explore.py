@@ -9,7 +9,6 @@ from cyclopts import Parameter
 
 from rocking.cli.options import OUTPUT, QuietOptions
 from rocking.errors import UnreadableRecord
-from rocking.explorer.pulses import is_pulse, pulse_of
 from rocking.motion.named import is_shipped
 
 if TYPE_CHECKING:
@@ -40,24 +39,25 @@ def explore(
     address
         Address of this machine to listen on. Others than 127.0.0.1 can be reached from other machines.
     """
-    from rocking.explorer.assets import require_packages
+    from rocking.explorer.launch import require_packages, served
 
     require_packages()
     from rocking.explorer.core import Explorer
-    from rocking.explorer.launch import announce_and_open, served
     from rocking.explorer.studies import StudyView
 
     explorer = Explorer()
     is_study = motion is not None and Path(motion).is_dir()
     study = StudyView(Path(motion)) if motion is not None and is_study else None
     texts = {"view": "map"} if is_study else {} if motion is None else _opening(explorer, motion)
-    here = served(explorer, texts, study, address=address, port=port)
-    announce_and_open(here, {}, open_browser=not no_open)
-    here.run()
+    server = served(explorer, texts, study, address=address, port=port)
+    server.announce(open_browser=not no_open)
+    server.run()
 
 
 def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
     """Texts of the motion that the page opens with."""
+    from rocking.explorer.inputs import is_pulse, pulse_of
+
     if is_pulse(motion):
         pulse_of(motion)
         return {"motion": motion}
@@ -65,9 +65,9 @@ def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
         return {"motion": motion}
     file = Path(motion)
     try:
-        key = explorer.shelf.put(file.name, file.read_bytes())
+        key = explorer.uploads.add_file(file.name, file.read_bytes())
     except OSError as error:
         sentence = f"this file could not be read ({error.strerror}); check the name"
         raise UnreadableRecord(sentence, path=motion) from None
-    explorer.shelf.contents(key)
+    explorer.uploads.contents(key)
     return {"motion": f"file:{key}"}

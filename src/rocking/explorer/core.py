@@ -8,7 +8,7 @@ import sys
 import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -20,8 +20,9 @@ from rocking.block import Block
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.schemes import compare_schemes
 from rocking.errors import InvalidOption
-from rocking.explorer.case import BLOCK_NAMES, Case, Texts, as_command, as_python, read_case
-from rocking.explorer.shelf import Shelf
+from rocking.explorer.inputs import SimulationInput, Texts, as_command, as_python, read_input
+from rocking.explorer.parameters import names_of
+from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
 from rocking.response import Response, active_span, in_words
@@ -56,13 +57,7 @@ EXPORTS: Final[Mapping[str, str]] = {
     "impacts.csv": "text/csv; charset=utf-8",
     "nc": "application/x-netcdf",
 }
-
-
-#: Texts that say one thing together.
-_GROUPS: Final = (
-    BLOCK_NAMES,
-    {"motion", "channel", "vertical", "dt", "units", "scale", "pga", "pgv", "sa"},
-)
+_TABLES: Final[Mapping[str, Any]] = {"csv": "histories", "events.csv": "events", "impacts.csv": "impacts"}
 
 
 @dataclass(frozen=True)
@@ -74,10 +69,10 @@ class Payload:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class Simulated:
     """A case with its response, and what is made of it when it is first asked for."""
 
-    case: Case
+    case: SimulationInput
     response: Response
 
     @functools.cached_property
@@ -113,26 +108,20 @@ class Explorer:
     """
 
     def __init__(self) -> None:
-        self.shelf = Shelf()
+        self.uploads = UploadStore()
         self._lock = threading.Lock()
         self._drawing = threading.Lock()
-        self._kept: OrderedDict[tuple[tuple[str, str], ...], Shown] = OrderedDict()
+        self._kept: OrderedDict[tuple[tuple[str, str], ...], Simulated] = OrderedDict()
 
-    def show(self, texts: Texts) -> Shown:
-        """Return a case with its response.
-
-        Raises
-        ------
-        RockingError
-            As `read_case` and `rocking.simulate`.
-        """
+    def show(self, texts: Texts) -> Simulated:
+        """Return a case with its response."""
         key = tuple(sorted((name, value) for name, value in texts.items() if value))
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
                 return self._kept[key]
-        case = read_case(texts, self.shelf)
-        shown = Shown(case, case.simulate())
+        case = read_input(texts, self.uploads)
+        shown = Simulated(case, case.simulate())
         with self._lock:
             self._kept[key] = shown
             while len(self._kept) > 1 and (len(self._kept) > _KEPT or self._steps() > _KEPT_STEPS):
@@ -140,29 +129,17 @@ class Explorer:
         return shown
 
     def case(self, texts: Texts, window: tuple[float, float] | None = None) -> Payload:
-        """Return all that the page says of a case, and its arrays in a window (s; by default where it moves).
-
-        Raises
-        ------
-        RockingError
-            As `read_case` and `rocking.simulate`.
-        """
+        """Return all that the page says of a case, and its arrays in a window (s; by default where it moves)."""
         shown = self.show(texts)
         response = shown.response
         start, end = active_span(response) if window is None else _checked(window, response)
         header = {**_facts(shown), "window": _window(shown, start, end)}
-        return Payload(header, {**_window_arrays(shown, start, end), **_whole_arrays(shown)})
+        return Payload(header, {**_window_arrays(shown, start, end), **_whole_arrays(response)})
 
     def window(
         self, texts: Texts, window: tuple[float, float], *, ground: bool = False, points: int = _POINTS
     ) -> Payload:
-        """Return the arrays of a window (s), evaluated anew; with those of the ground's displacement.
-
-        Raises
-        ------
-        RockingError
-            As `case`, or if the window is no stretch of time.
-        """
+        """Return the arrays of a window (s), evaluated anew; with those of the ground's displacement."""
         shown = self.show(texts)
         start, end = _checked(window, shown.response)
         arrays = _window_arrays(shown, start, end, min(max(points, 2), _POINTS))
@@ -171,18 +148,7 @@ class Explorer:
         return Payload({"window": _window(shown, start, end)}, arrays)
 
     def compare(self, texts: Texts, changed: Texts, window: tuple[float, float] | None = None) -> Payload:
-        """Return two cases in one window: one, and the same with some texts changed.
-
-        Parameters
-        ----------
-        changed : mapping of str to str
-            What the other one has in place of the first one's texts; a block or a motion is changed as a whole.
-
-        Raises
-        ------
-        RockingError
-            As `case`.
-        """
+        """Return two cases in one window: one, and the same with some texts changed; blocks and motions as a whole."""
         first = self.show(texts)
         second = self.show(_changed(first.case.texts, changed))
         spans = [active_span(shown.response) for shown in (first, second)]
@@ -200,68 +166,41 @@ class Explorer:
             arrays[f"{name}_rest"] = shown.response.rest_intervals.ravel()
         return Payload(header, arrays)
 
-    def words(self, texts: Texts) -> list[list[str]]:
-        """Return the summary of a response line by line: what, and how much."""
-        return [[row.name, row.text] for row in self.show(texts).response.summary_rows()]
+    def summary(self, texts: Texts) -> list[tuple[str, str]]:
+        """Return the summary of a response row by row: what, and how much."""
+        return [(row.name, row.text) for row in self.show(texts).response.summary_rows()]
+
+    def code(self, texts: Texts) -> dict[str, str | None]:
+        """Return a case as Python, and as a command where the command line does it."""
+        case = self.show(texts).case
+        return {"python": as_python(case), "command": as_command(case)}
 
     def schemes(self, texts: Texts) -> list[dict[str, Any]]:
         """Return what each treatment of chattering makes of a case, against the proven response."""
         case = self.show(texts).case
-        found = compare_schemes(
-            case.block,
-            case.motion,
-            model=case.model,
-            initial_rotation=case.initial_rotation,
-            initial_velocity=case.initial_velocity,
-        )
-        rows = [
-            {
-                "label": outcome.treatment.label,
-                "text": str(outcome.treatment),
-                "right": outcome.is_right,
-                "verdict": outcome.verdict,
-                "error": None if math.isnan(outcome.largest_error) else outcome.largest_error,
-            }
-            for outcome in found.outcomes
+        start: dict[str, Any] = {"initial_rotation": case.initial_rotation, "initial_velocity": case.initial_velocity}
+        found = compare_schemes(case.block, case.motion, model=case.model, **start)
+        rows = [(each.treatment, each.is_right, each.verdict, _plain(each.largest_error)) for each in found.outcomes]
+        unfit = [(scheme, None, reason, None) for scheme, reason in found.not_applicable]
+        return [
+            {"label": scheme.label, "text": str(scheme), "right": right, "verdict": words, "error": error}
+            for scheme, right, words, error in [*rows, *unfit]
         ]
-        unfit = [
-            {"label": scheme.label, "text": str(scheme), "right": None, "verdict": reason, "error": None}
-            for scheme, reason in found.not_applicable
-        ]
-        return rows + unfit
 
     def export(self, texts: Texts, form: str, window: tuple[float, float] | None = None) -> bytes:
-        """Return a figure or a table of a response as a file's content.
-
-        Parameters
-        ----------
-        form : str
-            One of `EXPORTS`.
-        window : (start, end), optional
-            Stretch of time that a figure shows, s.
-
-        Raises
-        ------
-        RockingError
-            As `case`, or if there is no such form.
-        """
+        """Return a response as the content of a file of one of `EXPORTS`; a figure shows a window (s)."""
         if form not in EXPORTS:
             raise InvalidOption(f"a case is written as one of {', '.join(EXPORTS)}, not {form[:20]!r}")
         response = self.show(texts).response
         with tempfile.TemporaryDirectory(prefix="rocking-") as folder:
             file = Path(folder) / f"response.{form}"
-            writers: dict[str, Callable[[], None]] = {
-                "csv": lambda: response.to_csv(file),
-                "events.csv": lambda: response.to_csv(file, "events"),
-                "impacts.csv": lambda: response.to_csv(file, "impacts"),
-                "nc": lambda: response.to_netcdf(file),
-            }
-            if form in writers:
-                writers[form]()
+            if form in _TABLES:
+                response.to_csv(file, _TABLES[form])
+            elif form == "nc":
+                response.to_netcdf(file)
             else:
-                stretch = None if window is None else _checked(window, response)
                 with self._drawing:
-                    _draw(response, file, stretch)
+                    _draw(response, file, None if window is None else _checked(window, response))
             return file.read_bytes()
 
     def _steps(self) -> int:
@@ -269,19 +208,17 @@ class Explorer:
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
-    """Texts of a case with others in their place; those of a whole group go together."""
-    kept = dict(texts)
-    for group in _GROUPS:
-        if group & changed.keys():
-            kept = {name: value for name, value in kept.items() if name not in group}
-    return {**kept, **changed}
+    """Texts of a case with others in their place; those of a whole block or motion go together."""
+    groups = [group for group in (names_of("block"), names_of("motion")) if changed.keys() & {*group}]
+    gone = {name for group in groups for name in group}
+    return {name: value for name, value in texts.items() if name not in gone} | dict(changed)
 
 
-def _window(shown: Shown, start: float, end: float) -> dict[str, Any]:
+def _window(shown: Simulated, start: float, end: float) -> dict[str, Any]:
     """Say what a window shows: its ends, how many impacts, and how long before a rest the last one is, s."""
     response = shown.resolved(start, end)
-    struck = response.impacts["time"]
-    count = np.searchsorted(struck, end, "right") - np.searchsorted(struck, start, "left")
+    times = response.impacts["time"]
+    count = np.searchsorted(times, end, "right") - np.searchsorted(times, start, "left")
     left = [each for each in _unresolved(response, start, end) if each > _SEEN * (end - start)]
     return {"from": start, "to": end, "impacts": int(count), "unresolved": max(left, default=None)}
 
@@ -289,26 +226,20 @@ def _window(shown: Shown, start: float, end: float) -> dict[str, Any]:
 def _unresolved(response: Response, start: float, end: float) -> list[float]:
     """Return the times, s, from the last resolved impact to the rest, of sequences that end so in a window."""
     ends = np.asarray(response.chattering["end"], dtype=float)
-    struck = np.asarray(response.impacts["time"], dtype=float)
-    last = struck[np.searchsorted(struck, ends, side="right") - 1]
+    impact_times = np.asarray(response.impacts["time"], dtype=float)
+    last = impact_times[np.searchsorted(impact_times, ends, side="right") - 1]
     seen = (ends > start) & (last < end)
     return [float(each) for each in (ends - last)[seen]]
 
 
-def thinned(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
-    """Return at most so many points of a line: the least and the greatest of each stretch of neighbours.
+def extremes(values: Floats, most: int) -> Integers:
+    """Return where at most so many values of a line are: the least and the greatest of each stretch of neighbours.
 
     Examples
     --------
-    >>> thinned(np.arange(6.0), np.array([0.0, 3.0, 1.0, 5.0, -2.0, 4.0]), 4)
-    (array([0., 1., 3., 4.]), array([ 0.,  3.,  5., -2.]))
+    >>> extremes(np.array([0.0, 3.0, 1.0, 5.0, -2.0, 4.0]), 4)
+    array([0, 1, 3, 4])
     """
-    kept = _extremes(values, most)
-    return time[kept], values[kept]
-
-
-def _extremes(values: Floats, most: int) -> Integers:
-    """Return where at most so many values are: the least and the greatest of each stretch of neighbours."""
     if len(values) <= most:
         return np.arange(len(values))
     width = math.ceil(2 * len(values) / most)
@@ -321,30 +252,31 @@ def _extremes(values: Floats, most: int) -> Integers:
 def _checked(window: tuple[float, float], response: Response) -> tuple[float, float]:
     start, end = window
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
-        raise InvalidOption("a window goes from a time to a later one, both in s")
+        raise InvalidOption("the window must go from a time to a later one, both in s", value=window)
     start, end = max(start, 0.0), min(end, response.duration)
     if not start < end:
         raise InvalidOption(f"the window is outside the response, which lasts {response.duration:.6g} s")
     return start, end
 
 
-def _window_arrays(shown: Shown, start: float, end: float, points: int = _POINTS) -> dict[str, Floats]:
+def _window_arrays(shown: Simulated, start: float, end: float, points: int = _POINTS) -> dict[str, Floats]:
     """Lines in a window; times count from its start, so that they keep their digits however narrow it is."""
     response = shown.resolved(start, end)
-    struck = response.impacts["time"]
-    inside = struck[(struck >= start) & (struck <= end)]
+    impact_times = response.impacts["time"]
+    inside = impact_times[(impact_times >= start) & (impact_times <= end)]
     marked = inside if len(inside) <= _MARKED else inside[:: math.ceil(len(inside) / _MARKED)]
     times = np.union1d(np.linspace(start, end, min(_TIMES, 4 * points)), marked)
-    time, rotation = thinned(times, response.rotation(times), points)
+    rotation = response.rotation(times)
+    kept = extremes(rotation, points)
     return {
-        "time": time - start,
-        "rotation": rotation,
+        "time": times[kept] - start,
+        "rotation": rotation[kept],
         "impact": marked - start,
         **_shaking(shown.case, start, end, points),
     }
 
 
-def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Floats]:
+def _shaking(case: SimulationInput, start: float, end: float, points: int) -> dict[str, Floats]:
     """Ground acceleration in a window, g; with a vertical component, the weight, by which thresholds are multiplied."""
     motion, gravity = case.motion, case.block.gravity
     if motion is None:
@@ -353,31 +285,29 @@ def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Flo
     corners = motion.drawing_times(start, min(end, max(start, last)))
     acceleration = motion.acceleration(corners) / gravity
     if motion.vertical is None:
-        corners, acceleration = thinned(corners, acceleration, points)
-        return {"ground_time": corners - start, "ground_g": acceleration}
+        kept = extremes(acceleration, points)
+        return {"ground_time": corners[kept] - start, "ground_g": acceleration[kept]}
     weight = 1.0 + motion.vertical.acceleration(corners) / gravity
     plus, minus = (threshold / gravity for threshold in case.block.uplift_thresholds(case.model))
     beyond = (-acceleration - plus * weight, acceleration - minus * weight)
-    kept = np.unique(np.concatenate([_extremes(each, points) for each in (acceleration, weight, *beyond)]))
+    kept = np.unique(np.concatenate([extremes(each, points) for each in (acceleration, weight, *beyond)]))
     return {"ground_time": corners[kept] - start, "ground_g": acceleration[kept], "weight": weight[kept]}
 
 
-def _ground_arrays(shown: Shown, start: float, end: float) -> dict[str, Floats]:
+def _ground_arrays(shown: Simulated, start: float, end: float) -> dict[str, Floats]:
     times = np.linspace(start, end, _POINTS // 4)
     ground = shown.ground
     moved = np.zeros_like(times) if ground is None else ground.displacement(np.minimum(times, ground.duration))
     return {"displacement_time": times - start, "displacement": moved}
 
 
-def _whole_arrays(shown: Shown) -> dict[str, Floats]:
+def _whole_arrays(response: Response) -> dict[str, Floats]:
     """Return what no window changes: impacts with their intervals, rests, uplifts, chattering sequences."""
-    response = shown.response
-    struck = np.asarray(response.impacts["time"], dtype=float)
     intervals, ratios = _intervals(response)
     sequences = response.chattering
     columns = [np.asarray(sequences[name], dtype=float) for name in ("start", "end", "lower", "upper", "impacts")]
     return {
-        "impact_time": struck,
+        "impact_time": np.asarray(response.impacts["time"], dtype=float),
         "impact_speed": np.asarray(response.impacts["speed_after"], dtype=float),
         "interval": intervals,
         "ratio": ratios,
@@ -392,18 +322,18 @@ def _intervals(response: Response) -> tuple[Floats, Floats]:
 
     Where chattering is complete the ratio tends to the product of both restitutions: eta^2.
     """
-    struck = np.asarray(response.impacts["time"], dtype=float)
-    intervals = np.append(np.diff(struck), np.nan)[: len(struck)]
+    impact_times = np.asarray(response.impacts["time"], dtype=float)
+    intervals = np.append(np.diff(impact_times), np.nan)[: len(impact_times)]
     uplifts = response.events["time"][response.events["kind"] == "uplift"]
-    rocking = np.searchsorted(uplifts, struck, side="right")
+    rocking = np.searchsorted(uplifts, impact_times, side="right")
     intervals[np.flatnonzero(np.diff(rocking))] = np.nan
-    ratios = np.full(len(struck), np.nan)
+    ratios = np.full(len(impact_times), np.nan)
     positive = np.where(intervals > 0.0, intervals, np.nan)
     ratios[:-2] = positive[2:] / positive[:-2]
     return intervals, ratios
 
 
-def _facts(shown: Shown) -> dict[str, Any]:
+def _facts(shown: Simulated) -> dict[str, Any]:
     case, response = shown.case, shown.response
     block, motion = case.block, case.motion
     gravity = block.gravity
@@ -435,21 +365,11 @@ def _facts(shown: Shown) -> dict[str, Any]:
         "share_at_rest": _plain(episodes.share_at_rest),
         "eta_squared": math.prod(side.restitution for side in block.sides),
         "verdict": verdict(response, block.uplift_thresholds(case.model)),
-        "python": as_python(case),
-        "command": as_command(case),
     }
 
 
 def verdict(response: Response, thresholds: tuple[float, float]) -> str:
-    """Say what becomes of a block in one sentence.
-
-    Parameters
-    ----------
-    response : Response
-        What happened.
-    thresholds : pair of float
-        Ground accelerations that lift the block, m/s^2.
-    """
+    """Say in one sentence what becomes of a block that these ground accelerations (m/s^2) lift."""
     if response.stopped:
         words = in_words(response, "")
         return f"{words[0].upper()}{words[1:]}."

@@ -1,4 +1,4 @@
-"""Starting the explorer: a socket, the link, the server."""
+"""Starting the explorer: its socket, its link and its server, for the command line or for a notebook."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import time
 import webbrowser
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from importlib import util
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
 
 from rocking.errors import InvalidOption
-from rocking.explorer.assets import require_packages
-from rocking.explorer.guard import LOOPBACK, Guard
+from rocking.explorer.authentication import LOOPBACK, RequestAuthentication
 from rocking.progress import note
+from rocking.response import Response
 
 if TYPE_CHECKING:
     import uvicorn
@@ -27,25 +28,34 @@ if TYPE_CHECKING:
 #: Address that nobody but this machine can reach.
 HERE: Final = "127.0.0.1"
 
+#: Pages that may show the explorer in a frame: a notebook that this machine serves.
+_NOTEBOOKS: Final = "http://localhost:* http://127.0.0.1:*"
+
 #: Connections at the same time, and those that wait to be accepted.
 _MOST: Final = 200
 _WAITING: Final = 128
 
 
-@dataclass(frozen=True)
-class Served:
-    """A server that listens, and what it takes to open its page."""
+def require_packages() -> None:
+    """Raise `InvalidOption` unless what the explorer needs is installed."""
+    if any(util.find_spec(name) is None for name in ("starlette", "uvicorn", "bokeh")):
+        raise InvalidOption("the explorer needs packages that are not installed: pip install 'rocking[explorer]'")
 
-    guard: Guard
+
+@dataclass(frozen=True)
+class Server:
+    """A server that listens, and what opens its page."""
+
+    authentication: RequestAuthentication
     server: uvicorn.Server
     socket: socket.socket
     host: str
     port: int
 
-    def link(self, texts: Mapping[str, str] | None = None, host: str | None = None) -> str:
+    def link(self, texts: Mapping[str, str] | None = None) -> str:
         """Return a link that opens the page once, with the texts of a case."""
-        query = urlencode({**(texts or {}), "token": self.guard.new_token()})
-        return f"http://{host or self.host}:{self.port}/?{query}"
+        query = urlencode({**(texts or {}), "token": self.authentication.new_token()})
+        return f"http://{self.host}:{self.port}/?{query}"
 
     def run(self) -> None:
         """Serve until it is interrupted."""
@@ -56,6 +66,18 @@ class Served:
         """Serve in a thread that ends with the program."""
         threading.Thread(target=self.run, name="rocking-explorer", daemon=True).start()
 
+    def announce(self, *, open_browser: bool) -> None:
+        """Print the one line with the link, and open it in a browser once the server answers."""
+        link = self.link()
+        print(f"rocking explorer: {link} (once, in one browser; Ctrl-C ends it)", flush=True)
+        if open_browser:
+            threading.Thread(target=self._open, args=(link,), daemon=True).start()
+
+    def _open(self, link: str) -> None:
+        while not self.server.started:
+            time.sleep(0.02)
+        webbrowser.open(link)
+
 
 def served(
     explorer: Explorer,
@@ -65,34 +87,23 @@ def served(
     address: str = HERE,
     port: int = 0,
     framed_by: str = "'none'",
-) -> Served:
-    """Bind the explorer to an address and a port.
+) -> Server:
+    """Bind the explorer's application (`rocking.explorer.server.App`) to an address of this machine and a port.
 
-    Parameters
-    ----------
-    explorer, opening, study, framed_by
-        As for `rocking.explorer.server.App`.
-    address : str
-        Address of this machine.
-    port : int
-        Port; 0 takes one that is free.
-
-    Raises
-    ------
-    InvalidOption
-        If the address cannot be bound, or a package is missing.
+    Port 0 takes one that is free. `InvalidOption` is raised if it cannot be bound, or if a package is missing.
     """
     require_packages()
     import uvicorn
 
     from rocking.explorer.server import App
 
+    application = App(explorer, opening, study, framed_by).asgi
     listening = _bound(address, port)
     number = int(listening.getsockname()[1])
-    own = f"[{address}]" if ":" in address else address
-    guard = Guard(App(explorer, opening, study, framed_by).asgi, number, {*LOOPBACK, own})
+    host = f"[{address}]" if ":" in address else address
+    authentication = RequestAuthentication(application, number, {*LOOPBACK, host})
     config = uvicorn.Config(
-        guard,
+        authentication,
         log_level="error",
         access_log=False,
         ws="none",
@@ -102,34 +113,26 @@ def served(
         timeout_graceful_shutdown=1,
         proxy_headers=False,
     )
-    return Served(guard, uvicorn.Server(config), listening, own, number)
-
-
-def announce_and_open(here: Served, texts: Mapping[str, str], *, open_browser: bool) -> None:
-    """Print the one line with the link, and open it in a browser once the server answers."""
-    link = here.link(texts)
-    print(f"rocking explorer: {link} (once, in one browser; Ctrl-C ends it)", flush=True)
-    if open_browser:
-        threading.Thread(target=_open, args=(here, link), daemon=True).start()
-
-
-def _open(here: Served, link: str) -> None:
-    while not here.server.started:
-        time.sleep(0.02)
-    webbrowser.open(link)
+    return Server(authentication, uvicorn.Server(config), listening, host, number)
 
 
 def _bound(address: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
-        raise InvalidOption(f"port must be a whole number from 0 to 65535, not {port}")
+        raise InvalidOption(f"{{}} must be a whole number from 0 to 65535, not {port}", "port", value=port)
     if address in ("0.0.0.0", "::", ""):
-        raise InvalidOption(f"address {address!r} is every address of this machine: name the one that others shall use")
+        raise InvalidOption(
+            f"{{}} {address!r} is every address of this machine: name the one that others shall use",
+            "address",
+            value=address,
+        )
     if address not in (HERE, "localhost", "::1"):
         note(f"{address} can be reached from other machines, and what is sent is not encrypted")
     try:
         family, kind, _, _, place = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM)[0]
     except OSError as error:
-        raise InvalidOption(f"{address} is no address of this machine: {error.strerror}") from None
+        raise InvalidOption(
+            f"{{}}: this machine has no {address} ({error.strerror})", "address", value=address
+        ) from None
     listening = socket.socket(family, kind)
     try:
         if sys.platform != "win32":
@@ -138,5 +141,100 @@ def _bound(address: str, port: int) -> socket.socket:
         listening.listen(_WAITING)
     except OSError as error:
         listening.close()
-        raise InvalidOption(f"port {port} of {address} cannot be used: {error.strerror}; choose another port") from None
+        raise InvalidOption(
+            f"{{}} {port} of {address} cannot be used ({error.strerror}): choose another one", "port", value=port
+        ) from None
     return listening
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The page of a response; a notebook shows it in a frame.
+
+    Attributes
+    ----------
+    texts : dict of str to str
+        The case, as the page's address has it.
+    height : int
+        Height of the frame, pixels.
+    """
+
+    texts: dict[str, str]
+    height: int
+    _server: Server = field(repr=False)
+
+    @property
+    def link(self) -> str:
+        """A link that opens the page once, in a browser on this machine."""
+        return self._server.link(self.texts)
+
+    def _repr_html_(self) -> str:
+        query = urlencode({**self.texts, "token": self._server.authentication.new_token()})
+        # The cookie goes to frames of the notebook's own site only: the frame takes the name that the notebook has.
+        choose = (
+            "const frame = document.currentScript.previousElementSibling;"
+            "const host = location.hostname === 'localhost' ? 'localhost' : '127.0.0.1';"
+            f"frame.src = `http://${{host}}:{self._server.port}/?{query}`;"
+        )
+        style = f"width:100%;height:{self.height}px;border:0"
+        return f'<iframe title="rocking explorer" style="{style}"></iframe><script>{choose}</script>'
+
+
+_lock = threading.Lock()
+_running: tuple[Explorer, Server] | None = None
+
+
+def explore(response: Response, *, height: int = 760) -> Frame:
+    """Show a response in the explorer, in a frame of the notebook.
+
+    Parameters
+    ----------
+    response : Response
+        From `rocking.simulate`.
+    height : int
+        Height of the frame, pixels.
+
+    Returns
+    -------
+    Frame
+        As the last line of a cell it shows the page; `link` opens it in a browser.
+
+    Raises
+    ------
+    InvalidOption
+        If it is not a response, or a package of the ``explorer`` extra is missing.
+
+    Notes
+    -----
+    The page is served by this process on 127.0.0.1, so the notebook must be open on the same machine. It ends with
+    the process.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+    >>> rocking.explore(response).texts["motion"]
+    'one-sine:amplitude=3.0,frequency=1.0'
+    """
+    if not isinstance(response, Response):
+        raise InvalidOption(
+            f"{{}} must be a Response, as rocking.simulate returns it, not a {type(response).__name__}", "response"
+        )
+    from rocking.explorer.inputs import texts_of
+
+    explorer, server = _server_of_this_process()
+    return Frame(texts_of(response, explorer.uploads), height, server)
+
+
+def _server_of_this_process() -> tuple[Explorer, Server]:
+    """Return the one server of this process; the first call starts it."""
+    global _running
+    from rocking.explorer.core import Explorer
+
+    with _lock:
+        if _running is None:
+            explorer = Explorer()
+            server = served(explorer, {}, framed_by=_NOTEBOOKS)
+            server.run_in_background()
+            _running = explorer, server
+        return _running

@@ -8,9 +8,8 @@ from typing import Any, Final
 
 from rocking.analysis.overturning import PULSES
 from rocking.constants import STANDARD_GRAVITY
-from rocking.explorer.case import BLOCK_NAMES, NAMES, block_as_python
+from rocking.explorer.inputs import BLOCK_NAMES, NAMES, arguments_of, block_as_python, is_pulse, pulse_call
 from rocking.explorer.maps import QUANTITIES, Axis, MapGrid
-from rocking.explorer.pulses import arguments_of, is_pulse, pulse_call
 from rocking.named_pulses import pulse_values
 
 #: Quantities of a map of overturning.

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import secrets
 import struct
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager
-from functools import partial
+from dataclasses import asdict
+from functools import cached_property
+from importlib import metadata, resources, util
+from pathlib import Path
 from typing import Any, Final, TypeVar
 from urllib.parse import quote
 
@@ -21,14 +25,13 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer import assets, map_code, maps
-from rocking.explorer.background import behind_others, result_of
-from rocking.explorer.case import NAMES, read_case
+from rocking.explorer import map_code, maps
+from rocking.explorer.background import Compilation, low_priority
 from rocking.explorer.core import EXPORTS, Explorer, Payload
-from rocking.explorer.offers import offers
-from rocking.explorer.shelf import LARGEST
+from rocking.explorer.inputs import read_input
+from rocking.explorer.parameters import PARAMETERS, field_label, specification
 from rocking.explorer.studies import StudyView
-from rocking.explorer.warming import Warming
+from rocking.explorer.uploads import LARGEST
 from rocking.quantities import number
 from rocking.tables import plain
 
@@ -41,6 +44,16 @@ OTHER: Final = "other."
 _THREADS: Final = 4
 _MAPS: Final = 2
 
+#: Types of the page's own files.
+TYPES: Final = {
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
+
+#: Files of the plotting library, in the order in which they are loaded.
+LIBRARY: Final = ("bokeh.min.js", "bokeh-api.min.js")
+
 _SENT_WITH_ALL: Final = {
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
@@ -50,19 +63,68 @@ _FRESH: Final = {**_SENT_WITH_ALL, "cache-control": "no-store"}
 _FOR_GOOD: Final = {**_SENT_WITH_ALL, "cache-control": "private, max-age=31536000, immutable"}
 
 
+def page_files() -> dict[str, bytes]:
+    """Return the page's own files by name."""
+    folder = resources.files("rocking.explorer") / "page"
+    return {file.name: file.read_bytes() for file in folder.iterdir() if Path(file.name).suffix in {*TYPES, ".html"}}
+
+
+def library_folder() -> Path:
+    """Return where the plotting library lies in its installed package, without importing that."""
+    version = metadata.version("bokeh")
+    if version.split(".")[0] != "3":
+        raise InvalidOption(f"the explorer needs bokeh 3.9 or a later 3, not {version}: pip install 'bokeh>=3.9,<4'")
+    found = util.find_spec("bokeh")
+    places = found.submodule_search_locations if found else None
+    folder = Path(next(iter(places or ["bokeh"]))) / "server" / "static" / "js"
+    if not all((folder / name).is_file() for name in LIBRARY):
+        raise InvalidOption(f"bokeh {version} is not installed completely: install it again")
+    return folder
+
+
+class Query:
+    """What an address says, read when it is asked for."""
+
+    def __init__(self, given: Mapping[str, str]) -> None:
+        self.given = given
+
+    def texts(self, prefix: str = "") -> dict[str, str]:
+        """Texts of a case."""
+        return {name: self.given[prefix + name] for name in PARAMETERS if self.given.get(prefix + name)}
+
+    @cached_property
+    def others(self) -> dict[str, str]:
+        """All that does not belong to the case."""
+        return {name: value for name, value in self.given.items() if name not in PARAMETERS}
+
+    def number(self, name: str) -> float | None:
+        """Return a finite number; None where it is not given."""
+        text = self.given.get(name)
+        if not text:
+            return None
+        value = number(text[:40], name)
+        if not math.isfinite(value):
+            raise InvalidOption("{} must be a finite number", name, value=value)
+        return value
+
+    def numbers(self, first: str, second: str) -> tuple[float, float]:
+        """Return two numbers that are needed."""
+        found = self.number(first), self.number(second)
+        if found[0] is None or found[1] is None:
+            raise InvalidOption("{} and {} are needed", first, second)
+        return found[0], found[1]
+
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """Ends of a stretch of time, s; None where they are not given."""
+        return self.numbers("from", "to") if self.given.get("from") and self.given.get("to") else None
+
+
 class App:
     """The explorer's application.
 
-    Parameters
-    ----------
-    explorer : Explorer
-        What computes.
-    opening : mapping of str to str
-        Texts with which the page opens where its address has none.
-    study : StudyView, optional
-        A study to show as a map.
-    framed_by : str
-        Sources of pages that may show this one in a frame, as a content security policy writes them.
+    The page opens with the texts of ``opening`` where its address has none, and shows a study as a map. ``framed_by``
+    are the sources of pages that may show it in a frame, as a content security policy writes them.
     """
 
     def __init__(
@@ -76,26 +138,30 @@ class App:
         self.opening = dict(opening)
         self.study = study
         self.framed_by = framed_by
-        self.warming = Warming()
-        self.files = assets.page_files()
-        self.library = {name: (assets.library_folder() / name).read_bytes() for name in assets.LIBRARY}
+        self.compilation = Compilation()
+        self.files = page_files()
+        self.library = {name: (library_folder() / name).read_bytes() for name in LIBRARY}
         self._threads = anyio.CapacityLimiter(_THREADS)
         self._maps = anyio.CapacityLimiter(_MAPS)
+        answers: dict[str, Callable[[Query], Payload | Any]] = {
+            "/api/start": self._start,
+            "/api/case": lambda query: explorer.case(query.texts(), query.window),
+            "/api/window": self._window,
+            "/api/summary": lambda query: explorer.summary(query.texts()),
+            "/api/code": lambda query: explorer.code(query.texts()),
+            "/api/schemes": lambda query: explorer.schemes(query.texts()),
+            "/api/compare": lambda query: explorer.compare(query.texts(), query.texts(OTHER), query.window),
+            "/api/map/point": lambda query: maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y")),
+            "/api/study": lambda query: self._study().slice(query.others),
+            "/api/study/point": lambda query: self._study().texts_at(query.others, explorer.uploads),
+        }
         self.asgi = Starlette(
             routes=[
                 Route("/", self.page),
                 Route("/page/{name}", self.file),
                 Route("/library/{name}", self.script),
-                Route("/api/start", self.start),
-                Route("/api/case", self.case),
-                Route("/api/window", self.window),
-                Route("/api/words", self.words),
-                Route("/api/schemes", self.schemes),
-                Route("/api/compare", self.compare),
+                *(Route(path, self._answering(work)) for path, work in answers.items()),
                 Route("/api/map", self.map),
-                Route("/api/map/point", self.point),
-                Route("/api/study", self.study_map),
-                Route("/api/study/point", self.study_point),
                 Route("/api/export", self.export),
                 Route("/api/records", self.upload, methods=["POST"]),
                 Route("/api/records/{key}", self.record),
@@ -106,7 +172,7 @@ class App:
 
     @asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        self.warming.start()
+        self.compilation.start()
         yield
 
     async def page(self, _: Request) -> Response:
@@ -128,71 +194,71 @@ class App:
         """Return a file of the plotting library."""
         return _static(self.library, request.path_params["name"], _FOR_GOOD)
 
-    async def start(self, _: Request) -> Response:
-        """Return what the page offers, with what it opens, and how far the compiling has come."""
-        study = None if self.study is None else await self._in_thread(self.study.describe)
-        return _json({**offers(), "opening": self.opening, "study": study, "warming": self.warming.state()})
+    def _answering(self, work: Callable[[Query], Payload | Any]) -> Callable[[Request], Awaitable[Response]]:
+        """Return what answers a request with a payload, or with plain values, made in a thread."""
 
-    async def case(self, request: Request) -> Response:
-        """Return all of a case."""
-        texts, window = _texts(request), _window(request)
-        return _packed(await self._in_thread(lambda: self.explorer.case(texts, window)))
+        async def answer(request: Request) -> Response:
+            found = await anyio.to_thread.run_sync(work, Query(request.query_params), limiter=self._threads)
+            if isinstance(found, Payload):
+                return Response(pack(found), media_type="application/octet-stream", headers=_FRESH)
+            return JSONResponse(plain(found), headers=_FRESH)
 
-    async def window(self, request: Request) -> Response:
+        return answer
+
+    async def _in_thread(self, work: Callable[[], T]) -> T:
+        return await anyio.to_thread.run_sync(work, limiter=self._threads)
+
+    def _start(self, _: Query) -> dict[str, Any]:
+        """Return the specification of the page, what it opens with, and how far the compiling has come."""
+        return {
+            **specification(),
+            "axes": [asdict(axis) for axis in maps.AXES.values()],
+            "opening": self.opening,
+            "study": None if self.study is None else self.study.describe(),
+            "compilation": self.compilation.state(),
+        }
+
+    def _window(self, query: Query) -> Payload:
         """Return the arrays of a window."""
-        texts, window = _texts(request), _window(request)
-        points = int(_number(request, "points") or 3000)
-        ground = request.query_params.get("ground") == "1"
-        if window is None:
-            raise InvalidOption("a window needs from= and to=, in s")
-        work = partial(self.explorer.window, texts, window, ground=ground, points=points)
-        return _packed(await self._in_thread(work))
+        points, ground = int(query.number("points") or 3000), query.given.get("ground") == "1"
+        return self.explorer.window(query.texts(), query.numbers("from", "to"), ground=ground, points=points)
 
-    async def words(self, request: Request) -> Response:
-        """Return the summary of a case."""
-        texts = _texts(request)
-        return _json(await self._in_thread(lambda: self.explorer.words(texts)))
+    def _grid(self, query: Query) -> maps.MapGrid:
+        return maps.grid_of(read_input(query.texts(), self.explorer.uploads), query.others)
 
-    async def schemes(self, request: Request) -> Response:
-        """Return what every treatment of chattering makes of a case."""
-        texts = _texts(request)
-        return _json(await self._in_thread(lambda: self.explorer.schemes(texts)))
-
-    async def compare(self, request: Request) -> Response:
-        """Return a case and another one, in the same window."""
-        texts, window = _texts(request), _window(request)
-        changed = _texts(request, OTHER)
-        return _packed(await self._in_thread(lambda: self.explorer.compare(texts, changed, window)))
+    def _study(self) -> StudyView:
+        if self.study is None:
+            raise InvalidOption("no study is open: start with rocking explore FOLDER")
+        return self.study
 
     async def map(self, request: Request) -> Response:
         """Stream a map, coarse to fine: what it shows, then parts of it."""
-        texts = _texts(request)
-        grid = maps.grid_of(read_case(texts, self.explorer.shelf), _others(request))
-        about = await self._in_thread(lambda: {**maps.described(grid), **map_code.described(grid)})
-        return StreamingResponse(self._map(grid, about), media_type="application/octet-stream", headers=_FRESH)
 
-    async def point(self, request: Request) -> Response:
-        """Return the texts of the case at a point of a map."""
-        grid = maps.grid_of(read_case(_texts(request), self.explorer.shelf), _others(request))
-        x, y = _number(request, "at_x"), _number(request, "at_y")
-        if x is None or y is None:
-            raise InvalidOption("a point of a map needs at_x= and at_y=")
-        return _json(maps.texts_at(grid, x, y))
+        def described() -> tuple[maps.MapGrid, dict[str, Any]]:
+            grid = self._grid(Query(request.query_params))
+            return grid, {**maps.described(grid), **map_code.described(grid)}
 
-    async def study_map(self, request: Request) -> Response:
-        """Return a slice of the study as a map."""
-        study = self._study()
-        return _packed(await self._in_thread(lambda: study.slice(_others(request))))
+        grid, about = await self._in_thread(described)
+        return StreamingResponse(self._parts(grid, about), media_type="application/octet-stream", headers=_FRESH)
 
-    async def study_point(self, request: Request) -> Response:
-        """Return the texts of a simulation of the study."""
-        study = self._study()
-        return _json(await self._in_thread(lambda: study.texts_at(_others(request), self.explorer.shelf)))
+    async def _parts(self, grid: maps.MapGrid, about: dict[str, Any]) -> AsyncIterator[bytes]:
+        """Parts of a map as bytes; the work ends with the reader."""
+        yield _framed(json.dumps({**about, "problem": None}).encode())
+        async with self._maps:
+            with low_priority() as executor:
+                found = maps.parts(grid)
+                try:
+                    while (part := await asyncio.wrap_future(executor.submit(_next, found))) is not None:
+                        yield part
+                finally:
+                    with anyio.CancelScope(shield=True):
+                        await asyncio.wrap_future(executor.submit(found.close))  # type: ignore[attr-defined]
 
     async def export(self, request: Request) -> Response:
         """Return a figure or a table of a case as a file."""
-        texts, window, form = _texts(request), _window(request), request.query_params.get("form", "")
-        content = await self._in_thread(lambda: self.explorer.export(texts, form, window))
+        query = Query(request.query_params)
+        form = query.given.get("form", "")
+        content = await self._in_thread(lambda: self.explorer.export(query.texts(), form, query.window))
         headers = {**_FRESH, "content-disposition": f"attachment; filename=rocking-response.{quote(form)}"}
         return Response(content, media_type=EXPORTS[form], headers=headers)
 
@@ -209,39 +275,16 @@ class App:
                     return _too_large()
         except ClientDisconnect:
             return Response(status_code=400)
-        name = request.query_params.get("name", "")
-        return _json(await self._in_thread(lambda: self._kept(name, bytes(data))))
+        name, uploads = request.query_params.get("name", ""), self.explorer.uploads
+        found = await self._in_thread(lambda: uploads.contents(uploads.add_file(name, bytes(data))))
+        return JSONResponse(found, headers=_FRESH)
 
     async def record(self, request: Request) -> Response:
-        """Say what a file that is kept is, read with what was told since."""
-        key, dt = request.path_params["key"], _number(request, "dt")
-        units = request.query_params.get("units") or None
-        return _json(await self._in_thread(lambda: self.explorer.shelf.contents(key, dt, units)))
-
-    def _kept(self, name: str, data: bytes) -> dict[str, Any]:
-        shelf = self.explorer.shelf
-        return shelf.contents(shelf.put(name, data))
-
-    def _study(self) -> StudyView:
-        if self.study is None:
-            raise InvalidOption("no study is open: start with rocking explore FOLDER")
-        return self.study
-
-    async def _in_thread(self, work: Callable[[], T]) -> T:
-        return await anyio.to_thread.run_sync(work, limiter=self._threads)
-
-    async def _map(self, grid: maps.MapGrid, about: dict[str, Any]) -> AsyncIterator[bytes]:
-        """Parts of a map as bytes; the work ends with the reader."""
-        yield _framed(json.dumps({**about, "problem": None}).encode())
-        async with self._maps:
-            with behind_others() as thread:
-                found = maps.parts(grid)
-                try:
-                    while (part := await result_of(thread, partial(_next, found))) is not None:
-                        yield part
-                finally:
-                    with anyio.CancelScope(shield=True):
-                        await result_of(thread, found.close)  # type: ignore[attr-defined]
+        """Say what a file that is kept is, read with the step and the units that are given now."""
+        query, uploads = Query(request.query_params), self.explorer.uploads
+        key, units = request.path_params["key"], query.given.get("units") or None
+        found = await self._in_thread(lambda: uploads.contents(key, query.number("dt"), units))
+        return JSONResponse(found, headers=_FRESH)
 
 
 def pack(payload: Payload) -> bytes:
@@ -266,7 +309,7 @@ def _next(found: Iterator[maps.Part]) -> bytes | None:
     try:
         part = next(found, None)
     except RockingError as error:
-        return _framed(json.dumps({"problem": str(error)}).encode())
+        return _framed(json.dumps(_problem(error)).encode())
     if part is None:
         return None
     head = struct.pack("<II", part.stride, len(part.points))
@@ -279,56 +322,28 @@ def _framed(data: bytes) -> bytes:
     return struct.pack("<I", len(padded)) + padded
 
 
-def _texts(request: Request, prefix: str = "") -> dict[str, str]:
-    """Return the texts of a case in an address."""
-    given = request.query_params
-    return {name: given[prefix + name] for name in NAMES if given.get(prefix + name)}
-
-
-def _others(request: Request) -> dict[str, str]:
-    """Return what an address says beside the case."""
-    return {name: value for name, value in request.query_params.items() if name not in NAMES}
-
-
-def _window(request: Request) -> tuple[float, float] | None:
-    start, end = _number(request, "from"), _number(request, "to")
-    return None if start is None or end is None else (start, end)
-
-
-def _number(request: Request, name: str) -> float | None:
-    text = request.query_params.get(name)
-    if not text:
-        return None
-    value = number(text[:40], name)
-    if not math.isfinite(value):
-        raise InvalidOption(f"{name} must be a finite number")
-    return value
-
-
 def _static(files: Mapping[str, bytes], name: str, headers: Mapping[str, str]) -> Response:
     suffix = name[name.rfind(".") :]
-    if name not in files or suffix not in assets.TYPES:
+    if name not in files or suffix not in TYPES:
         return Response("there is no such file", 404, headers=dict(_FRESH), media_type="text/plain")
-    return Response(files[name], media_type=assets.TYPES[suffix], headers=dict(headers))
+    return Response(files[name], media_type=TYPES[suffix], headers=dict(headers))
 
 
-def _packed(payload: Payload) -> Response:
-    return Response(pack(payload), media_type="application/octet-stream", headers=_FRESH)
-
-
-def _json(value: Any) -> Response:
-    return JSONResponse(plain(value), headers=_FRESH)
+def _problem(error: RockingError) -> dict[str, str | None]:
+    """Return the sentence of an error, with the labels of fields, and the argument that is wrong."""
+    return {"problem": error.text(field_label), "argument": error.argument}
 
 
 def _too_large() -> Response:
     problem = f"a record file may be {LARGEST // 2**20} MiB large: cut it into smaller ones"
-    return JSONResponse({"problem": problem}, 413, headers={**_FRESH, "connection": "close"})
+    return JSONResponse({"problem": problem, "argument": None}, 413, headers={**_FRESH, "connection": "close"})
 
 
 async def _refusal(_: Request, error: Exception) -> Response:
-    return JSONResponse({"problem": str(error)}, 422, headers=_FRESH)
+    assert isinstance(error, RockingError)
+    return JSONResponse(_problem(error), 422, headers=_FRESH)
 
 
 async def _failure(_: Request, error: Exception) -> Response:
-    kind = type(error).__name__
-    return JSONResponse({"problem": f"this could not be computed ({kind}); please report it"}, 500, headers=_FRESH)
+    problem = f"this could not be computed ({type(error).__name__}); please report it"
+    return JSONResponse({"problem": problem, "argument": None}, 500, headers=_FRESH)

@@ -1,56 +1,57 @@
 // The state of the page, as the address has it: whoever opens the link sees the same.
 
+import {namesOf, specification} from "./parameters.js";
+
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts}} State */
 
-export const NAMES = [
-  "width", "height", "offset", "p", "alpha", "pivots", "height_of_mass", "gyration", "restitution", "gravity", "motion", "channel", "vertical", "dt", "units",
-  "scale", "pga", "pgv", "sa", "model", "chattering", "duration", "initial_rotation", "initial_velocity",
-];
-export const BLOCK = ["width", "height", "offset", "p", "alpha", "pivots", "height_of_mass", "gyration", "restitution", "gravity"];
-export const MOTION = ["motion", "channel", "vertical", "dt", "units", "scale", "pga", "pgv", "sa", "initial_rotation", "initial_velocity"];
 const VIEWS = ["response", "block", "map", "compare"];
-const MAP = [
-  "x", "x_from", "x_to", "y", "y_from", "y_to", "points", "quantity",
-  "motion_index", "polarity_index", "scale_index", "fix_p", "fix_alpha", "fix_restitution", "fix_block",
-];
 
-/** @param {Texts} opening @returns {State} */
-export function read(opening) {
+/** @returns {State} */
+export function read() {
   const given = new URLSearchParams(location.search);
   /** @param {string[]} names @param {string} [prefix] @returns {Texts} */
   const those = (names, prefix = "") =>
-    Object.fromEntries(names.flatMap((name) => (given.get(prefix + name) ? [[name, /** @type {string} */ (given.get(prefix + name))]] : [])));
-  const texts = those(NAMES);
-  const view = given.get("view") ?? opening.view ?? "response";
+    Object.fromEntries(names.map((name) => [name, given.get(prefix + name) ?? ""]).filter(([, text]) => text));
+  const texts = those(namesOf());
+  const {view: first, ...opening} = specification.opening;
+  const view = given.get("view") ?? first ?? "response";
   const from = Number(given.get("from") ?? NaN), to = Number(given.get("to") ?? NaN);
-  const {view: _, ...first} = opening;
   return {
     view: VIEWS.includes(view) ? view : "response",
-    texts: Object.keys(texts).length ? texts : first,
-    other: those(NAMES, "other."),
+    texts: complete(Object.keys(texts).length ? texts : opening),
+    other: those(namesOf(), "other."),
     compare: given.get("compare") ?? "treatment",
     window: from < to ? [from, to] : null,
-    map: those(MAP),
+    map: those(specification.map),
   };
 }
 
+/** Texts with a block, where they have none. @param {Texts} texts @returns {Texts} */
+function complete(texts) {
+  const {width, height} = specification.default;
+  if (!Object.keys(texts).length) return {...specification.default};
+  return ["width", "p", "pivots"].some((name) => name in texts) ? texts : {width, height, ...texts};
+}
+
 /** @param {State} state */
-export function query(state) {
+function query(state) {
   const given = new URLSearchParams();
+  /** @param {Texts} texts @param {string[]} names @param {string} [prefix] */
+  const put = (texts, names, prefix = "") => { for (const name of names) if (texts[name]) given.set(prefix + name, texts[name]); };
   if (state.view !== "response") given.set("view", state.view);
-  for (const name of NAMES) if (state.texts[name]) given.set(name, state.texts[name]);
+  put(state.texts, namesOf());
   if (state.view === "compare") {
     given.set("compare", state.compare);
-    for (const name of NAMES) if (state.other[name]) given.set(`other.${name}`, state.other[name]);
+    put(state.other, namesOf(), "other.");
   }
-  if (state.view === "map") for (const name of MAP) if (state.map[name]) given.set(name, state.map[name]);
-  if (state.window) {
-    given.set("from", String(state.window[0]));
-    given.set("to", String(state.window[1]));
-  }
+  if (state.view === "map") put(state.map, specification.map);
+  put(ends(state), ["from", "to"]);
   return given.toString();
 }
+
+/** The window as texts. @param {State} state @returns {Texts} */
+export const ends = ({window: chosen}) => (chosen ? {from: String(chosen[0]), to: String(chosen[1])} : {});
 
 let waiting = 0;
 

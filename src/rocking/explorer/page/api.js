@@ -3,8 +3,14 @@
 /** @typedef {Record<string, string>} Texts */
 /** @typedef {{header: any, arrays: Record<string, Float64Array>}} Payload */
 
-/** What went wrong, in a sentence for people. */
-export class Problem extends Error {}
+/** What went wrong, in a sentence for people, and the argument that is wrong, where it is one. */
+export class Problem extends Error {
+  /** @param {string} sentence @param {string | null} [argument] */
+  constructor(sentence, argument = null) {
+    super(sentence);
+    this.argument = argument;
+  }
+}
 
 /** @param {string} path @param {Texts} texts */
 export function address(path, texts) {
@@ -23,9 +29,8 @@ async function answer(path, texts, options) {
   }
   if (response.ok) return response;
   const text = await response.text();
-  let problem = text;
-  try { problem = JSON.parse(text).problem; } catch { /* plain text */ }
-  throw new Problem(problem);
+  const {problem, argument} = response.headers.get("content-type") === "application/json" ? JSON.parse(text) : {problem: text};
+  throw new Problem(problem, argument);
 }
 
 /** @param {string} path @param {Texts} texts @param {RequestInit} [options] @returns {Promise<any>} */
@@ -74,9 +79,10 @@ export async function* frames(path, texts, signal) {
 
 /** Work of which one is under way, and of all that is asked for meanwhile only the last is done. */
 export class Latest {
-  /** @param {(...given: any[]) => Promise<void>} work */
-  constructor(work) {
+  /** @param {(...given: any[]) => Promise<void>} work @param {(error: unknown) => void} settled is told what went wrong, or null */
+  constructor(work, settled) {
     this.work = work;
+    this.settled = settled;
     this.busy = false;
     /** @type {any[] | null} */
     this.next = null;
@@ -87,14 +93,16 @@ export class Latest {
     this.next = given;
     if (this.busy) return;
     this.busy = true;
-    try {
-      while (this.next) {
-        const now = this.next;
-        this.next = null;
+    while (this.next) {
+      const now = this.next;
+      this.next = null;
+      try {
         await this.work(...now);
+        this.settled(null);
+      } catch (error) {
+        this.settled(error);
       }
-    } finally {
-      this.busy = false;
     }
+    this.busy = false;
   }
 }

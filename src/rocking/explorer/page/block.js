@@ -25,7 +25,7 @@ export class View {
     this.pace = 1;
     /** @type {any} */
     this.lines = null;
-    this.fetch = new Latest((from, to) => this.bring(from, to));
+    this.fetch = new Latest((from, to) => this.bring(from, to), (error) => { if (error) this.stop(); page.problem(error, "view-block"); });
     one("play").addEventListener("click", () => this.toggle());
     this.scrubber.addEventListener("input", () => this.seek(this.left() + (Number(this.scrubber.value) / 10000) * (this.right() - this.left())));
     one("to-uplift").addEventListener("click", () => this.jump("uplift"));
@@ -101,9 +101,9 @@ export class View {
   /** Pace at which the interval between impacts can be seen. @param {number} chosen */
   slowed(chosen) {
     if (!/** @type {HTMLInputElement} */ (one("slow")).checked) return chosen;
-    const {impact_time: struck, interval} = this.page.shown.arrays;
-    let low = 0, high = struck.length;
-    while (low < high) { const middle = (low + high) >> 1; if (struck[middle] <= this.time) low = middle + 1; else high = middle; }
+    const {impact_time: impacts, interval} = this.page.shown.arrays;
+    let low = 0, high = impacts.length;
+    while (low < high) { const middle = (low + high) >> 1; if (impacts[middle] <= this.time) low = middle + 1; else high = middle; }
     const now = interval[low - 1];
     return Number.isFinite(now) && now > 0 ? Math.max(Math.min(chosen, now / SEEN), chosen / SLOWEST) : chosen;
   }
@@ -134,14 +134,9 @@ export class View {
   async bring(from, to) {
     if (!(to > from)) return;
     const texts = {...this.page.state.texts, from: String(from), to: String(to), ground: "1", points: "1200"};
-    try {
-      const {header, arrays} = await payload("/api/window", texts);
-      this.lines = {...header.window, ...arrays};
-      if (!this.playing) this.paint();
-    } catch (error) {
-      this.stop();
-      this.page.problem(String(error instanceof Error ? error.message : error));
-    }
+    const {header, arrays} = await payload("/api/window", texts);
+    this.lines = {...header.window, ...arrays};
+    if (!this.playing) this.paint();
   }
 
   /** Draw the block, its ground and what is behind it. */
@@ -183,7 +178,7 @@ export class View {
     const behind = scale * moved - shift;
     const middle = width / 2 + shift;
     this.background(pen, width, floor, scale, behind);
-    this.earth(pen, width, height, floor, middle, scale);
+    this.earth(pen, width, height, floor, middle);
     pen.save();
     const pivot = drawn >= 0 ? right : -left;
     pen.translate(middle + scale * pivot, floor);
@@ -236,8 +231,8 @@ export class View {
     pen.fillText(`grid ${short(step)} m`, width - 10, floor - 8);
   }
 
-  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {number} floor @param {number} middle @param {number} scale */
-  earth(pen, width, height, floor, middle, scale) {
+  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {number} floor @param {number} middle */
+  earth(pen, width, height, floor, middle) {
     pen.fillStyle = colour("rest");
     pen.fillRect(0, floor, width, height - floor);
     pen.strokeStyle = colour("earth");
@@ -248,7 +243,6 @@ export class View {
     const pitch = 16;
     for (let x = (((middle % pitch) + pitch) % pitch) - pitch; x < width + pitch; x += pitch) { pen.moveTo(x + 8, floor + 2); pen.lineTo(x - 2, floor + 14); }
     pen.stroke();
-    void scale;
   }
 
   /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} theta @param {number} ground @param {number} moved */

@@ -24,7 +24,7 @@ export class ChatteringPanel {
       const before = shown.arrays.uplift.filter((each) => each <= start);
       return {uplift: before.length ? before[before.length - 1] : 0, start, end, lower, upper, impacts};
     });
-    if (this.key !== JSON.stringify(texts)) this.choose(this.longest());
+    if (this.key !== JSON.stringify(texts)) this.chosen = this.longest();
     this.key = JSON.stringify(texts);
     this.chosen = Math.min(this.chosen, Math.max(0, this.sequences.length - 1));
     this.list();
@@ -53,14 +53,9 @@ export class ChatteringPanel {
     }
     fill(table, ["", "Uplift, s", "Complete from, s", "At rest, s", "Known to", "Impacts"], this.sequences.map((each, k) => {
       const proven = Number.isFinite(each.upper);
-      const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.choose(k); this.list(); this.plot(); this.near(each); }}}, [`Show ${k + 1}`]);
+      const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; this.list(); this.plot(); this.near(each); }}}, [`Show ${k + 1}`]);
       return [button, each.uplift.toFixed(3), proven ? each.start.toFixed(4) : "not proven", each.end.toFixed(9), proven ? `± ${span(0.5 * (each.upper - each.lower))}` : "–", String(this.count(each))];
     }));
-  }
-
-  /** @param {number} k */
-  choose(k) {
-    this.chosen = k;
   }
 
   /** @param {any} sequence */
@@ -107,9 +102,9 @@ export class ChatteringPanel {
     this.label = new B.Label({x: 8, y: 0, x_units: "screen", y_units: "data", text_font_size: "12px", y_offset: 4});
     this.ratios.add_layout(this.label);
     themed(() => { if (this.label) this.label.text_color = colour("accent"); });
-    const grid = B.Plotting.gridplot([[this.intervals, this.ratios]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false});
     const narrow = window.matchMedia("(max-width: 700px)").matches;
-    B.Plotting.show(narrow ? B.Plotting.gridplot([[this.intervals], [this.ratios]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false}) : grid, one("ratios"));
+    const rows = narrow ? [[this.intervals], [this.ratios]] : [[this.intervals, this.ratios]];
+    B.Plotting.show(B.Plotting.gridplot(rows, {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false}), one("ratios"));
     this.made = true;
   }
 
@@ -145,8 +140,7 @@ export class ChatteringPanel {
   /** All numbers, once somebody wants to read them. @param {Record<string, string>} texts */
   async words(texts) {
     if (!/** @type {HTMLDetailsElement} */ (one("in-words")).open) return;
-    const rows = await json("/api/words", texts);
-    fill(/** @type {HTMLTableElement} */ (one("words")), ["", ""], rows);
-    one("words").querySelector("thead")?.remove();
+    const rows = await json("/api/summary", texts);
+    fill(/** @type {HTMLTableElement} */ (one("words")), [], rows);
   }
 }

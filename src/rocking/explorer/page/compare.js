@@ -1,11 +1,13 @@
 // Two responses over each other: another end of chattering, another block, another motion.
 
 import {Latest, json, payload} from "./api.js";
+import {ends} from "./address.js";
 import {BlockForm, MotionForm, TreatmentForm} from "./forms.js";
 import {Histories} from "./histories.js";
-import {fill, make, one, short} from "./words.js";
+import {namesOf, parameter, specification} from "./parameters.js";
+import {counted, fill, legend, make, one, short} from "./words.js";
 
-const FIRST = /** @type {Record<string, Record<string, string>>} */ ({treatment: {chattering: "velocity=0.05"}, block: {}, motion: {}});
+/** @typedef {import("./api.js").Texts} Texts */
 
 export class View {
   /** @param {any} page */
@@ -16,7 +18,7 @@ export class View {
     this.with.addEventListener("change", () => { page.state.compare = this.with.value; page.state.other = {}; this.form(); this.update(); });
     this.histories = new Histories(one("compare-plots"), {window: (ends) => { page.state.window = ends; this.update(); }});
     this.known = "";
-    this.load = new Latest(() => this.run());
+    this.load = new Latest(() => this.run(), (error) => page.problem(error, "view-compare"));
     this.form();
   }
 
@@ -24,33 +26,22 @@ export class View {
 
   /** The form of what is other. */
   form() {
-    const {state, offers} = this.page;
+    const {state} = this.page;
+    const {texts} = state;
     const element = make("div");
     one("compare-other").replaceChildren(element);
-    const changed = (/** @type {Record<string, string>} */ texts) => { state.other = texts; this.update(); };
-    const {texts} = state;
-    if (this.with.value === "treatment") {
-      if (!state.other.chattering) state.other = {...FIRST.treatment};
-      const form = new TreatmentForm(element, offers, changed, {prefix: "other-", label: "Chattering of the other ends by"});
-      form.show(state.other);
-    } else if (this.with.value === "block") {
-      if (!Object.keys(state.other).length) state.other = this.larger(texts);
-      this.block = new BlockForm(element, offers, changed, "other-");
-      this.block.show(state.other);
-    } else {
-      if (!Object.keys(state.other).length) state.other = {motion: offers.records.find((/** @type {any} */ each) => each.name !== texts.motion).name, pga: texts.pga ?? "0.4g"};
-      new MotionForm(element, offers, changed, "other-").show(state.other);
-    }
+    const changed = (/** @type {Texts} */ other) => { state.other = other; this.update(); };
+    /** @type {Record<string, () => [any, Texts]>} the form of each kind, and the texts with which it starts */
+    const kinds = {
+      treatment: () => [new TreatmentForm(element, changed, {prefix: "other-", label: "Chattering of the other ends by"}), {chattering: "velocity=0.05"}],
+      block: () => [new BlockForm(element, changed, "other-"), larger(texts)],
+      motion: () => [new MotionForm(element, changed, "other-"), {motion: specification.records.find((/** @type {any} */ each) => each.name !== texts.motion).name, pga: texts.pga ?? "0.4g"}],
+    };
+    const [form, first] = kinds[this.with.value]();
+    if (!Object.keys(state.other).length) state.other = first;
+    form.show(state.other);
+    this.block = form instanceof BlockForm ? form : null;
     one("schemes-part").hidden = this.with.value !== "treatment";
-  }
-
-  /** The same shape, half as large again. @param {Record<string, string>} texts */
-  larger(texts) {
-    const resized = (/** @type {string} */ text, /** @type {number} */ factor) =>
-      text.split(",").map((each) => String(Number((factor * parseFloat(each)).toPrecision(12))) + each.replace(/^[\s\d.eE+-]+/, "")).join(",");
-    const LENGTHS = ["width", "height", "offset", "pivots", "height_of_mass", "gyration"];
-    const kept = [...LENGTHS, "p", "alpha", "restitution"].filter((name) => texts[name]);
-    return Object.fromEntries(kept.map((name) => [name, LENGTHS.includes(name) ? resized(texts[name], 1.5) : name === "p" ? resized(texts[name], 0.8) : texts[name]]));
   }
 
   update() {
@@ -60,17 +51,11 @@ export class View {
 
   async run() {
     const {state} = this.page;
-    const ends = state.window ? {from: String(state.window[0]), to: String(state.window[1])} : {};
-    const other = Object.fromEntries(Object.entries(state.other).map(([name, value]) => [`other.${name}`, String(value)]));
-    try {
-      const {header, arrays} = await payload("/api/compare", {...state.texts, ...other, ...ends});
-      this.draw(header, arrays);
-      this.page.problem(null);
-      document.body.dataset.compared = String(Number(document.body.dataset.compared ?? 0) + 1);
-      if (this.with.value === "treatment") await this.schemes();
-    } catch (error) {
-      this.page.problem(error instanceof Error ? error.message : String(error));
-    }
+    const other = Object.fromEntries(Object.entries(state.other).map(([name, value]) => [`other.${name}`, value]));
+    const {header, arrays} = await payload("/api/compare", {...state.texts, ...other, ...ends(state)});
+    this.draw(header, arrays);
+    counted("compared");
+    if (this.with.value === "treatment") await this.schemes();
   }
 
   /** @param {any} [header] @param {any} [arrays] */
@@ -78,27 +63,16 @@ export class View {
     if (!header) return;
     const [one_, other] = header.cases;
     const none = new Float64Array(0);
-    const lines = (/** @type {string} */ name) => Object.fromEntries(["time", "rotation", "ground_time", "ground_g", "impact"].map((key) => [key, arrays[`${name}_${key}`] ?? none]));
-    const first = {lines: lines("first"), rest: arrays.first_rest, uplift: none, sides: one_.block.sides};
-    const weight = arrays.first_weight;
-    if (weight) first.lines.weight = weight;
-    const second = {lines: lines("second"), rest: arrays.second_rest, uplift: none, sides: other.block.sides};
+    const [first, second] = ["first", "second"].map((name, k) => {
+      const lines = /** @type {any} */ (Object.fromEntries(["time", "rotation", "ground_time", "ground_g", "impact"].map((key) => [key, arrays[`${name}_${key}`] ?? none])));
+      return {lines, rest: arrays[`${name}_rest`], uplift: none, block: header.cases[k].block};
+    });
+    first.lines.weight = arrays.first_weight;
     if (this.with.value !== "motion") second.lines.ground_time = second.lines.ground_g = none;
-    this.histories.draw([header.window.from, header.window.to], header.duration, /** @type {any} */ (first), /** @type {any} */ (second), one_.block.thresholds_g);
+    this.histories.draw(header, first, second);
     this.block?.show(this.page.state.other, other.block.sides);
-    one("compare-verdict").textContent = `The other${this.with.value === "treatment" ? ` (${other.treatment})` : ""}: ${this.lower(other.verdict)} ${this.difference(one_, other)}`;
-    const legend = [["line", "this case"], ["second", "the other"], ["rest", "this case at rest"], ["impact", "impacts: below, this case; above, the other"]];
-    one("compare-legend").replaceChildren(...legend.map(([name, text]) => make("span", {}, [make("i", {className: `key ${name}`}), text])));
-  }
-
-  /** @param {string} sentence */
-  lower(sentence) { return sentence.charAt(0).toLowerCase() + sentence.slice(1); }
-
-  /** @param {any} first @param {any} second */
-  difference(first, second) {
-    if (first.overturned !== second.overturned) return "";
-    if (first.overturned) return "";
-    return `Peak ${short(second.peak_over_slenderness)} α against ${short(first.peak_over_slenderness)} α.`;
+    one("compare-verdict").textContent = `The other${this.with.value === "treatment" ? ` (${other.treatment})` : ""}: ${other.verdict} ${difference(one_, other)}`;
+    legend("compare-legend", [["line", "this case"], ["second", "the other"], ["rest", "this case at rest"], ["impact", "impacts: below, this case; above, the other"]]);
   }
 
   async schemes() {
@@ -112,4 +86,18 @@ export class View {
       return [button, row.label, `${sign}${row.verdict}${row.error ? ` (worst error of a rest ${short(row.error)} s)` : ""}`];
     }));
   }
+}
+
+/** The same shape, half as large again. @param {Texts} texts @returns {Texts} */
+function larger(texts) {
+  const factors = /** @type {Record<string, number>} */ ({m: 1.5, "rad/s": 0.8});
+  const resized = (/** @type {string} */ text, factor = 1) =>
+    (factor === 1 ? text : text.split(",").map((each) => String(Number((factor * parseFloat(each)).toPrecision(12))) + each.replace(/^[\s\d.eE+-]+/, "")).join(","));
+  return Object.fromEntries(namesOf("block").filter((name) => texts[name]).map((name) => [name, resized(texts[name], factors[parameter(name).unit])]));
+}
+
+/** @param {any} first @param {any} second */
+function difference(first, second) {
+  if (first.overturned || second.overturned) return "";
+  return `Its peak is ${short(second.peak_over_slenderness)} α, that of this case ${short(first.peak_over_slenderness)} α.`;
 }

@@ -1,220 +1,275 @@
 // Forms that change the texts of a case: its block, its motion, its model.
 
 import {json} from "./api.js";
-import {NumberControl} from "./controls.js";
-import {make, one, sent, what} from "./words.js";
+import {namesOf, parameter, specification} from "./parameters.js";
+import {make, one, sent, explained} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {(texts: Texts, gone: string[]) => void} Changed */
+/** @typedef {import("./parameters.js").Parameter} Parameter */
+/** @typedef {(texts: Texts, replaced: string[]) => void} Changed the new texts, and all names that they replace */
+/** @typedef {{tell: () => void}} Form */
 
-/** @param {string} id @param {string} label @param {[string, string][]} options @param {(value: string) => void} changed */
-function choice(id, label, options, changed) {
-  const select = /** @type {HTMLSelectElement} */ (make("select", {id, on: {change: () => changed(select.value)}},
-    options.map(([value, text]) => make("option", {value}, [text]))));
-  return {select, element: make("div", {className: "choice"}, [make("label", {className: "field", for: id}, [label]), select])};
+const STEPS = 1000;
+const G = 9.80665;
+const BLOCK = namesOf("block"), MOTION = namesOf("motion", "start");
+
+/** A number with a slider, a field, its unit and its explanation. */
+class NumberControl {
+  /** @param {Parameter} spec @param {Form} form is told when the number changes @param {string} [prefix] */
+  constructor(spec, form, prefix = "") {
+    this.spec = spec;
+    this.form = form;
+    const id = `${prefix}${spec.name}`;
+    this.slider = /** @type {HTMLInputElement} */ (make("input", {
+      type: "range", id: `${id}-slider`, min: "0", max: String(STEPS), step: "1", "aria-label": `${spec.label}, slider`, on: {input: () => this.slid()},
+    }));
+    this.field = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, inputMode: "decimal", size: 6, "data-argument": spec.name, on: {change: () => this.typed()}}));
+    const [button, words] = spec.explanation ? explained(spec.explanation, spec.label) : [];
+    this.element = make("div", {className: "number"}, [
+      make("div", {className: "number-head"}, [make("label", {for: id}, [spec.label]), ...(button ? [button] : [])]),
+      make("div", {className: "number-body"}, [this.slider, this.field, make("span", {className: "unit"}, [spec.unit])]),
+      ...(words ? [words] : []),
+    ]);
+    this.text = "";
+    this.show(spec.default);
+  }
+
+  /** Value in the control's unit of a text in any unit. @param {string} text */
+  value(text) {
+    const number = parseFloat(text);
+    const plain = text.trim() !== "" && !Number.isNaN(Number(text));
+    if (this.spec.suffix === "deg" && (plain || text.endsWith("rad"))) return (number * 180) / Math.PI;
+    if (this.spec.suffix === "g" && (plain || /m\/s/.test(text))) return number / G;
+    return number;
+  }
+
+  /** Show a text without telling anybody. @param {string} text */
+  show(text) {
+    this.text = text;
+    const value = this.value(text);
+    if (!Number.isFinite(value)) return;
+    const {low, high, logarithmic} = this.spec;
+    const part = logarithmic ? Math.log(Math.max(value, 1e-300) / low) / Math.log(high / low) : (value - low) / (high - low);
+    this.slider.value = String(Math.round(STEPS * Math.min(1, Math.max(0, part))));
+    this.field.value = sent(value);
+    this.slider.setAttribute("aria-valuetext", `${this.field.value} ${this.spec.unit}`.trim());
+  }
+
+  slid() {
+    const part = Number(this.slider.value) / STEPS;
+    const {low, high, logarithmic, suffix, unit} = this.spec;
+    const number = String(Number((logarithmic ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3)));
+    this.text = number + suffix;
+    this.field.value = number;
+    this.slider.setAttribute("aria-valuetext", `${number} ${unit}`.trim());
+    this.form.tell();
+  }
+
+  typed() {
+    const given = this.field.value.trim().replace("−", "-").replace(",", ".");
+    this.show(given !== "" && !Number.isNaN(Number(given)) ? given + this.spec.suffix : given);
+    this.form.tell();
+  }
 }
 
-/** @param {string} id @param {string} label @param {(on: boolean) => void} changed */
+/** @param {string} prefix @param {string} name @param {string} label @param {string[][]} options values and labels @param {(value: string) => void} changed */
+function choice(prefix, name, label, options, changed) {
+  const id = prefix + name;
+  const select = /** @type {HTMLSelectElement} */ (make("select", {id, "data-argument": name, on: {change: () => changed(select.value)}}));
+  const element = make("div", {className: "choice"}, [make("label", {className: "field", for: id}, [label]), select]);
+  offer(select, options);
+  return {select, element};
+}
+
+/** @param {HTMLSelectElement} select @param {string[][]} options values and labels */
+const offer = (select, options) => select.replaceChildren(...options.map(([value, text]) => make("option", {value}, [text])));
+
+/** @param {string} id @param {string} label @param {() => void} changed */
 function check(id, label, changed) {
-  const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", id, on: {change: () => changed(box.checked)}}));
+  const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", id, on: {change: changed}}));
   return {box, element: make("label", {className: "check"}, [box, ` ${label}`])};
 }
 
-/** Halves of a text that may have a comma. @param {string | undefined} text */
-const sides = (text) => {
-  const parts = (text ?? "").split(",");
-  return [parts[0], parts[1] ?? parts[0]];
-};
+/** @param {number} angle rad */
+const degrees = (angle) => (angle * 180) / Math.PI;
 
 export class BlockForm {
-  /** @param {HTMLElement} element @param {any} offers @param {Changed} changed @param {string} [prefix] */
-  constructor(element, offers, changed, prefix = "") {
+  /** @param {HTMLElement} element @param {Changed} changed @param {string} [prefix] */
+  constructor(element, changed, prefix = "") {
     this.changed = changed;
     /** @type {Texts} */
     this.texts = {};
-    /** @param {string} name @param {number} side */
-    const control = (name, side) => {
-      const spec = offers.block.find((/** @type {any} */ each) => each.name === name);
-      const label = side < 0 ? spec.label : `${spec.label}, ${side ? "left (side −)" : "right (side +)"}`;
-      return new NumberControl({...spec, label, words: side > 0 ? "" : spec.words}, () => this.tell(), `${prefix}${side < 0 ? "" : side}`);
-    };
-    this.shape = choice(`${prefix}shape`, "Given by", [["sizes", "width and height"], ["parameters", "p and α"], ["pivots", "pivots and radius of gyration"]], () => this.reshape());
-    this.sizes = ["width", "height", "offset"].map((name) => control(name, -1));
-    this.plain = ["p", "alpha"].map((name) => control(name, -1));
-    this.pairs = ["p", "alpha", "restitution"].map((name) => [control(name, 0), control(name, 1)]);
-    this.pivots = [control("pivots", 0), control("pivots", 1), control("height_of_mass", -1), control("gyration", -1)];
+    /** @type {any[] | undefined} sides as they are, for what the texts leave out */
+    this.known = undefined;
+    this.shape = choice(prefix, "shape", "Given by", specification.shapes.map((/** @type {any} */ each) => [each.name, each.label]), () => this.reshape());
     this.two = check(`${prefix}two`, "Two different sides", () => this.part());
-    this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => this.tell());
-    this.restitution = control("restitution", -1);
-    element.replaceChildren(
-      this.shape.element, ...this.sizes.map((each) => each.element), this.two.element, ...this.plain.map((each) => each.element),
-      ...this.pairs.slice(0, 2).flat().map((each) => each.element), ...this.pivots.map((each) => each.element), this.housner.element,
-      this.restitution.element, ...this.pairs[2].map((each) => each.element),
-    );
+    this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => { this.reveal(); this.tell(); });
+    this.specs = BLOCK.map(parameter);
+    /** Controls by name: one for both sides, and one for each. @type {Record<string, {both: NumberControl, pair: NumberControl[]}>} */
+    this.controls = Object.fromEntries(this.specs.map((spec) => [spec.name, {
+      both: new NumberControl(spec, this, prefix),
+      pair: spec.values === "one" ? [] : ["right (side +)", "left (side −)"].map((side, k) =>
+        new NumberControl({...spec, label: `${spec.label}, ${side}`, explanation: k ? "" : spec.explanation}, this, `${prefix}${k}`)),
+    }]));
+    const before = /** @type {Record<string, HTMLElement>} */ ({p: this.two.element, restitution: this.housner.element});
+    element.replaceChildren(this.shape.element, ...this.specs.flatMap(({name}) => {
+      const {both, pair} = this.controls[name];
+      return [...(before[name] ? [before[name]] : []), both.element, ...pair.map((each) => each.element)];
+    }));
   }
 
-  /** Show the block of a case. @param {Texts} texts @param {any[]} [known] sides as they are, for what the texts leave out */
+  /** Show the block of a case. @param {Texts} texts @param {any[]} [known] */
   show(texts, known) {
     this.texts = texts;
     this.known = known ?? this.known;
-    const shape = "width" in texts ? "sizes" : "pivots" in texts ? "pivots" : "parameters";
-    this.shape.select.value = shape;
-    this.two.box.checked = shape === "parameters" && ["p", "alpha", "restitution"].some((name) => (texts[name] ?? "").includes(","));
+    const shape = specification.shapes.find((/** @type {any} */ each) => each.needed[0] in texts) ?? specification.shapes[1];
+    this.shape.select.value = shape.name;
+    this.two.box.checked = shape.name === "parameters" && this.specs.some(({name}) => (texts[name] ?? "").includes(","));
     this.housner.box.checked = !("restitution" in texts);
-    for (const each of [...this.sizes, ...this.plain]) each.show(texts[each.spec.name] ? sides(texts[each.spec.name])[0] : each.spec.name === "offset" ? "0" : each.text);
-    for (const pair of this.pairs) pair.forEach((each, k) => { if (texts[each.spec.name]) each.show(sides(texts[each.spec.name])[k]); });
-    this.pivots.forEach((each, k) => { if (texts[each.spec.name]) each.show(sides(texts[each.spec.name])[k === 1 ? 1 : 0]); });
-    if (this.known) {
-      if (!texts.restitution) this.restitution.show(sent(this.known[0].restitution));
-      this.pairs[2].forEach((each, k) => { if (!texts.restitution) each.show(sent(/** @type {any[]} */ (this.known)[k].restitution)); });
+    for (const {name} of this.specs) {
+      const text = texts[name] ?? (name === "offset" ? "0" : "");
+      if (text) this.put(name, text.split(","));
+      else if (name === "restitution" && this.known) this.put(name, this.known.map((side) => sent(side.restitution)));
     }
-    if (texts.restitution) this.restitution.show(sides(texts.restitution)[0]);
     this.reveal();
   }
 
-  /** Whether each side has a restitution of its own. */
-  sided() {
-    const shape = this.shape.select.value;
-    if (shape === "parameters") return this.two.box.checked;
-    return (this.texts.restitution ?? "").includes(",") || (this.known && this.known[0].restitution !== this.known[1].restitution);
+  /** @param {string} name @param {string[]} texts one, or one for each side */
+  put(name, texts) {
+    const {both, pair} = this.controls[name];
+    both.show(texts[0]);
+    pair.forEach((each, k) => each.show(texts[k] ?? texts[0]));
   }
 
+  /** Names of the parameters that describe the block as it is chosen. @returns {string[]} */
+  names() {
+    const {needed, optional} = specification.shapes.find((/** @type {any} */ each) => each.name === this.shape.select.value);
+    return [...needed, ...optional, ...(this.housner.box.checked ? [] : ["restitution"])];
+  }
+
+  /** Whether each side has a value of its own. @param {Parameter} spec */
+  sided({values}) {
+    if (values !== "one or two") return values === "two";
+    if (this.shape.select.value === "parameters") return this.two.box.checked;
+    return (this.texts.restitution ?? "").includes(",") || Boolean(this.known && this.known[0].restitution !== this.known[1].restitution);
+  }
+
+  /** Show the controls that describe the block as it is chosen, and hide the others. */
   reveal() {
-    const shape = this.shape.select.value, two = shape === "parameters" && this.two.box.checked, given = !this.housner.box.checked;
-    this.sizes.forEach((each) => { each.element.hidden = shape !== "sizes"; });
-    this.plain.forEach((each) => { each.element.hidden = shape !== "parameters" || two; });
-    this.pairs.slice(0, 2).flat().forEach((each) => { each.element.hidden = !two; });
-    this.pivots.forEach((each) => { each.element.hidden = shape !== "pivots"; });
-    this.two.element.hidden = shape !== "parameters";
-    this.restitution.element.hidden = this.sided() || !given;
-    this.pairs[2].forEach((each) => { each.element.hidden = !this.sided() || !given; });
+    const names = this.names();
+    for (const spec of this.specs) {
+      const {both, pair} = this.controls[spec.name];
+      const seen = names.includes(spec.name), sided = this.sided(spec);
+      both.element.hidden = !seen || sided;
+      for (const each of pair) each.element.hidden = !seen || !sided;
+    }
+    this.two.element.hidden = this.shape.select.value !== "parameters";
   }
 
   /** From one description to another; the block stays as far as that can describe it. */
   reshape() {
-    const shape = this.shape.select.value;
     if (this.known) {
       const [right, left] = this.known;
-      const distances = this.known.map((/** @type {any} */ side) => side.radius * Math.sin(side.alpha));
-      const height = right.radius * Math.cos(right.alpha);
-      if (shape === "parameters") {
-        this.plain[0].show(sent(right.p));
-        this.plain[1].show(`${sent((right.alpha * 180) / Math.PI)}deg`);
+      const distances = this.known.map((side) => side.radius * Math.sin(side.alpha));
+      const height = right.radius * Math.cos(right.alpha), gravity = Number(this.texts.gravity ?? G);
+      const same = {
+        width: [distances[0] + distances[1]], height: [2 * height], offset: [0.5 * (distances[1] - distances[0])],
+        p: this.known.map((side) => side.p), alpha: this.known.map((side) => degrees(side.alpha)),
+        pivots: distances, height_of_mass: [height], gyration: [Math.sqrt(Math.max((gravity * right.radius) / right.p ** 2 - right.radius ** 2, 0))],
+      };
+      for (const [name, values] of Object.entries(same)) if (this.names().includes(name)) this.put(name, values.map((value) => sent(value) + parameter(name).suffix));
+      if (this.shape.select.value === "parameters") {
         this.two.box.checked = right.p !== left.p || right.alpha !== left.alpha;
-        this.known.forEach((/** @type {any} */ side, /** @type {number} */ k) => {
-          this.pairs[0][k].show(sent(side.p));
-          this.pairs[1][k].show(`${sent((side.alpha * 180) / Math.PI)}deg`);
-          this.pairs[2][k].show(sent(side.restitution));
-        });
+        this.controls.restitution.pair.forEach((each, k) => each.show(sent([right, left][k].restitution)));
         // Rounded p and alpha need not be those of a body.
         if (this.two.box.checked) this.housner.box.checked = false;
-      } else if (shape === "sizes") {
-        this.sizes[0].show(sent(distances[0] + distances[1]));
-        this.sizes[1].show(sent(2 * height));
-        this.sizes[2].show(sent(0.5 * (distances[1] - distances[0])));
-      } else {
-        const gravity = Number(this.texts.gravity ?? 9.80665);
-        distances.forEach((/** @type {number} */ each, /** @type {number} */ k) => this.pivots[k].show(sent(each)));
-        this.pivots[2].show(sent(height));
-        this.pivots[3].show(sent(Math.sqrt(Math.max((gravity * right.radius) / right.p ** 2 - right.radius ** 2, 0))));
       }
     }
+    this.reveal();
     this.tell();
   }
 
   /** Between one set of parameters and a pair of each. */
   part() {
-    if (this.two.box.checked) {
-      this.plain.forEach((each, k) => this.pairs[k].forEach((side) => side.show(each.text)));
-      this.pairs[2].forEach((side) => side.show(this.restitution.text));
-      this.housner.box.checked = false;
-    } else {
-      this.plain.forEach((each, k) => each.show(this.pairs[k][0].text));
-      this.restitution.show(this.pairs[2][0].text);
+    for (const {both, pair} of Object.values(this.controls)) {
+      if (this.two.box.checked) for (const side of pair) side.show(both.text);
+      else if (pair.length) both.show(pair[0].text);
     }
+    if (this.two.box.checked) this.housner.box.checked = false;
+    this.reveal();
     this.tell();
   }
 
   tell() {
-    const shape = this.shape.select.value, two = shape === "parameters" && this.two.box.checked;
-    /** @type {Texts} */
-    const texts = {};
-    if (shape === "sizes") {
-      for (const each of this.sizes) texts[each.spec.name] = each.text;
-      if (Number(texts.offset) === 0) delete texts.offset;
-    } else if (shape === "pivots") {
-      texts.pivots = `${this.pivots[0].text},${this.pivots[1].text}`;
-      texts.height_of_mass = this.pivots[2].text;
-      texts.gyration = this.pivots[3].text;
-    } else if (two) for (const [plus, minus] of this.pairs.slice(0, 2)) texts[plus.spec.name] = `${plus.text},${minus.text}`;
-    else for (const each of this.plain) texts[each.spec.name] = each.text;
-    if (!this.housner.box.checked) texts.restitution = this.sided() ? `${this.pairs[2][0].text},${this.pairs[2][1].text}` : this.restitution.text;
-    this.reveal();
-    this.changed(texts, ["width", "height", "offset", "p", "alpha", "pivots", "height_of_mass", "gyration", "restitution"]);
+    const texts = Object.fromEntries(this.names().map((name) => {
+      const {both, pair} = this.controls[name];
+      return [name, this.sided(both.spec) ? pair.map((each) => each.text).join(",") : both.text];
+    }));
+    if (Number(texts.offset) === 0) delete texts.offset;
+    this.changed(texts, BLOCK);
   }
 }
 
-const KINDS = /** @type {[string, string][]} */ ([
+const KINDS = [
   ["record", "a shipped record"], ["pulse", "a pulse"], ["file", "a file of yours"], ["given", "the motion of the notebook"],
   ["none", "nothing: released from a rotation"],
-]);
-const SCALES = /** @type {[string, string][]} */ ([
-  ["", "as it is"], ["pga", "to a peak acceleration (PGA)"], ["pgv", "to a peak velocity (PGV)"],
-  ["sa", "to a spectral acceleration (Sa)"], ["scale", "by a factor"],
-]);
+];
 
 export class MotionForm {
-  /** @param {HTMLElement} element @param {any} offers @param {Changed} changed @param {string} [prefix] */
-  constructor(element, offers, changed, prefix = "") {
-    this.offers = offers;
+  /** @param {HTMLElement} element @param {Changed} changed @param {string} [prefix] */
+  constructor(element, changed, prefix = "") {
     this.changed = changed;
     this.prefix = prefix;
-    /** @type {any} */
+    /** @type {any} the file that shakes the block */
     this.file = null;
-    /** @type {any[]} */
+    /** @type {any[]} all files that are known */
     this.files = [];
     this.given = "";
-    this.wanted = "";
-    this.kind = choice(`${prefix}kind`, "Shaken by", KINDS, () => this.another());
-    this.record = choice(`${prefix}record`, "Record", offers.records.map((/** @type {any} */ each) => [each.name, each.name]), () => this.another());
+    this.upwards = "";
+    const tell = () => this.tell(), revealed = () => { this.reveal(); this.tell(); };
+    const another = () => { this.upwards = ""; revealed(); };
+    /** @param {string} name */
+    const field = (name) => parameter(name).label;
+    this.kind = choice(prefix, "kind", "Shaken by", KINDS, another);
+    this.record = choice(prefix, "record", field("motion"), specification.records.map((/** @type {any} */ each) => [each.name, each.name]), another);
     this.about = make("p", {className: "derived"});
-    this.pulse = choice(`${prefix}pulse`, "Pulse", Object.entries(offers.pulses).map(([name, each]) => [name, /** @type {any} */ (each).label]), (name) => { this.furnish(name); this.tell(); });
+    this.pulse = choice(prefix, "pulse", "Pulse", Object.entries(specification.pulses).map(([name, each]) => [name, each.label]), (name) => { this.furnish(name); revealed(); });
     this.numbers = make("div");
-    this.told = {
-      channel: choice(`${prefix}channel`, "Channel", [], () => this.tell()),
-      units: choice(`${prefix}units`, "Units of the numbers", offers.units.map((/** @type {string} */ each) => [each, each]), () => this.tell()),
-    };
-    this.dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, value: "0.01", on: {change: () => this.tell()}}));
-    this.dtElement = make("div", {className: "choice"}, [make("label", {className: "field", for: `${prefix}dt`}, ["Sampling step, s"]), this.dt]);
-    this.vertical = choice(`${prefix}vertical`, "Vertical component", [["", "none"]], (value) => { this.wanted = value; this.tell(); });
-    this.start = offers.start.map((/** @type {any} */ spec) => new NumberControl(spec, () => this.tell(), prefix));
-    this.scale = choice(`${prefix}scaled`, "Scaled", SCALES, () => this.tell());
-    this.scales = offers.scales.map((/** @type {any} */ spec) => new NumberControl(spec, () => this.tell(), prefix));
-    this.period = new NumberControl(offers.period, () => this.tell(), prefix);
+    this.channel = choice(prefix, "channel", field("channel"), [], revealed);
+    this.vertical = choice(prefix, "vertical", field("vertical"), [["", "none"]], (value) => { this.upwards = value; revealed(); });
+    this.units = choice(prefix, "units", field("units"), specification.units.map((/** @type {string} */ each) => [each, each]), tell);
+    const {label, unit, default: step} = parameter("dt");
+    const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, value: step, "data-argument": "dt", on: {change: tell}}));
+    this.dt = {field: dt, element: make("div", {className: "choice"}, [make("label", {className: "field", for: dt.id}, [`${label}, ${unit}`]), dt])};
+    this.start = new NumberControl(parameter("initial_rotation"), this, prefix);
+    this.scale = choice(prefix, "scaled", "Scaled", specification.scalings, revealed);
+    /** @type {NumberControl[]} */
+    this.scales = specification.scalings.slice(1).map((/** @type {string[]} */ [name]) => new NumberControl(parameter(name), this, prefix));
+    this.period = new NumberControl(specification.period, this, prefix);
     element.replaceChildren(
-      this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.told.channel.element, this.vertical.element, this.told.units.element,
-      this.dtElement, ...this.start.map((/** @type {NumberControl} */ each) => each.element), this.scale.element,
-      ...this.scales.map((/** @type {NumberControl} */ each) => each.element), this.period.element,
+      this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.channel.element, this.vertical.element, this.units.element,
+      this.dt.element, this.start.element, this.scale.element, ...this.scales.map((each) => each.element), this.period.element,
     );
     this.furnish("sine");
   }
 
   /** Numbers and choices of a pulse. @param {string} name */
   furnish(name) {
-    const {numbers, choices} = this.offers.pulses[name];
+    const {parameters, choices} = specification.pulses[name];
     this.family = name;
-    this.controls = numbers.map((/** @type {any} */ spec) => new NumberControl(spec, () => this.tell(), `${this.prefix}pulse-`));
+    /** @type {NumberControl[]} */
+    this.controls = parameters.map((/** @type {Parameter} */ spec) => new NumberControl(spec, this, `${this.prefix}pulse-`));
     this.choices = Object.entries(choices ?? {}).map(([each, values]) => ({
-      name: each, ...choice(`${this.prefix}pulse-${each}`, "Kind", /** @type {string[]} */ (values).map((value) => [value, value]), () => this.tell()),
+      name: each, ...choice(`${this.prefix}pulse-`, each, "Kind", values.map((/** @type {string} */ value) => [value, value]), () => this.tell()),
     }));
-    this.numbers.replaceChildren(...this.controls.map((/** @type {NumberControl} */ each) => each.element), ...this.choices.map((each) => each.element));
+    this.numbers.replaceChildren(...[...this.controls, ...this.choices].map((each) => each.element));
   }
 
   /** @param {Texts} texts */
   show(texts) {
-    const motion = texts.motion ?? this.offers.default.motion;
+    const motion = texts.motion ?? specification.default.motion;
     const family = motion.split(":")[0];
-    const kind = family in this.offers.pulses ? "pulse" : ["none", "file", "given"].includes(family) ? family : "record";
+    const kind = family in specification.pulses ? "pulse" : ["none", "file", "given"].includes(family) ? family : "record";
     this.kind.select.value = kind;
     if (kind === "record") this.record.select.value = motion;
     if (kind === "given") this.given = motion;
@@ -222,18 +277,15 @@ export class MotionForm {
       this.pulse.select.value = family;
       if (this.family !== family) this.furnish(family);
       const parts = Object.fromEntries(motion.slice(family.length + 1).split(",").map((part) => part.split("=")));
-      for (const each of this.controls) if (parts[each.spec.name]) each.show(parts[each.spec.name]);
+      for (const each of this.controls ?? []) if (parts[each.spec.name]) each.show(parts[each.spec.name]);
       for (const each of this.choices ?? []) each.select.value = parts[each.name] ?? each.select.value;
     }
-    const scaled = SCALES.map(([name]) => name).find((name) => name && texts[name]) ?? "";
-    this.scale.select.value = scaled;
-    for (const each of this.scales) if (texts[each.spec.name]) each.show(texts[each.spec.name].split("@")[0]);
+    this.scale.select.value = this.scales.find(({spec}) => texts[spec.name])?.spec.name ?? "";
+    for (const each of [this.start, ...this.scales]) if (texts[each.spec.name]) each.show(texts[each.spec.name].split("@")[0]);
     if (texts.sa) this.period.show(texts.sa.split("@")[1] ?? "1");
-    for (const each of this.start) if (texts[each.spec.name]) each.show(texts[each.spec.name]);
-    if (texts.channel) this.told.channel.select.value = texts.channel;
-    this.wanted = texts.vertical ?? "";
-    if (texts.units) this.told.units.select.value = texts.units;
-    if (texts.dt) this.dt.value = texts.dt;
+    this.upwards = texts.vertical ?? "";
+    if (texts.units) this.units.select.value = texts.units;
+    if (texts.dt) this.dt.field.value = texts.dt;
     this.reveal();
     void this.recall(texts);
   }
@@ -246,140 +298,122 @@ export class MotionForm {
       try { this.files.push(await json(`/api/records/${key}`, {})); } catch { return; }
     }
     const known = this.files.find((file) => file.key === moving);
-    if (known && known !== this.file) {
-      this.file = known;
-      this.offerChannels(known);
-      if (texts.channel) this.told.channel.select.value = texts.channel;
-    }
+    if (known && known !== this.file) this.use(known);
+    if (known && texts.channel) this.channel.select.value = texts.channel;
     if (moving || upwards) this.reveal();
   }
 
-  /** @param {any} file */
-  offerChannels(file) {
-    this.told.channel.select.replaceChildren(...file.channels.map((/** @type {any} */ each) => make("option", {value: String(each.number)}, [`${each.number}: ${each.name}`])));
+  /** Let a file shake the block. @param {any} file */
+  use(file) {
+    this.file = file;
+    offer(this.channel.select, file.channels.map((/** @type {any} */ each) => [String(each.number), `${each.number}: ${each.name}`]));
   }
 
-  /** A file that the server keeps: what shakes the block, or moves it up and down as well. @param {any} file @param {boolean} [upwards] */
+  /** Take a file that the server keeps: it shakes the block, or moves it up and down as well. @param {any} file @param {boolean} [upwards] */
   take(file, upwards = false) {
     this.files = [...this.files.filter((each) => each.key !== file.key), file];
-    if (upwards) {
-      this.wanted = file.channels.length > 1 ? `file:${file.key}#${file.channels.at(-1).number}` : `file:${file.key}`;
-      this.offerVertical();
-      this.tell();
-      return;
+    if (upwards) this.upwards = file.channels.length > 1 ? `file:${file.key}#${file.channels.at(-1).number}` : `file:${file.key}`;
+    else {
+      this.use(file);
+      this.upwards = "";
+      this.kind.select.value = "file";
+      this.scale.select.value = "";
     }
-    this.file = file;
-    this.wanted = "";
-    this.offerChannels(file);
-    this.kind.select.value = "file";
-    this.scale.select.value = "";
+    this.reveal();
     this.tell();
   }
 
   /** What may move the block up and down: other channels of the file, shipped records, other files. */
   offerVertical() {
     const kind = this.kind.select.value;
-    const shaking = kind === "record" ? this.record.select.value : "";
-    /** @type {[string, string][]} */
+    const used = kind === "file" ? this.file : null;
+    /** @type {string[][]} */
     const found = [];
-    if (kind === "file" && this.file) {
-      for (const each of this.file.channels) {
-        if (String(each.number) !== this.told.channel.select.value) found.push([String(each.number), `channel ${each.number}: ${each.name}`]);
-      }
-    }
-    for (const file of this.files) {
-      if (file.key === this.file?.key && kind === "file") continue;
+    for (const {number, name} of used?.channels ?? []) if (String(number) !== this.channel.select.value) found.push([String(number), `channel ${number}: ${name}`]);
+    for (const file of this.files.filter((each) => each.key !== used?.key)) {
       if (file.channels.length < 2) found.push([`file:${file.key}`, file.name]);
-      else for (const each of file.channels) found.push([`file:${file.key}#${each.number}`, `${file.name}, channel ${each.number}: ${each.name}`]);
+      else for (const {number, name} of file.channels) found.push([`file:${file.key}#${number}`, `${file.name}, channel ${number}: ${name}`]);
     }
-    const station = (/** @type {string} */ name) => name.slice(0, name.lastIndexOf("-"));
-    const upwards = this.offers.records.filter((/** @type {any} */ each) => each.direction === "up").map((/** @type {any} */ each) => each.name);
-    upwards.sort((/** @type {string} */ before, /** @type {string} */ after) => Number(station(after) === station(shaking)) - Number(station(before) === station(shaking)));
-    found.push(...upwards.map((/** @type {string} */ name) => [name, name]));
-    if (this.wanted && !found.some(([value]) => value === this.wanted)) found.push([this.wanted, this.wanted]);
+    /** Those of the same station first. @param {string} name */
+    const station = (name) => name.slice(0, name.lastIndexOf("-"));
+    const shaking = kind === "record" ? station(this.record.select.value) : "";
+    const records = specification.records.filter((/** @type {any} */ each) => each.direction === "up").map((/** @type {any} */ each) => each.name);
+    for (const same of [true, false]) found.push(...records.filter((/** @type {string} */ name) => (station(name) === shaking) === same).map((/** @type {string} */ name) => [name, name]));
+    if (this.upwards && !found.some(([value]) => value === this.upwards)) found.push([this.upwards, this.upwards]);
     const {select, element} = this.vertical;
     element.hidden = kind !== "record" && kind !== "file";
     if (!this.prefix) one("choose-vertical").hidden = element.hidden;
-    select.replaceChildren(...[["", "none"], ...found].map(([value, text]) => make("option", {value}, [text])));
-    select.value = this.wanted;
+    offer(select, [["", "none"], ...found]);
+    select.value = this.upwards;
   }
 
+  /** Show the fields that belong to the motion as it is chosen, and hide the others. */
   reveal() {
-    const kind = this.kind.select.value;
-    const options = [...this.kind.select.options];
-    for (const option of options) option.hidden = (option.value === "given" && !this.given) || (option.value === "file" && !this.file && kind !== "file");
+    const kind = this.kind.select.value, scaled = this.scale.select.value, scalable = kind !== "none" && kind !== "pulse";
+    for (const option of this.kind.select.options) option.hidden = (option.value === "given" && !this.given) || (option.value === "file" && !this.file && kind !== "file");
     this.record.element.hidden = kind !== "record";
     this.pulse.element.hidden = this.numbers.hidden = kind !== "pulse";
     this.offerVertical();
     const file = kind === "file" ? this.file : null;
-    this.told.channel.element.hidden = !file || file.channels.length < 2;
-    this.told.units.element.hidden = !this.needs("units");
-    this.dtElement.hidden = !this.needs("dt");
-    for (const each of this.start) each.element.hidden = kind !== "none";
-    this.scale.element.hidden = kind === "none" || kind === "pulse";
-    for (const each of this.scales) each.element.hidden = this.scale.element.hidden || this.scale.select.value !== each.spec.name;
-    this.period.element.hidden = this.scale.element.hidden || this.scale.select.value !== "sa";
-    const record = this.offers.records.find((/** @type {any} */ each) => each.name === this.record.select.value);
-    this.about.textContent = kind === "record" && record ? `${record.event}; ${record.station}, ${record.direction === "up" ? "vertical component, used as a horizontal motion" : `${record.direction}°`}.`
-      : file ? `${file.name}: ${file.format}, since ${file.reason}.` : "";
+    this.channel.element.hidden = !file || file.channels.length < 2;
+    this.units.element.hidden = !this.needs("units");
+    this.dt.element.hidden = !this.needs("dt");
+    this.start.element.hidden = kind !== "none";
+    this.scale.element.hidden = !scalable;
+    for (const each of this.scales) each.element.hidden = !scalable || scaled !== each.spec.name;
+    this.period.element.hidden = !scalable || scaled !== "sa";
+    const record = kind === "record" && specification.records.find((/** @type {any} */ each) => each.name === this.record.select.value);
+    const direction = record && (record.direction === "up" ? "vertical component, used as a horizontal motion" : `${record.direction}°`);
+    this.about.textContent = record ? `${record.event}; ${record.station}, ${direction}.` : file ? `${file.name}: ${file.format}, since ${file.reason}.` : "";
     this.about.hidden = !this.about.textContent;
-  }
-
-  /** Another motion, whose vertical component was not chosen yet. */
-  another() {
-    this.wanted = "";
-    this.tell();
   }
 
   /** Whether a file that is used does not say something itself. @param {string} name */
   needs(name) {
     const kind = this.kind.select.value;
-    const beside = this.files.find((file) => this.wanted.startsWith(`file:${file.key}`));
+    const beside = this.files.find((file) => this.upwards.startsWith(`file:${file.key}`));
     const used = kind === "file" ? [this.file, beside] : kind === "record" ? [beside] : [];
     return used.some((file) => file?.missing.includes(name));
   }
 
   tell() {
-    this.reveal();
-    const kind = this.kind.select.value;
+    const kind = this.kind.select.value, scaled = this.scale.select.value;
     /** @type {Texts} */
     const texts = {};
     if (kind === "record") texts.motion = this.record.select.value;
     else if (kind === "none") {
       texts.motion = "none";
-      for (const each of this.start) texts[each.spec.name] = Number.parseFloat(each.text) === 0 ? "3deg" : each.text;
+      texts.initial_rotation = Number.parseFloat(this.start.text) === 0 ? "3deg" : this.start.text;
     } else if (kind === "given") texts.motion = this.given;
     else if (kind === "pulse") {
-      const numbers = this.controls.map((/** @type {NumberControl} */ each) => `${each.spec.name}=${each.text}`);
+      const numbers = (this.controls ?? []).map((each) => `${each.spec.name}=${each.text}`);
       const chosen = (this.choices ?? []).map((each) => `${each.name}=${each.select.value}`);
       texts.motion = `${this.family}:${[...numbers, ...chosen].join(",")}`;
     } else if (this.file) {
       texts.motion = `file:${this.file.key}`;
-      if (this.file.channels.length > 1) texts.channel = this.told.channel.select.value;
+      if (this.file.channels.length > 1) texts.channel = this.channel.select.value;
     }
-    if (this.wanted && !this.vertical.element.hidden) texts.vertical = this.wanted;
-    if (this.needs("units")) texts.units = this.told.units.select.value;
-    if (this.needs("dt")) texts.dt = this.dt.value;
-    const scaled = this.scale.select.value;
-    if (scaled && kind !== "none" && kind !== "pulse") {
-      const control = this.scales.find((/** @type {NumberControl} */ each) => each.spec.name === scaled);
-      texts[scaled] = scaled === "sa" ? `${control.text}@${this.period.text}` : control.text;
-    }
-    this.changed(texts, ["motion", "channel", "vertical", "dt", "units", "scale", "pga", "pgv", "sa", "initial_rotation", "initial_velocity"]);
+    if (this.upwards && !this.vertical.element.hidden) texts.vertical = this.upwards;
+    if (this.needs("units")) texts.units = this.units.select.value;
+    if (this.needs("dt")) texts.dt = this.dt.field.value;
+    const control = this.scales.find(({spec}) => spec.name === scaled);
+    if (control && kind !== "none" && kind !== "pulse") texts[scaled] = scaled === "sa" ? `${control.text}@${this.period.text}` : control.text;
+    this.changed(texts, MOTION);
   }
 }
 
 export class TreatmentForm {
-  /** @param {HTMLElement} element @param {any} offers @param {Changed} changed @param {{prefix?: string, label?: string}} [given] */
-  constructor(element, offers, changed, {prefix = "", label = "Chattering ends by"} = {}) {
+  /** @param {HTMLElement} element @param {Changed} changed @param {{prefix?: string, label?: string}} [given] */
+  constructor(element, changed, {prefix = "", label = parameter("chattering").label} = {}) {
     this.changed = changed;
-    this.treatments = offers.treatments;
-    this.kind = choice(`${prefix}treatment`, label, this.treatments.map((/** @type {any} */ each) => [each.name, each.label]), () => this.tell());
+    const {treatments} = specification;
+    this.kind = choice(prefix, "treatment", label, treatments.map((/** @type {any} */ each) => [each.name, each.label]), () => { this.reveal(); this.tell(); });
+    this.kind.select.dataset.argument = "chattering";
     this.about = make("p", {className: "derived"});
     /** @type {Record<string, NumberControl>} */
-    this.numbers = {};
-    for (const each of this.treatments) if (each.number) this.numbers[each.name] = new NumberControl({...each.number, words: ""}, () => this.tell(), `${prefix}${each.name}-`);
-    element.append(this.kind.element, this.about, ...Object.values(this.numbers).map((each) => each.element));
+    this.limits = {};
+    for (const {name, limit} of treatments) if (limit) this.limits[name] = new NumberControl(limit, this, `${prefix}${name}-`);
+    element.append(this.kind.element, this.about, ...Object.values(this.limits).map((each) => each.element));
     this.reveal();
   }
 
@@ -387,33 +421,32 @@ export class TreatmentForm {
   show(texts) {
     const [name, value] = (texts.chattering ?? "certified").split("=");
     this.kind.select.value = name;
-    if (value && this.numbers[name]) this.numbers[name].show(value);
+    if (value) this.limits[name]?.show(value);
     this.reveal();
   }
 
   reveal() {
     const name = this.kind.select.value;
-    this.about.textContent = this.treatments.find((/** @type {any} */ each) => each.name === name)?.words ?? "";
-    for (const [each, control] of Object.entries(this.numbers)) control.element.hidden = each !== name;
+    this.about.textContent = specification.treatments.find((/** @type {any} */ each) => each.name === name)?.explanation ?? "";
+    for (const [each, control] of Object.entries(this.limits)) control.element.hidden = each !== name;
   }
 
   tell() {
-    this.reveal();
     const name = this.kind.select.value;
-    const text = this.numbers[name] ? `${name}=${this.numbers[name].text}` : name;
+    const text = this.limits[name] ? `${name}=${this.limits[name].text}` : name;
     this.changed(/** @type {Texts} */ (name === "certified" ? {} : {chattering: text}), ["chattering"]);
   }
 }
 
 export class ModelForm {
-  /** @param {HTMLElement} element @param {any} offers @param {Changed} changed */
-  constructor(element, offers, changed) {
-    this.model = choice("model", "Equation of motion", [["nonlinear", "exact (nonlinear)"], ["linear", "slender block (linear)"]],
+  /** @param {HTMLElement} element @param {Changed} changed */
+  constructor(element, changed) {
+    this.model = choice("", "model", parameter("model").label, specification.models,
       (value) => changed(/** @type {Texts} */ (value === "nonlinear" ? {} : {model: value}), ["model"]));
-    const [button, words] = what("Exact, or linearised for slender blocks: sin and tan of α and of the rotation are taken for the angles themselves.", "the equation of motion");
+    const [button, words] = explained("It is exact, or linear for slender blocks: then α and the rotation stand for their own sines and tangents.", "the equation of motion");
     this.model.element.querySelector("label")?.append(" ", button);
     element.replaceChildren(this.model.element, words);
-    this.treatment = new TreatmentForm(element, offers, changed);
+    this.treatment = new TreatmentForm(element, changed);
   }
 
   /** @param {Texts} texts */

@@ -4,7 +4,7 @@ import {bokeh, coarse, colour, figure, themed} from "./theme.js";
 import {decimals, short} from "./words.js";
 
 /** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, weight?: Float64Array, impact: Float64Array}} Lines */
-/** @typedef {{lines: Lines, rest: Float64Array, uplift: Float64Array, sides: {alpha: number}[]}} Drawn */
+/** @typedef {{lines: Lines, rest: Float64Array, uplift: Float64Array, block: {sides: {alpha: number}[], thresholds_g: number[]}}} Drawn */
 
 const NARROWEST = 1e-10;
 const WIDE = 0.5;
@@ -50,6 +50,8 @@ export class Histories {
     /** @type {[number, number]} */
     this.window = [0, 1];
     this.whole = 1;
+    /** Ground accelerations that lift the block, g: to the right and to the left. */
+    this.thresholds = [NaN, NaN];
     /** @type {(Drawn | null)[]} */
     this.drawn = [null, null];
     /** @type {Record<string, any>} */
@@ -168,28 +170,28 @@ export class Histories {
   }
 
   /** Draw one response, or two over each other.
-   * @param {[number, number]} window @param {number} whole @param {Drawn} first @param {Drawn | null} second @param {number[]} thresholds */
-  draw(window, whole, first, second, thresholds) {
+   * @param {{window: {from: number, to: number}, duration: number}} header @param {Drawn} first @param {Drawn | null} [second] */
+  draw({window: {from, to}, duration}, first, second = null) {
     if (!this.made) this.build();
-    this.window = window;
-    this.whole = whole;
-    this.thresholds = thresholds;
+    this.window = [from, to];
+    this.whole = duration;
     this.drawn = [first, second];
-    this.scale = new Scale(...window);
+    this.thresholds = first.block.thresholds_g;
+    this.scale = new Scale(from, to);
     Object.assign(this.element.dataset, {origin: String(this.scale.origin), unit: String(this.scale.unit)});
     this.quiet = true;
     for (const plot of [this.rotation, this.ground]) plot.hold_render = true;
-    this.x.setv({start: this.scale.plotted(window[0]), end: this.scale.plotted(window[1])});
+    this.x.setv({start: this.scale.plotted(from), end: this.scale.plotted(to)});
     this.ground.below[0].axis_label = this.scale.label;
     const heights = this.drawn.map((drawn, k) => (drawn ? this.line(NAMES[k], drawn) : this.blank(NAMES[k])));
     const [low, high] = [Math.min(...heights.map((each) => each[0])), Math.max(...heights.map((each) => each[1]))];
     this.frame(low, high);
     const rests = first.rest;
     const ends = Array.from({length: rests.length / 2}, (_, k) => [rests[2 * k], rests[2 * k + 1]]);
-    const seen = ends.filter(([start, end]) => end > window[0] && start < window[1]);
+    const seen = ends.filter(([start, end]) => end > from && start < to);
     this.sources.rest.data = {
-      from: Float64Array.from(seen, ([start]) => this.scale.plotted(Math.max(start, window[0]))),
-      to: Float64Array.from(seen, ([, end]) => this.scale.plotted(Math.min(end, window[1]))),
+      from: Float64Array.from(seen, ([start]) => this.scale.plotted(Math.max(start, from))),
+      to: Float64Array.from(seen, ([, end]) => this.scale.plotted(Math.min(end, to))),
     };
     for (const plot of [this.rotation, this.ground]) plot.hold_render = false;
     this.quiet = false;
@@ -197,7 +199,7 @@ export class Histories {
 
   /** @param {string} name @param {Drawn} drawn @returns {[number, number]} */
   line(name, drawn) {
-    const {lines, sides} = drawn;
+    const {lines, block: {sides}} = drawn;
     const from = this.window[0];
     const y = lines.rotation.map((each) => each / sides[each >= 0 ? 0 : 1].alpha);
     this.sources[name].data = {x: this.scale.all(lines.time, from), y};
@@ -215,7 +217,7 @@ export class Histories {
   weigh(weight) {
     const none = new Float64Array(0);
     const {x} = this.sources[`${NAMES[0]}-ground`].data;
-    const [plus, minus] = this.thresholds ?? [NaN, NaN];
+    const [plus, minus] = this.thresholds;
     for (const level of this.levels.threshold) level.visible = !weight;
     if (weight) this.sources.vertical.data = {x, y: weight.map((each) => each - 1), plus: weight.map((each) => minus * each), minus: weight.map((each) => -plus * each)};
     else if (this.sources.vertical.data.x.length) this.sources.vertical.data = {x: none, y: none, plus: none, minus: none};
@@ -225,20 +227,23 @@ export class Histories {
    * @param {number} sign @param {Float64Array} [weight] */
   beyond(sign, weight) {
     const {x, y} = this.sources[`${NAMES[0]}-ground`].data;
-    const [plus, minus] = this.thresholds ?? [Infinity, Infinity];
+    const [plus, minus] = this.thresholds;
     const still = sign > 0 ? minus : plus;
-    const level = (/** @type {number} */ k) => (weight ? still * weight[k] : still);
-    const over = (/** @type {number} */ k) => sign * y[k] > level(k);
     /** @type {number[]} */
     const seen = [], cut = [], line = [], levels = [];
+    let before = false, over = x.length > 0 && sign * y[0] > still * (weight?.[0] ?? 1);
     for (let k = 0; k < x.length; k += 1) {
-      if (!over(k) && !over(k - 1) && !over(k + 1)) continue;
-      // Between two stretches the area is of no height, and the line has a gap.
-      if (seen.length && !over(k) && !over(k - 1)) { seen.push(x[k]); cut.push(sign * level(k)); levels.push(sign * level(k)); line.push(NaN); }
-      seen.push(x[k]);
-      cut.push(over(k) ? y[k] : sign * level(k));
-      levels.push(sign * level(k));
-      line.push(cut[cut.length - 1]);
+      const after = k + 1 < x.length && sign * y[k + 1] > still * (weight?.[k + 1] ?? 1);
+      if (before || over || after) {
+        const level = sign * still * (weight?.[k] ?? 1);
+        // Between two stretches the area is of no height, and the line has a gap.
+        if (seen.length && !over && !before) { seen.push(x[k]); cut.push(level); levels.push(level); line.push(NaN); }
+        seen.push(x[k]);
+        cut.push(over ? y[k] : level);
+        levels.push(level);
+        line.push(cut[cut.length - 1]);
+      }
+      [before, over] = [over, after];
     }
     const [xs, ys, lines, bases] = [seen, cut, line, levels].map((each) => Float64Array.from(each));
     this.sources[`beyond${sign}`].data = {x: xs, y: ys, line: lines, level: bases};
@@ -263,10 +268,10 @@ export class Histories {
     let peak = 0;
     for (const drawn of this.drawn) for (const each of drawn?.lines.ground_g ?? []) peak = Math.max(peak, Math.abs(each));
     for (const each of this.drawn[0]?.lines.weight ?? []) peak = Math.max(peak, Math.abs(each - 1));
-    const shown = 1.1 * Math.max(peak, Math.min(...(this.thresholds ?? [0]), peak || Infinity) || 0.1);
+    const shown = 1.1 * Math.max(peak, Math.min(...this.thresholds, peak || Infinity) || 0.1);
     this.ground.y_range.setv({start: -shown, end: shown});
     this.levels.balance.forEach((each, k) => { each.location = k ? -1 : 1; });
-    const [plus, minus] = this.thresholds ?? [NaN, NaN];
+    const [plus, minus] = this.thresholds;
     this.levels.threshold[0].location = minus;
     this.levels.threshold[1].location = -plus;
     const from = this.window[0];
@@ -340,7 +345,7 @@ export class Histories {
     if (!first || !this.tell.cursor) return;
     const theta = at(first.lines.time, first.lines.rotation, time - this.window[0]);
     const ground = at(first.lines.ground_time, first.lines.ground_g, time - this.window[0]);
-    const alpha = first.sides[theta >= 0 ? 0 : 1].alpha;
+    const alpha = first.block.sides[theta >= 0 ? 0 : 1].alpha;
     const width = this.window[1] - this.window[0];
     this.tell.cursor(`${time.toFixed(decimals(width))} s: θ = ${short(theta / alpha)} α = ${short((theta * 180) / Math.PI)}°, ground ${short(ground)} g`);
   }

@@ -2,103 +2,112 @@
 
 import * as address from "./address.js";
 import {Latest, Problem, json, payload} from "./api.js";
+import {ChatteringPanel} from "./chattering.js";
+import {makeCopying, showCode, showFiles} from "./exports.js";
 import {BlockForm, ModelForm, MotionForm} from "./forms.js";
 import {Histories} from "./histories.js";
-import {ChatteringPanel} from "./chattering.js";
+import {specification} from "./parameters.js";
 import {coarse} from "./theme.js";
-import {makeCopying, showTaking} from "./taking.js";
 import {acceptFiles} from "./upload.js";
-import {make, one, say, short} from "./words.js";
+import {counted, legend, make, one, say, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
-const offers = await json("/api/start", {});
-const state = address.read(offers.opening);
-if (!Object.keys(state.texts).length) state.texts = {...offers.default};
-else if (!["width", "p", "pivots"].some((name) => name in state.texts)) state.texts = {width: offers.default.width, height: offers.default.height, ...state.texts};
+const state = address.read();
 
 /** What the views share.
- * @type {{offers: any, state: address.State, shown: import("./api.js").Payload | null, change: typeof change, go: typeof go, problem: typeof problem, restate: typeof restate, remember: () => void}} */
-const page = {offers, state, shown: null, change, go, problem, restate, remember: () => address.write(state)};
+ * @type {{state: address.State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, remember: () => void}} */
+const page = {state, shown: null, go, problem, restate, remember: () => address.write(state)};
 /** @type {Record<string, any>} */
 const views = {};
 
 const forms = {
-  block: new BlockForm(one("block-form"), offers, changed),
-  motion: new MotionForm(one("motion-form"), offers, changed),
-  model: new ModelForm(one("model-form"), offers, changed),
+  block: new BlockForm(one("block-form"), changed),
+  motion: new MotionForm(one("motion-form"), changed),
+  model: new ModelForm(one("model-form"), changed),
 };
-const histories = new Histories(one("histories"), {
-  window: (chosen) => { state.window = chosen; address.write(state); look.ask(); },
-  cursor: (text) => { one("cursor").textContent = text; },
-  pick: (time) => views.block?.seek(time),
-});
-const chattering = new ChatteringPanel((chosen) => { state.window = chosen; address.write(state); look.ask(); });
+const histories = new Histories(one("histories"), {window: showWindow, cursor: (text) => { one("cursor").textContent = text; }, pick: (time) => views.block?.seek(time)});
+const chattering = new ChatteringPanel(showWindow);
 
-/** @param {string | null} sentence */
-function problem(sentence) {
-  const box = one("problem");
-  box.hidden = !sentence;
-  if (sentence) box.textContent = sentence;
-}
+/** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
+const problems = {};
 
-/** Do some work, and say it on the page when it fails. @param {() => Promise<void>} work */
-async function told(work) {
-  try {
-    await work();
-    problem(null);
-  } catch (error) {
-    if (error instanceof DOMException && error.name === "AbortError") return;
-    problem(error instanceof Problem ? error.message : `The page stumbled: ${error}`);
-    if (!(error instanceof Problem)) console.error(error);
+/** Say what is wrong, or that nothing is, and mark the field that is wrong. @param {unknown} error @param {string} [place] id of what holds the field */
+function problem(error, place = "settings") {
+  if (error instanceof DOMException && error.name === "AbortError") return;
+  if (error && !(error instanceof Problem)) console.error(error);
+  problems[place] = error instanceof Problem ? error.message : error ? `The page has a fault: ${error}` : null;
+  for (const each of one(place).querySelectorAll("[aria-invalid]")) each.removeAttribute("aria-invalid");
+  for (const each of one(place).querySelectorAll("[data-problem]")) each.removeAttribute("data-problem");
+  const argument = error instanceof Problem && error.argument;
+  for (const each of argument ? one(place).querySelectorAll(`[data-argument="${CSS.escape(argument)}"]`) : []) {
+    if (!each.checkVisibility()) continue;
+    each.setAttribute("aria-invalid", "true");
+    each.setAttribute("aria-errormessage", "problem");
+    each.closest(".number, .choice")?.setAttribute("data-problem", problems[place] ?? "");
   }
+  const sentence = Object.values(problems).find(Boolean);
+  one("problem").hidden = !sentence;
+  if (sentence) one("problem").textContent = sentence;
 }
 
 /** How long sliders must lie still before all is drawn, ms. */
 const PAUSE = 120;
 /** The timer; 0 where all is drawn. */
-let resting = 0;
+let pause = 0;
 
 /** The whole case, where a form has changed it. */
 const load = new Latest(async () => {
-  window.clearTimeout(resting);
-  await told(async () => {
-    page.shown = await payload("/api/case", {...state.texts, ...ends()});
-    draw();
-    document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
-    resting = -1;
-  });
-  if (resting) resting = window.setTimeout(drawRest, PAUSE);
-});
+  window.clearTimeout(pause);
+  page.shown = await payload("/api/case", {...state.texts, ...address.ends(state)});
+  draw();
+  counted("drawn");
+  pause = window.setTimeout(() => rest.ask(), PAUSE);
+}, problem);
+
+/** What nobody reads while a slider moves. */
+const rest = new Latest(async () => {
+  pause = 0;
+  if (!page.shown) return;
+  const {header} = page.shown, {texts} = state;
+  forms.block.show(texts, header.block.sides);
+  showNotes(header);
+  showLegend(header.motion?.vertical);
+  chattering.window(header.window);
+  if (state.view === "response") chattering.draw(page.shown, texts);
+  if (state.view !== "map") {
+    showFiles(state);
+    const {python, command} = await json("/api/code", texts);
+    if (state.texts === texts && state.view !== "map") showCode("case", python, command);
+  }
+  counted("rested");
+}, problem);
 
 /** Another window of the case that is shown. */
-const look = new Latest(() => told(async () => {
+const look = new Latest(async () => {
   if (!page.shown) return;
   if (!state.window) { await load.work(); return; }
-  const {header, arrays} = await payload("/api/window", {...state.texts, ...ends()});
+  const {header, arrays} = await payload("/api/window", {...state.texts, ...address.ends(state)});
   page.shown.header.window = header.window;
   Object.assign(page.shown.arrays, arrays);
-  histories_draw();
-  showTaking(page.shown.header, state);
-  document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
-}));
+  draw();
+  chattering.window(header.window);
+  showFiles(state);
+  counted("drawn");
+}, problem);
 
-/** @returns {Texts} */
-function ends() {
-  return state.window ? {from: String(state.window[0]), to: String(state.window[1])} : {};
+/** @param {[number, number] | null} chosen */
+function showWindow(chosen) {
+  state.window = chosen;
+  address.write(state);
+  void look.ask();
 }
 
-/** A form has changed some texts; those that are gone with them are not meant any more. @param {Texts} texts @param {string[]} gone */
-function changed(texts, gone) {
-  const kept = Object.fromEntries(Object.entries(state.texts).filter(([name]) => !gone.includes(name)));
-  const other = gone.includes("motion") && (kept.motion ?? state.texts.motion) !== texts.motion;
-  state.texts = {...kept, ...texts};
-  if (other) state.window = null;
-  change();
-}
-
-/** The texts have changed. */
-function change() {
+/** A form has changed the case: new texts stand for all those that they replace. @param {Texts} texts @param {string[]} replaced */
+function changed(texts, replaced) {
+  if (replaced.includes("motion") && state.texts.motion !== texts.motion) state.window = null;
+  const kept = Object.entries(state.texts).filter(([name]) => !replaced.includes(name));
+  state.texts = {...Object.fromEntries(kept), ...texts};
   address.write(state);
   if (state.view === "map" || state.view === "compare") views[state.view].update();
   void load.ask();
@@ -106,10 +115,9 @@ function change() {
 
 /** Other texts altogether: show them in the forms, too. @param {Texts} texts */
 function restate(texts) {
-  state.texts = texts;
   state.window = null;
   for (const form of Object.values(forms)) form.show(texts);
-  change();
+  changed(texts, Object.keys(state.texts));
 }
 
 /** Show another view. @param {string} name */
@@ -128,58 +136,43 @@ async function go(name) {
   if (name === "block") histories.size(190, 140);
   else if (name === "response") histories.size(290, 190);
   address.write(state);
+  for (const [each, view] of Object.entries(views)) if (each !== name) { view.leave?.(); problem(null, `view-${each}`); }
   if (name !== "response" && !views[name]) {
     const module = await import(`./${name}.js`);
     views[name] = new module.View(page, histories);
   }
-  for (const [each, view] of Object.entries(views)) if (each !== name) view.leave?.();
   views[name]?.enter?.();
   if (page.shown) draw();
   void load.ask();
 }
 
+/** Draw what a slider changes. */
 function draw() {
   if (!page.shown) return;
-  const {header} = page.shown;
-  if (one("verdict").textContent !== header.verdict) one("verdict").textContent = header.verdict;
+  const {header, arrays} = page.shown;
+  put(one("verdict"), header.verdict);
   showFigures(header);
-  showNotes(header);
   const [plus, minus] = header.block.thresholds_g;
   const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
     `p = ${short(side.p)} rad/s, α = ${short((side.alpha * 180) / Math.PI)}°, η = ${short(side.restitution)}; lifts above ${short([plus, minus][k])} g`);
   one("derived").textContent = right === left ? `${right}.` : `To the right ${right}. To the left ${left}.`;
-  if (state.view === "response" || state.view === "block") histories_draw();
+  if (state.view === "response" || state.view === "block") {
+    const lines = /** @type {any} */ (arrays);
+    histories.draw(header, {lines, rest: arrays.rest, uplift: arrays.uplift, block: header.block});
+  }
   views[state.view]?.draw?.();
 }
 
-/** What nobody reads while a slider moves. */
-function drawRest() {
-  resting = 0;
-  if (!page.shown) return;
-  const {header} = page.shown;
-  forms.block.show(state.texts, header.block.sides);
-  if (state.view !== "map") showTaking(header, state);
-  if (state.view === "response") chattering.draw(page.shown, state.texts);
-  document.body.dataset.rested = String(Number(document.body.dataset.rested ?? 0) + 1);
-}
-
-function histories_draw() {
-  if (!page.shown) return;
-  const {header, arrays} = page.shown;
-  const lines = /** @type {any} */ (arrays);
-  histories.draw([header.window.from, header.window.to], header.duration, {lines, rest: arrays.rest, uplift: arrays.uplift, sides: header.block.sides}, null, header.block.thresholds_g);
-  showLegend(header.motion?.vertical);
-  chattering.window(header.window);
+/** Write a text where it is another one. @param {Node} node @param {string} text */
+function put(node, text) {
+  if (node.textContent !== text) node.textContent = text;
 }
 
 /** @param {{name: string, pga_g: number} | null} [vertical] */
 function showLegend(vertical) {
-  const text = vertical ? `vertical acceleration (${vertical.name}, peak ${short(vertical.pga_g)} g), with which the thresholds move` : "";
-  if (one("legend").dataset.vertical === text) return;
-  one("legend").dataset.vertical = text;
   const entries = [["line", "rotation"], ["rest", "at rest"], ["impact", "impact"], ["uplift", "uplift"], ["ground", "ground acceleration"], ["beyond", "beyond the threshold of uplift"]];
-  if (text) entries.push(["up", text]);
-  one("legend").replaceChildren(...entries.map(([name, words]) => make("span", {}, [make("i", {className: `key ${name}`}), words])));
+  if (vertical) entries.push(["up", `vertical acceleration (${vertical.name}, peak ${short(vertical.pga_g)} g), with which the thresholds move`]);
+  legend("legend", entries);
 }
 
 /** @param {any} header */
@@ -192,13 +185,11 @@ function showFigures(header) {
     ["At rest", header.share_at_rest === null ? "–" : `${short(100 * header.share_at_rest, 2)} %`, "of the strong shaking"],
   ];
   const list = one("figures");
-  if (!list.childNodes.length) {
-    list.append(...rows.map(([name]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, ["", make("small")])])));
-  }
+  if (!list.childNodes.length) list.append(...rows.map(([name]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, ["", make("small")])])));
   rows.forEach(([, value, more], k) => {
     const [number, small] = list.querySelectorAll("dd")[k].childNodes;
-    if (number.nodeValue !== value) number.nodeValue = value;
-    if (small.textContent !== more) small.textContent = more;
+    put(number, value);
+    put(small, more);
   });
 }
 
@@ -209,14 +200,15 @@ function showNotes(header) {
   one("notes").replaceChildren(...notes.map((/** @type {string} */ note) => make("li", {}, [note])));
 }
 
-async function warm() {
-  let {warming} = offers;
-  while (!warming.done) {
-    one("warming").hidden = warming.seconds < 3;
+/** Say that kernels are compiled, as long as they are. */
+async function watchCompilation() {
+  let {compilation} = specification;
+  while (!compilation.done) {
+    one("compiling").hidden = compilation.seconds < 3;
     await new Promise((wake) => setTimeout(wake, 500));
-    try { ({warming} = await json("/api/start", {})); } catch { return; }
+    try { ({compilation} = await json("/api/start", {})); } catch { return; }
   }
-  one("warming").hidden = true;
+  one("compiling").hidden = true;
 }
 
 for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => go(/** @type {any} */ (button).dataset.view));
@@ -232,12 +224,17 @@ one("in-words").addEventListener("toggle", () => chattering.words(state.texts));
 if (coarse()) one("cursor").textContent = "Tap the plots to read them.";
 one("settings").addEventListener("submit", (event) => event.preventDefault());
 makeCopying();
-acceptFiles(async (file, upwards) => told(async () => {
-  const found = await file();
-  forms.motion.take(found, upwards);
-  say(`${found.name} was read as ${found.format}.`);
-}));
+acceptFiles(async (file, upwards) => {
+  try {
+    const found = await file();
+    forms.motion.take(found, upwards);
+    say(`${found.name} was read as ${found.format}.`);
+    problem(null);
+  } catch (error) {
+    problem(error);
+  }
+});
 for (const form of Object.values(forms)) form.show(state.texts);
-void warm();
+void watchCompilation();
 await go(state.view);
 document.body.dataset.ready = String(performance.now());

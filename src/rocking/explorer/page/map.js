@@ -1,9 +1,9 @@
 // A map of the case over two of its parameters, coarse to fine; or of a study.
 
-import {BLOCK} from "./address.js";
-import {Latest, frames, json, payload} from "./api.js";
+import {Latest, Problem, frames, json, payload} from "./api.js";
+import {showMapExports, withLegend} from "./exports.js";
+import {namesOf, specification} from "./parameters.js";
 import {bokeh, colour, figure, themed} from "./theme.js";
-import {showMapTaking, withLegend} from "./taking.js";
 import {make, one, short} from "./words.js";
 
 /** From harmless to the worst, each darker than the one before; the last stands out. */
@@ -22,10 +22,10 @@ export class View {
   /** @param {any} page */
   constructor(page) {
     this.page = page;
-    this.study = page.offers.study;
+    this.study = specification.study;
     /** @type {AbortController | null} */
     this.running = null;
-    this.latest = new Latest(() => this.run());
+    this.latest = new Latest(() => this.run(), (error) => page.problem(error, "view-map"));
     /** @type {any} */
     this.about = null;
     this.mark = [0, 0];
@@ -102,24 +102,23 @@ export class View {
 
   async run() {
     this.running = new AbortController();
-    const {signal} = this.running;
-    try {
-      if (this.study) await this.slice();
-      else await this.stream(signal);
-    } catch (error) {
-      if (error instanceof DOMException && error.name === "AbortError") return;
-      this.page.problem(error instanceof Error ? error.message : String(error));
-    }
+    await (this.study ? this.slice() : this.stream(this.running.signal));
   }
 
   /** Axes that the case has, and those that are chosen. */
   axes() {
     const {texts, map} = this.page.state;
+    if (this.study) {
+      const varied = this.study.axes.map((/** @type {any} */ each) => each.name);
+      if (!varied.includes(map.x)) map.x = varied[0];
+      if (!varied.includes(map.y) || map.y === map.x) map.y = varied.find((/** @type {string} */ each) => each !== map.x);
+      return {names: varied, right: varied};
+    }
     const motion = texts.motion ?? "";
     const family = motion.split(":")[0];
-    const pulse = family in this.page.offers.pulses;
+    const pulse = family in specification.pulses;
     const frequency = pulse && motion.includes("frequency=");
-    const names = this.page.offers.axes.map((/** @type {any} */ each) => each.name).filter((/** @type {string} */ name) => name !== "omega" || frequency);
+    const names = specification.axes.map((/** @type {any} */ each) => each.name).filter((/** @type {string} */ name) => name !== "omega" || frequency);
     const right = names.filter((/** @type {string} */ name) => name !== "a" && name !== "pga");
     if (!names.includes(map.y)) map.y = pulse ? "a" : "pga";
     if (!right.includes(map.x)) map.x = frequency ? "omega" : "p";
@@ -129,19 +128,15 @@ export class View {
 
   fill() {
     const {map} = this.page.state;
-    const {names, right} = this.study ? {names: this.study.axes.map((/** @type {any} */ each) => each.name), right: this.study.axes.map((/** @type {any} */ each) => each.name)} : this.axes();
-    if (this.study) {
-      if (!names.includes(map.x)) map.x = names[0];
-      if (!names.includes(map.y) || map.y === map.x) map.y = names.find((/** @type {string} */ each) => each !== map.x);
-    }
+    const {names, right} = this.axes();
     for (const [name, slice] of Object.entries(this.slices)) slice.hidden = [map.x, map.y].some((axis) => name === `fix_${axis}` || name === `${axis}_index`);
-    const offered = this.study ? this.study.axes : this.page.offers.axes;
+    const offered = this.study ? this.study.axes : specification.axes;
     const label = (/** @type {string} */ name) => offered.find((/** @type {any} */ each) => each.name === name).label;
     for (const [name, values] of Object.entries({x: right, y: names})) {
       this.select(name).replaceChildren(...values.map((/** @type {string} */ value) => make("option", {value}, [label(value)])));
       this.select(name).value = map[name];
     }
-    const quantities = this.study ? this.study.quantities : this.page.offers.quantities;
+    const quantities = this.study ? this.study.quantities : specification.quantities;
     this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each.name}, [each.label])));
     if (!quantities.some((/** @type {any} */ each) => each.name === map.quantity)) map.quantity = quantities[0].name;
     this.select("quantity").value = map.quantity;
@@ -172,7 +167,6 @@ export class View {
     for await (const frame of frames("/api/map", this.asked(), signal)) {
       if (!this.about || done === 0) {
         this.about = JSON.parse(new TextDecoder().decode(frame));
-        this.page.problem(null);
         const count = this.about.shape[0] * this.about.shape[1];
         this.values = this.about.quantities.map(() => new Float32Array(count).fill(NaN));
         this.covered = new Uint8Array(count).fill(255);
@@ -181,7 +175,10 @@ export class View {
         done = 1;
         continue;
       }
-      if (frame[0] === 123) { this.page.problem(JSON.parse(new TextDecoder().decode(frame)).problem); break; }
+      if (frame[0] === 123) {
+        const {problem, argument} = JSON.parse(new TextDecoder().decode(frame));
+        throw new Problem(problem, argument);
+      }
       done += this.take(frame);
       const [rows, columns] = this.about.shape;
       /** @type {HTMLProgressElement} */ (one("map-progress")).value = done / (rows * columns);
@@ -224,12 +221,12 @@ export class View {
     this.waiting = window.setTimeout(() => { this.waiting = 0; if (!this.complete) this.recolour(); }, wait);
   }
 
-  /** What can be taken away: the picture, the numbers, and code that computes them again. */
+  /** What can be saved: the picture, the numbers, and code that computes them again. */
   offer() {
     const {python, command} = this.about;
     const name = this.study ? "rocking-study" : "rocking-map";
     const {quantity} = this.page.state.map;
-    showMapTaking(this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
+    showMapExports(this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
       [`${name}.svg`, "Figure, SVG", () => this.picture("svg")], [`${name}.png`, "Figure, PNG", () => this.picture("png")],
       [`${name}.csv`, "Numbers, CSV", async () => new Blob([this.table()], {type: "text/csv"})],
     ]);
@@ -458,7 +455,7 @@ export class View {
       this.page.restate(found);
       await this.page.go("response");
     } catch (error) {
-      this.page.problem(error instanceof Error ? error.message : String(error));
+      this.page.problem(error, "view-map");
     }
   }
 
@@ -468,7 +465,7 @@ export class View {
     const [threshold] = shown?.header.block.thresholds_g ?? [0.2];
     const p = shown?.header.block.sides[0].p ?? 3.6;
     const {texts} = this.page.state;
-    const block = Object.fromEntries([...BLOCK, "model"].filter((name) => texts[name] && name !== "gravity").map((name) => [name, texts[name]]));
+    const block = Object.fromEntries([...namesOf("block"), "model"].filter((name) => texts[name]).map((name) => [name, texts[name]]));
     const motion = `sine:amplitude=${(1.03 * threshold).toPrecision(6)}g,frequency=${(p / Math.PI).toPrecision(6)},cycles=2.5`;
     this.page.state.map = {};
     this.page.restate({...block, motion});

@@ -7,7 +7,7 @@ const LARGEST = 16 * 2 ** 20;
 
 /** @param {File} file */
 async function sendFile(file) {
-  if (file.size > LARGEST) throw new Problem(`${file.name}: larger than 16 MiB; cut the record into smaller files`);
+  if (file.size > LARGEST) throw new Problem(`${file.name}: it is larger than 16 MiB; cut the record into smaller files`);
   return json("/api/records", {name: file.name}, {method: "POST", body: file});
 }
 

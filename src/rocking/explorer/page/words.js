@@ -8,7 +8,7 @@ export function make(name, given = {}, inside = []) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(given)) {
     if (key === "on") for (const [event, act] of Object.entries(value)) made.addEventListener(event, /** @type {any} */ (act));
-    else if (key.startsWith("aria-") || key === "for" || key === "role") made.setAttribute(key, value);
+    else if (/^(aria-|data-|for$|role$)/.test(key)) made.setAttribute(key, value);
     else /** @type {any} */ (made)[key] = value;
   }
   made.append(...inside);
@@ -38,11 +38,17 @@ export function span(seconds) {
 /** Decimals of times in a window of this width. @param {number} width */
 export const decimals = (width) => Math.min(15, Math.max(2, 3 - Math.floor(Math.log10(width))));
 
+/** Count on the page how often something was done, for those who wait for it. @param {string} name */
+export function counted(name) {
+  const {dataset} = document.body;
+  dataset[name] = String(Number(dataset[name] ?? 0) + 1);
+}
+
 /** Say something to those who listen. @param {string} text */
 export function say(text) { one("said").textContent = text; }
 
 /** A "?" that opens an explanation. @param {string} words @param {string} about */
-export function what(words, about) {
+export function explained(words, about) {
   const text = make("p", {className: "words", hidden: true}, [words]);
   const button = make("button", {
     type: "button", className: "what", "aria-expanded": "false", "aria-label": `What is ${about}?`,
@@ -51,10 +57,15 @@ export function what(words, about) {
   return [button, text];
 }
 
+/** @param {string} id @param {string[][]} entries kinds of marks, and what they mean */
+export function legend(id, entries) {
+  one(id).replaceChildren(...entries.map(([kind, words]) => make("span", {}, [make("i", {className: `key ${kind}`}), words])));
+}
+
 /** @param {HTMLTableElement} table @param {string[]} head @param {(string | Node)[][]} rows */
 export function fill(table, head, rows) {
   table.replaceChildren(
-    make("thead", {}, [make("tr", {}, head.map((name) => (name ? make("th", {scope: "col"}, [name]) : make("td"))))]),
+    ...(head.length ? [make("thead", {}, [make("tr", {}, head.map((name) => (name ? make("th", {scope: "col"}, [name]) : make("td"))))])] : []),
     make("tbody", {}, rows.map((row) => make("tr", {}, row.map((cell) => make("td", {}, [cell]))))),
   );
 }

@@ -1,6 +1,6 @@
-"""What stands before the application: it lets in one person's browser, on this machine, and nobody else.
+"""Authentication of requests: one person's browser, on this machine, is let in, and nobody else.
 
-An ASGI application outside everything else. Each request, whatever its method and path,
+It is an ASGI application outside everything else. Each request, whatever its method and path,
 
 - names this server in its one Host header, else 421: a page of another name that was made to resolve to this address
   (DNS rebinding) does not;
@@ -31,25 +31,18 @@ _LINKS: Final = 100
 
 _READING: Final = ("GET", "HEAD")
 
-_MISDIRECTED: Final = "this address is not served here: open the link that rocking explore printed"
-_STRANGER: Final = (
+_OTHER_SERVER: Final = "this address is not served here: open the link that rocking explore printed"
+_UNKNOWN: Final = (
     "this page needs the link that rocking explore printed, which opens once in one browser: open that link, or start "
     "rocking explore again"
 )
-_FOREIGN: Final = "only the page of this server may send this"
+_OTHER_PAGE: Final = "only the page of this server may send this"
 
 
-class Guard:
-    """ASGI application that passes on to another what it lets through.
+class RequestAuthentication:
+    """ASGI application that passes on to another one what it lets through.
 
-    Parameters
-    ----------
-    application
-        What is guarded.
-    port : int
-        Where the server listens.
-    hosts : iterable of str
-        Names by which it may be called, without the port.
+    The server listens at ``port``, and may be called by the names ``hosts``, which are without it.
     """
 
     def __init__(self, application: Application, port: int, hosts: Iterable[str] = LOOPBACK) -> None:
@@ -78,7 +71,7 @@ class Guard:
         elif (token := _token_of(scope)) is not None:
             await self._exchange(scope, send, token)
         elif not self._is_known(scope):
-            await _answer(send, 403, _STRANGER)
+            await _answer(send, 403, _UNKNOWN)
         else:
             await self._application(scope, receive, send)
 
@@ -86,16 +79,16 @@ class Guard:
         """Return status and reason if the request names another server or comes from another page."""
         hosts = _values(scope, b"host")
         if len(hosts) != 1 or hosts[0] not in self._hosts:
-            return 421, _MISDIRECTED
+            return 421, _OTHER_SERVER
         origins, sites = _values(scope, b"origin"), _values(scope, b"sec-fetch-site")
         ours = [b"http://" + hosts[0]]
         if scope["method"] in _READING:
             # A link may lead here from anywhere; what a page loads must be loaded by ours.
             navigates = _values(scope, b"sec-fetch-mode") in ([], [b"navigate"])
             own = origins in ([], ours) and sites in ([], [b"same-origin"], [b"none"])
-            return None if own or navigates else (403, _FOREIGN)
+            return None if own or navigates else (403, _OTHER_PAGE)
         own = origins == ours or (origins == [] and sites == [b"same-origin"])
-        return None if own else (403, _FOREIGN)
+        return None if own else (403, _OTHER_PAGE)
 
     def _is_known(self, scope: Scope) -> bool:
         """Whether the request carries the cookie, once."""
@@ -105,9 +98,9 @@ class Guard:
 
     async def _exchange(self, scope: Scope, send: Send, token: str) -> None:
         """Exchange a token for the cookie, and lead to the page without it; who has the cookie already just goes on."""
-        fresh = self._takes(token)
+        fresh = self._redeemed(token)
         if not fresh and not self._is_known(scope):
-            await _answer(send, 403, _STRANGER)
+            await _answer(send, 403, _UNKNOWN)
             return
         rest = [(name, value) for name, value in _query(scope) if name != "token"]
         headers = [(b"location", b"/" + (f"?{urlencode(rest)}".encode() if rest else b""))]
@@ -116,7 +109,8 @@ class Guard:
             headers.append((b"set-cookie", cookie))
         await _answer(send, 303, "", headers)
 
-    def _takes(self, token: str) -> bool:
+    def _redeemed(self, token: str) -> bool:
+        """Whether a token is known and was not used before; it is used then."""
         with self._lock:
             for known in self._tokens:
                 if hmac.compare_digest(known.encode(), token.encode()):

@@ -9,7 +9,7 @@ from starlette.applications import Starlette
 from starlette.responses import PlainTextResponse
 from starlette.routing import Route
 
-from rocking.explorer.guard import LOOPBACK, Guard
+from rocking.explorer.authentication import LOOPBACK, RequestAuthentication
 
 PORT = 8123
 OURS = f"http://127.0.0.1:{PORT}"
@@ -22,27 +22,27 @@ def reached():
 
 
 @pytest.fixture
-def guard(reached):
+def application(reached):
     async def answer(request):
         reached.append(request.method)
         return PlainTextResponse("inside")
 
     routes = [Route("/", answer, methods=METHODS), Route("/{rest:path}", answer, methods=METHODS)]
-    return Guard(Starlette(routes=routes), PORT)
+    return RequestAuthentication(Starlette(routes=routes), PORT)
 
 
 @pytest.fixture(scope="module")
 def client():
     """Make browsers that know nothing yet."""
     with clients() as portal:
-        yield lambda guard: Client(portal, guard, OURS)
+        yield lambda application: Client(portal, application, OURS)
 
 
 @pytest.fixture
-def known(guard, client):
+def known(application, client):
     """A browser that has opened the link."""
-    browser = client(guard)
-    assert browser.get(f"/?token={guard.new_token()}").status_code == 303
+    browser = client(application)
+    assert browser.get(f"/?token={application.new_token()}").status_code == 303
     return browser
 
 
@@ -51,35 +51,35 @@ def cookie_of(known):
     return f"{name}={value}"
 
 
-def test_nothing_is_served_without_the_link(guard, reached, client):
+def test_nothing_is_served_without_the_link(application, reached, client):
     for method, path in itertools.product(
         METHODS, ["/", "/page/main.js", "/api/case", "/library/bokeh.min.js", "/nothing"]
     ):
-        answer = client(guard).request(method, path, headers={"origin": OURS})
+        answer = client(application).request(method, path, headers={"origin": OURS})
         assert answer.status_code == 403
         assert answer.headers["cache-control"] == "no-store"
     assert reached == []
 
 
-def test_the_link_opens_once_and_keeps_what_else_it_says(guard, reached, client):
-    token = guard.new_token()
-    answer = client(guard).get(f"/?view=map&p=2&token={token}&alpha=12deg")
+def test_the_link_opens_once_and_keeps_what_else_it_says(application, reached, client):
+    token = application.new_token()
+    answer = client(application).get(f"/?view=map&p=2&token={token}&alpha=12deg")
     assert answer.status_code == 303
     assert answer.headers["location"] == "/?view=map&p=2&alpha=12deg"
-    assert client(guard).get(f"/?token={token}").status_code == 403
-    assert client(guard).get("/?token=").status_code == 403
-    assert client(guard).get("/?token=%C3%A9").status_code == 403
+    assert client(application).get(f"/?token={token}").status_code == 403
+    assert client(application).get("/?token=").status_code == 403
+    assert client(application).get("/?token=%C3%A9").status_code == 403
     assert reached == []
 
 
-def test_the_cookie_is_for_this_server_alone(guard, client):
-    answer = client(guard).get(f"/?token={guard.new_token()}")
+def test_the_cookie_is_for_this_server_alone(application, client):
+    answer = client(application).get(f"/?token={application.new_token()}")
     cookie = answer.headers["set-cookie"]
     assert cookie.startswith(f"rocking-{PORT}=")
     assert cookie.endswith("; HttpOnly; SameSite=Strict; Path=/")
 
 
-def test_whoever_has_the_cookie_is_let_in_and_a_spent_link_just_leads_on(guard, known, reached):
+def test_whoever_has_the_cookie_is_let_in_and_a_spent_link_just_leads_on(application, known, reached):
     assert known.get("/").text == "inside"
     answer = known.get("/?token=spent&p=2")
     assert (answer.status_code, answer.headers["location"]) == (303, "/?p=2")
@@ -88,16 +88,16 @@ def test_whoever_has_the_cookie_is_let_in_and_a_spent_link_just_leads_on(guard, 
 
 
 @pytest.mark.parametrize("cookie", ["", "{}x", "x{}", "rocking-8123=", "rocking-8124={}", "{};{}", "ROCKING-8123=a"])
-def test_another_cookie_does_not_do(guard, known, cookie, reached, client):
+def test_another_cookie_does_not_do(application, known, cookie, reached, client):
     own = cookie_of(known)
-    answer = client(guard).get("/", headers={"cookie": cookie.replace("{}", own)})
+    answer = client(application).get("/", headers={"cookie": cookie.replace("{}", own)})
     assert answer.status_code == 403
     assert reached == []
 
 
 @pytest.mark.parametrize("host", LOOPBACK)
-def test_the_machine_is_known_by_its_own_names(guard, known, host, client):
-    answer = client(guard).get("/", headers={"host": f"{host}:{PORT}", "cookie": cookie_of(known)})
+def test_the_machine_is_known_by_its_own_names(application, known, host, client):
+    answer = client(application).get("/", headers={"host": f"{host}:{PORT}", "cookie": cookie_of(known)})
     assert answer.status_code == 200
 
 
@@ -121,16 +121,16 @@ def test_the_machine_is_known_by_its_own_names(guard, known, host, client):
 )
 @pytest.mark.parametrize("method", ["GET", "POST", "OPTIONS"])
 def test_a_rebound_name_is_misdirected_even_with_cookie_and_matching_origin(
-    guard, known, host, method, reached, client
+    application, known, host, method, reached, client
 ):
     headers = {"host": host, "origin": f"http://{host}", "cookie": cookie_of(known), "sec-fetch-site": "same-origin"}
-    assert client(guard).request(method, "/api/case", headers=headers).status_code == 421
+    assert client(application).request(method, "/api/case", headers=headers).status_code == 421
     assert reached == []
 
 
 @pytest.mark.parametrize("hosts", [[], [b"127.0.0.1:8123", b"127.0.0.1:8123"], [b"127.0.0.1:8123", b"evil.example"]])
 @pytest.mark.anyio
-async def test_one_host_header_and_no_other_number_of_them(guard, hosts, reached):
+async def test_one_host_header_and_no_other_number_of_them(application, hosts, reached):
     sent = []
 
     async def send(message):
@@ -143,7 +143,7 @@ async def test_one_host_header_and_no_other_number_of_them(guard, hosts, reached
         "query_string": b"",
         "headers": [(b"host", host) for host in hosts],
     }
-    await guard(scope, None, send)
+    await application(scope, None, send)
     assert sent[0]["status"] == 421
     assert reached == []
 
@@ -200,22 +200,22 @@ def test_other_pages_may_link_here_but_load_nothing(known, headers, status):
 
 
 @pytest.mark.anyio
-async def test_no_websocket_is_accepted(guard):
+async def test_no_websocket_is_accepted(application):
     sent = []
 
     async def send(message):
         sent.append(message)
 
-    await guard({"type": "websocket", "path": "/", "headers": [(b"host", b"127.0.0.1:8123")]}, None, send)
+    await application({"type": "websocket", "path": "/", "headers": [(b"host", b"127.0.0.1:8123")]}, None, send)
     assert sent == [{"type": "websocket.close", "code": 1008}]
 
 
-def test_links_that_nobody_opened_are_forgotten_in_the_end(guard, client):
-    first = guard.new_token()
+def test_links_that_nobody_opened_are_forgotten_in_the_end(application, client):
+    first = application.new_token()
     for _ in range(150):
-        guard.new_token()
-    assert client(guard).get(f"/?token={first}").status_code == 403
-    assert len(guard._tokens) == 100
+        application.new_token()
+    assert client(application).get(f"/?token={first}").status_code == 403
+    assert len(application._tokens) == 100
 
 
 def test_the_printed_link_has_a_token_of_its_own():

@@ -1,4 +1,4 @@
-"""Records that were handed to the explorer: files in memory, so many at most, each known by a hash of its content."""
+"""Records that the explorer was given: files in memory, so many at most, each known by a hash of its content."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ import hashlib
 import io
 import threading
 from collections import OrderedDict
-from dataclasses import dataclass
 from pathlib import PurePosixPath, PureWindowsPath
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion import formats
@@ -27,52 +26,45 @@ LONGEST: Final = 500_000
 #: Letters of a name, and of a hash.
 _NAME, _HASH = 80, 24
 
-
-class _Named(io.BytesIO):
-    """Bytes that readers can call by the name of their file."""
-
-    def __init__(self, data: bytes, name: str) -> None:
-        super().__init__(data)
-        self.name = name
+#: What a file is read with to learn its channels while it is not known what it leaves out.
+_STAND_INS: Final[dict[str, Any]] = {"dt": 0.01, "units": "m/s2"}
 
 
-@dataclass(frozen=True)
-class Upload:
+class Upload(NamedTuple):
     """A file: its name without folders, and its content."""
 
     name: str
     data: bytes
 
+    def stream(self) -> io.BytesIO:
+        """Return its content as readers take it: a stream that has the file's name."""
+        stream = io.BytesIO(self.data)
+        stream.name = self.name
+        return stream
 
-class Shelf:
+
+class UploadStore:
     """Files and motions by keys; safe to use from several threads."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._files: OrderedDict[str, Upload] = OrderedDict()
-        self._motions: OrderedDict[tuple[str, ...], Motion] = OrderedDict()
-        self._given: dict[str, Motion] = {}
+        self._read: OrderedDict[tuple[str, ...], Motion] = OrderedDict()
+        self._motions: dict[str, Motion] = {}
 
-    def put(self, name: str, data: bytes) -> str:
-        """Keep a file, and return its key.
-
-        Raises
-        ------
-        UnreadableRecord
-            If it is too large.
-        """
-        called = bare_name(name)
+    def add_file(self, name: str, data: bytes) -> str:
+        """Keep a file, and return its key."""
+        upload = Upload(bare_name(name), data)
         if len(data) > LARGEST:
-            raise UnreadableRecord(f"{called}: larger than {LARGEST // 2**20} MiB; cut the record into smaller files")
+            raise UnreadableRecord(
+                f"larger than {LARGEST // 2**20} MiB; cut the record into smaller files", path=upload.name
+            )
         key = hashlib.sha256(data).hexdigest()[:_HASH]
         with self._lock:
-            self._files[key] = Upload(called, data)
-            self._files.move_to_end(key)
-            while len(self._files) > MOST:
-                self._files.popitem(last=False)
+            _keep(self._files, key, upload)
         return key
 
-    def give(self, motion: Motion) -> str:
+    def add_motion(self, motion: Motion) -> str:
         """Keep a motion of the program's own, and return its key."""
         components = [motion] if motion.vertical is None else [motion, motion.vertical]
         parts = [
@@ -82,29 +74,17 @@ class Shelf:
         ]
         key = hashlib.sha256(b"".join(parts)).hexdigest()[:_HASH]
         with self._lock:
-            self._given[key] = motion
+            self._motions[key] = motion
         return key
 
-    def given(self, key: str) -> Motion:
-        """Return a motion of the program's own.
-
-        Raises
-        ------
-        UnreadableRecord
-            If there is none of that key.
-        """
-        if key not in self._given:
+    def motion(self, key: str) -> Motion:
+        """Return a motion of the program's own."""
+        if key not in self._motions:
             raise UnreadableRecord("this link names a motion of another program: open the page from there again")
-        return self._given[key]
+        return self._motions[key]
 
     def file(self, key: str) -> Upload:
-        """Return a file that is kept.
-
-        Raises
-        ------
-        UnreadableRecord
-            If there is none of that key.
-        """
+        """Return a file that is kept."""
         with self._lock:
             if key not in self._files:
                 raise UnreadableRecord("this record is not here any more: drop its file on the page again")
@@ -112,63 +92,48 @@ class Shelf:
             return self._files[key]
 
     def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
-        """Return the motion of a file; arguments as for `rocking.read`.
-
-        Raises
-        ------
-        UnreadableRecord, InvalidMotion
-            As for `rocking.read`, or if the record is too long.
-        """
+        """Return the motion of a file; arguments as for `rocking.read`."""
         upload = self.file(key)
         request = (key, str(channel), str(dt), str(units))
         with self._lock:
-            known = self._motions.get(request)
+            known = self._read.get(request)
         if known is not None:
             return known
-        motion = formats.read(_Named(upload.data, upload.name), channel=channel, dt=dt, units=units)
+        motion = formats.read(upload.stream(), channel=channel, dt=dt, units=units)
         if len(motion.coefficients) > LONGEST:
-            raise InvalidMotion(f"{upload.name}: {len(motion.coefficients)} samples; at most {LONGEST} are shown here")
+            raise InvalidMotion(
+                f"{len(motion.coefficients)} samples; at most {LONGEST} are shown here", path=upload.name
+            )
         with self._lock:
-            self._motions[request] = motion
-            while len(self._motions) > MOST:
-                self._motions.popitem(last=False)
+            _keep(self._read, request, motion)
         return motion
 
     def contents(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
-        """Say what a file is: its format, its channels, and what must still be told before it can be read.
-
-        Raises
-        ------
-        UnreadableRecord, InvalidMotion
-            If it cannot be read, whatever is told.
-        """
+        """Say what a file is: its format, its channels, and which arguments it needs before it can be read."""
         upload = self.file(key)
+        given: dict[str, Any] = {"dt": dt, "units": units}
         missing: list[str] = []
-        told: dict[str, Any] = {"dt": dt, "units": units}
-        for _ in range(2):
+        while True:
             try:
-                identification, channels = formats.content(_Named(upload.data, upload.name), **told)
+                identification, channels = formats.content(upload.stream(), **given)
                 break
             except (UnreadableRecord, InvalidMotion) as error:
-                need = error.argument
-                if need not in told or told[need] is not None:
+                name = error.argument
+                if name not in _STAND_INS or given[name] is not None:
                     raise
-                missing.append(need)
-                told[need] = _STAND_IN[need]
-        else:
-            identification, channels = formats.content(_Named(upload.data, upload.name), **told)
+                missing.append(name)
+                given[name] = _STAND_INS[name]
         return {
             "key": key,
             "name": upload.name,
             "format": identification.format,
             "reason": identification.reason,
             "missing": missing,
-            "channels": [{"number": each.number, "name": each.name, "notes": _notes(each)} for each in channels],
+            "channels": [
+                {"number": each.number, "name": each.name, "notes": list(motion_notes(each.motion()))}
+                for each in channels
+            ],
         }
-
-
-#: What a file is read with to learn its channels while the truth is not told yet.
-_STAND_IN: Final[dict[str, Any]] = {"dt": 0.01, "units": "m/s2"}
 
 
 def bare_name(name: str) -> str:
@@ -184,5 +149,9 @@ def bare_name(name: str) -> str:
     return shown[-_NAME:] or "record"
 
 
-def _notes(channel: Any) -> list[str]:
-    return list(motion_notes(channel.motion()))
+def _keep(store: OrderedDict[Any, Any], key: object, value: object) -> None:
+    """Put a value at the end of a store, and drop the first ones of too many."""
+    store[key] = value
+    store.move_to_end(key)
+    while len(store) > MOST:
+        store.popitem(last=False)

@@ -1,5 +1,6 @@
-// What can be taken away: figures, data, and the case as code.
+// What can be saved or copied: figures, data, and the case as code.
 
+import {ends} from "./address.js";
 import {address} from "./api.js";
 import {make, one, say} from "./words.js";
 
@@ -8,25 +9,22 @@ const FORMS = /** @type {[string, string, boolean][]} */ ([
   ["impacts.csv", "Impacts, CSV", false], ["nc", "All, NetCDF", false],
 ]);
 
-/** @param {any} header @param {import("./address.js").State} state */
-export function showTaking(header, state) {
-  const {from, to} = header.window;
+/** Files of a case, which the server makes; figures show its window. @param {import("./address.js").State} state */
+export function showFiles(state) {
   one("exports").replaceChildren(...FORMS.map(([form, label, windowed]) => make("a", {
-    href: address("/api/export", {...state.texts, form, ...(windowed && state.window ? {from: String(from), to: String(to)} : {})}),
-    download: `rocking-response.${form}`,
+    href: address("/api/export", {...state.texts, form, ...(windowed ? ends(state) : {})}), download: `rocking-response.${form}`,
   }, [label])));
-  showCode("case", header.python, header.command);
 }
 
-/** What can be taken of a map, which the page has already. @param {string} python @param {string | null} command
+/** Files of a map, which the page makes of what it has. @param {string} python @param {string | null} command
  * @param {[string, string, () => Promise<Blob>][]} files names, labels, and what makes them */
-export function showMapTaking(python, command, files) {
+export function showMapExports(python, command, files) {
   one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => save(name, await content())}}, [label])));
   showCode("map", python, command);
 }
 
 /** @param {string} what @param {string} python @param {string | null} command */
-function showCode(what, python, command) {
+export function showCode(what, python, command) {
   one("python-title").textContent = `This ${what} as Python`;
   one("python").textContent = python;
   one("command").textContent = command ?? `The command line does not do this ${what}; Python does.`;

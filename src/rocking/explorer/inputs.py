@@ -1,0 +1,423 @@
+"""What is simulated, read from texts, and written as Python, as a command, and as texts again.
+
+The texts are those of the page's address: names of the command line's options and values as people write them
+(``alpha=12deg``, ``pga=0.5g``), so that an address says what it shows.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple, cast
+
+import numpy as np
+
+from rocking.block import Block
+from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
+from rocking.explorer.parameters import DEFAULT, PARAMETERS, PULSES, SCALINGS, SHAPES, names_of
+from rocking.explorer.uploads import UploadStore
+from rocking.model import Model
+from rocking.motion import records
+from rocking.motion.motion import Motion
+from rocking.motion.scaling import FACTOR, Measure, MeasureName
+from rocking.named_pulses import FAMILIES, pulse_values
+from rocking.response import Response
+from rocking.simulation import simulate
+from rocking.treatment import Treatment, treatment
+
+Texts = Mapping[str, str]
+
+#: What reads a text of a case has: numbers in SI units, and texts.
+Values = Mapping[str, Any]
+
+#: Names of the texts of a case, and of those that describe its block.
+NAMES: Final = tuple(PARAMETERS)
+BLOCK_NAMES: Final = frozenset(names_of("block"))
+
+#: Product of both restitutions up to which a page waits for the block to come to rest.
+_LIVELIEST: Final = 0.998
+
+_LONGEST_TEXT: Final = 300
+
+#: Longest pulse, cycles: a page shows no more, and memory is bounded.
+MOST_CYCLES: Final = 1000.0
+
+#: Functions that make a block by their names in `rocking`, the one for each shape, and what they call its parameters.
+_MAKERS: Final[Mapping[str, Callable[..., Block]]] = {
+    "Block": Block, "Block.from_parameters": Block.from_parameters, "Block.from_pivots": Block.from_pivots,
+}  # fmt: skip
+_MAKER_OF: Final = {"sizes": "Block", "parameters": "Block.from_parameters", "pivots": "Block.from_pivots"}
+_ARGUMENTS: Final = {"pivots": "distances", "height_of_mass": "height", "gyration": "radius_of_gyration"}
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationInput:
+    """What `rocking.simulate` takes, with the texts from which it was read.
+
+    ``python`` is the expression that makes the motion, ``words`` are the arguments that name it on the command line;
+    there are none where it cannot be named.
+    """
+
+    texts: Texts
+    block: Block
+    motion: Motion | None
+    model: Model
+    treatment: Treatment
+    duration: float | None
+    initial_rotation: float
+    initial_velocity: float
+    python: str
+    words: tuple[str, ...]
+
+    def simulate(self) -> Response:
+        """Return the response."""
+        return simulate(
+            self.block,
+            self.motion,
+            model=self.model,
+            chattering=self.treatment,
+            duration=self.duration,
+            initial_rotation=self.initial_rotation,
+            initial_velocity=self.initial_velocity,
+        )
+
+
+def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
+    """Read what is simulated from texts; those that are not given have the command line's defaults.
+
+    Parameters
+    ----------
+    texts : mapping of str to str
+        Values by the names of `PARAMETERS`; empty ones count as not given. ``motion`` is the name of a shipped record,
+        a pulse (``sine:amplitude=0.3g,frequency=1,cycles=2.5``), ``file:KEY``, ``given:KEY`` or ``none``; ``vertical``
+        is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a channel of the motion's own file.
+    uploads : UploadStore
+        Where the files and motions of keys are.
+
+    Examples
+    --------
+    >>> texts = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
+    >>> case = read_input(texts, UploadStore())
+    >>> case.block, round(case.motion.pga, 6)
+    (<Block: rectangular block, 0.24 m x 1.1 m; p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184>, 3.92266)
+    """
+    given = _given(texts)
+    values = _values(given)
+    maker, arguments = _block_call(values)
+    block = _MAKERS[maker](**arguments)
+    found = _motion(values, uploads)
+    if "duration" not in values and math.prod(side.restitution for side in block.sides) > _LIVELIEST:
+        raise InvalidOption(
+            f"the product of {{}} on both sides is above {_LIVELIEST:g}, so that the block hardly comes to rest: lower "
+            "it, or simulate it in Python",
+            "restitution",
+        )
+    return SimulationInput(
+        texts=given,
+        block=block,
+        motion=found.motion,
+        model=values.get("model", "nonlinear"),
+        treatment=treatment(values.get("chattering", "certified")),
+        duration=values.get("duration"),
+        initial_rotation=values.get("initial_rotation", 0.0),
+        initial_velocity=values.get("initial_velocity", 0.0),
+        python=found.python,
+        words=found.words,
+    )
+
+
+def as_python(case: SimulationInput) -> str:
+    """Write the case as a script that runs as it stands.
+
+    Examples
+    --------
+    >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
+    >>> print(as_python(read_input(texts, UploadStore())))
+    import rocking
+    <BLANKLINE>
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2)
+    motion = None
+    response = rocking.simulate(block, motion, initial_rotation=0.02)
+    print(response.summary())
+    """
+    numbers = {
+        "model": None if case.model == "nonlinear" else case.model,
+        "chattering": case.texts.get("chattering"),
+        "duration": case.duration,
+        "initial_rotation": case.initial_rotation or None,
+        "initial_velocity": case.initial_velocity or None,
+    }
+    options = "".join(f", {name}={value!r}" for name, value in numbers.items() if value is not None)
+    return "\n".join(
+        [
+            "import rocking",
+            "",
+            f"block = rocking.{block_as_python(case.texts)}",
+            f"motion = {case.python}",
+            f"response = rocking.simulate(block, motion{options})",
+            "print(response.summary())",
+        ]
+    )
+
+
+def as_command(case: SimulationInput) -> str | None:
+    """Write the case as a command; None for what the command line does not do.
+
+    Examples
+    --------
+    >>> texts = {"p": "2", "alpha": "12deg", "motion": "ridgecrest-clc-090", "sa": "0.4g@1"}
+    >>> as_command(read_input(texts, UploadStore()))
+    'rocking simulate ridgecrest-clc-090 --p 2 --alpha 12deg --sa 0.4g@1'
+    """
+    if not case.words or "gravity" in case.texts:
+        return None
+    options = [name for name in NAMES if name in case.texts and name not in ("motion", "vertical")]
+    each = ([f"--{name.replace('_', '-')}", case.texts[name]] for name in options)
+    return shlex.join(["rocking", "simulate", *case.words, *itertools.chain.from_iterable(each)])
+
+
+def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
+    """Write a response as the texts of its case; the store keeps its motion if no text can name it."""
+    block, motion = response.block, response.motion
+    texts = _texts_of_block(block)
+    texts |= {"motion": "none"} if motion is None else texts_of_motion(motion, uploads)
+    if response.model != "nonlinear":
+        texts["model"] = response.model
+    if str(response.treatment) != str(treatment("certified")):
+        texts["chattering"] = str(response.treatment)
+    rules = response.trail.rules
+    if not rules["endless"]:
+        texts["duration"] = repr(float(rules["stop"]))
+    rotation, velocity = float(response.rotation(0.0)), float(response.angular_velocity(0.0))
+    if rotation or velocity:
+        texts |= {"initial_rotation": repr(rotation), "initial_velocity": repr(velocity)}
+    return texts
+
+
+def _texts_of_block(block: Block) -> dict[str, str]:
+    """Sizes of a rectangular block, else the parameters of both sides."""
+    pairs = {name: [getattr(side, name) for side in block.sides] for name in ("p", "alpha", "restitution")}
+    texts = {name: ",".join(repr(value) for value in pair) for name, pair in pairs.items()}
+    if block.gravity != STANDARD_GRAVITY:
+        texts["gravity"] = repr(block.gravity)
+    if block.half_width is None or block.half_height is None:
+        return texts
+    del texts["p"], texts["alpha"]
+    sizes = {"width": 2.0 * block.half_width, "height": 2.0 * block.half_height}
+    if block.offset:
+        sizes["offset"] = block.offset
+    if block.sides == Block(**sizes, gravity=block.gravity).sides:
+        del texts["restitution"]
+    return {name: repr(size) for name, size in sizes.items()} | texts
+
+
+def _given(texts: Texts) -> dict[str, str]:
+    """Texts that are not empty, of names that a case has."""
+    given = {name: value.strip() for name, value in texts.items() if value.strip()}
+    for name, value in given.items():
+        if name not in NAMES:
+            raise InvalidOption(f"a case has no {name[:40]!r}; it has {', '.join(NAMES)}")
+        if len(value) > _LONGEST_TEXT:
+            raise InvalidOption(f"{{}} is {len(value)} letters long; at most {_LONGEST_TEXT} are read", name)
+    return given or dict(DEFAULT)
+
+
+def _values(given: Texts) -> dict[str, Any]:
+    return {name: PARAMETERS[name].read(text) for name, text in given.items()}
+
+
+def _block_call(values: Values) -> tuple[str, dict[str, Any]]:
+    """Name in `_MAKERS` and arguments of the call that makes the block."""
+    chosen = values.keys() & BLOCK_NAMES - {"restitution"}
+    shape = next((each for each in SHAPES if {*each.needed} <= chosen <= {*each.needed, *each.optional}), None)
+    if shape is None:
+        raise InvalidBlock(
+            "a block has either {} and {} (m) and perhaps {}, or {} (rad/s) and {}, or {}, {} and {} (m)",
+            *(name for each in SHAPES for name in (*each.needed, *each.optional)),
+        )
+    names = (*shape.needed, *shape.optional, "restitution", "gravity")
+    arguments = {_ARGUMENTS.get(name, name): values[name] for name in names if name in values}
+    if isinstance(arguments.get("distances"), float):
+        arguments["distances"] = (arguments["distances"],) * 2
+    return _MAKER_OF[shape.name], arguments
+
+
+def block_as_python(given: Texts) -> str:
+    """Write the call of `rocking` that makes the block."""
+    maker, arguments = _block_call(_values({name: given[name] for name in given.keys() & {*BLOCK_NAMES, "gravity"}}))
+    return f"{maker}({_written(arguments)})"
+
+
+def _written(arguments: Mapping[str, Any]) -> str:
+    """Arguments of a call, as Python writes them."""
+    return ", ".join(f"{name}={value!r}" for name, value in arguments.items())
+
+
+class _Found(NamedTuple):
+    """A motion, how Python makes it, and how the command line names it."""
+
+    motion: Motion | None
+    python: str
+    words: tuple[str, ...]
+
+
+def _motion(values: Values, uploads: UploadStore) -> _Found:
+    target = _target(values)
+    name = values.get("motion", DEFAULT["motion"])
+    found = _unscaled(name, values, uploads)
+    if "vertical" in values:
+        found = _with_vertical(found, name, values, uploads)
+    if target is None:
+        return found
+    if found.motion is None:
+        raise InvalidOption("there is no motion to scale: choose one, or leave the scaling out")
+    return _Found(_scaled(found.motion, *target), f"{found.python}.{_scaling_as_python(*target)}", found.words)
+
+
+def _target(values: Values) -> tuple[float, Measure] | None:
+    """Level that the motion is scaled to, and the measure that it is of."""
+    chosen = [name for name in SCALINGS if name in values]
+    if len(chosen) > 1:
+        raise InvalidOption(f"{' and '.join(['{}'] * len(chosen))} scale the same motion; give one of them", *chosen)
+    if not chosen:
+        return None
+    (name,) = chosen
+    if name == "sa":
+        level, period = values["sa"]
+        return level, Measure("sa", period)
+    return values[name], FACTOR if name == "scale" else Measure(cast(MeasureName, name))
+
+
+def _scaling_as_python(level: float, measure: Measure) -> str:
+    if measure.name == "factor":
+        return f"scaled({level!r})"
+    kind = f'rocking.Measure("sa", period={measure.period!r})' if measure.name == "sa" else repr(measure.name)
+    return f"scaled_to({level!r}" + ("" if measure.name == "pga" else f", {kind}") + ")"
+
+
+# These are made once while only the block is changed.
+_scaled = functools.lru_cache(maxsize=4)(Motion.scaled_to)
+_together = functools.lru_cache(maxsize=4)(Motion.with_vertical)
+_shipped = functools.cache(records.load)
+
+
+def _with_vertical(found: _Found, horizontal: str, values: Values, uploads: UploadStore) -> _Found:
+    """Add the vertical component, which is read with the same step and units as the motion."""
+    name, (kind, _, key) = values["vertical"], horizontal.partition(":")
+    if found.motion is None or is_pulse(horizontal) or kind == "given":
+        raise InvalidOption("{} goes with a record: choose one, or leave the component out", "vertical")
+    if name.startswith("file:"):
+        other, _, channel = name.removeprefix("file:").partition("#")
+        vertical = _from_file(other, values, channel or None, uploads)
+        words = vertical.words if not channel else ()
+    elif name in records.names():
+        vertical, words = _unscaled(name, {}, uploads), (name,)
+    elif kind == "file":
+        vertical, words = _from_file(key, values, name, uploads), (name,)
+    else:
+        raise InvalidOption(f"{{}}: there is no shipped record {name[:40]!r}", "vertical", value=name)
+    return _Found(
+        _together(found.motion, vertical.motion),
+        f"{found.python}.with_vertical({vertical.python})",
+        (*found.words, "--vertical", *words) if found.words and words else (),
+    )
+
+
+def _unscaled(name: str, values: Values, uploads: UploadStore) -> _Found:
+    kind, _, key = name.partition(":")
+    if name == "none":
+        return _Found(None, "None", ())
+    if is_pulse(name):
+        call = pulse_call(name, {parameter: repr(value) for parameter, value in arguments_of(name).items()})
+        return _Found(pulse_of(name), call, ("--pulse", name))
+    if kind == "given":
+        motion = uploads.motion(key)
+        return _Found(motion, f"...  # {motion.name}: the motion that this page was opened with", ())
+    if kind == "file":
+        return _from_file(key, values, values.get("channel"), uploads)
+    return _Found(_shipped(name), f"rocking.records.load({name!r})", (name,))
+
+
+def _from_file(key: str, values: Values, channel: str | None, uploads: UploadStore) -> _Found:
+    """Read a channel of a file with the step and the units that the texts give."""
+    given: dict[str, Any] = {"channel": channel, "dt": values.get("dt"), "units": values.get("units")}
+    file = uploads.file(key).name
+    arguments = _written({name: value for name, value in given.items() if value is not None})
+    call = f"rocking.read({file!r}{', ' if arguments else ''}{arguments})"
+    return _Found(uploads.read(key, **given), call, (file,))
+
+
+def is_pulse(text: str) -> bool:
+    """Whether a text names a pulse that the page has."""
+    return text.partition(":")[0] in PULSES
+
+
+def arguments_of(text: str) -> dict[str, Any]:
+    """Read the parameters of a pulse, in SI units; one that is longer than the page shows is refused."""
+    _, arguments = pulse_values(text)
+    for name in ("cycles", "gamma"):
+        if arguments.get(name, 0.0) > MOST_CYCLES:
+            raise InvalidMotion(f"{{}} of a pulse may be {MOST_CYCLES:g} here at most, not {arguments[name]:g}", name)
+    return arguments
+
+
+def pulse_of(text: str) -> Motion:
+    """Make the pulse that a text names."""
+    return pulse_values(text)[0].motion(arguments_of(text))
+
+
+def pulse_call(text: str, arguments: Mapping[str, str]) -> str:
+    """Write the call that makes a pulse of the same family with these arguments, as Python has them."""
+    written = ", ".join(f"{name}={value}" for name, value in arguments.items())
+    return f"rocking.pulses.{pulse_values(text)[0].make.__name__}({written})"
+
+
+def pulse_as_text(motion: Motion) -> str | None:
+    """Write a motion that is one of the pulses, bit for bit and without a vertical component, as text; else None.
+
+    Examples
+    --------
+    >>> pulse_as_text(pulse_of("one-sine:amplitude=3,frequency=2").scaled(2.0))
+    'one-sine:amplitude=6.0,frequency=2.0'
+    """
+    name = motion.description.family.lower().replace(" ", "-")
+    given: dict[str, Any] = dict(motion.description.parameters)
+    if name.endswith("-ricker"):
+        name, given["kind"] = "ricker", name.removesuffix("-ricker")
+    if name not in PULSES or motion.vertical is not None:
+        return None
+    parameters = [*FAMILIES[name].needed, *FAMILIES[name].optional]
+    text = f"{name}:" + ",".join(f"{each}={value}" for each, value in given.items() if each in parameters)
+    made = pulse_of(text)
+    same = np.array_equal(made.breakpoints, motion.breakpoints) and np.array_equal(
+        made.coefficients, motion.coefficients
+    )
+    return text if same else None
+
+
+def texts_of_motion(motion: Motion, uploads: UploadStore) -> dict[str, str]:
+    """Text of a pulse, or of a shipped record and its scale, or else of the key under which the motion is kept."""
+    pulse = pulse_as_text(motion)
+    if pulse is not None:
+        return {"motion": pulse}
+    if motion.name in records.names():
+        factor = _factor_of(motion, records.load(motion.name))
+        if factor is not None:
+            return {"motion": motion.name} | ({} if factor == 1.0 else {"scale": repr(factor)})
+    return {"motion": f"given:{uploads.add_motion(motion)}"}
+
+
+def _factor_of(motion: Motion, base: Motion) -> float | None:
+    """Factor that makes one motion of the other, bit for bit; None if there is none."""
+    if motion.vertical is not None:
+        return None
+    if not np.array_equal(motion.breakpoints, base.breakpoints) or motion.coefficients.shape != base.coefficients.shape:
+        return None
+    largest = np.unravel_index(np.argmax(np.abs(base.coefficients)), base.coefficients.shape)
+    factor = float(motion.coefficients[largest] / base.coefficients[largest])
+    return factor if np.array_equal(base.coefficients * factor, motion.coefficients) else None

@@ -1,0 +1,328 @@
+"""The parameters of a case: their names, how their texts are read, and what the page says about them.
+
+This is the only list of them. `inputs` reads texts by it, `core` groups texts by it, `server` names fields in messages
+by it, and the page builds its address and its forms from `specification`.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Final, Literal, NamedTuple
+
+from rocking.constants import VERSION
+from rocking.errors import InvalidOption
+from rocking.motion import records
+from rocking.motion.formats.units import CHOICES
+from rocking.quantities import Quantity, acceleration, angle, length, number, sides
+
+#: Parameters that one form sets together, and that a comparison replaces together.
+Group = Literal["block", "motion", "start", "model", "map", "pulse", "treatment"]
+
+Kind = Literal["text", "number", "length", "angle", "acceleration", "acceleration at a period"]
+
+_READERS: Final[Mapping[Kind, Quantity]] = {
+    "number": number,
+    "length": length,
+    "angle": angle,
+    "acceleration": acceleration,
+}
+
+#: What the page writes behind a number that is shown in these units; others are SI units.
+_SUFFIXES: Final = {"°": "deg", "g": "g"}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a case, and the field of the page that sets it.
+
+    ``name`` is that of the address, and of the command line's option; ``label`` is what the page calls it; ``kind``
+    says how its text is read, ``unit`` what the page shows it in, ``default`` with which text its field starts. Its
+    slider goes from ``low`` to ``high``, in ``unit``; where it is ``logarithmic``, equal distances are equal ratios.
+    ``values`` says whether the sides of a block may differ in it.
+    """
+
+    name: str
+    label: str
+    group: Group
+    kind: Kind = "number"
+    unit: str = ""
+    default: str = ""
+    low: float = 0.0
+    high: float = 0.0
+    logarithmic: bool = False
+    values: Literal["one", "one or two", "two"] = "one"
+    explanation: str = ""
+
+    def read(self, text: str) -> Any:
+        """Return the value of a text in SI units: the text itself, a number, or a tuple of two numbers.
+
+        Examples
+        --------
+        >>> PARAMETERS["alpha"].read("0.1,0.2"), PARAMETERS["sa"].read("2@0.5"), PARAMETERS["motion"].read("none")
+        ((0.1, 0.2), (2.0, 0.5), 'none')
+        """
+        if self.kind == "text":
+            return text
+        if self.kind == "acceleration at a period":
+            level, at, period = text.partition("@")
+            if not at:
+                raise InvalidOption(
+                    f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {text!r}", self.name, value=text
+                )
+            return acceleration(level, self.name), number(period, self.name)
+        if self.values == "one":
+            return _READERS[self.kind](text, self.name)
+        found = sides(text, self.name, _READERS[self.kind])
+        return tuple(found) if isinstance(found, list) else found
+
+    def described(self) -> dict[str, Any]:
+        """Return all of it in plain values, as the page takes it."""
+        return {**asdict(self), "suffix": _SUFFIXES.get(self.unit, "")}
+
+
+def _by_name(*parameters: Parameter) -> dict[str, Parameter]:
+    return {parameter.name: parameter for parameter in parameters}
+
+
+#: All texts of a case by name, in the order of the address and of the command line.
+PARAMETERS: Final = _by_name(
+    Parameter(
+        "width", "Width", "block", "number", "m", "0.24", 0.02, 5.0, True,
+        explanation="Full width 2b of a rectangular block.",
+    ),
+    Parameter(
+        "height", "Height", "block", "number", "m", "1.1", 0.1, 20.0, True,
+        explanation="Full height 2h of a rectangular block.",
+    ),
+    Parameter(
+        "offset", "Offset of the centre of mass", "block", "number", "m", "0", -0.25, 0.25,
+        explanation="Distance of the centre of mass from the middle of the width, positive to the right (side +). It "
+        "is a quarter of the width at most. The two sides then differ.",
+    ),
+    Parameter(
+        "p", "Frequency parameter p", "block", "number", "rad/s", "3.61", 0.3, 12.0, True, "one or two",
+        explanation="It says how fast the block tips: p² = 3g/4R for a rectangle with half diagonal R. Large blocks "
+        "have a small p. It is not a frequency of vibration: a rocking block has none.",
+    ),
+    Parameter(
+        "alpha", "Slenderness α", "block", "angle", "°", "12.3deg", 1.0, 40.0, False, "one or two",
+        explanation="Angle between the vertical and the line from a corner to the centre of mass. The block lifts when "
+        "the ground acceleration passes g tan α, and it stands on its corner in balance when it is rotated by α.",
+    ),
+    Parameter(
+        "pivots", "Distance of the pivot", "block", "length", "m", "0.15", 0.01, 2.5, True, "two",
+        explanation="Horizontal distance of the corner from the centre of mass.",
+    ),
+    Parameter(
+        "height_of_mass", "Height of the centre of mass", "block", "length", "m", "0.55", 0.05, 10.0, True,
+        explanation="Its height above the corners.",
+    ),
+    Parameter(
+        "gyration", "Radius of gyration", "block", "length", "m", "0.33", 0.02, 8.0, True,
+        explanation="About the centre of mass: the square root of the moment of inertia over the mass.",
+    ),
+    Parameter(
+        "restitution", "Restitution η", "block", "number", "", "0.93", 0.5, 0.99, False, "one or two",
+        explanation="Angular speed just after an impact over the speed just before. Housner's value, 1 − 1.5 sin² α, "
+        "keeps the angular momentum about the new corner; that of two different sides follows from both p and α.",
+    ),
+    Parameter("gravity", "Gravity", "model", "number", "m/s²"),
+    Parameter("motion", "Record", "motion", "text", default="ridgecrest-clc-090"),
+    Parameter("channel", "Channel", "motion", "text"),
+    Parameter("vertical", "Vertical component", "motion", "text"),
+    Parameter("dt", "Sampling step", "motion", "number", "s", "0.01"),
+    Parameter("units", "Units of the numbers", "motion", "text"),
+    Parameter(
+        "scale", "Factor", "motion", "number", "", "1", 0.1, 10.0, True,
+        explanation="Every acceleration is multiplied by it; a negative one reverses the motion.",
+    ),
+    Parameter(
+        "pga", "Peak acceleration", "motion", "acceleration", "g", "0.4g", 0.05, 2.0, True,
+        explanation="Largest ground acceleration (PGA).",
+    ),
+    Parameter(
+        "pgv", "Peak velocity", "motion", "number", "m/s", "0.5", 0.05, 3.0, True,
+        explanation="Largest ground velocity (PGV).",
+    ),
+    Parameter(
+        "sa", "Spectral acceleration", "motion", "acceleration at a period", "g", "0.5g", 0.05, 4.0, True,
+        explanation="Peak response of an oscillator of the period below, with 5 % damping.",
+    ),
+    Parameter("model", "Equation of motion", "model", "text", default="nonlinear"),
+    Parameter("chattering", "Chattering ends by", "treatment", "text", default="certified"),
+    Parameter("duration", "Duration", "model", "number", "s"),
+    Parameter(
+        "initial_rotation", "Release from a rotation of", "start", "angle", "°", "0deg", -20.0, 20.0,
+        explanation="Rotation at time zero; positive leans to the right corner.",
+    ),
+    Parameter("initial_velocity", "Release with a velocity of", "start", "number", "rad/s"),
+)  # fmt: skip
+
+#: What an address says about a map, of a case or of a study.
+MAP: Final = _by_name(
+    Parameter("x", "to the right", "map", "text"),
+    Parameter("x_from", "to the right, from", "map"),
+    Parameter("x_to", "to the right, to", "map"),
+    Parameter("y", "upwards", "map", "text"),
+    Parameter("y_from", "upwards, from", "map"),
+    Parameter("y_to", "upwards, to", "map"),
+    Parameter("points", "points", "map", default="200"),
+    Parameter("quantity", "Shows", "map", "text"),
+    Parameter("motion_index", "motion", "map"),
+    Parameter("polarity_index", "polarity", "map"),
+    Parameter("scale_index", "scale", "map"),
+    *(Parameter(f"fix_{name}", name, "map") for name in ("p", "alpha", "restitution", "block")),
+)
+
+#: The case that is shown when nothing is asked for: it chatters, rests and rocks on several times.
+DEFAULT: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
+
+
+class Shape(NamedTuple):
+    """A way to describe a block: its name, its label, and which parameters it needs and takes."""
+
+    name: str
+    label: str
+    needed: tuple[str, ...]
+    optional: tuple[str, ...] = ()
+
+
+SHAPES: Final = (
+    Shape("sizes", "width and height", ("width", "height"), ("offset",)),
+    Shape("parameters", "p and α", ("p", "alpha")),
+    Shape("pivots", "pivots and radius of gyration", ("pivots", "height_of_mass", "gyration")),
+)
+
+#: Parameters that scale a motion, of which a case has one at most; and how the page calls each.
+SCALINGS: Final = {
+    "pga": "to a peak acceleration (PGA)",
+    "pgv": "to a peak velocity (PGV)",
+    "sa": "to a spectral acceleration (Sa)",
+    "scale": "by a factor",
+}
+
+_PERIOD: Final = Parameter(
+    "period", "at a period of", "motion", "number", "s", "1", 0.05, 5.0, True, explanation="Period of that oscillator."
+)
+
+
+def _of_pulse(name: str, label: str, unit: str, default: str, ends: tuple[float, float], words: str) -> Parameter:
+    """Return a parameter of a pulse, which `named_pulses` reads; its slider is logarithmic where it can be."""
+    logarithmic = ends[0] > 0.0 and name not in ("cycles", "gamma")
+    return Parameter(name, label, "pulse", "text", unit, default, *ends, logarithmic, explanation=words)
+
+
+_AMPLITUDE = _of_pulse("amplitude", "Amplitude", "g", "0.3g", (0.02, 2.0), "Largest acceleration of the pulse.")
+_FREQUENCY = _of_pulse("frequency", "Frequency", "Hz", "1", (0.1, 10.0), "Cycles per second.")
+_DURATION = _of_pulse("duration", "Duration", "s", "0.5", (0.05, 5.0), "How long the pulse lasts.")
+_CYCLES = _of_pulse("cycles", "Cycles", "", "2.5", (0.5, 20.0), "Duration times frequency; any number.")
+_PHASE = _of_pulse("phase", "Phase", "°", "0deg", (0.0, 360.0), "Where in its cycle the pulse begins.")
+_VELOCITY = _of_pulse("amplitude", "Velocity amplitude", "m/s", "0.6", (0.05, 3.0), "Amplitude of the velocity pulse.")
+_GAMMA = _of_pulse("gamma", "Length γ", "cycles", "2", (1.0, 6.0), "How many cycles its envelope holds.")
+
+#: Label and parameters of each pulse, and choices.
+PULSES: Final[Mapping[str, dict[str, Any]]] = {
+    "sine": {"label": "Sine", "parameters": (_AMPLITUDE, _FREQUENCY, _CYCLES, _PHASE)},
+    "half-sine": {"label": "Half sine", "parameters": (_AMPLITUDE, _FREQUENCY)},
+    "one-sine": {"label": "One sine", "parameters": (_AMPLITUDE, _FREQUENCY)},
+    "one-cosine": {"label": "One cosine", "parameters": (_AMPLITUDE, _FREQUENCY)},
+    "ricker": {
+        "label": "Ricker",
+        "parameters": (_AMPLITUDE, _FREQUENCY),
+        "choices": {"kind": ("symmetric", "antisymmetric")},
+    },
+    "mavroeidis-papageorgiou": {
+        "label": "Mavroeidis–Papageorgiou (near fault)",
+        "parameters": (_VELOCITY, _FREQUENCY, _PHASE, _GAMMA),
+    },
+    "rectangular": {"label": "Rectangular", "parameters": (_AMPLITUDE, _DURATION)},
+    "triangular": {"label": "Triangular", "parameters": (_AMPLITUDE, _DURATION)},
+}
+
+_TREATMENTS: Final = (
+    {"name": "certified", "label": "Proof", "explanation": "The block rests where the impacts provably accumulate."},
+    {
+        "name": "velocity",
+        "label": "Velocity threshold",
+        "limit": Parameter(
+            "limit", "Threshold over pα", "treatment", "number", "", "0.05", 1e-9, 0.1, True
+        ).described(),
+        "explanation": "The block rests as soon as an impact leaves less speed than this.",
+    },
+    {
+        "name": "interval",
+        "label": "Interval threshold",
+        "limit": Parameter("limit", "Threshold", "treatment", "number", "s", "0.001", 1e-9, 0.1, True).described(),
+        "explanation": "The block rests as soon as two impacts follow each other within this time.",
+    },
+    {
+        "name": "time",
+        "label": "Asymptotic time (Eq. 65)",
+        "explanation": "The block rests once the paper's asymptotic chattering time has passed; for a sine only.",
+    },
+)
+
+
+#: Quantities of a map, and how the page calls each.
+QUANTITIES: Final = {
+    "outcome": "Chattering: complete or not",
+    "rest": "Time from uplift to rest",
+    "peak": "Peak rotation over slenderness",
+    "mode": "Overturning mode",
+}
+
+
+def names_of(*groups: Group) -> tuple[str, ...]:
+    """Return the names of a case's texts in some groups.
+
+    Examples
+    --------
+    >>> names_of("start")
+    ('initial_rotation', 'initial_velocity')
+    """
+    return tuple(name for name, parameter in PARAMETERS.items() if parameter.group in groups)
+
+
+def field_label(name: str) -> str:
+    """Return what a message on the page calls an argument: the label of its field, where it has one.
+
+    Examples
+    --------
+    >>> field_label("width"), field_label("radius")
+    ('“Width”', 'radius')
+    """
+    found = PARAMETERS.get(name) or MAP.get(name) or _LABELLED.get(name)
+    return name if found is None else f"“{found.label}”"
+
+
+_LABELLED: Final = _by_name(_PERIOD, *(each for pulse in PULSES.values() for each in pulse["parameters"]))
+
+
+@functools.cache
+def specification() -> dict[str, Any]:
+    """Return all of this in plain values, as the page takes it."""
+    return {
+        "version": VERSION,
+        "default": DEFAULT,
+        "parameters": [parameter.described() for parameter in PARAMETERS.values()],
+        "map": list(MAP),
+        "shapes": [shape._asdict() for shape in SHAPES],
+        "scalings": [["", "as it is"], *SCALINGS.items()],
+        "period": _PERIOD.described(),
+        "pulses": {
+            name: {**pulse, "parameters": [parameter.described() for parameter in pulse["parameters"]]}
+            for name, pulse in PULSES.items()
+        },
+        "records": [_record(name) for name in records.names()],
+        "units": list(CHOICES),
+        "models": [["nonlinear", "exact (nonlinear)"], ["linear", "slender block (linear)"]],
+        "treatments": list(_TREATMENTS),
+        "quantities": [{"name": name, "label": label} for name, label in QUANTITIES.items()],
+    }
+
+
+def _record(name: str) -> dict[str, str]:
+    record = records.info(name)
+    return {"name": name, "event": record.event, "station": record.station, "direction": record.direction}

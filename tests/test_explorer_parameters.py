@@ -1,0 +1,87 @@
+"""The one specification of the explorer's parameters: it agrees with itself and with the command line."""
+
+import math
+
+import pytest
+
+from rocking.errors import InvalidOption
+from rocking.explorer.inputs import FAMILIES
+from rocking.explorer.parameters import (
+    DEFAULT,
+    MAP,
+    PARAMETERS,
+    PULSES,
+    SCALINGS,
+    SHAPES,
+    field_label,
+    names_of,
+    specification,
+)
+from rocking.named_pulses import named_pulse
+
+#: What the command line takes as an argument, and what it does not do.
+NO_OPTIONS = {"motion", "gravity", "initial_rotation", "initial_velocity"}
+
+
+def in_shown_unit(parameter, value):
+    factor = {"°": math.pi / 180.0, "g": 9.80665}.get(parameter.unit, 1.0)
+    return value / factor
+
+
+def test_every_slider_starts_within_its_ends():
+    judged = 0
+    for name, parameter in PARAMETERS.items():
+        if parameter.low == parameter.high:
+            continue
+        value = PARAMETERS["pga" if name == "sa" else name].read(parameter.default)
+        assert parameter.low < in_shown_unit(parameter, value) < parameter.high, name
+        assert parameter.low > 0.0 or not parameter.logarithmic, name
+        judged += 1
+    assert judged >= 14
+
+
+def test_every_text_of_a_case_is_an_option_of_the_command_line(run):
+    _, shown, _ = run("simulate", "--help")
+    options = PARAMETERS.keys() - NO_OPTIONS
+    assert len(options) >= 20
+    assert [name for name in options if f"--{name.replace('_', '-')}" not in shown] == []
+
+
+def test_shapes_and_scalings_are_made_of_parameters_of_their_forms():
+    described = {name for shape in SHAPES for name in (*shape.needed, *shape.optional)}
+    assert described == {*names_of("block")} - {"restitution"}
+    assert SCALINGS.keys() <= {*names_of("motion")}
+    assert DEFAULT.keys() <= PARAMETERS.keys()
+    assert not MAP.keys() & PARAMETERS.keys()
+
+
+@pytest.mark.parametrize("name", PULSES)
+def test_a_pulse_of_the_defaults_of_its_fields_can_be_made(name):
+    parameters = PULSES[name]["parameters"]
+    assert FAMILIES[name].motion  # the page has no pulse that the package lacks
+    choices = {each: values[0] for each, values in PULSES[name].get("choices", {}).items()}
+    given = {**{each.name: each.default for each in parameters}, **choices}
+    motion = named_pulse(f"{name}:" + ",".join(f"{each}={text}" for each, text in given.items()))
+    assert motion.pga > 0.0
+
+
+def test_two_sides_are_read_where_a_parameter_may_have_them_and_refused_elsewhere():
+    assert PARAMETERS["restitution"].read("0.9,0.8") == (0.9, 0.8)
+    assert PARAMETERS["pivots"].read("20cm,0.1") == (0.2, 0.1)
+    with pytest.raises(InvalidOption, match="takes a number"):
+        PARAMETERS["width"].read("0.2,0.3")
+
+
+def test_a_field_is_called_by_its_label_and_another_argument_by_its_name():
+    assert field_label("gyration") == "“Radius of gyration”"
+    assert field_label("cycles") == "“Cycles”"
+    assert field_label("tolerance") == "tolerance"
+
+
+def test_the_page_is_given_every_parameter_with_its_label():
+    given = specification()["parameters"]
+    assert [each["name"] for each in given] == [*PARAMETERS]
+    assert all(each["label"] for each in given)
+    assert {each["name"]: each["suffix"] for each in given if each["suffix"]} == {
+        "alpha": "deg", "pga": "g", "sa": "g", "initial_rotation": "deg",
+    }  # fmt: skip
