@@ -54,7 +54,9 @@ def test_every_one_of_several_motions_is_a_motion(take, motions):
 def test_a_mapping_gives_motions_its_names(take):
     take = {
         "simulate_many": lambda motions: rocking.simulate_many(BLOCK, motions),
-        "rocking_spectrum": lambda motions: rocking.rocking_spectrum(motions, alpha=[0.2], p=[2.0]).data,
+        "rocking_spectrum": lambda motions: (
+            rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0]), motions).data
+        ),
     }[take]
     named, listed = take({"weak": MOTION, "strong": 2.0 * MOTION}), take([MOTION, 2.0 * MOTION])
     assert named.motion.values.tolist() == ["weak", "strong"]

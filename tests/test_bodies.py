@@ -146,7 +146,7 @@ def test_what_a_ball_cannot_do_is_refused():
         simulate(Ball(0.5), None)
     with pytest.raises(InvalidOption, match="the only one of this body"):
         simulate(Ball(0.5), None, model="linear", initial_rotation=-0.1)
-    with pytest.raises(InvalidOption, match='chattering="time" is for symmetric blocks'):
+    with pytest.raises(InvalidOption, match='chattering "time" is for symmetric blocks'):
         simulate(Ball(0.5), rocking.pulses.sine(15.0, 1.0, cycles=2), model="linear", chattering="time")
     with pytest.raises(InvalidOption, match="never comes to rest"):
         simulate(Ball(1.0), None, model="linear", initial_rotation=0.1)
@@ -169,7 +169,7 @@ def test_the_engine_plays_balls_as_simulate_does(how):
 
 
 def test_an_ensemble_of_balls_is_labelled_by_its_parameters():
-    result = simulate_many(BALLS, table(), model="linear", factor=[0.5, 1.0])
+    result = simulate_many(BALLS, table(), model="linear", levels=[0.5, 1.0])
     assert result.sizes == {"motion": 1, "scale": 2, "block": 3}
     assert result.restitution.values.tolist() == [0.3, 0.6, 0.9]
     assert not np.any(result.peak_rotation.sel(scale=0.5))  # 0.76 g does not lift them
@@ -182,9 +182,9 @@ def test_an_ensemble_of_balls_is_labelled_by_its_parameters():
 
 def test_a_study_of_balls_keeps_its_inputs_and_takes_them_up_again(tmp_path):
     folder = tmp_path / "balls"
-    study = rocking.study(folder, BALLS, table(), model="linear", factor=[0.5, 1.0], unit_blocks=512)
+    study = rocking.study(folder, BALLS, table(), model="linear", levels=[0.5, 1.0], unit_blocks=512)
     study.run(threads=1)
     again = rocking.study(folder)
     assert isinstance(again.product.bodies, Balls)
-    expected = simulate_many(BALLS, table(), model="linear", factor=[0.5, 1.0])
+    expected = simulate_many(BALLS, table(), model="linear", levels=[0.5, 1.0])
     assert again.results().peak_rotation.values.tolist() == expected.peak_rotation.values.tolist()

@@ -96,7 +96,7 @@ def test_a_message_stays_short():
         lambda number: (
             rocking.Block(half_width=number(0.25), half_height=number(1.0), mass=number(2.0), restitution=number(0.5)).p
         ),
-        lambda number: rocking.Block.from_pivots((number(0.25), number(0.5)), number(1.0), number(0.5)).p,
+        lambda number: rocking.Block.from_pivots((number(0.25), number(0.5)), number(1.0), number(0.5)).sides[0].p,
         lambda number: rocking.Motion.from_samples([0.0, 1.0], number(0.5)).delayed(number(0.25)).duration,
         lambda number: rocking.Motion([0.0, 2.0], [[1.0]]).spectral_acceleration(number(1.0), number(0.0)),
         lambda number: rocking.pulses.ricker(number(2.0), number(0.5), duration=number(1.0)).pga,

@@ -142,7 +142,7 @@ def test_fragility_prints_a_table_and_writes_what_it_says(run, tmp_path):
         (["spectrum", RECORD, "--alpha", "0.2", "--p", "0:2:3:log"], "positive"),
         (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2:1"], "COUNT"),
         (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2:9999999"], "COUNT"),
-        (["spectrum", RECORD, "--alpha", "0.2", "--p", "nan"], "finite"),
+        (["spectrum", RECORD, "--alpha", "0.2", "--p", "nan"], "--p must be positive"),
         (["spectrum", "nowhere.AT2", "--alpha", "0.2", "--p", "2"], "nowhere.AT2"),
         (["spectrum", RECORD, "--p", "2"], "alpha"),
         (["spectrum", RECORD, "--alpha", "0.2", "--p", "2", "--chattering", "hope"], "hope"),

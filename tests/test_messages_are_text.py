@@ -11,7 +11,7 @@ from rocking import Block, Motion
 from rocking.analysis.survey import survey
 from rocking.cli import wording
 from rocking.errors import Message, RockingError
-from rocking.explorer.shelf import Shelf
+from rocking.explorer.uploads import UploadStore
 from rocking.named_pulses import named_pulse
 
 RECORD = "el-centro-meloland-270"
@@ -81,7 +81,7 @@ REFUSED = {
     "degrees": lambda _: Block.from_parameters(2.0, 12.0),
     "offset too large": lambda _: Block(width=0.3, height=1.0, offset=0.2),
     "step below zero": lambda _: Motion.from_samples([0.0, 1.0], -0.01),
-    "period without sa": lambda _: rocking.pulses.one_sine(1.0, 1.0).scaled(pga=1.0, period=1.0),
+    "period without sa": lambda _: rocking.Measure("pga", period=1.0),
     "unknown treatment": lambda _: rocking.simulate(Block(width=0.2, height=1.0), None, chattering="hope"),
     "treatment out of range": lambda _: rocking.simulate(
         Block(width=0.2, height=1.0), None, initial_rotation=0.1, chattering="certified=0"
@@ -197,8 +197,8 @@ def test_what_the_explorer_asks_of_a_file_does_not_hang_on_words(folder):
     """The fields of an upload that a page shows; other requests of a page belong here as well."""
 
     def described(name):
-        uploads = Shelf()
-        found = uploads.contents(uploads.put(name, (folder / name).read_bytes()))
+        uploads = UploadStore()
+        found = uploads.contents(uploads.add_file(name, (folder / name).read_bytes()))
         return {field: found[field] for field in ("name", "format", "missing")}
 
     for name, missing in (("no-units.txt", ["units"]), ("no-step.txt", ["dt"]), ("sound.csv", [])):

@@ -500,7 +500,7 @@ def test_who_asks_for_the_holder_reads_beyond_the_byte_that_windows_locks(tmp_pa
 @pytest.mark.parametrize(
     ("changes", "part"),
     [
-        ({"pga": [2.0, 4.5]}, "the scales"),
+        ({"levels": [2.0, 4.5]}, "the scales"),
         ({"model": "nonlinear"}, "model"),
         ({"chattering": "velocity"}, "treatment"),
         ({"duration": 3.0}, "duration"),

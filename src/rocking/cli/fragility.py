@@ -148,16 +148,17 @@ def _refuse_beside_outcomes(
     """Refuse what observed outcomes leave no room for."""
     given = {
         "records": names,
-        "--pulse": motion.pulse,
-        "--levels": measure.levels,
-        "--ensemble": block.ensemble,
-        "--limits": limits if limits != "overturning" else None,
-        "--polarity": polarity if polarity != "+" else None,
+        "pulse": motion.pulse,
+        "levels": measure.levels,
+        "ensemble": block.ensemble,
+        "limits": limits if limits != "overturning" else None,
+        "polarity": polarity if polarity != "+" else None,
         **block.given(),
     }
     found = [option for option, value in given.items() if value]
     if found:
-        raise InvalidOption(f"--outcomes are observed, of a block and under motions of their own: leave {found[0]} out")
+        sentence = "{} are observed, of a block and under motions of their own: leave {} out"
+        raise InvalidOption(sentence, "outcomes", found[0])
 
 
 def _limits(text: str) -> dict[str, float]:

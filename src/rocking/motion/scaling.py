@@ -79,7 +79,7 @@ class Measure:
         object.__setattr__(self, "damping", damping)
         if self.name == "sa":
             if self.period is None:
-                raise InvalidOption('{} "sa" needs {}, in s: give Measure("sa", period=...)', "measure", "period")
+                raise InvalidOption('{} "sa" needs {}, in s', "measure", "period")
             object.__setattr__(self, "period", checks.positive(self.period, "period", InvalidOption, "s"))
         elif self.period is not None:
             raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', "period", "measure")
@@ -158,7 +158,7 @@ class Measure:
     @property
     def alone(self) -> Measure:
         """Measure of the motion alone that this one counts."""
-        return Measure(self.of_motion, self.period, self.damping)
+        return self if self.of_motion == self.name else Measure(self.of_motion, self.period, self.damping)
 
     def value(self, motion: Piecewise) -> float:
         """Return what the motion alone measures, in SI units; 1 where levels are factors.

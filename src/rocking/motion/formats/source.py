@@ -234,7 +234,7 @@ class Request:
             raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=_SAME_STEP):
             raise source.error(
-                f"the sampling step is {stated:g} s, not {{}} = {self.dt:g} s; leave {{}} out", at, "dt", "dt"
+                f"the sampling step is {stated:g} s, not {{}} {self.dt:g} s; leave {{}} out", at, "dt", "dt"
             )
         return stated
 
@@ -247,7 +247,7 @@ class Request:
             )
         if self.unit is not None and not self.several and unit != self.unit:
             raise source.error(
-                f"the units are {unit.name}, not {{}} = {self.unit.name!r}; leave {{}} out", at, "units", "units"
+                f"the units are {unit.name}, not {{}} {self.unit.name!r}; leave {{}} out", at, "units", "units"
             )
         return unit
 
