@@ -16,6 +16,7 @@ import importlib.util
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -49,7 +50,7 @@ SMALL_ALPHA = (0.005, 0.6)
 MESH_P = 10.69
 
 #: What the calibrations of the validation are of.
-LINEAR = {"model": "linear", "restitution": (0.3, 0.99)}
+LINEAR: dict[str, Any] = {"model": "linear", "restitution": (0.3, 0.99)}
 SEEDS = (0, 1, 2)
 
 

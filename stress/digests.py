@@ -122,7 +122,7 @@ def calibration() -> Iterator[tuple[str, Digest]]:
     truth = rocking.Block.from_parameters(p=3.0, alpha=0.2, restitution=0.9)
     motions = [rocking.pulses.ricker(level, 1.2) for level in np.linspace(1.5, 6.0, 24)]
     fell = rocking.simulate_many(rocking.Blocks.of([truth]), motions, model="linear").overturned.values[:, 0]
-    known = {"p": (1.0, 9.0), "alpha": (0.1, 0.4), "restitution": 0.9}
+    known: Any = {"p": (1.0, 9.0), "alpha": (0.1, 0.4), "restitution": 0.9}
     found = rocking.calibrate(motions, fell, model="linear", **known, seed=3, candidates=256)
     digest = Digest()
     for each in (found.blocks.p, found.blocks.alpha, found.weights):

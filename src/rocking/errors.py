@@ -67,8 +67,6 @@ class RockingError(Exception):
 
     Attributes
     ----------
-    argument : str or None
-        Name of the argument that is wrong.
     message : Message
         The sentence without the file's name.
     path, line, value
