@@ -16,7 +16,7 @@ export class View {
     this.with = /** @type {HTMLSelectElement} */ (one("compare-with"));
     this.with.value = page.state.compare;
     this.with.addEventListener("change", () => { page.state.compare = this.with.value; page.state.other = {}; this.form(); this.update(); });
-    this.histories = new Histories(one("compare-plots"), {window: (ends) => { page.state.window = ends; this.update(); }});
+    this.histories = new Histories(one("compare-plots"), {window: (span) => { page.state.window = span; this.update(); }});
     this.known = "";
     this.load = new Latest(() => this.run(), (error) => page.problem(error, "view-compare"));
     this.form();
