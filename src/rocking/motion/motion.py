@@ -277,83 +277,83 @@ class Motion:
         return measures.peak_displacement(self)
 
     @overload
-    def acceleration(self, t: float) -> float: ...
+    def acceleration(self, time: float) -> float: ...
     @overload
-    def acceleration(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
-    def acceleration(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground acceleration, m/s^2, at the times `t` (s) and shaped like it; zero outside the motion.
+    def acceleration(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
+    def acceleration(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
+        """Ground acceleration, m/s^2, at the times `time` (s) and shaped like it; zero outside the motion.
 
         Parameters
         ----------
-        t : float or array_like
+        time : float or array_like
             Times, s.
 
         Returns
         -------
         float or ndarray
-            m/s^2, shaped like `t`.
+            m/s^2, shaped like `time`.
 
         Examples
         --------
         >>> Motion([0.0, 2.0], [[1.0]]).acceleration([1.0, 3.0])
         array([1., 0.])
         """
-        time = checks.numbers(t, "time", InvalidMotion)
-        result = piecewise.at(self.breakpoints, self.coefficients, time)
-        result = np.where((time < 0.0) | (time > self.duration), 0.0, result)
+        at = checks.numbers(time, "time", InvalidMotion)
+        result = piecewise.at(self.breakpoints, self.coefficients, at)
+        result = np.where((at < 0.0) | (at > self.duration), 0.0, result)
         return result if result.ndim else float(result)
 
     @overload
-    def velocity(self, t: float) -> float: ...
+    def velocity(self, time: float) -> float: ...
     @overload
-    def velocity(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
-    def velocity(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground velocity at the times `t` (s), m/s, from rest; constant after the end of the motion.
+    def velocity(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
+    def velocity(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
+        """Ground velocity at the times `time` (s), m/s, from rest; constant after the end of the motion.
 
         Parameters
         ----------
-        t : float or array_like
+        time : float or array_like
             Times, s.
 
         Returns
         -------
         float or ndarray
-            m/s, shaped like `t`.
+            m/s, shaped like `time`.
 
         Examples
         --------
         >>> Motion([0.0, 2.0], [[1.0]]).velocity([1.0, 3.0])
         array([1., 2.])
         """
-        time = checks.numbers(t, "time", InvalidMotion)
-        result = piecewise.at(self.breakpoints, measures.velocity_pieces(self), time)
+        at = checks.numbers(time, "time", InvalidMotion)
+        result = piecewise.at(self.breakpoints, measures.velocity_pieces(self), at)
         return result if result.ndim else float(result)
 
     @overload
-    def displacement(self, t: float) -> float: ...
+    def displacement(self, time: float) -> float: ...
     @overload
-    def displacement(self, t: Sequence[float] | NDArray[Any]) -> Floats: ...
-    def displacement(self, t: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground displacement at the times `t` (s), m, from rest; after the end at the last velocity.
+    def displacement(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
+    def displacement(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
+        """Ground displacement at the times `time` (s), m, from rest; after the end at the last velocity.
 
         Parameters
         ----------
-        t : float or array_like
+        time : float or array_like
             Times, s.
 
         Returns
         -------
         float or ndarray
-            m, shaped like `t`.
+            m, shaped like `time`.
 
         Examples
         --------
         >>> Motion([0.0, 2.0], [[1.0]]).displacement([1.0, 3.0])
         array([0.5, 4. ])
         """
-        time = checks.numbers(t, "time", InvalidMotion)
-        result = piecewise.at(self.breakpoints, measures.displacement_pieces(self), time)
-        result = result + self.velocity(self.duration) * np.maximum(time - self.duration, 0.0)
+        at = checks.numbers(time, "time", InvalidMotion)
+        result = piecewise.at(self.breakpoints, measures.displacement_pieces(self), at)
+        result = result + self.velocity(self.duration) * np.maximum(at - self.duration, 0.0)
         return result if result.ndim else float(result)
 
     @property
@@ -648,19 +648,22 @@ class Motion:
             error=self.error if cut_only else 0.0,
         )
 
-    def plot(self, ax: Axes | None = None, *, figsize: tuple[float, float] | None = None) -> Figure:
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the ground acceleration in g over time, and below it the vertical one.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
             Where to draw the horizontal acceleration alone; by default in a new figure.
+        title : str
+            Title; by default the motion's label.
         figsize : (float, float), optional
             Width and height of a new figure, inches.
 
         Returns
         -------
         matplotlib.figure.Figure
+            The figure, new or that of `ax`.
 
         Examples
         --------
@@ -677,7 +680,7 @@ class Motion:
             time=times,
             acceleration_g=self.acceleration(times) / STANDARD_GRAVITY,
             vertical_g=None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY,
-            title=self.label,
+            title=title or self.label,
             ax=ax,
             figsize=figsize,
         )

@@ -1,0 +1,80 @@
+"""Laws of the public interface: what stands first, what is called how, what is exported, what docstrings hold."""
+
+import inspect
+import re
+from typing import Any
+
+import pytest
+from public_names import callables
+
+#: What rocks, and what shakes it, by the names of parameters.
+ROCKS = {"block", "blocks", "body", "bodies"}
+SHAKES = {"motion", "motions", "pulse"}
+
+#: Words that are no longer used for what another word stands for.
+OTHER_WORDS = {"t": "time", "scale": "levels", "pga": "measure", "pgv": "measure", "sa": "measure"}
+
+#: Most parameters of one function.
+MOST = 14
+
+
+def parameters_of(value: Any) -> dict[str, inspect.Parameter]:
+    try:
+        found = inspect.signature(value).parameters
+    except ValueError:  # an enumeration
+        return {}
+    return {name: each for name, each in found.items() if name not in ("self", "cls")}
+
+
+FUNCTIONS = {name: value for name, value in callables().items() if not inspect.isclass(value)}
+
+
+def test_what_rocks_stands_first_and_what_shakes_it_second() -> None:
+    judged = 0
+    for name, function in FUNCTIONS.items():
+        names = list(parameters_of(function))
+        if ROCKS & {*names} and SHAKES & {*names} and not {"blocks", "block"} & {*names[2:]}:
+            judged += 1
+            first, second = [each for each in names if each in ROCKS | SHAKES][:2]
+            assert first in ROCKS and second in SHAKES, name
+    assert judged >= 10
+
+
+def test_the_default_model_is_nonlinear() -> None:
+    defaults = {name: each["model"].default for name, f in FUNCTIONS.items() if "model" in (each := parameters_of(f))}
+    chosen = {name: model for name, model in defaults.items() if model not in (inspect.Parameter.empty, None)}
+    assert len(chosen) >= 8
+    assert set(chosen.values()) == {"nonlinear"}, chosen
+
+
+def test_a_default_is_the_same_everywhere() -> None:
+    """Of parameters that mean the same in all functions."""
+    shared = ("polarity", "threads", "progress", "title", "figsize", "ax", "seed", "measure", "period")
+    for name in shared:
+        found = {
+            function: each[name].default
+            for function, value in FUNCTIONS.items()
+            if name in (each := parameters_of(value)) and each[name].default is not inspect.Parameter.empty
+        }
+        assert len({repr(default) for default in found.values()}) <= 1 + (name == "measure"), (name, found)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_function_takes_few_parameters_in_plain_words(name: str) -> None:
+    names = list(parameters_of(FUNCTIONS[name]))
+    assert len(names) <= MOST
+    assert not {*names} & {*OTHER_WORDS} - {name.rpartition(".")[2]}
+
+
+@pytest.mark.parametrize("name", [name for name in FUNCTIONS if re.search(r"\.to_|\.export", name)])
+def test_what_is_written_to_a_file_is_called_to_format(name: str) -> None:
+    last = name.rpartition(".")[2]
+    assert re.fullmatch(r"to_(csv|netcdf|parquet|nrml|json|dict|dataframe|xarray)", last)
+    names = list(parameters_of(FUNCTIONS[name]))
+    if last not in ("to_dict", "to_dataframe", "to_xarray"):
+        assert names[0] == "path"
+
+
+@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name.endswith(".plot")])
+def test_every_figure_takes_axes_a_title_and_a_size(name: str) -> None:
+    assert {"ax", "title", "figsize"} <= {*parameters_of(FUNCTIONS[name])}
