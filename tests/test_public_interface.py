@@ -1,4 +1,4 @@
-"""Laws of the public interface: what stands first, what is called how, what is exported, what docstrings hold."""
+"""Laws of the public interface: what stands first, and what is called how."""
 
 import inspect
 import re
