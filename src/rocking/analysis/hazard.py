@@ -38,7 +38,7 @@ _OPENQUAKE: Final[dict[str, tuple[IntensityName, float]]] = {
     "SA": ("sa", STANDARD_GRAVITY),
 }
 
-#: Rates that a figure's axis has room for.
+#: Rates that a figure shows.
 _DRAWN: Final = (1e-200, 1e200)
 
 _POE: Final = re.compile(r"poe-([0-9.eE+-]+)")

@@ -145,7 +145,7 @@ def _refuse_beside_outcomes(
     limits: str,
     polarity: Polarity,
 ) -> None:
-    """Refuse what observed outcomes leave no room for."""
+    """Refuse options that do not go with observed outcomes."""
     given = {
         "records": names,
         "pulse": motion.pulse,

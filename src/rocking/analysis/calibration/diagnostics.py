@@ -101,7 +101,7 @@ class Leaning:
     bound : float
         Where it is, in the parameter's unit.
     wider : float
-        A bound that leaves more room.
+        A wider bound.
     share : float
         Share of the posterior in the outermost 5 % of the range.
     """
@@ -205,7 +205,7 @@ def leaning(space: Space, centres: Floats) -> tuple[Leaning, ...]:
         ]
         for end, bound, further, near in ends:
             share = float(near.mean())
-            # A bound that no block can exceed needs no room beyond it.
+            # Nothing lies beyond a bound that no block can exceed.
             if share > _LEANING and bound < math.log(HIGHEST[parameter]) - 1e-9:
                 found.append(Leaning(name, end, math.exp(bound), further, share))
     return tuple(found)
