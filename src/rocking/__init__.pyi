@@ -1,4 +1,4 @@
-from . import chattering, studies
+from . import analysis, chattering, studies
 from .analysis import rules
 from .analysis.calibration import Calibration, HistoryCalibration, calibrate, calibrate_history
 from .analysis.efficiency import compare_measures
@@ -7,7 +7,9 @@ from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
+from .analysis.survey import survey
 from .block import Block, Blocks, Side
+from .body import Bodies, Body, Coordinate
 from .ensemble import simulate_many
 from .errors import (
     DamagedStudy,
@@ -22,14 +24,18 @@ from .errors import (
     Unfinished,
     UnreadableRecord,
 )
-from .explorer.launch import explore
+from .explorer.launch import Frame, explore
 from .motion import Motion, pulses, records
+from .motion.description import Description
 from .motion.formats import read
 from .motion.scaling import Measure
+from .named_pulses import PulseFamily
+from .product import Product
 from .response import Response, Sensitivity
+from .result import Row
 from .simulation import simulate
 from .studies import Study, study
-from .treatment import AsymptoticTime, Certified, IntervalThreshold, VelocityThreshold
+from .treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
 
 __version__: str
 
@@ -37,10 +43,15 @@ __all__ = [
     "AsymptoticTime",
     "Block",
     "Blocks",
+    "Bodies",
+    "Body",
     "Calibration",
     "Certified",
+    "Coordinate",
     "DamagedStudy",
+    "Description",
     "Fragility",
+    "Frame",
     "HazardCurve",
     "HistoryCalibration",
     "IntervalThreshold",
@@ -51,16 +62,21 @@ __all__ = [
     "Motion",
     "OutputError",
     "OutsideFit",
+    "Product",
+    "PulseFamily",
     "Response",
     "RockingError",
+    "Row",
     "Sensitivity",
     "Side",
     "Study",
     "StudyError",
+    "Treatment",
     "UnequalSides",
     "Unfinished",
     "UnreadableRecord",
     "VelocityThreshold",
+    "analysis",
     "calibrate",
     "calibrate_history",
     "chattering",
@@ -79,4 +95,5 @@ __all__ = [
     "simulate_many",
     "studies",
     "study",
+    "survey",
 ]

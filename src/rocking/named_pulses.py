@@ -38,7 +38,7 @@ _VELOCITY: Final = _Kind(quantities.velocity, "m/s")
 
 
 @dataclass(frozen=True)
-class Family:
+class PulseFamily:
     """A family of pulses.
 
     Attributes
@@ -107,11 +107,11 @@ class Family:
 
 
 #: All families, by name.
-FAMILIES: Final = {family.name: family for family in (Family(getattr(pulses, name)) for name in pulses.__all__)}
+FAMILIES: Final = {family.name: family for family in (PulseFamily(getattr(pulses, name)) for name in pulses.__all__)}
 
 
-def pulse_family(name: str) -> Family:
-    """Family of pulses of a name; blanks, hyphens and underscores are the same.
+def pulse_family(name: str) -> PulseFamily:
+    """PulseFamily of pulses of a name; blanks, hyphens and underscores are the same.
 
     Raises
     ------
@@ -170,8 +170,8 @@ def named_pulse(text: str) -> Motion:
     return family.motion(values)
 
 
-def pulse_values(text: str) -> tuple[Family, dict[str, Any]]:
-    """Family and values (SI units) of the parameters that a text of `named_pulse` gives.
+def pulse_values(text: str) -> tuple[PulseFamily, dict[str, Any]]:
+    """PulseFamily and values (SI units) of the parameters that a text of `named_pulse` gives.
 
     Raises
     ------
@@ -205,7 +205,7 @@ def _parts(text: str) -> dict[str, list[str]]:
     return found
 
 
-def _value(family: Family, parameter: str, texts: list[str]) -> Any:
+def _value(family: PulseFamily, parameter: str, texts: list[str]) -> Any:
     quantity = family.quantity(parameter)
     shown = f"the {parameter} of a {family.name} pulse"
     if len(texts) > 1 and not (family.make is pulses.n_lobe and parameter == "amplitude"):

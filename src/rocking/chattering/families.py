@@ -36,10 +36,10 @@ class SimulationInput(NamedTuple):
     model: Model = "nonlinear"
 
 
-Family = Callable[[float, float], SimulationInput]
+PulseFamily = Callable[[float, float], SimulationInput]
 
 
-def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Family:
+def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> PulseFamily:
     """Sines: (a, omega).
 
     Examples
@@ -54,7 +54,7 @@ def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Fa
     return lambda a, omega: SimulationInput(block, pulses.sine(a * scale, _hertz(block, omega), cycles=cycles), model)
 
 
-def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> Family:
+def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> PulseFamily:
     """Half cycles of a sine with unequal amplitudes: (a, ratio).
 
     The first lobe has the amplitude a, each other one `ratio` times that of the lobe before it: the shaking grows
@@ -70,7 +70,7 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
 
 def ricker(
     block: Block, *, kind: Literal["symmetric", "antisymmetric"] = "symmetric", model: Model = "nonlinear"
-) -> Family:
+) -> PulseFamily:
     """Ricker pulses: (a, omega)."""
     scale = _threshold(block, model)
     return lambda a, omega: SimulationInput(block, pulses.ricker(a * scale, _hertz(block, omega), kind=kind), model)
@@ -78,7 +78,7 @@ def ricker(
 
 def mavroeidis_papageorgiou(
     block: Block, *, phase: float = 0.0, gamma: float = 3.0, model: Model = "nonlinear"
-) -> Family:
+) -> PulseFamily:
     """Near-fault pulses of Mavroeidis and Papageorgiou: (a, omega)."""
     scale = _threshold(block, model)
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final
 from rocking.cli.options import OUTPUT, RECORDS, FileOptions, Names, PrintOptions, refusal
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion.named import STANDARD_INPUT, Contents, contents, expanded, is_shipped, refuse_what_is_known, shipped
-from rocking.named_pulses import FAMILIES, Family
+from rocking.named_pulses import FAMILIES, PulseFamily
 from rocking.plausibility import reading_notes
 from rocking.progress import Progress, note
 from rocking.tables import text_table, to_json
@@ -79,7 +79,7 @@ def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
     print(f"\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:\n{_EXAMPLE}")
 
 
-def _listed(family: Family, parameters: Mapping[str, Any]) -> str:
+def _listed(family: PulseFamily, parameters: Mapping[str, Any]) -> str:
     """Return parameters of a pulse with their units and defaults."""
     units = {name: f" ({family.unit(name)})" if family.unit(name) else "" for name in parameters}
     defaults = {
