@@ -186,12 +186,12 @@ class IncrementalDynamicAnalysis(Result):
         block = ("band", self.data.band_block.values)
         return part[[]].assign(labels | {"block": block, "band_start": part.band_start, "band_end": part.band_end})
 
-    def bands(self, motion: int, block: int = 0) -> list[tuple[float, float]]:
+    def bands(self, block: int = 0, motion: int = 0) -> list[tuple[float, float]]:
         """Return the bands of levels that overturn a block under a motion.
 
         Parameters
         ----------
-        motion, block : int
+        block, motion : int
             Positions of both.
 
         Returns
@@ -213,7 +213,7 @@ class IncrementalDynamicAnalysis(Result):
             [
                 self._with_vertical(str(data[what].values[m]), m),
                 *([b] if many else []),
-                looked_at.overturning(self.bands(m, b)),
+                looked_at.overturning(self.bands(b, m)),
             ]
             for m in range(data.sizes["motion"])
             for b in range(data.sizes["block"])
@@ -250,7 +250,7 @@ class IncrementalDynamicAnalysis(Result):
                     "block": b,
                     named("overturning_level", units): float(lowest[m, b]),
                     "overturns": [
-                        {named("from", units): low, named("to", units): high} for low, high in self.bands(m, b)
+                        {named("from", units): low, named("to", units): high} for low, high in self.bands(b, m)
                     ],
                     "peak_over_alpha": peaks[m, b],
                 }
@@ -288,7 +288,7 @@ class IncrementalDynamicAnalysis(Result):
         peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
         motions = []
         for m in range(data.sizes["motion"]):
-            bands = data.level.scale * np.array(self.bands(m, block)).reshape(-1, 2)
+            bands = data.level.scale * np.array(self.bands(block, m)).reshape(-1, 2)
             bands = np.where(np.isnan(bands), ends, bands)
             motions.append(ScaledMotion(self._label(m), levels, peaks[m], bands))
         what = data.blocks if data.sizes["block"] == 1 else f"block {block}"
