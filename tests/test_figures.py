@@ -258,6 +258,7 @@ def test_where_blocks_overturn_the_lines_of_a_spectrum_end_in_crosses():
 def test_impacts_are_counted_by_whole_numbers(count):
     figure = intervals_figure(intervals=0.8 ** np.arange(1.0, count + 1.0), eta=0.9)
     figure.draw_without_rendering()
+    assert len(figure.axes) == 2
     for panel in figure.axes:
         low, high = panel.get_xlim()
         assert low < 1.0 and high > count

@@ -52,6 +52,7 @@ def complaint(path: Path | str, error: type[RockingError] = UnreadableRecord, **
 
 
 def test_fixtures_are_what_their_writer_writes() -> None:
+    assert len(written.fixtures()) >= 20
     for name, content in written.fixtures().items():
         assert (written.FOLDER / name).read_bytes() == content.encode(), name
 

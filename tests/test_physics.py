@@ -133,6 +133,7 @@ def test_energy_is_constant_along_free_arcs(case: Case, share: float, moving: bo
     free = replace(case, motion=None)
     response = free.simulate(**state)
     starts = [0.0, *(float(t) for t in response.impacts["time"])]
+    assert len(starts) > 1 or response.overturned
     for (start, end), k in zip(pairwise(starts), range(6), strict=False):
         times = np.linspace(start, end, 22)[1:-1]
         rotation, rate = response.rotation(times), response.angular_velocity(times)

@@ -214,6 +214,7 @@ def test_no_text_covers_another_text():
         titles = [axes.title, axes._left_title, axes.xaxis.label, axes.yaxis.label]
         boxes += [text.get_window_extent() for text in titles if text.get_text()]
     boxes.append(figure.legends[0].get_window_extent())
+    assert len(boxes) >= 8
     for number, box in enumerate(boxes):
         assert not any(box.overlaps(other) for other in boxes[:number])
         assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1

@@ -35,7 +35,9 @@ def stacks(draw) -> Stack:
     stack(-1, 1.0, 0, 1.5, 1, 2.0, 0, 2.5, 1, 3.0, 0),
 )
 def test_half_way_both_sides_fill_the_frame_in_order(left, right):
-    for levels in meeting(left, right):
+    halves = list(meeting(left, right))
+    assert len(halves) == 2
+    for levels in halves:
         assert levels[0] == LOW
         assert levels[-1] == HIGH
         assert np.all(np.diff(levels) >= 0.0)
