@@ -1,11 +1,13 @@
-"""The README as a package index shows it: there no file of the project stands beside it."""
+"""What a wheel holds that is not in the tree: a README for the package index, and libraries of compiled kernels."""
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
 
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 #: A picture on a line of its own, and a link, where what they lead to is a file of the project.
@@ -38,3 +40,20 @@ class ReadmeHook(MetadataHookInterface):
         """Put the README for the index where the project's table says that it is dynamic."""
         text = for_index((Path(self.root) / "README.md").read_text("utf-8"))
         metadata["readme"] = {"content-type": "text/markdown", "text": text}
+
+
+class KernelsHook(BuildHookInterface[Any]):
+    """Puts libraries of kernels into the wheel where `scripts/ship_kernels.py` has made them; it compiles nothing."""
+
+    PLUGIN_NAME = "custom"
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Name the files and the platform. Versions of Python and numba do not matter to the libraries."""
+        folder = Path(self.root) / "build" / "shipped"
+        if version != "standard" or self.target_name != "wheel" or not (folder / "manifest.json").exists():
+            return
+        manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
+        build_data["pure_python"] = False
+        build_data["tag"] = f"py3-none-{manifest['platform']}"
+        for name in ("manifest.json", *manifest["libraries"]):
+            build_data["force_include"][str(folder / name)] = f"rocking/kernels/shipped/{name}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import time
-from typing import Any, Final
+from typing import Final
 
 from rocking.progress import note
 
@@ -16,6 +16,35 @@ AMPLITUDES: Final = 5
 
 #: What takes less than this is not worth a word, s.
 _PATIENCE: Final = 1.0
+
+
+class _Word:
+    """Speaks as soon as the compiler has been at work for some time; a kernel is compiled with its parts."""
+
+    def __init__(self) -> None:
+        self.expected, self.spoken = 0, set[int]()
+        self.functions, self.since, self.spent = 0, 0.0, 0.0
+
+    def expect(self, seconds: int) -> None:
+        if seconds != self.expected:
+            self.expected, self.spent = seconds, 0.0
+
+    def start(self) -> None:
+        now = time.process_time()
+        if self.functions == 0:
+            self.since = now
+        self.functions += 1
+        if self.expected and self.spent + now - self.since >= _PATIENCE and self.expected not in self.spoken:
+            self.spoken.add(self.expected)
+            note(f"compiling what this needs, up to {self.expected} s of processor time; later runs find it ready")
+
+    def end(self) -> None:
+        self.functions -= 1
+        if self.functions == 0:
+            self.spent += time.process_time() - self.since
+
+
+_WORD: Final = _Word()
 
 
 def announce(seconds: int) -> None:
@@ -30,39 +59,19 @@ def announce(seconds: int) -> None:
     -----
     The compiler itself says when it is at work: what is cached, for which sources and processor, is known to it alone.
     """
-    _listener().expect(seconds)
+    _WORD.expect(seconds)
 
 
 @functools.cache
-def _listener() -> Any:
-    """Return what listens to the compiler."""
+def listen() -> None:
+    """Listen to numba's compiler; called before anything is compiled, since numba is imported no earlier."""
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
-        """Speaks as soon as the compiler has been at work for some time; a kernel is compiled with its parts."""
-
-        def __init__(self) -> None:
-            self.expected, self.told = 0, set[int]()
-            self.kernels, self.since, self.spent = 0, 0.0, 0.0
-
-        def expect(self, seconds: int) -> None:
-            if seconds != self.expected:
-                self.expected, self.spent = seconds, 0.0
-
         def on_start(self, event: object) -> None:
-            now = time.process_time()
-            if self.kernels == 0:
-                self.since = now
-            self.kernels += 1
-            if self.spent + now - self.since >= _PATIENCE and self.expected not in self.told:
-                self.told.add(self.expected)
-                note(f"compiling what this needs, up to {self.expected} s of processor time; later runs find it ready")
+            _WORD.start()
 
         def on_end(self, event: object) -> None:
-            self.kernels -= 1
-            if self.kernels == 0:
-                self.spent += time.process_time() - self.since
+            _WORD.end()
 
-    listener = Listener()
-    event.register("numba:compile", listener)
-    return listener
+    event.register("numba:compile", Listener())

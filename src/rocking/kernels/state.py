@@ -7,8 +7,9 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import config
 from numpy.typing import NDArray
+
+from rocking.kernels.compiled import UNCOMPILED
 
 Records = NDArray[np.void]
 
@@ -130,7 +131,7 @@ def records(count: int, kind: np.dtype[np.void]) -> Records:
 
 def attributed(array: Records) -> Records:
     """Give records as kernels take them: uncompiled ones read fields as attributes, which is slow elsewhere."""
-    return array.view(np.recarray) if config.DISABLE_JIT else array
+    return array.view(np.recarray) if UNCOMPILED else array
 
 
 def record(kind: np.dtype[np.void], **values: Any) -> Record:

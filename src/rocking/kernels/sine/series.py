@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-import numba
 import numpy as np
 
 from rocking.arrays import Floats
+from rocking.kernels.compiled import allocating
 from rocking.kernels.paper import positive_root
 from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.sine.sequence import LEVELS, richardson_weights
@@ -107,9 +107,8 @@ _MAXIMUM_PAIRS: Final = 100_000
 _FALLEN: Final = 2.3
 _SPARE_PAIRS: Final = 3
 
-#: These kernels allocate their arrays of coefficients, unlike all others. Python strings the arcs together: that costs
-#: little beside them, and to compile it as well would multiply the time of a first call.
-_allocating = numba.njit(cache=True, error_model="numpy")
+# Python strings the arcs together: that costs little beside them, and to compile it as well would multiply the time of a
+# first call.
 
 
 def phase_coefficients(delta: float, eta: float, order: int) -> Series:
@@ -186,7 +185,7 @@ def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[S
     return passed, entered
 
 
-@_allocating
+@allocating
 def series_arc(
     v: Series, p: Series, d: Series, first_side: bool, delta: float
 ) -> tuple[Series, Series, Series, Series]:
@@ -234,7 +233,7 @@ def series_arc(
     return z, -speed, p_impact, d_impact
 
 
-@_allocating
+@allocating
 def leading_duration(v: float, p: float, d: float) -> float:
     """Duration of a first-side arc to leading order (the cubic of Eq. 62)."""
     if v == 0.0:
@@ -242,7 +241,7 @@ def leading_duration(v: float, p: float, d: float) -> float:
     return positive_root(d / 6.0, p / 2.0, v)
 
 
-@_allocating
+@allocating
 def series_basis(q: Series, delta: float) -> tuple[Series, Series, Series, Series]:
     """Return the four basis functions of ``basis.Basis`` at a series q without constant term."""
     order = q.size
@@ -275,7 +274,7 @@ def square_root_of_two_plus(order: int) -> Series:
     return root
 
 
-@_allocating
+@allocating
 def product(a: Series, b: Series) -> Series:
     """Multiply, truncated."""
     c = np.zeros(a.size)
@@ -286,7 +285,7 @@ def product(a: Series, b: Series) -> Series:
     return c
 
 
-@_allocating
+@allocating
 def quotient(a: Series, b: Series) -> Series:
     """Divide, truncated."""
     c = np.zeros(a.size)
@@ -298,7 +297,7 @@ def quotient(a: Series, b: Series) -> Series:
     return c
 
 
-@_allocating
+@allocating
 def raised(a: Series, power: int) -> Series:
     """Multiply by eps^power."""
     b = np.zeros(a.size)

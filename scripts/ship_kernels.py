@@ -1,0 +1,326 @@
+"""Make libraries of compiled kernels for this platform: a wheel that is built next holds them.
+
+python scripts/ship_kernels.py            # build/shipped: a library for each level of the processor, and a manifest
+
+numba compiles each kernel for the types that `signatures` lists. Of what it makes, the kernel's own function is kept;
+a function around it unpacks arguments from the eight bytes each that `rocking.kernels.library` packs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+OUT = ROOT / "build" / "shipped"
+
+#: Levels of the processor as LLVM names them, the one that every machine has first.
+LEVELS = {
+    "x86_64": ["x86-64", "x86-64-v3", "x86-64-v4"],
+    "amd64": ["x86-64", "x86-64-v3", "x86-64-v4"],
+    "arm64": ["generic"],
+    "aarch64": ["generic"],
+}
+
+#: The number of the highest level that the processor has; every library answers, and the lowest one is asked.
+PROCESSOR = {
+    "x86_64": """
+int rocking_level(void) {
+    __builtin_cpu_init();
+    int third = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi")
+        && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("lzcnt") && __builtin_cpu_supports("f16c")
+        && __builtin_cpu_supports("movbe");
+    int fourth = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw")
+        && __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+    return third ? (fourth ? 2 : 1) : 0;
+}
+""",
+    "arm64": "int rocking_level(void) { return 0; }\n",
+}
+SUFFIX = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
+
+PROCESSOR["amd64"], PROCESSOR["aarch64"] = PROCESSOR["x86_64"], PROCESSOR["arm64"]
+
+
+def signatures() -> dict[str, list[tuple[Any, ...]]]:
+    """Arguments as Python passes them to each kernel, by its name: of them only the types count."""
+    import numpy as np
+
+    from rocking.kernels import ground, state
+    from rocking.kernels.lanes.pool import pool_of
+    from rocking.kernels.sine import lanes, sequence
+    from rocking.kernels.trace import Trail
+
+    def reals(*shape: int, kind: Any = np.float64) -> Any:
+        return np.ones(shape or (1,), dtype=kind)
+
+    def given(*shape: int) -> Any:
+        """Numbers that a kernel only reads: whether Python may write them does not matter."""
+        array = reals(*shape)
+        array.flags.writeable = False
+        return array
+
+    count = reals(1, kind=np.int64)
+    flags, singles = reals(1, kind=np.bool_), reals(1, kind=np.float32)
+    seen = ground.Ground(reals(3, 4), reals(1, 1, 4), 0.0, 2, 2)
+    block, rules, scratch = state.record(state.BLOCK), state.record(state.RULES), state.new_scratch()
+    blocks, states, table = state.records(1, state.BLOCK), state.new_states(1, 1), state.new_table(1)
+    trail = Trail(seen, block, rules, state.records(1, state.NODE_ROW))
+    pool = pool_of(blocks, states, 1, 1.0, 0)
+    sequences = (given(), given(), given())
+    statuses = reals(1, kind=np.int8)
+    shares = (reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), singles)
+    return {
+        "march.march": [(seen, block, rules, table, scratch, states[0])],
+        "trace.trace": [(trail, scratch, reals(), count, reals(1, 3))],
+        "variation.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
+        "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
+        "ground.fill": [(given(3), given(2, 2), 1.0, seen, reals())],
+        "lanes.scheduler.run_lanes": [(seen, rules, scratch, pool, 0)],
+        "lanes.scheduler.march_each": [(seen, rules, scratch, pool)],
+        "oscillator.peak_displacements": [(given(3), given(2, 2), given(), 0.05, reals(), reals())],
+        "paper.eq65_time": [(1.0, 1.0, 1.0)],
+        "paper.eq65_sums": [(1.0,)],
+        "paper.eq65_terms": [(1.0, reals(1, 2))],
+        "paper.eq76": [(1.0, 1.0)],
+        "paper.eq77": [(1.0,)],
+        "paper.fitted_amplitudes": [(given(), given(), True, reals())],
+        "population.shares": [(*shares, reals(1, 1, kind=np.float32), reals())],
+        "population.log_density": [(reals(1, 1), reals(1, 1), reals(), reals())],
+        "sine.arc.first_landing": [(1.0, 1.0)],
+        "sine.lanes.rest_phases": [(sequences, count, np.zeros(1, lanes.BLOCK), lanes.Answers(reals(), statuses))],
+        "sine.sequence.rest_phase": [(1.0, 1.0, 1.0)],
+        "sine.sequence.resolve": [(1.0, 1.0, 1.0, 1.0, np.zeros(1, sequence.IMPACT))],
+        "sine.sequence.semianalytical_phases": [(sequences, count, reals(), statuses)],
+        "sine.sequence.critical_amplitudes": [(given(), given(), reals())],
+    }
+
+
+def described(kind: Any) -> Any:
+    """Describe a type of numba's for the manifest (see `rocking.kernels.library`)."""
+    import numba.np.numpy_support as support
+    from numba import types
+
+    from rocking.kernels.library import layout
+
+    if isinstance(kind, types.Record):
+        return {"record": layout(support.as_dtype(kind))}
+    if isinstance(kind, types.Array):
+        if kind.layout != "C":
+            raise TypeError(f"{kind} is not contiguous")
+        about = {"dimensions": kind.ndim, "readonly": not kind.mutable, "aligned": kind.aligned}
+        return {"items": layout(support.as_dtype(kind.dtype)), **about}
+    if isinstance(kind, types.BaseTuple):
+        return {"tuple": [described(member) for member in kind.types]}
+    for name, plain in (("bool", types.Boolean), ("int", (types.Integer, types.IntEnumMember)), ("float", types.Float)):
+        if isinstance(kind, plain):
+            return name
+    raise TypeError(f"there is no rule for arguments of type {kind}")
+
+
+class Unpacking:
+    """The function around a kernel's own: it unpacks arguments, eight bytes each, and gives numbers back.
+
+    numba passes a record as its address, a tuple as its members, and an array as owner, parent, number of items, bytes
+    of an item, data, shape and strides, one after the other.
+    """
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.passed: list[str] = []
+        self.names = 0
+        self.places = 0
+
+    def name(self, expression: str) -> str:
+        """Give the value of an expression a name."""
+        self.names += 1
+        self.lines.append(f"  %v{self.names} = {expression}")
+        return f"%v{self.names}"
+
+    def unpacked(self, kind: str) -> str:
+        """The next eight bytes as a value."""
+        place = self.name(f"getelementptr i8, ptr %packed, i64 {8 * self.places}")
+        self.places += 1
+        return self.name(f"load {kind}, ptr {place}, align 8")
+
+    def take(self, kind: Any) -> None:
+        """Unpack an argument as numba passes it."""
+        from numba import types
+
+        if isinstance(kind, types.BaseTuple):
+            for member in kind.types:
+                self.take(member)
+        elif isinstance(kind, types.Array):
+            self.take_array(kind)
+        elif isinstance(kind, types.Boolean):
+            truth = self.unpacked("i64")
+            self.passed.append(f"i8 {self.name(f'trunc i64 {truth} to i8')}")
+        elif isinstance(kind, types.Record):
+            self.passed.append(f"ptr {self.unpacked('ptr')}")
+        else:
+            plain = "double" if isinstance(kind, types.Float) else "i64"
+            self.passed.append(f"{plain} {self.unpacked(plain)}")
+
+    def take_array(self, kind: Any) -> None:
+        """Unpack an array's address and shape; all else follows from them, for it is contiguous."""
+        import numba.np.numpy_support as support
+
+        size = support.as_dtype(kind.dtype).itemsize
+        data = self.unpacked("ptr")
+        shape = [self.unpacked("i64") for _ in range(kind.ndim)]
+        count, strides = "1", []
+        for length in reversed(shape):
+            strides.append(str(size) if count == "1" else self.name(f"mul i64 {count}, {size}"))
+            count = self.name(f"mul i64 {count}, {length}")
+        self.passed += ["ptr null", "ptr null", f"i64 {count}", f"i64 {size}", f"ptr {data}"]
+        self.passed += [f"i64 {each}" for each in (*shape, *reversed(strides))]
+
+    def text(self, symbol: str, inner: str, returned: Any) -> str:
+        """The whole function, in LLVM's language: what the kernel returns is its result, or is written to %answer."""
+        from numba import types
+
+        members = [*returned.types] if isinstance(returned, types.BaseTuple) else [returned]
+        nothing = isinstance(returned, types.NoneType)
+        kinds = ["double" if isinstance(member, types.Float) else "i64" for member in members]
+        several = isinstance(returned, types.BaseTuple)
+        result = "void" if nothing or several else kinds[0]
+        space = "%answer" if several else "%own"
+        given = "ptr %packed, ptr %answer" if several else "ptr %packed"
+        end = (
+            ["  ret void"] if result == "void" else [f"  %result = load {result}, ptr %own", f"  ret {result} %result"]
+        )
+        return "\n".join(
+            [
+                f"define {result} @{symbol}({given}) {{",
+                "  %own = alloca i64",
+                "  %problem = alloca ptr",
+                *self.lines,
+                f"  call i32 @{inner}({', '.join([f'ptr {space}', 'ptr %problem', *self.passed])})",
+                *end,
+                "}",
+            ]
+        )
+
+
+def compiled(level: str, folder: Path) -> dict[str, list[dict[str, Any]]]:
+    """Compile all kernels for a level, in a process whose numba was told so; objects go to a folder."""
+    import importlib
+
+    import llvmlite.binding as llvm
+    import numba
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    machine = target.create_target_machine(cpu=level, features="", opt=3, reloc="pic", codemodel="default")
+    manifest: dict[str, list[dict[str, Any]]] = {}
+    for name, several in signatures().items():
+        module, _, function = name.rpartition(".")
+        kernel = getattr(importlib.import_module(f"rocking.kernels.{module}"), function).compiled
+        for number, arguments in enumerate(several):
+            kinds = tuple(numba.typeof(argument) for argument in arguments)
+            kernel.compile(kinds)
+            made = kernel.overloads[kinds]
+            symbol = f"rocking_{name.replace('.', '_')}_{number}"
+            unpacking = Unpacking()
+            for kind in kinds:
+                unpacking.take(kind)
+            returned = made.signature.return_type
+            around = unpacking.text(symbol, f'"{made.fndesc.llvm_func_name}"', returned)
+            path = folder / f"{symbol}.o"
+            path.write_bytes(object_of(made.library.get_llvm_str() + "\n" + around, symbol, machine))
+            what = {"symbol": symbol, "arguments": [described(kind) for kind in kinds], "returns": answer(returned)}
+            manifest.setdefault(f"rocking.kernels.{name}", []).append(what)
+    return manifest
+
+
+def answer(returned: Any) -> Any:
+    """What a kernel returns, for the manifest."""
+    from numba import types
+
+    if isinstance(returned, types.NoneType):
+        return "nothing"
+    return (
+        [described(member) for member in returned.types]
+        if isinstance(returned, types.BaseTuple)
+        else described(returned)
+    )
+
+
+def object_of(text: str, symbol: str, machine: Any) -> bytes:
+    """Machine code of one function of a module, with what it calls and nothing else."""
+    import llvmlite.binding as llvm
+
+    module = llvm.parse_assembly(text)
+    for each in [*module.functions, *module.global_variables]:
+        if not each.is_declaration and each.name != symbol and each.linkage != llvm.Linkage.private:
+            each.linkage = llvm.Linkage.internal
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
+    passes = llvm.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.run(module, builder)
+    wanted = {each.name for each in module.functions if each.is_declaration and not each.name.startswith("llvm.")}
+    if unknown := {name for name in wanted if name.startswith(("numba", "NRT", "Py"))}:
+        raise RuntimeError(f"{symbol} needs {', '.join(sorted(unknown))}, which only numba and Python have")
+    code: bytes = machine.emit_object(module)
+    return code
+
+
+def library(level: str, out: Path) -> dict[str, Any]:
+    """Compile and link the library of a level; return the manifest's part about kernels."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = os.environ | {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": folder}
+        command = [sys.executable, __file__, "--level", level, "--out", folder]
+        subprocess.run(command, env=environment | {"ROCKING_SHIPPED": "0"}, check=True)
+        source = Path(folder) / "processor.c"
+        source.write_text(PROCESSOR[platform.machine().lower()], "utf-8")
+        objects = sorted(str(path) for path in Path(folder).glob("*.o"))
+        name = out / f"kernels-{level}{SUFFIX}"
+        strip = [] if sys.platform == "darwin" else ["-Wl,--strip-all", "-Wl,-z,noexecstack"]
+        subprocess.run(
+            ["cc", "-O2", "-fPIC", "-shared", *strip, "-o", str(name), str(source), *objects, "-lm"], check=True
+        )
+        kernels: dict[str, Any] = json.loads((Path(folder) / "kernels.json").read_text("utf-8"))
+    print(f"{name.name}: {name.stat().st_size / 1e6:.2f} MB, {len(objects)} functions")
+    return kernels
+
+
+def tag() -> str:
+    """The platform, as a wheel's name has it: Linux with the C library that the functions were linked to, or newer."""
+    if sys.platform == "linux":
+        _, version = platform.libc_ver()
+        return f"manylinux_{version.replace('.', '_')}_{platform.machine()}"
+    return sysconfig.get_platform().replace("-", "_").replace(".", "_")
+
+
+def main() -> None:
+    """Make all libraries, or compile for one level."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--out", type=Path, default=OUT, help="folder for libraries and manifest")
+    parser.add_argument("--level", help="compile for this level alone (used by the script itself)")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    if options.level:
+        kernels = compiled(options.level, options.out)
+        (options.out / "kernels.json").write_text(json.dumps(kernels), "utf-8")
+        return
+    from rocking.kernels.library import FOLDER, sources
+
+    levels = LEVELS[platform.machine().lower()]
+    kernels = [library(level, options.out) for level in levels][0]
+    libraries = [f"kernels-{level}{SUFFIX}" for level in levels]
+    manifest = {"sources": sources(FOLDER.parent), "platform": tag(), "libraries": libraries, "kernels": kernels}
+    (options.out / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+    print(f"{options.out}: {', '.join(libraries)}")
+
+
+if __name__ == "__main__":
+    main()

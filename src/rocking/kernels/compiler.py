@@ -1,0 +1,187 @@
+"""How numba compiles kernels and their parts: `compiled` imports this where something has to be compiled.
+
+IEEE arithmetic, no exceptions, no reference counts. A part is code that is only ever linked into kernels: numba makes a
+library of every function that it compiles; it optimises the function together with all that it calls, turns all of it
+into machine code, and wraps it for callers from Python and from C. Where a kernel calls the function all of that is
+done again for the kernel, and so at every level of calls. Here a part ends as intermediate code, each function
+simplified by itself (else branches in a part would keep the loops that it is inlined into from being vectorised). The
+kernel links all of its parts, and they are optimised once and together. That halves the time of a first call, and the
+kernel that results is as fast.
+
+It uses numba's documented ways to choose the passes over a function, and two methods of its libraries. `_POSSIBLE`
+checks for the latter; without them parts are compiled in numba's own way.
+"""
+
+import contextlib
+import functools
+import gc
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import types
+from numba.core.codegen import CodeLibrary, JITCodeLibrary
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, Flags
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.datamodel.models import OpaqueModel
+from numba.core.typed_passes import NativeLowering
+from numba.core.types.misc import unliteral
+from numba.extending import register_model
+
+#: Whether numba's libraries are as `PartLibrary` takes them to be.
+_POSSIBLE = hasattr(Flags, "no_compile") and all(
+    hasattr(JITCodeLibrary, name) for name in ("_finalized", "_ensure_finalized", "_get_module_for_linking")
+)
+
+#: Passes over what kernels have none of: closures, array expressions, functions that numba inlines for itself.
+_IDLE_PASSES = ("InlineClosureLikes", "InlineOverloads", "NopythonRewrites")
+
+
+class PartLibrary(JITCodeLibrary):
+    """Code that is linked into other libraries, and neither optimised nor turned into machine code for itself."""
+
+    def __init__(self, codegen: Any, name: str) -> None:
+        super().__init__(codegen, name)
+        self._needed: dict[CodeLibrary, None] = {}
+
+    def add_linking_library(self, library: CodeLibrary) -> None:
+        """Remember what this code calls: who links this library has to link that one, too."""
+        super().add_linking_library(library)
+        self._needed[library] = None
+
+    def with_needed(self) -> list[CodeLibrary]:
+        """List this library and all that it calls, directly or not."""
+        return [self, *self._needed]
+
+    def finalize(self) -> None:
+        """Take no more code, and do nothing with it."""
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class PartLowering(NativeLowering):
+    """The last pass over a part: from typed Python to intermediate code."""
+
+    _name = "part_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower into a library of our kind, and tell where callers find the code and all that it needs."""
+        context = state.targetctx
+        state.library = PartLibrary(context.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        lowered = state["cr"]
+        # Compiled functions are known by what Python calls, a function of C's. A part has none: any that is nobody
+        # else's will do, and is never called, for Python calls a `Part`.
+        name: Callable[[Any], None] = [].append
+        context.insert_user_function(name, lowered.fndesc, state.library.with_needed())
+        state["cr"] = lowered._replace(cfunc=name)
+        return True
+
+
+class KernelCompiler(CompilerBase):
+    """numba's compiler, without passes that have nothing to do, and without a look for garbage at every turn."""
+
+    lowering = NativeLowering
+
+    def define_pipelines(self) -> list[PassManager]:
+        """Choose the passes."""
+        usual = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        chosen = PassManager(usual.pipeline_name)
+        for step, description in usual.passes:
+            if step.__name__ not in _IDLE_PASSES:
+                chosen.add_pass(self.lowering if step is NativeLowering else step, description)
+        chosen.finalize()
+        return [chosen]
+
+    def compile_extra(self, func: Callable[..., Any]) -> CompileResult:
+        """Compile a function."""
+        with _garbage_left_alone():
+            return super().compile_extra(func)
+
+
+class PartCompiler(KernelCompiler):
+    """The same for parts of kernels."""
+
+    lowering = PartLowering
+
+
+@contextlib.contextmanager
+def _garbage_left_alone() -> Iterator[None]:
+    """No search for cyclic garbage meanwhile: there is little, and a tenth of the time went into looking for it."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
+
+
+class PartType(types.Dispatcher):
+    """Type of a part, as its callers see it: a compiled function, the same for a constant as for any other integer."""
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        """Type of a call."""
+        return super().get_call_type(context, tuple(unliteral(one) for one in args), kws)
+
+
+register_model(PartType)(OpaqueModel)
+
+
+class Part:
+    """A part of kernels. Python, too, may call it: through a kernel that does nothing else."""
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        functools.update_wrapper(self, function)
+        #: The function as it is without compilation, and what kernels call; named as numba names them.
+        self.py_func = function
+        self.dispatcher = numba.njit(
+            pipeline_class=PartCompiler, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
+        )(function)
+        self._numba_type_ = PartType(self.dispatcher)
+        self._options = options
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the part from Python."""
+        return self._kernel(*arguments)
+
+    @functools.cached_property
+    def _kernel(self) -> Callable[..., Any]:
+        part = self
+
+        def call(*arguments: Any) -> Any:
+            return part(*arguments)
+
+        compiled: Callable[..., Any] = numba.njit(pipeline_class=KernelCompiler, **self._options)(call)
+        return compiled
+
+
+# - error_model: a kernel that divides by zero goes on with inf or NaN and reports through its status.
+# - fast-math is never switched on: the proofs rest on IEEE rounding, and every machine gives the same answer.
+# - _nrt=False: kernels never allocate, so counting references to their array arguments (atomic operations, dearer
+#   than a whole Taylor step) is switched off.
+_OPTIONS = {"error_model": "numpy", "_nrt": False}
+
+# - forceinline is said of every function: numba hands an unsaid one down from the first caller, so that one inlined
+#   function would inline all that it calls, a march included.
+# - no_cfunc_wrapper: nobody calls a kernel from C.
+_KERNEL = {"forceinline": False, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
+
+
+def kernel_of(function: Callable[..., Any], cache: Path | None, *, allocates: bool = False) -> Any:
+    """Compile an entry point that Python calls, kept in a folder, and free of Python's lock while it runs."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache or "")
+    try:
+        options = {"error_model": "numpy"} if allocates else {"nogil": True, **_KERNEL, **_OPTIONS}
+        return numba.njit(cache=cache is not None, **options)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def part_of(function: Callable[..., Any], *, inline: bool) -> Any:
+    """Compile a part of kernels."""
+    options = {"forceinline": inline, **_OPTIONS}
+    return Part(function, **options) if _POSSIBLE else numba.njit(**options)(function)
