@@ -39,7 +39,8 @@ int rocking_level(void) {
         && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("lzcnt") && __builtin_cpu_supports("f16c")
         && __builtin_cpu_supports("movbe");
     int fourth = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw")
-        && __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+        && __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq")
+        && __builtin_cpu_supports("avx512vl");
     return third ? (fourth ? 2 : 1) : 0;
 }
 """,
@@ -146,7 +147,7 @@ class Unpacking:
         return f"%v{self.names}"
 
     def unpacked(self, kind: str) -> str:
-        """The next eight bytes as a value."""
+        """Unpack the next eight bytes."""
         place = self.name(f"getelementptr i8, ptr %packed, i64 {8 * self.places}")
         self.places += 1
         return self.name(f"load {kind}, ptr {place}, align 8")
@@ -183,31 +184,21 @@ class Unpacking:
         self.passed += ["ptr null", "ptr null", f"i64 {count}", f"i64 {size}", f"ptr {data}"]
         self.passed += [f"i64 {each}" for each in (*shape, *reversed(strides))]
 
-    def text(self, symbol: str, inner: str, returned: Any) -> str:
-        """The whole function, in LLVM's language: what the kernel returns is its result, or is written to %answer."""
-        from numba import types
-
-        members = [*returned.types] if isinstance(returned, types.BaseTuple) else [returned]
-        nothing = isinstance(returned, types.NoneType)
-        kinds = ["double" if isinstance(member, types.Float) else "i64" for member in members]
-        several = isinstance(returned, types.BaseTuple)
-        result = "void" if nothing or several else kinds[0]
-        space = "%answer" if several else "%own"
-        given = "ptr %packed, ptr %answer" if several else "ptr %packed"
-        end = (
-            ["  ret void"] if result == "void" else [f"  %result = load {result}, ptr %own", f"  ret {result} %result"]
-        )
-        return "\n".join(
-            [
-                f"define {result} @{symbol}({given}) {{",
-                "  %own = alloca i64",
-                "  %problem = alloca ptr",
-                *self.lines,
-                f"  call i32 @{inner}({', '.join([f'ptr {space}', 'ptr %problem', *self.passed])})",
-                *end,
-                "}",
-            ]
-        )
+    def text(self, symbol: str, inner: str, returns: list[str]) -> str:
+        """Return the function in LLVM's language: the kernel's number is its result, several are written to %answer."""
+        kinds = ["double" if each == "float" else "i64" for each in returns]
+        result = kinds[0] if len(kinds) == 1 else "void"
+        space = "%answer" if len(kinds) > 1 else "%own"
+        lines = [
+            f"define {result} @{symbol}(ptr %packed, ptr %answer) {{",
+            "  %own = alloca i64",
+            "  %problem = alloca ptr",
+            *self.lines,
+            f"  call i32 @{inner}({', '.join([f'ptr {space}', 'ptr %problem', *self.passed])})",
+        ]
+        if result == "void":
+            return "\n".join([*lines, "  ret void", "}"])
+        return "\n".join([*lines, f"  %result = load {result}, ptr %own", f"  ret {result} %result", "}"])
 
 
 def compiled(level: str, folder: Path) -> dict[str, list[dict[str, Any]]]:
@@ -233,26 +224,22 @@ def compiled(level: str, folder: Path) -> dict[str, list[dict[str, Any]]]:
             unpacking = Unpacking()
             for kind in kinds:
                 unpacking.take(kind)
-            returned = made.signature.return_type
-            around = unpacking.text(symbol, f'"{made.fndesc.llvm_func_name}"', returned)
+            returns = numbers_of(made.signature.return_type)
+            around = unpacking.text(symbol, f'"{made.fndesc.llvm_func_name}"', returns)
             path = folder / f"{symbol}.o"
             path.write_bytes(object_of(made.library.get_llvm_str() + "\n" + around, symbol, machine))
-            what = {"symbol": symbol, "arguments": [described(kind) for kind in kinds], "returns": answer(returned)}
+            what = {"symbol": symbol, "arguments": [described(kind) for kind in kinds], "returns": returns}
             manifest.setdefault(f"rocking.kernels.{name}", []).append(what)
     return manifest
 
 
-def answer(returned: Any) -> Any:
-    """What a kernel returns, for the manifest."""
+def numbers_of(returned: Any) -> list[str]:
+    """List the kinds of numbers that a kernel returns."""
     from numba import types
 
     if isinstance(returned, types.NoneType):
-        return "nothing"
-    return (
-        [described(member) for member in returned.types]
-        if isinstance(returned, types.BaseTuple)
-        else described(returned)
-    )
+        return []
+    return [described(member) for member in (returned.types if isinstance(returned, types.BaseTuple) else [returned])]
 
 
 def object_of(text: str, symbol: str, machine: Any) -> bytes:
@@ -294,7 +281,7 @@ def library(level: str, out: Path) -> dict[str, Any]:
 
 
 def tag() -> str:
-    """The platform, as a wheel's name has it: Linux with the C library that the functions were linked to, or newer."""
+    """Name the platform as wheels do: Linux with the C library that the functions were linked to, or a newer one."""
     if sys.platform == "linux":
         _, version = platform.libc_ver()
         return f"manylinux_{version.replace('.', '_')}_{platform.machine()}"
@@ -315,7 +302,7 @@ def main() -> None:
     from rocking.kernels.library import FOLDER, sources
 
     levels = LEVELS[platform.machine().lower()]
-    kernels = [library(level, options.out) for level in levels][0]
+    kernels = {level: library(level, options.out) for level in levels}[levels[0]]
     libraries = [f"kernels-{level}{SUFFIX}" for level in levels]
     manifest = {"sources": sources(FOLDER.parent), "platform": tag(), "libraries": libraries, "kernels": kernels}
     (options.out / "manifest.json").write_text(json.dumps(manifest), "utf-8")

@@ -480,6 +480,7 @@ def test_compiling_is_said_once_for_each_work_and_not_where_it_is_short():
         "import time\n"
         "from numba import njit\n"
         "from rocking import compiling, progress\n"
+        "compiling.listen()\n"
         "def compiled(seconds, patience):\n"
         "    compiling._PATIENCE = patience\n"
         "    compiling.announce(seconds)\n"

@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-import numba
 import pytest
 
 from rocking.kernels import compiled
@@ -20,7 +19,7 @@ SOURCE = KERNELS.parent.parent
 @pytest.fixture
 def places(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     """A folder for everything, nothing remembered of other folders, and no wish of the user's."""
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(compiled, "_HERE", tmp_path / "package")
     monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
@@ -59,11 +58,11 @@ def test_it_falls_back_to_the_users_then_to_a_temporary_one_then_to_none(places:
 
 
 def test_the_users_wish_comes_first(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(places / "wished"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(places / "wished"))
     folder = compiled.cache_folder()
     assert folder is not None
     assert folder.parent == places / "wished"
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(places / "xdg"))
     block(places / "package" / "__pycache__")
     compiled.cache_folder.cache_clear()
@@ -148,7 +147,7 @@ def test_a_change_in_a_kernel_that_others_call_is_seen(tmp_path: Path) -> None:
     source, cache = tmp_path / "source", tmp_path / "cache"
     shutil.copytree(SOURCE, source, ignore=shutil.ignore_patterns("__pycache__"))
     before = finished(started(PROGRAM, source, cache))
-    impact = source / "rocking" / "kernels" / "impact.py"
+    impact = source / "rocking" / "kernels" / "events.py"
     text = impact.read_text()
     changed = text.replace("block.restitution[left] * speed", "0.5 * block.restitution[left] * speed")
     assert changed != text

@@ -4,7 +4,6 @@ import itertools
 import math
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,6 +12,7 @@ from kernel_records import ULP
 from oracles.exact import as_float, exact, polynomial, real_roots
 
 from rocking.kernels import events
+from rocking.kernels.compiled import UNCOMPILED
 from rocking.kernels.events import curvature_bound, first_root
 
 quick = settings(deadline=None, max_examples=150)
@@ -183,7 +183,7 @@ def visited(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return seen
 
 
-uncompiled = pytest.mark.skipif(not numba.config.DISABLE_JIT, reason="counts the calls of an uncompiled kernel")
+uncompiled = pytest.mark.skipif(not UNCOMPILED, reason="counts the calls of an uncompiled kernel")
 
 
 @uncompiled

@@ -88,10 +88,12 @@ def _variant(code: Any, types: dict[str, Any]) -> Callable[..., Any]:
     """Return what calls one function: for arguments of certain types."""
     takers = [_taker(kind) for kind in types["arguments"]]
     pack = struct.Struct("=" + "".join(_format(kind) for kind in types["arguments"])).pack
-    returns = types["returns"]
-    several = struct.Struct("=" + "".join(_format(kind) for kind in returns)) if isinstance(returns, list) else None
-    code.restype = {"int": ctypes.c_int64, "float": ctypes.c_double}.get(returns) if several is None else None
-    code.argtypes = [ctypes.c_char_p, ctypes.c_char_p] if several else [ctypes.c_char_p]
+    returned = struct.Struct("=" + "".join(_format(kind) for kind in types["returns"]))
+    several = len(types["returns"]) > 1
+    code.restype = None
+    if len(types["returns"]) == 1:
+        code.restype = {"int": ctypes.c_int64, "float": ctypes.c_double}[types["returns"][0]]
+    code.argtypes = [ctypes.c_char_p, ctypes.c_char_p]
 
     def call(*arguments: Any) -> Any:
         if len(arguments) != len(takers):
@@ -99,11 +101,11 @@ def _variant(code: Any, types: dict[str, Any]) -> Callable[..., Any]:
         packed: list[Any] = []
         for take, argument in zip(takers, arguments, strict=True):
             take(argument, packed)
-        if several is None:
-            return code(pack(*packed))
-        answer = ctypes.create_string_buffer(several.size)
+        if not several:
+            return code(pack(*packed), None)
+        answer = ctypes.create_string_buffer(returned.size)
         code(pack(*packed), answer)
-        return several.unpack(answer.raw)
+        return returned.unpack(answer.raw)
 
     return call
 
