@@ -9,6 +9,7 @@ a function around it unpacks arguments from the eight bytes each that `rocking.k
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import platform
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -201,8 +203,8 @@ class Unpacking:
         return "\n".join([*lines, f"  %result = load {result}, ptr %own", f"  ret {result} %result", "}"])
 
 
-def compiled(level: str, folder: Path) -> dict[str, list[dict[str, Any]]]:
-    """Compile all kernels for a level, in a process whose numba was told so; objects go to a folder."""
+def compiled(level: str, folder: Path, names: Collection[str]) -> dict[str, list[dict[str, Any]]]:
+    """Compile kernels, all by default, for a level, in a process whose numba was told so; objects go to a folder."""
     import importlib
 
     import llvmlite.binding as llvm
@@ -214,6 +216,8 @@ def compiled(level: str, folder: Path) -> dict[str, list[dict[str, Any]]]:
     machine = target.create_target_machine(cpu=level, features="", opt=3, reloc="pic", codemodel="default")
     manifest: dict[str, list[dict[str, Any]]] = {}
     for name, several in signatures().items():
+        if names and name not in names:
+            continue
         module, _, function = name.rpartition(".")
         kernel = getattr(importlib.import_module(f"rocking.kernels.{module}"), function).compiled
         for number, arguments in enumerate(several):
@@ -261,11 +265,11 @@ def object_of(text: str, symbol: str, machine: Any) -> bytes:
     return code
 
 
-def library(level: str, out: Path) -> dict[str, Any]:
+def library(level: str, out: Path, names: Collection[str] = ()) -> dict[str, Any]:
     """Compile and link the library of a level; return the manifest's part about kernels."""
     with tempfile.TemporaryDirectory() as folder:
         environment = os.environ | {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": folder}
-        command = [sys.executable, __file__, "--level", level, "--out", folder]
+        command = [sys.executable, __file__, "--level", level, "--out", folder, *names]
         subprocess.run(command, env=environment | {"ROCKING_SHIPPED": "0"}, check=True)
         source = Path(folder) / "processor.c"
         source.write_text(PROCESSOR[platform.machine().lower()], "utf-8")
@@ -280,6 +284,17 @@ def library(level: str, out: Path) -> dict[str, Any]:
     return kernels
 
 
+def ship(out: Path, levels: list[str], names: Collection[str] = ()) -> None:
+    """Make the libraries of some levels, the lowest first, and the manifest."""
+    from rocking.kernels.library import FOLDER, sources
+
+    kernels = {level: library(level, out, names) for level in levels}[levels[0]]
+    files = [out / f"kernels-{level}{SUFFIX}" for level in levels]
+    libraries = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    manifest = {"sources": sources(FOLDER.parent), "platform": tag(), "libraries": libraries, "kernels": kernels}
+    (out / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+
+
 def tag() -> str:
     """Name the platform as wheels do: Linux with the C library that the functions were linked to, or a newer one."""
     if sys.platform == "linux":
@@ -292,21 +307,15 @@ def main() -> None:
     """Make all libraries, or compile for one level."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", type=Path, default=OUT, help="folder for libraries and manifest")
+    parser.add_argument("kernels", nargs="*", help="names of kernels; by default all")
     parser.add_argument("--level", help="compile for this level alone (used by the script itself)")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     if options.level:
-        kernels = compiled(options.level, options.out)
+        kernels = compiled(options.level, options.out, options.kernels)
         (options.out / "kernels.json").write_text(json.dumps(kernels), "utf-8")
         return
-    from rocking.kernels.library import FOLDER, sources
-
-    levels = LEVELS[platform.machine().lower()]
-    kernels = {level: library(level, options.out) for level in levels}[levels[0]]
-    libraries = [f"kernels-{level}{SUFFIX}" for level in levels]
-    manifest = {"sources": sources(FOLDER.parent), "platform": tag(), "libraries": libraries, "kernels": kernels}
-    (options.out / "manifest.json").write_text(json.dumps(manifest), "utf-8")
-    print(f"{options.out}: {', '.join(libraries)}")
+    ship(options.out, LEVELS[platform.machine().lower()], options.kernels)
 
 
 if __name__ == "__main__":

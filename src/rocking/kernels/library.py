@@ -28,11 +28,14 @@ class OtherTypes(TypeError):
 
 
 class _Library:
-    """A library that fits this processor, and its manifest."""
+    """A library and its manifest."""
 
-    def __init__(self, path: Path, manifest: Manifest) -> None:
-        self.path, self.manifest = path, manifest
-        self.handle = ctypes.CDLL(str(path))
+    def __init__(self, name: str, manifest: Manifest) -> None:
+        # The system loads half a library without a word, and ends the process when something is called.
+        if hashlib.sha256((FOLDER / name).read_bytes()).hexdigest() != manifest["libraries"][name]:
+            raise ValueError(f"{name} is not the file that the manifest describes")
+        self.name, self.manifest = name, manifest
+        self.handle = ctypes.CDLL(str(FOLDER / name))
 
 
 @functools.cache
@@ -45,10 +48,9 @@ def opened() -> _Library | None:
         if manifest["sources"] != sources(Path(__file__).parent):
             return None
         lowest, *higher = manifest["libraries"]
-        found = _Library(FOLDER / lowest, manifest)
-        level = found.handle.rocking_level()
-        best = higher[:level][-1:]
-        return _Library(FOLDER / best[0], manifest) if best else found
+        found = _Library(lowest, manifest)
+        best = higher[: found.handle.rocking_level()][-1:]
+        return _Library(best[0], manifest) if best else found
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 

@@ -107,8 +107,8 @@ _MAXIMUM_PAIRS: Final = 100_000
 _FALLEN: Final = 2.3
 _SPARE_PAIRS: Final = 3
 
-# Python strings the arcs together: that costs little beside them, and to compile it as well would multiply the time of a
-# first call.
+# Python strings the arcs together: that costs little beside them, and to compile it as well would multiply the time of
+# a first call.
 
 
 def phase_coefficients(delta: float, eta: float, order: int) -> Series:
