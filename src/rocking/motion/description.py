@@ -59,9 +59,8 @@ class Description:
         Kind of motion: "record", "samples", "sine", "symmetric Ricker", ... After a delay or processing it says so
         ("delayed sine", "processed record"), since the formula of `text` then no longer starts at time zero.
     parameters : mapping of str to float
-        Numbers of the formula in SI units and radians, for instance amplitude, frequency, phase and cycles of
-        a sine. Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it
-        negative).
+        Numbers of the formula in SI units and radians, for instance amplitude, frequency, phase and cycles of a sine.
+        Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it negative).
     text : str
         The formula, or the record's source and terms, in words.
     origin : Origin, optional

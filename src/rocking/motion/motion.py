@@ -672,7 +672,7 @@ class Motion:
         >>> figure.axes[0].get_xlabel(), figure.get_suptitle()
         ('time (s)', 'sine')
         """
-        from rocking.plot import motion_figure
+        from rocking.plot.response import motion_figure
 
         end = self.duration if self.vertical is None else max(self.duration, self.vertical.duration)
         times = self.drawing_times(0.0, end)
