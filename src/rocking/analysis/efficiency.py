@@ -205,7 +205,7 @@ class MeasureComparison(Drawn, Result):
         }
 
     def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import dispersions_figure
+        from rocking.plot.fragility import dispersions_figure
 
         data, order = self.data, self._order()
         return dispersions_figure(

@@ -280,7 +280,7 @@ class IncrementalDynamicAnalysis(Result):
         figsize : (float, float), optional
             Width and height of a new figure, inches.
         """
-        from rocking.plot import ScaledMotion, ida_figure
+        from rocking.plot.ida import ScaledMotion, ida_figure
 
         data = self.data
         levels = data.level.scale * data.level.values

@@ -277,7 +277,7 @@ class OverturningMap(Result):
         title, figsize
             Title, by default the pulse and the block; width and height of a new figure, inches.
         """
-        from rocking.plot import regions_figure
+        from rocking.plot.maps import regions_figure
 
         data = self.data
         modes = data.mode.values

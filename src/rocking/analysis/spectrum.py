@@ -243,7 +243,7 @@ class RockingSpectrum(Result):
         InvalidOption
             If there are more than four combinations of slenderness and restitution, or no such abscissa.
         """
-        from rocking.plot import SpectrumCurves, spectrum_figure
+        from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
         checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
         named_curves = self._curves()

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_title, figure_for
-from rocking.plot.style import ABOVE, GROUND, INK, REST
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, figure_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,11 +35,10 @@ def block_figure(*, upright: Floats, rocking: Floats, title: str) -> Figure:
     """
     from matplotlib.patches import Polygon
 
-    with figure_for(None, (3.4, 4.2)) as figure:
+    with figure_for(None, (3.4, 4.2), title=title) as figure:
         axes = figure.add_subplot()
         axes.set_aspect("equal")
         axes.set_axis_off()
-        add_title(figure, None, title)
         axes.add_patch(Polygon(rocking[:4], facecolor=REST, edgecolor=INK, linewidth=1.3))
         axes.add_patch(Polygon(upright[:4], fill=False, edgecolor=GROUND, linewidth=0.9, linestyle=(0, (4, 2))))
         _draw_ground(axes, rocking, upright)

@@ -134,7 +134,7 @@ class HistoryCalibration(Report):
         }
 
     def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import measured_figure
+        from rocking.plot.calibration import measured_figure
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
         end = min(float(self.times[-1]), self.response.duration)

@@ -330,7 +330,7 @@ class Fragility(Tabled):
         nrml.write(path, function, states, self.description, **about)
 
     def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import FragilityLine, fragility_figure
+        from rocking.plot.fragility import FragilityLine, fragility_figure
 
         first = self.curves[0]
         band_text = f"band: {100 * first.confidence:g} % confidence ({self.band_kind})"
