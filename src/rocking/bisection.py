@@ -19,18 +19,6 @@ def is_wide(low: Floats, high: Floats, tolerance: Floats | float) -> Flags:
 
 
 def halved(low: Floats, high: Floats, in_upper: Flags, in_lower: Flags) -> tuple[Floats, Floats]:
-    """Return brackets of which some are cut at their middle.
-
-    Parameters
-    ----------
-    low, high : ndarray, shape (n,)
-        Ends of the brackets.
-    in_upper, in_lower : ndarray of bool, shape (n,)
-        Whether the change lies above the middle, or below it. A bracket with neither stays as it is.
-
-    Returns
-    -------
-    low, high : ndarray, shape (n,)
-    """
+    """Return brackets cut at their middle, where it is known whether the change lies above it or below it."""
     between = middle(low, high)
     return np.where(in_upper, between, low), np.where(in_lower, between, high)

@@ -366,8 +366,7 @@ def ricker(
     longest = 2.0 * (_SYMMETRIC_REACH if symmetric else _ANTISYMMETRIC_REACH) / rate
     length = longest if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")
     if length > longest:
-        sentence = f"a Ricker pulse of {frequency:.6g} Hz lasts only {longest:.6g} s: give no longer {{}}"
-        raise InvalidMotion(sentence, "duration", value=duration)
+        raise InvalidMotion(f"a Ricker pulse of {frequency:.6g} Hz lasts only {longest:.6g} s: give no longer duration")
     breakpoints = np.linspace(0.0, length, whole_pieces(rate * length / GAUSSIAN_PIECE))
     series = -gaussian_derivative(2 if symmetric else 3, middles(breakpoints) - 0.5 * length, rate)
     peak = 1.0 if symmetric else _antisymmetric_peak()

@@ -23,8 +23,8 @@ from rocking.analysis.calibration.space import (
 from rocking.analysis.report import Report
 from rocking.arrays import Floats
 from rocking.block import Block
+from rocking.constants import Model
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response, drawing_times

@@ -21,9 +21,8 @@ from rocking.analysis.risk import Risk
 from rocking.analysis.survival import Survival
 from rocking.arrays import Floats
 from rocking.block import Block
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption, Message
-from rocking.model import Model
 from rocking.motion.scaling import Measure
 from rocking.progress import spelled
 from rocking.tables import counted, text_table

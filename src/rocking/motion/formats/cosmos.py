@@ -6,15 +6,15 @@ read. Real header 62 is the step in milliseconds, 34 that of the raw data in sec
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from typing import NamedTuple
 
 from rocking.arrays import Floats
 from rocking.motion.formats import csmip
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.source import Identification, Line, Request, Source
-from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
+from rocking.motion.formats.source import Line, Request, Source, find_unit
 from rocking.motion.formats.values import expect, read_values
 
 NAME = "COSMOS"
@@ -43,20 +43,21 @@ class _CosmosHeader(NamedTuple):
     quantity: str
 
 
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if the first line states its version and number of text lines."""
     line = source.first_line()
     found = _TITLE.search(line.text) if line is not None else None
     if line is None or found is None:
         return None
-    return Identification(NAME, f"line {source.line_number(line.start)} says {found[0] + ' lines)'!r}")
+    identification = Identification(NAME, f"line {source.line_number(line.start)} says {found[0] + ' lines)'!r}")
+    return Recognised(identification, functools.partial(_read, source, line))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
+def _read(source: Source, first: Line, request: Request) -> list[Channel]:
     """Return the accelerations in the file."""
     found: list[Channel] = []
     others: list[str] = []
-    title = source.first_line()
+    title: Line | None = first
     while title is not None:
         header = _header(source, title)
         end = csmip.data_end(source, header.data.next, _TITLE)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from typing import NamedTuple
 
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.source import Identification, Request, Source
-from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
+from rocking.motion.formats.source import Request, Source, find_unit
 from rocking.motion.formats.values import parse, read_values
 
 NAME = "ESM"
@@ -23,18 +23,17 @@ class _EsmEntry(NamedTuple):
     at: int
 
 
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if the first lines are keys and values, step and type of data among them."""
-    entries, _ = _entries(source)
+    entries, start = _entries(source)
     if not all(key in entries for key in _SIGNS):
         return None
     line = source.line_number(entries["DATA_TYPE"].at)
-    return Identification(NAME, f"the first lines read 'KEY: value', line {line} is DATA_TYPE")
+    identification = Identification(NAME, f"the first lines read 'KEY: value', line {line} is DATA_TYPE")
+    return Recognised(identification, functools.partial(_read, source, entries, start))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file."""
-    entries, start = _entries(source)
+def _read(source: Source, entries: dict[str, _EsmEntry], start: int, request: Request) -> list[Channel]:
     kind = entries["DATA_TYPE"]
     if kind.value.upper() != "ACCELERATION":
         raise source.error(f"this ESM file holds {kind.value.lower()!r}; give the file of the acceleration", kind.at)
@@ -50,18 +49,19 @@ def read(source: Source, request: Request) -> list[Channel]:
     text = {key: entry.value for key, entry in entries.items() if entry.value}
     name = text.get("STREAM", "acceleration")
     processing = {"processing": text["PROCESSING"]} if "PROCESSING" in text else {}
-    channel = Channel(
-        name=name,
-        number=1,
-        acceleration=to_acceleration(source, start, values, unit),
-        dt=dt,
-        azimuth=_AZIMUTHS.get(name[-1]),
-        units=spelling.value or unit.name,
-        station=".".join(text[key] for key in ("NETWORK", "STATION_CODE") if key in text),
-        event=text.get("EVENT_ID", text.get("EVENT_NAME", "")),
-        metadata={"format": NAME, "file": source.file, **processing},
-    )
-    return [channel]
+    return [
+        Channel(
+            name=name,
+            number=1,
+            acceleration=to_acceleration(source, start, values, unit),
+            dt=dt,
+            azimuth=_AZIMUTHS.get(name[-1]),
+            units=spelling.value or unit.name,
+            station=".".join(text[key] for key in ("NETWORK", "STATION_CODE") if key in text),
+            event=text.get("EVENT_ID", text.get("EVENT_NAME", "")),
+            metadata={"format": NAME, "file": source.file, **processing},
+        )
+    ]
 
 
 def _entries(source: Source) -> tuple[dict[str, _EsmEntry], int]:

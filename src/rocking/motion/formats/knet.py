@@ -6,15 +6,15 @@ baseline correction of the motion. "Record Time" is 15 s later than the first sa
 
 from __future__ import annotations
 
+import functools
 import re
 from typing import NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.source import Identification, Line, Request, Source
-from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
+from rocking.motion.formats.source import Line, Request, Source, find_unit
 from rocking.motion.formats.values import Layout, parse, read_values
 
 NAME = "K-NET/KiK-net"
@@ -54,17 +54,17 @@ class _KnetEntry(NamedTuple):
     at: int
 
 
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if the file begins with 'Origin Time' and has a 'Scale Factor'."""
     lines = source.lines(0, 2 * len(_KEYS))
     scale = next((line for line in lines if line.text.startswith("Scale Factor")), None)
     if scale is None or not lines[0].text.startswith("Origin Time"):
         return None
-    return Identification(NAME, f"line 1 begins 'Origin Time', line {source.line_number(scale.start)} 'Scale Factor'")
+    reason = f"line 1 begins 'Origin Time', line {source.line_number(scale.start)} 'Scale Factor'"
+    return Recognised(Identification(NAME, reason), functools.partial(_read, source))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file, its offset kept."""
+def _read(source: Source, request: Request) -> list[Channel]:
     entries, start = _entries(source)
     (rate,) = _positive(source, entries, "Sampling Freq", _RATE)
     gal, counts = _positive(source, entries, "Scale Factor", _SCALE)
@@ -78,23 +78,24 @@ def read(source: Source, request: Request) -> list[Channel]:
     acceleration = to_acceleration(source, scale_at, scaled, unit)
     direction = entries["Dir."].value
     name = _SENSORS.get(direction, direction) or "acceleration"
-    channel = Channel(
-        name=name,
-        number=1,
-        acceleration=acceleration,
-        dt=dt,
-        azimuth=_AZIMUTHS.get(name.split(" ")[0]),
-        units="gal",
-        station=entries["Station Code"].value,
-        event=f"{entries['Origin Time'].value}, magnitude {entries['Mag.'].value}",
-        metadata={
-            "format": NAME,
-            "file": source.file,
-            "record time": entries["Record Time"].value,
-            "offset": f"kept, the mean is {_mean(acceleration):.4g} m/s^2",
-        },
-    )
-    return [channel]
+    return [
+        Channel(
+            name=name,
+            number=1,
+            acceleration=acceleration,
+            dt=dt,
+            azimuth=_AZIMUTHS.get(name.split(" ")[0]),
+            units="gal",
+            station=entries["Station Code"].value,
+            event=f"{entries['Origin Time'].value}, magnitude {entries['Mag.'].value}",
+            metadata={
+                "format": NAME,
+                "file": source.file,
+                "record time": entries["Record Time"].value,
+                "offset": f"kept, the mean is {_mean(acceleration):.4g} m/s^2",
+            },
+        )
+    ]
 
 
 def _entries(source: Source) -> tuple[dict[str, _KnetEntry], int]:
