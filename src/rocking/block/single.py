@@ -19,8 +19,6 @@ from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
 if TYPE_CHECKING:
     from rocking.block.many import Blocks
 
-Number = float | int
-
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
 
@@ -146,7 +144,7 @@ class Block:
         width: float | None = None,
         height: float | None = None,
         offset: float = 0.0,
-        restitution: Number | Sequence[Number] | None = None,
+        restitution: float | Sequence[float] | None = None,
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
@@ -183,9 +181,9 @@ class Block:
     @classmethod
     def from_parameters(
         cls,
-        p: Number | Sequence[Number],
-        alpha: Number | Sequence[Number],
-        restitution: Number | Sequence[Number] | None = None,
+        p: float | Sequence[float],
+        alpha: float | Sequence[float],
+        restitution: float | Sequence[float] | None = None,
         *,
         gravity: float = STANDARD_GRAVITY,
     ) -> Block:
@@ -254,11 +252,11 @@ class Block:
     @classmethod
     def from_pivots(
         cls,
-        distances: Sequence[Number],
+        distances: Sequence[float],
         height: float,
         radius_of_gyration: float,
         *,
-        restitution: Number | Sequence[Number] | None = None,
+        restitution: float | Sequence[float] | None = None,
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> Block:
@@ -318,7 +316,7 @@ class Block:
         half_width: float,
         half_height: float,
         mass_ratio: float,
-        restitution: Number | Sequence[Number] | None = None,
+        restitution: float | Sequence[float] | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> Block:
         """Solitary block that rocks like a frame: equal columns that carry a freely supported rigid beam.

@@ -758,6 +758,10 @@ class Motion:
         return ", ".join(part for part in (self.name, *described, *self.history) if part)
 
     def _times(self, factor: float, done: str) -> Motion:
+        """Return both components times a factor, the vertical one by its size."""
+        vertical = self.vertical
+        if vertical is not None and abs(factor) != 1.0:
+            vertical = vertical._times(abs(factor), done)
         with np.errstate(over="ignore"):
             coefficients = self.coefficients * factor
         return replace(
@@ -766,11 +770,8 @@ class Motion:
             description=self.description.scaled(factor),
             history=(*self.history, done),
             error=self.error * abs(factor),
-            vertical=self._vertical_times(abs(factor), done),
+            vertical=vertical,
         )
-
-    def _vertical_times(self, factor: float, done: str) -> Motion | None:
-        return self.vertical if self.vertical is None or factor == 1.0 else self.vertical._times(factor, done)
 
 
 def _peak(motion: Motion) -> str:

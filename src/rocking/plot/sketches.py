@@ -91,7 +91,7 @@ def _draw_sizes(axes: Axes, corners: Floats) -> None:
 def _draw_angles(axes: Axes, upright: Floats, rocking: Floats) -> None:
     """Draw the slenderness, between the block's edge and R, and the rotation, between the edge upright and rocking."""
     pivot = rocking[0]
-    edge, before, diagonal = (_direction(end - pivot) for end in (rocking[1], upright[1], rocking[4]))
+    edge, before, diagonal = (math.atan2(*(end - pivot)[::-1]) for end in (rocking[1], upright[1], rocking[4]))
     height = float(np.hypot(*(upright[1] - pivot)))
     arcs = ((_ALPHA_RADIUS, diagonal, r"$\alpha$"), (_THETA_RADIUS * height, before, r"$\theta$"))
     start = edge
@@ -103,10 +103,6 @@ def _draw_angles(axes: Axes, upright: Floats, rocking: Floats) -> None:
         middle = 0.5 * (start + end)
         at = pivot + (radius + 0.09) * np.array([math.cos(middle), math.sin(middle)])
         axes.annotate(name, at, ha="center", va="center")
-
-
-def _direction(vector: Floats) -> float:
-    return math.atan2(vector[1], vector[0])
 
 
 def _draw_arrow(axes: Axes, start: Any, end: Any, style: str, color: str, **look: float) -> None:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 from rocking.arrays import Floats
 from rocking.motion.formats.channel import Channel, Identification, Recognised, even_step, first_fault, to_acceleration
 from rocking.motion.formats.source import Line, Request, Source, Unit, find_unit
-from rocking.motion.formats.values import Layout, bad_number, expect, numeric_end, parse, read_values
+from rocking.motion.formats.values import Layout, bad_number, numeric_end, parse, read_count
 
 V1_TITLE = re.compile(r"^\s*uncorrected accelerogram", re.IGNORECASE)
 V2_TITLE = re.compile(r"^\s*corrected accelerogram", re.IGNORECASE)
@@ -164,25 +164,22 @@ def _v1_samples(
     dt = request.step(source, 1.0 / rate, line.start)
     end = data_end(source, line.next, V1_TITLE)
     count, layout = int(stated[1]), layout_in(line.text)
-    values = expect(source, line.start, count, read_values(source, line.next, end, count=count, layout=layout))
-    units = spelling[1] if spelling else unit.name
-    return _v1_labelled(
-        source, header, ordinal, units, to_acceleration(source, line.start, values, unit), dt, None
-    ), end
+    values = read_count(source, line.start, line.next, end, count, layout)
+    units, acceleration = spelling[1] if spelling else unit.name, to_acceleration(source, line.start, values, unit)
+    return _v1_labelled(source, header, ordinal, units, acceleration, dt, None), end
 
 
 def _v1_pairs(source: Source, request: Request, header: list[Line], ordinal: int) -> tuple[Channel, int]:
     points, spelling, unit = _v1_pair_header(source, request, header)
     start, at = header[-1].next, header[0].start
     end = data_end(source, start, V1_TITLE)
-    values = expect(source, at, 2 * points, read_values(source, start, end, count=2 * points, layout=_V1_PAIRS))
+    values = read_count(source, at, start, end, 2 * points, _V1_PAIRS)
     times, acceleration = values[0::2], to_acceleration(source, at, values[1::2], unit)
     if first_fault(times) is not None:
         raise source.error("the times of the points that follow do not increase throughout; correct the file", start)
-    dt = even_step(times)
-    if dt is None:
-        return _v1_labelled(source, header, ordinal, spelling, acceleration, None, times), end
-    return _v1_labelled(source, header, ordinal, spelling, acceleration, request.step(source, dt, start), None), end
+    step = even_step(times)
+    dt, uneven = (None, times) if step is None else (request.step(source, step, start), None)
+    return _v1_labelled(source, header, ordinal, spelling, acceleration, dt, uneven), end
 
 
 def _v1_pair_header(source: Source, request: Request, header: list[Line]) -> tuple[int, str, Unit]:
@@ -264,7 +261,7 @@ def _v2_acceleration(
     dt = request.step(source, _v2_step(source, header, stated[2]), line.start)
     end = data_end(source, line.next, V2_TITLE, _V2_NEXT_QUANTITY)
     count, layout = int(stated[1]), layout_in(line.text) or _V2_COLUMNS
-    values = expect(source, line.start, count, read_values(source, line.next, end, count=count, layout=layout))
+    values = read_count(source, line.start, line.next, end, count, layout)
     label = labels(header[:_V2_TEXT_LINES], ordinal)
     channel = Channel(
         name=label.name,

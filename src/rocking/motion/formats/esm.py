@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import functools
 import re
-from typing import NamedTuple
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
-from rocking.motion.formats.source import Request, Source, find_unit
+from rocking.motion.formats.source import Entry, Request, Source, find_unit
 from rocking.motion.formats.values import parse, read_values
 
 NAME = "ESM"
@@ -16,11 +15,6 @@ _HEADER_LINES = 200
 _KEY = re.compile(r"^([A-Z][A-Z0-9_/^]*)\s*:\s*(.*)$")
 _SIGNS = ("DATA_TYPE", "SAMPLING_INTERVAL_S", "NDATA")
 _AZIMUTHS = {"N": 0.0, "E": 90.0}
-
-
-class _EsmEntry(NamedTuple):
-    value: str
-    at: int
 
 
 def recognise(source: Source) -> Recognised | None:
@@ -33,11 +27,11 @@ def recognise(source: Source) -> Recognised | None:
     return Recognised(identification, functools.partial(_read, source, entries, start))
 
 
-def _read(source: Source, entries: dict[str, _EsmEntry], start: int, request: Request) -> list[Channel]:
+def _read(source: Source, entries: dict[str, Entry], start: int, request: Request) -> list[Channel]:
     kind = entries["DATA_TYPE"]
     if kind.value.upper() != "ACCELERATION":
         raise source.error(f"this ESM file holds {kind.value.lower()!r}; give the file of the acceleration", kind.at)
-    spelling = entries.get("UNITS", _EsmEntry("", start))
+    spelling = entries.get("UNITS", Entry("", start))
     unit = request.units(source, find_unit(spelling.value), spelling.at)
     dt = request.step(source, _number(source, entries, "SAMPLING_INTERVAL_S"), entries["SAMPLING_INTERVAL_S"].at)
     values = read_values(source, start, len(source.data))
@@ -64,20 +58,20 @@ def _read(source: Source, entries: dict[str, _EsmEntry], start: int, request: Re
     ]
 
 
-def _entries(source: Source) -> tuple[dict[str, _EsmEntry], int]:
+def _entries(source: Source) -> tuple[dict[str, Entry], int]:
     """Return the header's values by their key, and where the data start."""
-    entries: dict[str, _EsmEntry] = {}
+    entries: dict[str, Entry] = {}
     start = 0
     for line in source.lines(0, _HEADER_LINES):
         found = _KEY.match(line.text)
         if found is None:
             break
-        entries[found[1]] = _EsmEntry(found[2].strip(), line.start)
+        entries[found[1]] = Entry(found[2].strip(), line.start)
         start = line.next
     return entries, start
 
 
-def _number(source: Source, entries: dict[str, _EsmEntry], key: str) -> float:
+def _number(source: Source, entries: dict[str, Entry], key: str) -> float:
     entry = entries[key]
     number = parse(entry.value.encode("latin-1"))
     if number is None:

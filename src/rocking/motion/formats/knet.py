@@ -8,36 +8,19 @@ from __future__ import annotations
 
 import functools
 import re
-from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
-from rocking.motion.formats.source import Line, Request, Source, find_unit
+from rocking.motion.formats.source import Entry, Request, Source, find_unit
 from rocking.motion.formats.values import Layout, parse, read_values
 
 NAME = "K-NET/KiK-net"
 
 _KEYS = (
-    "Origin Time",
-    "Lat.",
-    "Lon",
-    "Depth",
-    "Mag.",
-    "Station Code",
-    "Station Lat",
-    "Station Lon",
-    "Station Height",
-    "Record Time",
-    "Sampling Freq",
-    "Duration Time",
-    "Dir.",
-    "Scale Factor",
-    "Max",
-    "Last Correction",
-    "Memo",
-)
+    "Origin Time", "Lat.", "Lon", "Depth", "Mag.", "Station Code", "Station Lat", "Station Lon", "Station Height",
+    "Record Time", "Sampling Freq", "Duration Time", "Dir.", "Scale Factor", "Max", "Last Correction", "Memo",
+)  # fmt: skip
 _KEY_COLUMNS = 18
 _COUNTS = Layout(per_line=8, width=9)
 _RATE = re.compile(r"([\d.]{1,20})\s*Hz", re.IGNORECASE | re.ASCII)
@@ -47,11 +30,6 @@ _SECONDS = re.compile(r"([\d.]{1,20})", re.ASCII)
 #: KiK-net numbers its six sensors: three in the borehole, three at the surface.
 _SENSORS = {"1": "N-S borehole", "2": "E-W borehole", "3": "U-D borehole", "4": "N-S", "5": "E-W", "6": "U-D"}
 _AZIMUTHS = {"N-S": 0.0, "E-W": 90.0}
-
-
-class _KnetEntry(NamedTuple):
-    value: str
-    at: int
 
 
 def recognise(source: Source) -> Recognised | None:
@@ -76,6 +54,8 @@ def _read(source: Source, request: Request) -> list[Channel]:
     with np.errstate(over="ignore"):
         scaled = values * gal / counts
     acceleration = to_acceleration(source, scale_at, scaled, unit)
+    with np.errstate(over="ignore"):
+        mean = float(acceleration.mean())
     direction = entries["Dir."].value
     name = _SENSORS.get(direction, direction) or "acceleration"
     return [
@@ -92,13 +72,13 @@ def _read(source: Source, request: Request) -> list[Channel]:
                 "format": NAME,
                 "file": source.file,
                 "record time": entries["Record Time"].value,
-                "offset": f"kept, the mean is {_mean(acceleration):.4g} m/s^2",
+                "offset": f"kept, the mean is {mean:.4g} m/s^2",
             },
         )
     ]
 
 
-def _entries(source: Source) -> tuple[dict[str, _KnetEntry], int]:
+def _entries(source: Source) -> tuple[dict[str, Entry], int]:
     """Return the header's values by their key, and where the data start."""
     lines = source.lines(0, len(_KEYS))
     for line, key in zip(lines, _KEYS, strict=False):
@@ -106,14 +86,11 @@ def _entries(source: Source) -> tuple[dict[str, _KnetEntry], int]:
             raise source.error(f"the header line {key!r} should stand here; get the record again", line.start)
     if len(lines) < len(_KEYS):
         raise source.error("the file ends within its header; get the whole file again", lines[-1].start)
-    return dict(zip(_KEYS, map(_entry, lines), strict=True)), lines[-1].next
+    entries = [Entry(line.text[_KEY_COLUMNS:].strip(), line.start) for line in lines]
+    return dict(zip(_KEYS, entries, strict=True)), lines[-1].next
 
 
-def _entry(line: Line) -> _KnetEntry:
-    return _KnetEntry(line.text[_KEY_COLUMNS:].strip(), line.start)
-
-
-def _positive(source: Source, entries: dict[str, _KnetEntry], key: str, pattern: re.Pattern[str]) -> list[float]:
+def _positive(source: Source, entries: dict[str, Entry], key: str, pattern: re.Pattern[str]) -> list[float]:
     """Return the numbers that `pattern` finds in the entry `key`; each must be positive."""
     entry = entries[key]
     found = pattern.match(entry.value)
@@ -124,7 +101,7 @@ def _positive(source: Source, entries: dict[str, _KnetEntry], key: str, pattern:
     return positive
 
 
-def _check_duration(source: Source, entries: dict[str, _KnetEntry], rate: float, count: int) -> None:
+def _check_duration(source: Source, entries: dict[str, Entry], rate: float, count: int) -> None:
     """Refuse fewer samples than the duration, which is in whole seconds, or a second's more."""
     (seconds,) = _positive(source, entries, "Duration Time", _SECONDS)
     stated = seconds * rate
@@ -133,8 +110,3 @@ def _check_duration(source: Source, entries: dict[str, _KnetEntry], rate: float,
             f"{seconds:g} s at {rate:g} Hz make {stated:g} samples but {count} follow; get the whole file again",
             entries["Duration Time"].at,
         )
-
-
-def _mean(acceleration: Floats) -> float:
-    with np.errstate(over="ignore"):
-        return float(acceleration.mean())

@@ -48,6 +48,13 @@ class Line:
     next: int
 
 
+class Entry(NamedTuple):
+    """What a header has after a key, and the offset of its line."""
+
+    value: str
+    at: int
+
+
 @dataclass(frozen=True)
 class Source:
     """A file's content.
@@ -102,10 +109,8 @@ class Source:
 
     def binary_at(self) -> int | None:
         """Return the offset of the first byte that no text file holds, or None if this is text."""
-        cleaned = self.data.translate(None, _CONTROL)
-        if len(cleaned) == len(self.data):
-            return None
-        return min(position for position in map(self.data.find, _each(_CONTROL)) if position >= 0)
+        places = (self.data.find(bytes([control])) for control in _CONTROL)
+        return min((place for place in places if place >= 0), default=None)
 
     def error(self, message: str, at: int | None = None, *arguments: str) -> UnreadableRecord:
         """Return the error that says `message` about this file, at the line that holds the offset `at`.
@@ -191,10 +196,6 @@ def _text(raw: bytes) -> bytes:
         # At the start of a line a form feed is the printer's page break and takes no column.
         data = data.removeprefix(b"\f").replace(b"\n\f", b"\n").replace(b"\f", b" ")
     return data.rstrip(_ENDS_OF_TEXT)
-
-
-def _each(values: bytes) -> list[bytes]:
-    return [bytes([value]) for value in values]
 
 
 #: What the argument `units=` takes.

@@ -272,8 +272,9 @@ def rows_of_numbers(source: Source, start: int, columns: int, translation: bytes
     return np.concatenate(parts) if parts else None
 
 
-def expect(source: Source, at: int, count: int, values: Floats) -> Floats:
-    """Return `values`, of which the header at the offset `at` says that there are `count`."""
+def read_count(source: Source, at: int, start: int, end: int, count: int, layout: Layout | None = None) -> Floats:
+    """Return the numbers between two offsets, of which the header at the offset `at` says that there are `count`."""
+    values = read_values(source, start, end, count=count, layout=layout)
     if len(values) != count:
         raise source.error(f"the header says {count} values but {len(values)} follow; get the whole file again", at)
     return values
