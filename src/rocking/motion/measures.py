@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Flags, Floats
+from rocking.bisection import bisected
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
@@ -144,14 +145,12 @@ def _time_at(motion: Piecewise, cumulated: Floats, fraction: float) -> float:
     """First time at which the energy reaches a fraction of the whole, by bisection within its piece."""
     wanted = fraction * cumulated[-1]
     piece = max(int(np.searchsorted(cumulated, wanted, side="left")) - 1, 0)
-    low, high = np.float64(0.0), motion.breakpoints[piece + 1] - motion.breakpoints[piece]
-    for _ in range(53):
-        middle = 0.5 * (low + high)
-        if cumulated[piece] + _energy(motion.coefficients[piece], middle) < wanted:
-            low = middle
-        else:
-            high = middle
-    return float(motion.breakpoints[piece] + high)
+    start, end = motion.breakpoints[piece : piece + 2]
+
+    def is_reached(span: float) -> bool:
+        return bool(cumulated[piece] + _energy(motion.coefficients[piece], np.asarray(span)) >= wanted)
+
+    return float(start + bisected(0.0, end - start, is_reached, halvings=53)[1])
 
 
 def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float = STANDARD_GRAVITY) -> Floats:
