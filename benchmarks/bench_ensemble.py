@@ -19,12 +19,12 @@ import numba
 import numpy as np
 
 import rocking
+from rocking.constants import Model
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, last_piece
 from rocking.kernels.lanes import pool, scheduler
 from rocking.kernels.lanes.steps import step_linear
 from rocking.kernels.state import Record
-from rocking.model import Model
 from rocking.problem import ground_of, rules_of
 from rocking.treatment import Certified
 

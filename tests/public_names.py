@@ -13,6 +13,10 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import rocking
+from rocking.body import Bodies, Body
+
+#: What describes the methods of these classes, which do not inherit from it.
+PROTOCOLS: dict[Any, tuple[Any, ...]] = {rocking.Block: (Body,), rocking.Blocks: (Bodies,)}
 
 #: Checks of numpydoc: form and order of sections; parameters, returns and yields without a name, a type or a word.
 CHECKS = frozenset({"GL01", "GL03", "GL05", "GL06", "GL07", "GL08", "PR02", "PR03", "PR04", "PR07", "RT03"})
@@ -72,7 +76,8 @@ def faults() -> list[str]:
     from numpydoc.validate import validate
 
     found = []
-    for name, member in public_members().items():
+    for name, own in public_members().items():
+        member = _described(name, own)
         wanted = CHECKS_OF_FUNCTIONS if inspect.isfunction(member) else CHECKS
         # What a property is, its one line says; and a class that only the package makes has attributes.
         if isinstance(member, property) or "Attributes\n" in (inspect.getdoc(member) or ""):
@@ -80,6 +85,15 @@ def faults() -> list[str]:
         errors = validate(get_doc_object(member))["errors"]
         found += [f"{name}: {code} {text}" for code, text in errors if code in wanted]
     return found
+
+
+def _described(name: str, member: Any) -> Any:
+    """Return a member, or the one of a base class or a protocol that it implements: that one describes it."""
+    owner = public_names().get(name.rpartition(".")[0])
+    key = name.rpartition(".")[2]
+    bases = [*inspect.getmro(owner)[1:], *PROTOCOLS.get(owner, ())] if inspect.isclass(owner) else []
+    given = [_plain(vars(base)[key]) for base in bases if key in vars(base) and base.__module__.startswith("rocking")]
+    return given[0] if given else member
 
 
 def _is_member(member: Any) -> bool:

@@ -479,10 +479,10 @@ def test_compiling_is_said_once_for_each_work_and_not_where_it_is_short():
     program = (
         "import time\n"
         "from numba import njit\n"
-        "from rocking import compiling, progress\n"
+        "from rocking import progress\n"
         "def compiled(seconds, patience):\n"
-        "    compiling._PATIENCE = patience\n"
-        "    compiling.announce(seconds)\n"
+        "    progress._PATIENCE = patience\n"
+        "    progress.announce(seconds)\n"
         "    njit(lambda x: x + 1)(1)\n"
         "with progress.notes_for('everybody'):\n"
         "    for seconds, patience in ((7, 1e9), (7, 0.0), (7, 0.0), (9, 1e9), (9, 0.0), (7, 0.0)):\n"

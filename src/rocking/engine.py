@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies
-from rocking.compiling import SIMULATIONS, announce
+from rocking.constants import Model
 from rocking.errors import Unfinished
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, greatest_weight, has_vertical
@@ -24,9 +24,9 @@ from rocking.kernels.lanes import scheduler
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.problem import ground_of, rules_of, step_of
+from rocking.progress import SIMULATIONS, announce
 from rocking.treatment import Treatment
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended

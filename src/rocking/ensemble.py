@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.block import Block
 from rocking.body import Bodies, Body
+from rocking.constants import Model
 from rocking.engine import OUTCOME, cores, simulate_tasks
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
+from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import Measure, MeasureName
 from rocking.problem import bodies_of
 from rocking.product import VARIABLES, Polarity, Product, Scales

@@ -13,12 +13,11 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.body import Bodies
-from rocking.constants import VERSION
+from rocking.constants import VERSION, Model
 from rocking.engine import Setup, Task, parts_of
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import names_of
 from rocking.motion.motion import Motion
+from rocking.motion.named import names_of
 from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.problem import rules_of

@@ -1,8 +1,9 @@
-"""What is written to stderr beside the result: a bar for work that takes long, and notes, each a line."""
+"""What is written to stderr beside the result: a bar for work that takes long; notes, also on what is compiled."""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import sys
 import time
 import warnings
@@ -10,15 +11,21 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from rocking.errors import Message, OutsideFit, Spelling, as_argument
 
 if TYPE_CHECKING:
     import rich.progress
 
-#: Work that is over sooner than this shows no bar, s.
-_PATIENCE = 1.0
+#: Work that is over sooner than this shows no bar, and compiling is not worth a word, s.
+_PATIENCE: Final = 1.0
+
+#: Processor time, s, that takes to compile what is missing, with nothing there: for the simulation of any motion, alone
+#: or in ensembles; for a chattering sequence under a sine; for critical amplitudes under one.
+SIMULATIONS: Final = 25
+SEQUENCES: Final = 20
+AMPLITUDES: Final = 5
 
 #: Who reads notes: a person at a terminal, everybody, nobody.
 Audience = Literal["terminal", "everybody", "nobody"]
@@ -37,23 +44,12 @@ _listener = _Listener()
 
 
 def spelled(message: Message) -> str:
-    """Return a message with names of arguments as the present reader knows them: on the command line its options.
-
-    Examples
-    --------
-    >>> spelled(Message('{} "both" counts both', ("polarity",)))
-    'polarity "both" counts both'
-    """
+    """Return a message with names of arguments as the present reader knows them: on the command line its options."""
     return message.text(_listener.spelling)
 
 
 def note(message: Message | str) -> None:
-    """Print a sentence on stderr, on a line of its own, for those whom `notes_for` has chosen.
-
-    Examples
-    --------
-    >>> note("nobody reads this where stderr is not a terminal")
-    """
+    """Print a sentence on stderr, on a line of its own, for those whom `notes_for` has chosen."""
     # The template of a sentence in which no argument is named has no places to fill.
     whole = message if isinstance(message, Message) else Message(message)
     if _listener.seen is not None:
@@ -69,11 +65,6 @@ def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[
     """Choose who reads notes while a command runs, and how arguments are named; each note is given once.
 
     Warnings that a formula is used outside its fit are notes as well.
-
-    Examples
-    --------
-    >>> with notes_for("nobody"):
-    ...     note("not even a person at a terminal sees this")
     """
     global _listener
 
@@ -98,22 +89,8 @@ def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[
 class Progress:
     """Progress bar on stderr with the rate and the time left, drawn once the work has taken a second.
 
-    Parameters
-    ----------
-    what : str
-        What is being done.
-    total : int
-        Number of steps.
-    show : bool, optional
-        By default only if stderr is a terminal.
-    done : int
-        Steps that were done before; they do not count for the rate.
-
-    Examples
-    --------
-    >>> with Progress("counting", total=3, show=False) as progress:
-    ...     for _ in range(3):
-    ...         progress.advance()
+    It is shown only if stderr is a terminal, unless `show` says otherwise; steps that were `done` before do not count
+    for the rate.
     """
 
     def __init__(self, what: str, total: int, *, show: bool | None = None, done: int = 0) -> None:
@@ -160,3 +137,46 @@ def _started(what: str, total: int) -> rich.progress.Progress:
     bar.add_task(what, total=total, rate="", left="")
     bar.start()
     return bar
+
+
+def announce(seconds: int) -> None:
+    """From now on, note on stderr when kernels are not found in the cache and must be compiled; once for each work.
+
+    The compiler itself says when it is at work: what is cached, for which sources and processor, is known to it alone.
+    """
+    _compilations().expect(seconds)
+
+
+@functools.cache
+def _compilations() -> Any:
+    """Return what listens to the compiler."""
+    from numba.core import event
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        """Speaks as soon as the compiler has been at work for some time; a kernel is compiled with its parts."""
+
+        def __init__(self) -> None:
+            self.expected, self.told = 0, set[int]()
+            self.kernels, self.since, self.spent = 0, 0.0, 0.0
+
+        def expect(self, seconds: int) -> None:
+            if seconds != self.expected:
+                self.expected, self.spent = seconds, 0.0
+
+        def on_start(self, event: object) -> None:
+            now = time.process_time()
+            if self.kernels == 0:
+                self.since = now
+            self.kernels += 1
+            if self.spent + now - self.since >= _PATIENCE and self.expected not in self.told:
+                self.told.add(self.expected)
+                note(f"compiling what this needs, up to {self.expected} s of processor time; later runs find it ready")
+
+        def on_end(self, event: object) -> None:
+            self.kernels -= 1
+            if self.kernels == 0:
+                self.spent += time.process_time() - self.since
+
+    listener = Listener()
+    event.register("numba:compile", listener)
+    return listener

@@ -6,16 +6,16 @@ import math
 
 from rocking import checks
 from rocking.body import Body
-from rocking.compiling import SIMULATIONS, announce
+from rocking.constants import Model
 from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
-from rocking.model import Model
-from rocking.motion.arguments import one_motion
 from rocking.motion.motion import Motion
+from rocking.motion.named import one_motion
 from rocking.problem import ground_of, one_body, rules_of
+from rocking.progress import SIMULATIONS, announce
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
 

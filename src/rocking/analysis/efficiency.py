@@ -16,9 +16,9 @@ from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled, units_of, va
 from rocking.analysis.report import Drawn
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
+from rocking.constants import Model
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
+from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import Measure
 from rocking.result import Result
 from rocking.tables import counted, text_table
@@ -205,7 +205,7 @@ class MeasureComparison(Drawn, Result):
         }
 
     def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import dispersions_figure
+        from rocking.plot.fragility import dispersions_figure
 
         data, order = self.data, self._order()
         return dispersions_figure(

@@ -19,7 +19,7 @@ from rocking.motion.scaling import IntensityName, Measure, intensities
 from rocking.tables import csv_rows, text_table
 
 if TYPE_CHECKING:
-    from rocking.plot import HazardLine
+    from rocking.plot.risk import HazardLine
 
 #: Headings of an intensity in a table, with its measure and the factor to SI units.
 HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
@@ -152,7 +152,7 @@ class HazardCurve:
 
     def line(self, intensity: Floats) -> HazardLine:
         """Return rates at intensities (SI) as a figure takes them: neither 0 nor infinite."""
-        from rocking.plot import HazardLine
+        from rocking.plot.risk import HazardLine
 
         low, high = self.measure.scale * self.intensity[[0, -1]]
         return HazardLine(np.clip(self.rate_of(intensity), *_DRAWN), (float(low), float(high)))

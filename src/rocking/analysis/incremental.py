@@ -16,13 +16,13 @@ from rocking.analysis.boundaries import Boundaries, boundaries
 from rocking.analysis.levels import REVERSED_TOO, described, simulate_levels, units_of, values_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
+from rocking.constants import Model
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
-from rocking.motion.exceedance import lifting_factors
+from rocking.motion.measures import lifting_factors
 from rocking.motion.motion import Motion
+from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.result import Result
 from rocking.tables import counted, named, text_table
@@ -280,7 +280,7 @@ class IncrementalDynamicAnalysis(Result):
         figsize : (float, float), optional
             Width and height of a new figure, inches.
         """
-        from rocking.plot import ScaledMotion, ida_figure
+        from rocking.plot.ida import ScaledMotion, ida_figure
 
         data = self.data
         levels = data.level.scale * data.level.values

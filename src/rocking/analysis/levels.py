@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
+from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.tables import counted

@@ -17,10 +17,9 @@ from rocking.analysis.boundaries import Boundaries, boundaries
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks, one_block
 from rocking.body import Body
-from rocking.constants import VERSION
+from rocking.constants import VERSION, Model
 from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_family
@@ -277,7 +276,7 @@ class OverturningMap(Result):
         title, figsize
             Title, by default the pulse and the block; width and height of a new figure, inches.
         """
-        from rocking.plot import regions_figure
+        from rocking.plot.maps import regions_figure
 
         data = self.data
         modes = data.mode.values

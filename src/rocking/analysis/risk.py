@@ -231,7 +231,7 @@ class Risk(Report):
         }
 
     def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import RiskLine, risk_figure
+        from rocking.plot.risk import RiskLine, risk_figure
 
         scale, at = self.hazard.measure.scale, self._shown()
         return risk_figure(

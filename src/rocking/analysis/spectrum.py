@@ -16,13 +16,13 @@ from rocking.analysis.levels import mean_one, pooled
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.block.many import rates_of
+from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
 from rocking.motion.motion import Motion
+from rocking.motion.named import Motions, several_motions
 from rocking.result import Result, table_of_some
 from rocking.treatment import Treatment
 
@@ -243,7 +243,7 @@ class RockingSpectrum(Result):
         InvalidOption
             If there are more than four combinations of slenderness and restitution, or no such abscissa.
         """
-        from rocking.plot import SpectrumCurves, spectrum_figure
+        from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
         checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
         named_curves = self._curves()

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
-from rocking.motion.arguments import Motions, motions_by_name, names_of
 from rocking.motion.motion import Motion
+from rocking.motion.named import Motions, motions_by_name, names_of
 from rocking.product import body_coordinates, verticals_of
 from rocking.progress import Progress, note
 from rocking.response import Response, in_brief, ratio_text

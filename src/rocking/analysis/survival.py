@@ -165,7 +165,7 @@ class Survival(Report):
         }
 
     def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import survival_figure
+        from rocking.plot.risk import survival_figure
 
         ends = [self.curve.intensity_of(chance) for chance in _SHOWN]
         if self.hazard is not None:

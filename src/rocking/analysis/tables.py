@@ -13,8 +13,8 @@ import numpy as np
 from rocking.analysis.hazard import HEADINGS, heading_of
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.constants import Model
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
 from rocking.motion.scaling import Measure

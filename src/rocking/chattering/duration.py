@@ -21,7 +21,6 @@ from rocking.chattering.parameters import (
     lifting_amplitude,
     single,
 )
-from rocking.compiling import SEQUENCES, announce
 from rocking.engine import cores, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import Verdict
@@ -29,6 +28,7 @@ from rocking.kernels.sine.arc import first_landing
 from rocking.kernels.sine.lanes import BLOCK, BLOCKS, LANES, Answers, rest_phases
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
 from rocking.kernels.sine.sequence import resolve, semianalytical_phases
+from rocking.progress import SEQUENCES, announce
 from rocking.tables import counted
 
 #: Sequences of a part, which is sorted and computed by one thread: few enough for a core's own cache.

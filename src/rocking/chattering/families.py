@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 from rocking.block import Block
-from rocking.model import Model
+from rocking.constants import Model
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 

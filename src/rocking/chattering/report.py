@@ -173,7 +173,7 @@ class ChatteringReport:
         -------
         matplotlib.figure.Figure
         """
-        from rocking.plot import intervals_figure
+        from rocking.plot.histories import intervals_figure
 
         values = self.values
         rest = values["chattering_time"]["exact"]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block
+from rocking.constants import Model
 from rocking.engine import in_threads, require_finished
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response

@@ -17,8 +17,8 @@ from rocking.analysis.calibration.space import HOUSNER
 from rocking.analysis.tables import History, Outcomes, read_calibration
 from rocking.cli import batch
 from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledPulseOptions
-from rocking.errors import InvalidOption, RockingError
-from rocking.model import Model
+from rocking.constants import Model
+from rocking.errors import InvalidOption, RockingError, literal
 from rocking.motion.motion import Motion
 from rocking.quantities import bounds, number, tilt
 from rocking.tables import counted, text_table
@@ -165,7 +165,7 @@ def _naming(specimen: str) -> Iterator[None]:
     try:
         yield
     except RockingError as error:
-        error.message = replace(error.message, template=f"specimen {specimen}: {error.message.template}")
+        error.message = replace(error.message, template=f"specimen {literal(specimen)}: {error.message.template}")
         raise
 
 

@@ -14,8 +14,8 @@ from cyclopts import Group, Parameter
 
 from rocking.cli.batch import output_folder
 from rocking.cli.wording import option_of
+from rocking.constants import Model
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.motion.scaling import IntensityName, Measure

@@ -17,11 +17,10 @@ from typing import Any, Final, NamedTuple, cast
 import numpy as np
 
 from rocking.block import Block
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.explorer.parameters import DEFAULT, PARAMETERS, PULSES, SCALINGS, SHAPES, names_of
 from rocking.explorer.uploads import UploadStore
-from rocking.model import Model
 from rocking.motion import records
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.arrays import Floats, as_asked
 from rocking.block import Block
 from rocking.body import Body
+from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.trace import Trail
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.response.forces import Contact, friction_coefficient, friction_demand, with_all_impacts
 from rocking.response.history import History, Sensitivity

@@ -10,7 +10,7 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
-from rocking.plot import RotationUnits
+from rocking.plot.response import RotationUnits
 from rocking.response.answers import Answers
 from rocking.response.history import even_times
 from rocking.tables import named, rows_of
@@ -136,7 +136,7 @@ def figure(
     chattering: bool,
 ) -> Figure:
     """Draw the rotation over the ground motion, from the window's start to its end."""
-    from rocking.plot import DrawnSequence, response_figure
+    from rocking.plot.response import DrawnSequence, response_figure
 
     checks.one_of(units, "units", InvalidOption, get_args(RotationUnits))
     start, end = active_span(response) if window is None else _checked(window, response.duration)

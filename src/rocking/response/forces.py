@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
+from rocking.bisection import bisected
 from rocking.body import ContactLaw
 from rocking.errors import InvalidOption
 from rocking.kernels import state
@@ -19,7 +20,7 @@ from rocking.kernels.ground import components
 from rocking.kernels.march import march
 from rocking.kernels.trace import Trail
 from rocking.motion import piecewise
-from rocking.response.history import History, bisected
+from rocking.response.history import History
 
 #: Samples per step, rounds, and steps that are looked at again, when the forces' extremes are searched.
 _SAMPLES: Final = 9
@@ -152,7 +153,7 @@ class Contact:
         def passes(time: float) -> bool:
             return bool(is_beyond(self._measured(measure, np.array([time]), rows[step, :1]))[0])
 
-        return bisected(float(before.max()), high, passes)
+        return bisected(float(before.max()), high, passes)[1]
 
     def _peaks(self, measure: Measure, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
         """Where each of some steps has its largest value, and that value."""

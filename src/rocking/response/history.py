@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
+from rocking.bisection import bisected
 from rocking.errors import InvalidOption
 from rocking.kernels import state, variation
 from rocking.kernels.trace import Trail, trace
@@ -91,16 +91,7 @@ class History:
         within = np.flatnonzero(np.abs(self.states(times)[:, 0]) < balance)
         if not len(within):
             return float(ends[0])  # beyond it from the start
-        return bisected(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)
-
-
-def bisected(low: float, high: float, holds: Callable[[float], bool]) -> float:
-    """Time from which on something holds, between one at which it does not and one at which it does."""
-    while True:
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            return high
-        low, high = (low, middle) if holds(middle) else (middle, high)
+        return bisected(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)[1]
 
 
 def even_times(end: float, dt: float) -> Floats:

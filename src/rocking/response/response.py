@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rocking import svg
-from rocking.plot import RotationUnits
+from rocking.plot.response import RotationUnits
 from rocking.response import export, summary
 from rocking.response.answers import Answers
 from rocking.result import Findings, Row, dictionary_of, text_of

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 import itertools
 import re
 import tomllib
@@ -444,8 +443,7 @@ def _in_table(table: Path, line: int) -> Iterator[None]:
 def _nearest(name: str, known: Iterable[str]) -> str:
     """Say which known name is meant, or which there are."""
     names = [*known]
-    close = difflib.get_close_matches(name, names, n=1)
-    return f"did you mean {close[0]}?" if close else f"there are {', '.join(names)}"
+    return checks.meant(name, names, f"there are {', '.join(names)}")
 
 
 def _number(key: str, text: str) -> float:

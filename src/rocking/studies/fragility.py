@@ -209,7 +209,7 @@ class BlockFragilities(BlocksResult):
         InvalidOption
             If there are several limit states for the one `ax`.
         """
-        from rocking.plot import blocks_figure
+        from rocking.plot.maps import blocks_figure
 
         names = [str(name) for name in self.data.limit_state.values]
         medians = self.measure.scale * self.data["median"].values

@@ -21,10 +21,9 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Final
 
-from rocking.compiling import SIMULATIONS, announce
 from rocking.engine import cores
 from rocking.errors import RockingError, StudyError
-from rocking.progress import Progress
+from rocking.progress import SIMULATIONS, Progress, announce
 from rocking.studies.store import UnitArray
 from rocking.studies.units import Key, Work, compute
 from rocking.tables import counted

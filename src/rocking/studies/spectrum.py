@@ -236,7 +236,7 @@ class StudySpectrum(BlocksResult):
         InvalidOption
             If there are several scales for the one `ax`.
         """
-        from rocking.plot import blocks_figure
+        from rocking.plot.maps import blocks_figure
 
         one = self._fractile(fractile)
         return blocks_figure(

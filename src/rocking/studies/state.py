@@ -13,9 +13,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import StudyError
-from rocking.progress import Progress
+from rocking.progress import SIMULATIONS, Progress, announce
 from rocking.studies.place import Place, this_process
 from rocking.studies.refine import Refinement, kept_plan, refinement, rounds
 from rocking.studies.report import kept_report

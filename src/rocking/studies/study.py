@@ -15,9 +15,9 @@ from rocking import checks
 from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.fragility.result import Fragility
 from rocking.block import Block, Blocks
+from rocking.constants import Model
 from rocking.errors import InvalidOption, StudyError
-from rocking.model import Model
-from rocking.motion.arguments import Motions, names_of, several_motions
+from rocking.motion.named import Motions, names_of, several_motions
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.problem import bodies_of
 from rocking.product import Polarity, Product, Scales

@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
-from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import VERSION
 from rocking.engine import Setup, Task, simulate_task
 from rocking.errors import InvalidOption, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
 from rocking.product import Product, Scales
+from rocking.progress import SIMULATIONS, announce
 from rocking.studies.inputs import OUTCOMES
 
 #: Units are multiples of so many blocks, which the engine takes through a motion together.

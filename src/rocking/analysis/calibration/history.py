@@ -23,8 +23,8 @@ from rocking.analysis.calibration.space import (
 from rocking.analysis.report import Report
 from rocking.arrays import Floats
 from rocking.block import Block
+from rocking.constants import Model
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response, drawing_times
@@ -134,7 +134,7 @@ class HistoryCalibration(Report):
         }
 
     def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import measured_figure
+        from rocking.plot.calibration import measured_figure
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
         end = min(float(self.times[-1]), self.response.duration)

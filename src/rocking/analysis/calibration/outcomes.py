@@ -20,12 +20,12 @@ from rocking.analysis.report import Tabled
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
+from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.motion import Motion
+from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.tables import counted, named, text_table
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rocking.plot import Parameter
+    from rocking.plot.calibration import Parameter
 
 #: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
 _LAPSE: Final = 0.005
@@ -349,7 +349,7 @@ class Calibration(Tabled):
         return pd.DataFrame({**columns, "weight": self.weights, "model": self.model})
 
     def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import outcomes_figure
+        from rocking.plot.calibration import outcomes_figure
 
         return outcomes_figure(
             probabilities=self.probabilities,
@@ -363,7 +363,7 @@ class Calibration(Tabled):
 
     def _parameter(self, name: str) -> Parameter:
         """One parameter for a figure: of both sides where they may differ."""
-        from rocking.plot import Parameter
+        from rocking.plot.calibration import Parameter
 
         estimates = [one for key, one in self.estimates.items() if key.partition("_")[0] == name]
         values = getattr(self.blocks, name)[:, : len(estimates)]

@@ -21,9 +21,8 @@ from rocking.analysis.fragility.curve import FragilityCurve
 from rocking.analysis.levels import units_of
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion.scaling import Measure
 from rocking.tables import write_text
 

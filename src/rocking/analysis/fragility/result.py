@@ -21,9 +21,8 @@ from rocking.analysis.risk import Risk
 from rocking.analysis.survival import Survival
 from rocking.arrays import Floats
 from rocking.block import Block
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption, Message
-from rocking.model import Model
 from rocking.motion.scaling import Measure
 from rocking.progress import spelled
 from rocking.tables import counted, text_table
@@ -330,7 +329,7 @@ class Fragility(Tabled):
         nrml.write(path, function, states, self.description, **about)
 
     def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import FragilityLine, fragility_figure
+        from rocking.plot.fragility import FragilityLine, fragility_figure
 
         first = self.curves[0]
         band_text = f"band: {100 * first.confidence:g} % confidence ({self.band_kind})"

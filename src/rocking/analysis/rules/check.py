@@ -11,11 +11,10 @@ from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.rules.criteria import TITLES, rate
 from rocking.analysis.survey import BlockUnderRecords, motion_of
 from rocking.block import Block
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, motions_by_name
 from rocking.motion.motion import Motion
+from rocking.motion.named import Motions, motions_by_name
 from rocking.progress import Progress
 from rocking.response import Response, in_brief
 from rocking.simulation import simulate

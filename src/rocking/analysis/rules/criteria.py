@@ -18,8 +18,8 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidBlock, InvalidOption
-from rocking.motion.arguments import several_motions
 from rocking.motion.motion import Motion
+from rocking.motion.named import several_motions
 from rocking.tables import range_text
 
 #: Share of the velocity that would overturn a block at one blow, from which on Ishiyama sees blocks overturn.
