@@ -15,8 +15,8 @@ from rocking.analysis.calibration.outcomes import Calibration, checked_outcomes
 from rocking.analysis.calibration.outcomes import calibrate as run
 from rocking.analysis.calibration.space import HOUSNER
 from rocking.analysis.tables import History, Outcomes, read_calibration
-from rocking.cli import batch
-from rocking.cli.options import OUTPUT, RECORDS, OutputOptions, ScaledPulseOptions
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.cli.records import RECORDS, ScaledPulseOptions
 from rocking.errors import InvalidOption, RockingError
 from rocking.model import Model
 from rocking.motion.motion import Motion
@@ -78,11 +78,11 @@ def calibrate(
         The same seed gives the same result.
     """
     ranges = {
-        "p": None if p is None else bounds(p, "--p", number),
-        "alpha": None if alpha is None else bounds(alpha, "--alpha", tilt),
-        "restitution": restitution if restitution in (None, HOUSNER) else bounds(restitution, "--restitution", number),
+        "p": None if p is None else bounds(p, "p", number),
+        "alpha": None if alpha is None else bounds(alpha, "alpha", tilt),
+        "restitution": restitution if restitution in (None, HOUSNER) else bounds(restitution, "restitution", number),
     }
-    start = None if initial_rotation is None else tilt(initial_rotation, "--initial-rotation")
+    start = None if initial_rotation is None else tilt(initial_rotation, "initial_rotation")
     given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
     choices = {name: value for name, value in given.items() if value is not None}
     with output.folder() as folder:
@@ -101,7 +101,7 @@ def calibrate(
             results = _history_results(history)
         if folder is not None:
             results.write(folder)
-        batch.show(results.numbers, results.text, as_json=output.as_json, folder=folder)
+        print_result(results.numbers, results.text, as_json=output.as_json, folder=folder)
 
 
 @dataclass(frozen=True)
@@ -126,20 +126,20 @@ class _Results:
         """Write numbers, and figure and ensemble of a calibration."""
         if isinstance(self.found, Calibration):
             self.found.to_csv(folder / "ensemble.csv")
-        batch.write(folder, figures={"calibration": self.found.plot()} if self.found else {}, result=self.numbers)
+        write_results(folder, figures={"calibration": self.found.plot()} if self.found else {}, result=self.numbers)
 
 
 def _refuse(belong_to: str, **given: object) -> None:
     for name, value in given.items():
         if value is not None:
-            raise InvalidOption(f"--{name.replace('_', '-')} is for {belong_to}; the columns of this table are not")
+            raise InvalidOption(f"{{}} is for {belong_to}; the columns of this table are not", name)
 
 
 def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
     """Motion of the base, if it moved."""
     motions = file.pulses() if record is None else {record: file.read(record)} | file.pulses()
     if len(motions) > 1:
-        raise InvalidOption("a history has one motion of the base: give --motion, or one --pulse")
+        raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
     return next(iter(motions.values()), None)
 
 

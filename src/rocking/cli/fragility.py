@@ -15,22 +15,11 @@ from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.fragility.fit import fragility as run
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.tables import read_observed
-from rocking.cli import batch
-from rocking.cli.options import (
-    BLOCK,
-    MEASURE,
-    MODEL,
-    OUTPUT,
-    RECORDS,
-    EnsembleOptions,
-    MeasureOptions,
-    MotionOptions,
-    Names,
-    OutputOptions,
-    TreatmentOptions,
-)
+from rocking.cli.options import BLOCK, MEASURE, MODEL, EnsembleOptions, MeasureOptions, TreatmentOptions
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, with_records, write_results
+from rocking.cli.records import RECORDS, MotionOptions, Names
+from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption
-from rocking.product import Polarity
 from rocking.quantities import number
 
 if TYPE_CHECKING:
@@ -131,10 +120,10 @@ def fragility(
                 fitted.to_nrml(folder / f"fragility-{form}.xml", taxonomy=taxonomy, format=form)
             fitted.to_csv(folder / "fragility.csv")
             if fitted.outcomes is not None:
-                together = fitted if read is None else batch.with_records(fitted, read)
+                together = fitted if read is None else with_records(fitted, read)
                 together.to_csv(folder / "outcomes.csv", "outcomes")
-            batch.write(folder, figures={name: draw() for name, draw in figures.items()}, result=found)
-        batch.show(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
+            write_results(folder, figures={name: draw() for name, draw in figures.items()}, result=found)
+        print_result(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
 
 
 def _refuse_beside_outcomes(
@@ -166,6 +155,8 @@ def _limits(text: str) -> dict[str, float]:
     for part in text.split(","):
         name, given, value = part.strip().partition("=")
         if not given and name != "overturning":
-            raise InvalidOption(f"--limits takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}")
-        limits[name] = number(value, f"--limits {name}") if given else math.inf
+            raise InvalidOption(
+                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}", "limits"
+            )
+        limits[name] = number(value, "limits") if given else math.inf
     return limits

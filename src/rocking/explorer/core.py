@@ -25,7 +25,7 @@ from rocking.explorer.parameters import names_of
 from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
-from rocking.response import Response, active_span, in_words
+from rocking.response import Response, active_span, in_words, trail_of
 from rocking.treatment import Certified
 
 #: Times at which a rotation is evaluated across a window, and points of a line that are sent.
@@ -204,7 +204,7 @@ class Explorer:
             return file.read_bytes()
 
     def _steps(self) -> int:
-        return sum(len(shown.response.trail.nodes) for shown in self._kept.values())
+        return sum(len(trail_of(shown.response).nodes) for shown in self._kept.values())
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
@@ -427,7 +427,7 @@ def _drifts(motion: Motion) -> bool:
 def _draw(response: Response, file: Path, window: tuple[float, float] | None) -> None:
     from matplotlib import rc_context
 
-    figure = response.plot(window=window, chattering=bool(len(response.chattering)))
+    figure = response.plot(window=window, longest_sequence=bool(len(response.chattering)))
     with rc_context({"svg.hashsalt": "rocking"}):
         figure.savefig(file, dpi=160)
     if "matplotlib.pyplot" in sys.modules:

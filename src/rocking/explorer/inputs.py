@@ -26,7 +26,7 @@ from rocking.motion import records
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.named_pulses import FAMILIES, pulse_values
-from rocking.response import Response
+from rocking.response import Response, trail_of
 from rocking.simulation import simulate
 from rocking.treatment import Treatment, treatment
 
@@ -190,7 +190,7 @@ def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
         texts["model"] = response.model
     if str(response.treatment) != str(treatment("certified")):
         texts["chattering"] = str(response.treatment)
-    rules = response.trail.rules
+    rules = trail_of(response).rules
     if not rules["endless"]:
         texts["duration"] = repr(float(rules["stop"]))
     rotation, velocity = float(response.rotation(0.0)), float(response.angular_velocity(0.0))

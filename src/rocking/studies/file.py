@@ -18,6 +18,7 @@ import numpy as np
 from rocking import checks, quantities
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
+from rocking.ensemble import Product, Scales
 from rocking.errors import InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
 from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
@@ -25,11 +26,10 @@ from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.named_pulses import pulse_family
 from rocking.plausibility import vertical_notes
-from rocking.product import Product, Scales
 from rocking.progress import note
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
 from rocking.studies.refine import Tolerances, tolerances_of
-from rocking.studies.report import PLANS, ReportPlan
+from rocking.studies.report import PLANS, ReportPlan, check_part
 from rocking.tables import csv_rows
 from rocking.treatment import treatment
 
@@ -140,6 +140,7 @@ def read_study(path: str | Path) -> StudyFile:
     Returns
     -------
     StudyFile
+        Its product, and what is to be kept and made of the results.
 
     Raises
     ------
@@ -254,7 +255,7 @@ class _Reader:
         for name, given in self._table("report").items():
             with self._located(f"report.{name}"):
                 plans[name] = PLANS[name](**given)
-                plans[name].check(kept)
+                check_part(plans[name], kept)
         return ReportPlan(**plans) if "report" in self.tables else None
 
     def _blocks(self) -> Blocks:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final, Literal
@@ -22,7 +21,7 @@ from rocking.studies.spectrum import (
     require_ratios,
     study_spectrum,
 )
-from rocking.studies.store import Store
+from rocking.studies.store import Store, keep
 
 #: What a report may hold: each with a summary, a figure and a table.
 ReportPart = Fragility | BlockFragilities | StudySpectrum
@@ -30,26 +29,18 @@ ReportPart = Fragility | BlockFragilities | StudySpectrum
 _NAME: Final = "report.json"
 
 
-class _Plan(ABC):
-    """A part of a report that is wanted."""
-
-    @abstractmethod
-    def check(self, kept: Sequence[str]) -> None:
-        """Raise an InvalidOption unless these names of outcomes, which a study keeps, are enough for it."""
-
-    @abstractmethod
-    def make(self, store: Store, progress: bool | None) -> ReportPart:
-        """Make it of a complete study."""
-
-
 @dataclass(frozen=True)
-class FragilityPlan(_Plan):
+class FragilityPlan:
     """Fragility curves that are wanted.
 
     Attributes
     ----------
-    measure, period, damping
+    measure : str
         Intensity, as for `rocking.fragility`.
+    period : float or None
+        Period of a spectral acceleration, s.
+    damping : float
+        Its fraction of critical damping.
     limits : mapping of str to float
         Limit states: peak rotation over slenderness that is exceeded, or infinity for overturning.
     blocks : {"each", "together"}
@@ -82,20 +73,9 @@ class FragilityPlan(_Plan):
                     value=limit,
                 )
 
-    def check(self, kept: Sequence[str]) -> None:
-        """Raise an InvalidOption unless these outcomes tell whether the limits are passed."""
-        require_limits(kept, self.limits)
-
-    def make(self, store: Store, progress: bool | None) -> Fragility | BlockFragilities:
-        """Fit the curves to a complete study."""
-        measure = Measure(self.measure, self.period, self.damping)
-        if self.blocks == "together":
-            return pooled_fragility(store, measure, self.limits, self.confidence)
-        return block_fragilities(store, measure, self.limits, self.confidence, progress)
-
 
 @dataclass(frozen=True)
-class SpectrumPlan(_Plan):
+class SpectrumPlan:
     """Fractiles that are wanted.
 
     Attributes
@@ -113,14 +93,6 @@ class SpectrumPlan(_Plan):
 
     def __post_init__(self) -> None:
         checked_fractiles(self.fractiles)
-
-    def check(self, kept: Sequence[str]) -> None:
-        """Raise an InvalidOption unless these outcomes tell peak rotations."""
-        require_ratios(kept, "a spectrum")
-
-    def make(self, store: Store, progress: bool | None) -> StudySpectrum:
-        """Read the spectrum of a complete study."""
-        return study_spectrum(store, self.fractiles, progress)
 
 
 #: Plans by the names of the parts of a report.
@@ -142,17 +114,39 @@ class ReportPlan:
     fragility: FragilityPlan | None = None
     spectrum: SpectrumPlan | None = None
 
-    def make(self, store: Store, progress: bool | None) -> dict[str, ReportPart]:
-        """Make all that is wanted of a complete study, by name."""
-        plans: dict[str, _Plan | None] = {name: getattr(self, name) for name in PLANS}
-        return {name: plan.make(store, progress) for name, plan in plans.items() if plan is not None}
+
+def check_part(plan: FragilityPlan | SpectrumPlan, kept: Sequence[str]) -> None:
+    """Raise an InvalidOption unless these outcomes, which a study keeps, are enough for a part of a report."""
+    if isinstance(plan, FragilityPlan):
+        require_limits(kept, plan.limits)
+    else:
+        require_ratios(kept, "a spectrum")
+
+
+def made_report(store: Store, progress: bool | None) -> dict[str, ReportPart]:
+    """Make all that is wanted of a complete study, by name."""
+    plan = kept_report(store)
+    if plan is None:
+        raise StudyError(
+            "the study says nothing of a report: add [report.fragility] to its file and create it again",
+            path=str(store.place),
+        )
+    found: dict[str, ReportPart] = {}
+    if (curves := plan.fragility) is not None:
+        measure = Measure(curves.measure, curves.period, curves.damping)
+        found["fragility"] = (
+            pooled_fragility(store, measure, curves.limits, curves.confidence)
+            if curves.blocks == "together"
+            else block_fragilities(store, measure, curves.limits, curves.confidence, progress)
+        )
+    if plan.spectrum is not None:
+        found["spectrum"] = study_spectrum(store, plan.spectrum.fractiles, progress)
+    return found
 
 
 def keep_report(store: Store, plan: ReportPlan) -> None:
     """Store what is wanted beside the study, in place of what was."""
-    data = json.dumps(asdict(plan), indent=2).encode()
-    if store.place.get(_NAME) != data:
-        store.place.put(_NAME, data)
+    keep(store.place, _NAME, json.dumps(asdict(plan), indent=2).encode())
 
 
 def kept_report(store: Store) -> ReportPlan | None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rocking.engine import OUTCOME
 from rocking.errors import InvalidOption, StudyError
 from rocking.progress import Progress
-from rocking.studies.refine import Verdict
+from rocking.studies.refine import StudyVerdict
 from rocking.studies.store import Store
 from rocking.studies.units import name_of
 from rocking.tables import data_frame, plain, whole_file, write_netcdf
@@ -46,10 +46,10 @@ class WrittenToFiles(ABC):
     """What writes its results to one file, a part of them at a time."""
 
     @abstractmethod
-    def _results(self, critical: Verdict | None) -> tuple[xr.Dataset, str, int]:
+    def _results(self, critical: StudyVerdict | None) -> tuple[xr.Dataset, str, int]:
         """Return results, their first dimension, and how much of it is held in memory at a time."""
 
-    def to_netcdf(self, path: str | Path, *, critical: Verdict | None = None) -> None:
+    def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
         """Write the results as `results` has them to a NetCDF file.
 
         Parameters
@@ -68,7 +68,7 @@ class WrittenToFiles(ABC):
         """
         write_netcdf(path, self._results(critical)[0])
 
-    def to_csv(self, path: str | Path, *, critical: Verdict | None = None, progress: bool | None = None) -> None:
+    def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
         """Write a row for each simulation as text, in columns named with their units.
 
         Parameters
@@ -89,14 +89,16 @@ class WrittenToFiles(ABC):
         """
         self._write(path, critical, progress, _write_csv)
 
-    def to_json(self, path: str | Path, *, critical: Verdict | None = None, progress: bool | None = None) -> None:
+    def to_json(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
         """Write an object for each simulation as JSON; parameters and errors as of `to_csv`.
 
         The keys are those of its columns, and NaN is null; attributes of the study stand under "study".
         """
         self._write(path, critical, progress, _write_json)
 
-    def to_parquet(self, path: str | Path, *, critical: Verdict | None = None, progress: bool | None = None) -> None:
+    def to_parquet(
+        self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None
+    ) -> None:
         """Write the table of `to_csv` as Parquet; parameters and errors as there.
 
         Raises
@@ -106,7 +108,7 @@ class WrittenToFiles(ABC):
         """
         self._write(path, critical, progress, _write_parquet)
 
-    def to_excel(self, path: str | Path, *, critical: Verdict | None = None, progress: bool | None = None) -> None:
+    def to_excel(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
         """Write the table of `to_csv` as a workbook (.xlsx); parameters and errors as there.
 
         Raises
@@ -116,7 +118,7 @@ class WrittenToFiles(ABC):
         """
         self._write(path, critical, progress, _write_excel)
 
-    def _write(self, path: str | Path, critical: Verdict | None, progress: bool | None, writer: _Writer) -> None:
+    def _write(self, path: str | Path, critical: StudyVerdict | None, progress: bool | None, writer: _Writer) -> None:
         dataset, along, step = self._results(critical)
         table, count = _with_named_scales(dataset), max(1, dataset.sizes[along])
         with Progress("writing", count, show=progress) as bar:

@@ -16,12 +16,11 @@ from rocking.analysis.levels import mean_one, only_block, pooled, simulate_level
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.engine import require_finished
-from rocking.ensemble import simulate_many
+from rocking.ensemble import Polarity, simulate_many
 from rocking.errors import InvalidOption
 from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.product import Polarity
 from rocking.tables import counted
 from rocking.treatment import Treatment
 
