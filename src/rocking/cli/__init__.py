@@ -33,10 +33,10 @@ for _command, (_module, _help) in {
     "spectrum": ("analysis", "Compute rocking spectra: peak rotation against the size of the block."),
     "map": ("analysis", "Map what a pulse does to a block, over amplitude and frequency."),
     "ida": ("analysis", "Scale motions up until the block overturns and beyond (incremental dynamic analysis)."),
-    "fragility": ("fragility", "Fit the probability that a block overturns against the intensity of the motions."),
+    "fragility": ("fits", "Fit the probability that a block overturns against the intensity of the motions."),
     "measures": ("analysis", "Compare intensity measures: which predicts best when motions overturn a block."),
     "check": ("simulate", "Say what rules of thumb make of a block, beside the exact answer."),
-    "calibrate": ("calibrate", "Find the block behind observed outcomes, or behind a measured rotation history."),
+    "calibrate": ("fits", "Find the block behind observed outcomes, or behind a measured rotation history."),
     "explore": ("explore", "Open a page on which a block is seen to rock, chatter, rest and fall."),
     "study": ("study", "Run a study too long for one sitting: created once, resumed after anything."),
 }.items():

@@ -8,7 +8,6 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
-from rocking.chattering.paper import FIGURES, paper_figure
 from rocking.chattering.report import chattering_report, critical_report
 from rocking.cli.output import OUTPUT, OutputOptions, QuietOptions, output_folder, print_result, write_results
 from rocking.errors import InvalidOption
@@ -117,6 +116,8 @@ def paper(
     figure
         Number of one figure; all of them by default.
     """
+    from rocking.chattering.paper import FIGURES, paper_figure
+
     parameters = case.chosen()
     if parameters and figure is None:
         named = " and ".join(["{}"] * len(parameters))

@@ -1,4 +1,4 @@
-"""What is simulated, read from texts, and written as Python, as a command, and as texts again.
+"""What is simulated, read from texts, and written as texts again.
 
 The texts are those of the page's address: names of the command line's options and values as people write them
 (``alpha=12deg``, ``pga=0.5g``), so that an address says what it shows.
@@ -7,9 +7,7 @@ The texts are those of the page's address: names of the command line's options a
 from __future__ import annotations
 
 import functools
-import itertools
 import math
-import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, cast
@@ -56,7 +54,7 @@ _ARGUMENTS: Final = {"pivots": "distances", "height_of_mass": "height", "gyratio
 
 
 @dataclass(frozen=True, eq=False)
-class SimulationInput:
+class Case:
     """What `rocking.simulate` takes, with the texts from which it was read.
 
     ``python`` is the expression that makes the motion, ``words`` are the arguments that name it on the command line;
@@ -87,7 +85,7 @@ class SimulationInput:
         )
 
 
-def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
+def read_case(texts: Texts, uploads: UploadStore) -> Case:
     """Read what is simulated from texts; those that are not given have the command line's defaults.
 
     Parameters
@@ -102,7 +100,7 @@ def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
     Examples
     --------
     >>> texts = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
-    >>> case = read_input(texts, UploadStore())
+    >>> case = read_case(texts, UploadStore())
     >>> case.block, round(case.motion.pga, 6)
     (<Block: rectangular block, 0.24 m x 1.1 m; p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184>, 3.92266)
     """
@@ -117,7 +115,7 @@ def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
             "it, or simulate it in Python",
             "restitution",
         )
-    return SimulationInput(
+    return Case(
         texts=given,
         block=block,
         motion=found.motion,
@@ -129,56 +127,6 @@ def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
         python=found.python,
         words=found.words,
     )
-
-
-def as_python(case: SimulationInput) -> str:
-    """Write the case as a script that runs as it stands.
-
-    Examples
-    --------
-    >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
-    >>> print(as_python(read_input(texts, UploadStore())))
-    import rocking
-    <BLANKLINE>
-    block = rocking.Block.from_parameters(p=2.0, alpha=0.2)
-    motion = None
-    response = rocking.simulate(block, motion, initial_rotation=0.02)
-    print(response.summary())
-    """
-    numbers = {
-        "model": None if case.model == "nonlinear" else case.model,
-        "chattering": case.texts.get("chattering"),
-        "duration": case.duration,
-        "initial_rotation": case.initial_rotation or None,
-        "initial_velocity": case.initial_velocity or None,
-    }
-    options = "".join(f", {name}={value!r}" for name, value in numbers.items() if value is not None)
-    return "\n".join(
-        [
-            "import rocking",
-            "",
-            f"block = rocking.{block_as_python(case.texts)}",
-            f"motion = {case.python}",
-            f"response = rocking.simulate(block, motion{options})",
-            "print(response.summary())",
-        ]
-    )
-
-
-def as_command(case: SimulationInput) -> str | None:
-    """Write the case as a command; None for what the command line does not do.
-
-    Examples
-    --------
-    >>> texts = {"p": "2", "alpha": "12deg", "motion": "ridgecrest-clc-090", "sa": "0.4g@1"}
-    >>> as_command(read_input(texts, UploadStore()))
-    'rocking simulate ridgecrest-clc-090 --p 2 --alpha 12deg --sa 0.4g@1'
-    """
-    if not case.words or "gravity" in case.texts:
-        return None
-    options = [name for name in NAMES if name in case.texts and name not in ("motion", "vertical")]
-    each = ([f"--{name.replace('_', '-')}", case.texts[name]] for name in options)
-    return shlex.join(["rocking", "simulate", *case.words, *itertools.chain.from_iterable(each)])
 
 
 def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:

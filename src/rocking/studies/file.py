@@ -29,7 +29,7 @@ from rocking.plausibility import vertical_notes
 from rocking.progress import note
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
 from rocking.studies.refine import Tolerances, tolerances_of
-from rocking.studies.report import PLANS, ReportPlan, check_part
+from rocking.studies.results import PLANS, ReportPlan, check_part
 from rocking.tables import csv_rows
 from rocking.treatment import treatment
 
@@ -318,8 +318,9 @@ class _Reader:
             try:
                 return Blocks(**{name: columns[name] for name in ("p", "alpha", "restitution") if name in columns})
             except RockingError as error:
-                where = f"{table}, whose block 0 is in line {rows[0][0]}"
-                raise self._wrong(f"{where}: {error}", **about) from None
+                where = f"{table}, whose block 0 is in line {rows[0][0]}: "
+                line = _line(self.text, "blocks", "csv", 0)
+                raise _moved(error, StudyError, self.file, line, where) from None
         bodies = []
         for (line, _), values in zip(rows, zip(*columns.values(), strict=True), strict=True):
             with _in_table(table, line):
@@ -425,12 +426,10 @@ class _Reader:
         return StudyError(message, *arguments, path=str(self.file), line=line, value=value)
 
 
-def _moved(error: RockingError, kind: type[_Kept], file: Path, line: int) -> _Kept:
-    """Return an error as one of this line; what it says of a file of its own stays in the sentence."""
-    message, arguments = error.message.template, error.message.arguments
-    if error.path is not None:
-        message, arguments = error.text(), ()
-    return kind(message, *arguments, path=str(file), line=line, value=error.value)
+def _moved(error: RockingError, kind: type[_Kept], file: Path, line: int, where: str = "") -> _Kept:
+    """Return an error as one of this line, with all its data; what it says of a file of its own comes before."""
+    where += error.text().removesuffix(error.message.text())
+    return kind(where + error.message.template, *error.message.arguments, path=str(file), line=line, value=error.value)
 
 
 @contextlib.contextmanager

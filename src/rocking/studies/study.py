@@ -24,8 +24,7 @@ from rocking.studies.fragility import BlockFragilities, block_fragilities, poole
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
 from rocking.studies.place import Place, place_of
 from rocking.studies.refine import StudyVerdict, critical_scales, keep_plan, kept_plan, next_round, tolerances_of
-from rocking.studies.report import ReportPart, ReportPlan, keep_report, made_report
-from rocking.studies.results import WrittenToFiles, lazy_outcome
+from rocking.studies.results import ReportPart, ReportPlan, WrittenToFiles, keep_report, lazy_outcome, made_report
 from rocking.studies.run import RunReport, Stop, run
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.state import Log, Status, simulations_done, status_of, verified

@@ -19,11 +19,13 @@ class NumberControl {
   constructor(spec, form, prefix = "") {
     this.spec = spec;
     this.form = form;
+    /** Whether somebody types in the field: what arrives meanwhile leaves it as it is. */
+    this.typing = false;
     const id = `${prefix}${spec.name}`;
     this.slider = /** @type {HTMLInputElement} */ (make("input", {
       type: "range", id: `${id}-slider`, min: "0", max: String(STEPS), step: "1", "aria-label": `${spec.label}, slider`, on: {input: () => this.slid()},
     }));
-    this.field = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, inputMode: "decimal", size: 6, "data-argument": spec.name, on: {change: () => this.typed()}}));
+    this.field = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, inputMode: "decimal", size: 6, "data-argument": spec.name, on: {input: () => { this.typing = true; }, change: () => this.typed(), blur: () => { this.typing = false; }}}));
     const [button, words] = spec.explanation ? explained(spec.explanation, spec.label) : [];
     this.element = make("div", {className: "number"}, [
       make("div", {className: "number-head"}, [make("label", {for: id}, [spec.label]), ...(button ? [button] : [])]),
@@ -51,8 +53,9 @@ class NumberControl {
     const {low, high, logarithmic} = this.spec;
     const part = logarithmic ? Math.log(Math.max(value, 1e-300) / low) / Math.log(high / low) : (value - low) / (high - low);
     this.slider.value = String(Math.round(STEPS * Math.min(1, Math.max(0, part))));
-    this.field.value = sent(value);
-    this.slider.setAttribute("aria-valuetext", `${this.field.value} ${this.spec.unit}`.trim());
+    const written = sent(value);
+    if (!this.typing) this.field.value = written;
+    this.slider.setAttribute("aria-valuetext", `${written} ${this.spec.unit}`.trim());
   }
 
   slid() {
@@ -66,6 +69,7 @@ class NumberControl {
   }
 
   typed() {
+    this.typing = false;
     const given = this.field.value.trim().replace("−", "-").replace(",", ".");
     this.show(given !== "" && !Number.isNaN(Number(given)) ? given + this.spec.suffix : given);
     this.form.tell();
@@ -102,7 +106,7 @@ export class BlockForm {
     /** @type {any[] | undefined} sides as they are, for what the texts leave out */
     this.known = undefined;
     this.shape = choice(prefix, "shape", "Given by", specification.shapes.map((/** @type {any} */ each) => [each.name, each.label]), () => this.reshape());
-    this.two = check(`${prefix}two`, "Two different sides", () => this.part());
+    this.two = check(`${prefix}two`, "Two different sides", () => this.separate());
     this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => { this.reveal(); this.tell(); });
     this.specs = BLOCK.map(parameter);
     /** Controls by name: one for both sides, and one for each. @type {Record<string, {both: NumberControl, pair: NumberControl[]}>} */
@@ -190,7 +194,7 @@ export class BlockForm {
   }
 
   /** Between one set of parameters and a pair of each. */
-  part() {
+  separate() {
     for (const {both, pair} of Object.values(this.controls)) {
       if (this.two.box.checked) for (const side of pair) side.show(both.text);
       else if (pair.length) both.show(pair[0].text);
@@ -233,7 +237,7 @@ export class MotionForm {
     this.kind = choice(prefix, "kind", "Shaken by", KINDS, another);
     this.record = choice(prefix, "record", field("motion"), specification.records.map((/** @type {any} */ each) => [each.name, each.name]), another);
     this.about = make("p", {className: "derived"});
-    this.pulse = choice(prefix, "pulse", "Pulse", Object.entries(specification.pulses).map(([name, each]) => [name, each.label]), (name) => { this.furnish(name); revealed(); });
+    this.pulse = choice(prefix, "pulse", "Pulse", Object.entries(specification.pulses).map(([name, each]) => [name, each.label]), (name) => { this.showPulse(name); revealed(); });
     this.numbers = make("div");
     this.channel = choice(prefix, "channel", field("channel"), [], revealed);
     this.vertical = choice(prefix, "vertical", field("vertical"), [["", "none"]], (value) => { this.upwards = value; revealed(); });
@@ -250,11 +254,11 @@ export class MotionForm {
       this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.channel.element, this.vertical.element, this.units.element,
       this.dt.element, this.start.element, this.scale.element, ...this.scales.map((each) => each.element), this.period.element,
     );
-    this.furnish("sine");
+    this.showPulse("sine");
   }
 
   /** Numbers and choices of a pulse. @param {string} name */
-  furnish(name) {
+  showPulse(name) {
     const {parameters, choices} = specification.pulses[name];
     this.family = name;
     /** @type {NumberControl[]} */
@@ -275,7 +279,7 @@ export class MotionForm {
     if (kind === "given") this.given = motion;
     if (kind === "pulse") {
       this.pulse.select.value = family;
-      if (this.family !== family) this.furnish(family);
+      if (this.family !== family) this.showPulse(family);
       const parts = Object.fromEntries(motion.slice(family.length + 1).split(",").map((part) => part.split("=")));
       for (const each of this.controls ?? []) if (parts[each.spec.name]) each.show(parts[each.spec.name]);
       for (const each of this.choices ?? []) each.select.value = parts[each.name] ?? each.select.value;

@@ -35,6 +35,7 @@ const problems = {};
 /** Say what is wrong, or that nothing is, and mark the field that is wrong. @param {unknown} error @param {string} [place] id of what holds the field */
 function problem(error, place = "settings") {
   if (error instanceof DOMException && error.name === "AbortError") return;
+  if (!error && !problems[place]) return;
   if (error && !(error instanceof Problem)) console.error(error);
   problems[place] = error instanceof Problem ? error.message : error ? `The page has a fault: ${error}` : null;
   for (const each of one(place).querySelectorAll("[aria-invalid]")) each.removeAttribute("aria-invalid");
@@ -62,11 +63,11 @@ const load = new Latest(async () => {
   page.shown = await payload("/api/case", {...state.texts, ...address.ends(state)});
   draw();
   counted("drawn");
-  pause = window.setTimeout(() => rest.ask(), PAUSE);
+  pause = window.setTimeout(() => afterPause.ask(), PAUSE);
 }, problem);
 
 /** What nobody reads while a slider moves. */
-const rest = new Latest(async () => {
+const afterPause = new Latest(async () => {
   pause = 0;
   if (!page.shown) return;
   const {header} = page.shown, {texts} = state;
@@ -155,7 +156,7 @@ function draw() {
   const [plus, minus] = header.block.thresholds_g;
   const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
     `p = ${short(side.p)} rad/s, α = ${short((side.alpha * 180) / Math.PI)}°, η = ${short(side.restitution)}; lifts above ${short([plus, minus][k])} g`);
-  one("derived").textContent = right === left ? `${right}.` : `To the right ${right}. To the left ${left}.`;
+  put(one("derived"), right === left ? `${right}.` : `To the right ${right}. To the left ${left}.`);
   if (state.view === "response" || state.view === "block") {
     const lines = /** @type {any} */ (arrays);
     histories.draw(header, {lines, rest: arrays.rest, uplift: arrays.uplift, block: header.block});
@@ -186,8 +187,9 @@ function showFigures(header) {
   ];
   const list = one("figures");
   if (!list.childNodes.length) list.append(...rows.map(([name]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, ["", make("small")])])));
+  const values = list.getElementsByTagName("dd");
   rows.forEach(([, value, more], k) => {
-    const [number, small] = list.querySelectorAll("dd")[k].childNodes;
+    const [number, small] = values[k].childNodes;
     put(number, value);
     put(small, more);
   });
