@@ -199,6 +199,7 @@ def test_every_module_that_is_imported_is_served(page):
         ({"width": "-1"}, "width", "“Width” must be a positive number"),
         ({"restitution": "0.9999"}, "restitution", "“Restitution η”"),
         ({"pgv": "1"}, "pga", "“Peak acceleration” and “Peak velocity” scale the same motion"),
+        ({"pga": "-1g"}, "pga", "“Peak acceleration” must be a positive number, in m/s^2, not -9.80665"),
         ({"vertical": "nothing-up"}, "vertical", "“Vertical component”: there is no shipped record"),
     ],
 )

@@ -10,10 +10,11 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from rocking import checks
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
@@ -22,8 +23,9 @@ from rocking.explorer.uploads import UploadStore
 from rocking.model import Model
 from rocking.motion import records
 from rocking.motion.motion import Motion
-from rocking.motion.scaling import FACTOR, Measure, MeasureName
+from rocking.motion.scaling import Measure
 from rocking.named_pulses import FAMILIES, pulse_values
+from rocking.quantities import acceleration, scaling
 from rocking.response import Response, trail_of
 from rocking.simulation import simulate
 from rocking.treatment import Treatment, treatment
@@ -108,7 +110,7 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     values = _values(given)
     maker, arguments = _block_call(values)
     block = _MAKERS[maker](**arguments)
-    found = _motion(values, uploads)
+    found = _motion(given, values, uploads)
     if "duration" not in values and math.prod(side.restitution for side in block.sides) > _LIVELIEST:
         raise InvalidOption(
             f"the product of {{}} on both sides is above {_LIVELIEST:g}, so that the block hardly comes to rest: lower "
@@ -214,8 +216,8 @@ class _Found(NamedTuple):
     words: tuple[str, ...]
 
 
-def _motion(values: Values, uploads: UploadStore) -> _Found:
-    target = _target(values)
+def _motion(given: Texts, values: Values, uploads: UploadStore) -> _Found:
+    target = scaling({name: given[name] for name in SCALINGS if name in given}, _level)
     name = values.get("motion", DEFAULT["motion"])
     found = _unscaled(name, values, uploads)
     if "vertical" in values:
@@ -227,18 +229,8 @@ def _motion(values: Values, uploads: UploadStore) -> _Found:
     return _Found(_scaled(found.motion, *target), f"{found.python}.{_scaling_as_python(*target)}", found.words)
 
 
-def _target(values: Values) -> tuple[float, Measure] | None:
-    """Level that the motion is scaled to, and the measure that it is of."""
-    chosen = [name for name in SCALINGS if name in values]
-    if len(chosen) > 1:
-        raise InvalidOption(f"{' and '.join(['{}'] * len(chosen))} scale the same motion; give one of them", *chosen)
-    if not chosen:
-        return None
-    (name,) = chosen
-    if name == "sa":
-        level, period = values["sa"]
-        return level, Measure("sa", period)
-    return values[name], FACTOR if name == "scale" else Measure(cast(MeasureName, name))
+def _level(text: str, name: str) -> float:
+    return checks.positive(acceleration(text, name), name, InvalidOption, "m/s^2")
 
 
 def _scaling_as_python(level: float, measure: Measure) -> str:

@@ -337,7 +337,8 @@ function beyond(x, y, sign, still, weight) {
     // Between two stretches the area is of no height, and the line has a gap.
     if (seen.length && !over && !before && after) seen.push(-k - 1);
     if (before || over || after) seen.push(k);
-    [before, over] = [over, after];
+    before = over;
+    over = after;
   }
   const count = seen.length;
   const found = {x: new Float64Array(count), y: new Float64Array(count), level: new Float64Array(count), line: new Float64Array(count)};
