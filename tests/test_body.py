@@ -102,15 +102,11 @@ def test_what_digits_leave_open_is_bounded_or_refused():
     """Of every body that rounds to what is given, the restitution is as near as is said: 0.05."""
     judged = 0
 
-    @given(
-        st.floats(1.0, 8.0),
-        st.floats(0.05, 0.6),
-        st.floats(0.05, 0.6),
-        st.floats(-0.15, 0.15),
-        st.integers(3, 6),
-    )
+    slenderness = st.floats(0.05, 0.6)
+
+    @given(st.tuples(st.floats(1.0, 8.0), slenderness, slenderness, st.floats(-0.15, 0.15), st.integers(3, 6)))
     @settings(deadline=None)
-    def judge(*drawn):
+    def judge(drawn):
         nonlocal judged
         judged += _restitution_is_near_or_refused(*drawn)
 

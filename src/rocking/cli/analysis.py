@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,10 +23,11 @@ from rocking.cli.options import (
     TreatmentOptions,
     ensemble_of,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, deliver
-from rocking.cli.records import RECORDS, MotionOptions, Names, UnscaledOptions
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, UnscaledOptions
 from rocking.errors import InvalidOption
 from rocking.quantities import angle, tilt, values
+from rocking.result import Result
 
 
 def spectrum(
@@ -91,7 +93,7 @@ def spectrum(
         shares = values(fractiles, "fractiles").tolist()
         read = motion.read_all(names)
         found = rocking_spectrum(blocks, [*read.motions.values()], **axes, fractiles=shares, **how)
-        deliver(found, "spectrum", read, folder=folder, as_json=output.as_json, against=against)
+        _deliver(found, "spectrum", read, folder=folder, as_json=output.as_json, against=against)
 
 
 def map(
@@ -149,7 +151,7 @@ def map(
             tolerance=tolerance,
             **{name: value for name, value in given.items() if value is not None},
         )
-        deliver(found, "map", None, folder=folder, as_json=output.as_json)
+        _deliver(found, "map", None, folder=folder, as_json=output.as_json)
 
 
 def ida(
@@ -178,7 +180,7 @@ def ida(
         read = motion.read_all(names)
         motions = [*read.motions.values()]
         found = incremental_dynamic_analysis(body, motions, **measure.chosen(), model=model.model, tolerance=tolerance)
-        deliver(found, "ida", read, folder=folder, as_json=output.as_json)
+        _deliver(found, "ida", read, folder=folder, as_json=output.as_json)
 
 
 def measures(
@@ -212,4 +214,23 @@ def measures(
             damping=damping,
             **bodies,
         )
-        deliver(found, "measures", read, folder=folder, as_json=output.as_json)
+        _deliver(found, "measures", read, folder=folder, as_json=output.as_json)
+
+
+def _deliver(
+    found: Result, stem: str, read: ReadRecords | None, *, folder: Path | None, as_json: bool, **figure: Any
+) -> None:
+    """Write an analysis into a folder where there is one (figure, tables, dataset, result), and print it.
+
+    Its tables name each motion by the record that was read, too, as those of other commands do.
+    """
+    result = found.to_dict()
+    if read is not None:
+        result |= read.to_dict()
+        found = replace(found, data=found.data.assign_coords(record=("motion", [*read.motions])))
+    if folder is not None:
+        for table in found.TABLES:
+            found.to_csv(folder / f"{table}.csv", table)
+        found.to_netcdf(folder / f"{stem}.nc")
+        write_results(folder, figures={stem: found.plot(**figure)}, result=result)
+    print_result(result, found.summary(), as_json=as_json, folder=folder)

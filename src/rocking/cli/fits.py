@@ -19,11 +19,12 @@ from rocking.analysis.calibration.space import HOUSNER
 from rocking.analysis.fragility.curve import Band
 from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.fragility.fit import fragility as run
+from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.tables import History, Outcomes, read_calibration, read_observed
 from rocking.cli.options import BLOCK, MEASURE, MODEL, EnsembleOptions, MeasureOptions, TreatmentOptions
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, with_records, write_results
-from rocking.cli.records import RECORDS, MotionOptions, Names, ScaledPulseOptions
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, ScaledPulseOptions
 from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption, RockingError
 from rocking.model import Model
@@ -129,10 +130,20 @@ def fragility(
                 fitted.to_nrml(folder / f"fragility-{form}.xml", taxonomy=taxonomy, format=form)
             fitted.to_csv(folder / "fragility.csv")
             if fitted.outcomes is not None:
-                together = fitted if read is None else with_records(fitted, read)
+                together = fitted if read is None else _with_records(fitted, read)
                 together.to_csv(folder / "outcomes.csv", "outcomes")
             write_results(folder, figures={name: draw() for name, draw in figures.items()}, result=found)
         print_result(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
+
+
+def _with_records(found: Fragility, read: ReadRecords) -> Fragility:
+    """Name the motion of each outcome by the record that was read, too."""
+    if found.outcomes is None:
+        return found
+    records = {row["motion"]: row["record"] for row in read.to_dict()["records"]}
+    named = found.outcomes.copy()
+    named.insert(0, "record", named["motion"].map(records))
+    return replace(found, outcomes=named)
 
 
 def _refuse_beside_outcomes(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -12,14 +12,11 @@ from cyclopts import Group, Parameter
 
 from rocking.errors import OutputError
 from rocking.progress import note
-from rocking.result import Result
 from rocking.tables import to_json, write_figure, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rocking.analysis.fragility.result import Fragility
-    from rocking.cli.records import ReadRecords
 
 #: Resolution of figures as PNG.
 _DOTS_PER_INCH: Final = 160
@@ -66,35 +63,6 @@ def write_results(folder: Path, *, figures: Mapping[str, Figure], result: Mappin
         write_figure(folder / f"{stem}.pdf", figure)
     if result is not None:
         write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
-
-
-def deliver(
-    found: Result, stem: str, read: ReadRecords | None, *, folder: Path | None, as_json: bool, **figure: Any
-) -> None:
-    """Write an analysis into a folder where there is one (figure, tables, dataset, result), and print it.
-
-    Its tables name each motion by the record that was read, too, as those of other commands do.
-    """
-    result = found.to_dict()
-    if read is not None:
-        result |= read.to_dict()
-        found = replace(found, data=found.data.assign_coords(record=("motion", [*read.motions])))
-    if folder is not None:
-        for table in found.TABLES:
-            found.to_csv(folder / f"{table}.csv", table)
-        found.to_netcdf(folder / f"{stem}.nc")
-        write_results(folder, figures={stem: found.plot(**figure)}, result=result)
-    print_result(result, found.summary(), as_json=as_json, folder=folder)
-
-
-def with_records(found: Fragility, read: ReadRecords) -> Fragility:
-    """Name the motion of each outcome by the record that was read, too."""
-    if found.outcomes is None:
-        return found
-    records = {row["motion"]: row["record"] for row in read.to_dict()["records"]}
-    named = found.outcomes.copy()
-    named.insert(0, "record", named["motion"].map(records))
-    return replace(found, outcomes=named)
 
 
 def print_result(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | None) -> None:

@@ -1,4 +1,4 @@
-// Two responses over each other: another end of chattering, another block, another motion.
+// Two responses over each other: another treatment of chattering, another block, another motion.
 
 import {Latest, json, payload} from "./api.js";
 import {ends} from "./address.js";

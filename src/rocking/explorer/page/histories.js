@@ -61,7 +61,7 @@ export class Histories {
     /** @type {any[]} */
     this.cursors = [];
     this.made = false;
-    this.quiet = false;
+    this.drawing = false;
     element.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -180,7 +180,7 @@ export class Histories {
     this.scale = new Scale(from, to);
     const {dataset} = this.element, origin = String(this.scale.origin), unit = String(this.scale.unit);
     if (dataset.origin !== origin || dataset.unit !== unit) Object.assign(dataset, {origin, unit});
-    this.quiet = true;
+    this.drawing = true;
     for (const plot of [this.rotation, this.ground]) plot.hold_render = true;
     this.x.setv({start: this.scale.plotted(from), end: this.scale.plotted(to)});
     this.ground.below[0].axis_label = this.scale.label;
@@ -204,7 +204,7 @@ export class Histories {
       to: Float64Array.from(seen, ([, end]) => this.scale.plotted(Math.min(end, to))),
     };
     for (const plot of [this.rotation, this.ground]) plot.hold_render = false;
-    this.quiet = false;
+    this.drawing = false;
   }
 
   /** What of the ground motion is beyond the threshold of a side; under a vertical component, that and the thresholds, which it moves.
@@ -265,7 +265,7 @@ export class Histories {
 
   /** The range was changed by a tool. */
   ranged() {
-    if (this.quiet) return;
+    if (this.drawing) return;
     window.clearTimeout(this.waiting);
     this.waiting = window.setTimeout(() => {
       this.go([this.scale.time(this.x.start), this.scale.time(this.x.end)]);
