@@ -69,22 +69,7 @@ class WrittenToFiles(ABC):
         """Return results, their first dimension, and how much of it is held in memory at a time."""
 
     def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
-        """Write the results as `results` has them to a NetCDF file.
-
-        Parameters
-        ----------
-        path : path
-            File to write.
-        critical : {"overturning", "complete_chattering"}, optional
-            Write the `critical_scales` of this verdict instead.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        StudyError
-            If a unit is damaged, or critical scales are not known yet.
-        """
+        """Write the results as `results` has them to a NetCDF file; parameters and errors as of `to_csv`."""
         write_netcdf(path, self._results(critical)[0])
 
     def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
