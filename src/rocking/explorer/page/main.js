@@ -1,23 +1,22 @@
 // The page: one state, in its address; forms that change it, and four views that show it.
 
-import * as address from "./address.js";
+import {ends, readAddress, specification, writeAddress} from "./parameters.js";
 import {Latest, Problem, json, payload} from "./api.js";
 import {ChatteringPanel} from "./chattering.js";
 import {makeCopying, showCode, showFiles} from "./exports.js";
 import {BlockForm, ModelForm, MotionForm} from "./forms.js";
 import {Histories} from "./histories.js";
-import {specification} from "./parameters.js";
 import {coarse} from "./theme.js";
 import {acceptFiles} from "./upload.js";
 import {counted, legend, make, one, say, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
-const state = address.read();
+const state = readAddress();
 
 /** What the views share.
- * @type {{state: address.State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, remember: () => void}} */
-const page = {state, shown: null, go, problem, restate, remember: () => address.write(state)};
+ * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, remember: () => void}} */
+const page = {state, shown: null, go, problem, restate, remember: () => writeAddress(state)};
 /** @type {Record<string, any>} */
 const views = {};
 
@@ -60,7 +59,7 @@ let pause = 0;
 /** The whole case, where a form has changed it. */
 const load = new Latest(async () => {
   window.clearTimeout(pause);
-  page.shown = await payload("/api/case", {...state.texts, ...address.ends(state)});
+  page.shown = await payload("/api/case", {...state.texts, ...ends(state)});
   draw();
   counted("drawn");
   pause = window.setTimeout(() => afterPause.ask(), PAUSE);
@@ -88,7 +87,7 @@ const afterPause = new Latest(async () => {
 const look = new Latest(async () => {
   if (!page.shown) return;
   if (!state.window) { await load.work(); return; }
-  const {header, arrays} = await payload("/api/window", {...state.texts, ...address.ends(state)});
+  const {header, arrays} = await payload("/api/window", {...state.texts, ...ends(state)});
   page.shown.header.window = header.window;
   Object.assign(page.shown.arrays, arrays);
   draw();
@@ -100,7 +99,7 @@ const look = new Latest(async () => {
 /** @param {[number, number] | null} chosen */
 function showWindow(chosen) {
   state.window = chosen;
-  address.write(state);
+  writeAddress(state);
   void look.ask();
 }
 
@@ -109,7 +108,7 @@ function changed(texts, replaced) {
   if (replaced.includes("motion") && state.texts.motion !== texts.motion) state.window = null;
   const kept = Object.entries(state.texts).filter(([name]) => !replaced.includes(name));
   state.texts = {...Object.fromEntries(kept), ...texts};
-  address.write(state);
+  writeAddress(state);
   if (state.view === "map" || state.view === "compare") views[state.view].update();
   void load.ask();
 }
@@ -136,7 +135,7 @@ async function go(name) {
   one("figures").hidden = name === "block";
   if (name === "block") histories.size(190, 140);
   else if (name === "response") histories.size(290, 190);
-  address.write(state);
+  writeAddress(state);
   for (const [each, view] of Object.entries(views)) if (each !== name) { view.leave?.(); problem(null, `view-${each}`); }
   if (name !== "response" && !views[name]) {
     const module = await import(`./${name}.js`);
