@@ -43,7 +43,7 @@ _EXAMPLE = "rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 
 
 RECORDS: Final = Parameter(name="*", group=Group("Records", sort_key=2))
 
-#: ReadRecords as arguments: a lone hyphen is one, too.
+#: Records as arguments: a lone hyphen is one, too.
 Names = Annotated[
     str,
     Parameter(
@@ -157,7 +157,7 @@ class PulseOptions(FileOptions):
 
 
 class ReadRecords(NamedTuple):
-    """ReadRecords that were read, and pulses.
+    """Records that were read, and pulses.
 
     Attributes
     ----------
