@@ -178,7 +178,10 @@ def _limits(text: str) -> dict[str, float]:
             raise InvalidOption(
                 f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}", "limits"
             )
-        limits[name] = number(value, "limits") if given else math.inf
+        try:
+            limits[name] = number(value, "limits") if given else math.inf
+        except InvalidOption:
+            raise InvalidOption(f"{{}} {name} takes a number, not {value.strip()!r}", "limits") from None
     return limits
 
 
