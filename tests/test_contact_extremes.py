@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 import rocking
 from rocking import Block, Motion, Response, simulate
+from rocking.response import trail_of
 
 GRAVITY = 9.80665
 COUNT = 100
@@ -54,7 +55,7 @@ def instants(response: Response) -> NDArray[np.float64]:
     """Densely within every stretch without impact, event or corner of the motion, and just before its end."""
     assert response.motion is not None
     corners = [
-        response.trail.nodes["time"],
+        trail_of(response).nodes["time"],
         response.impacts["time"],
         response.events["time"],
         response.motion.breakpoints,

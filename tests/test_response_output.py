@@ -14,8 +14,8 @@ import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
 from rocking.kernels import variation
-from rocking.response import QUANTITIES, Sensitivity, history, summary
-from rocking.response.forces import Contact
+from rocking.response import QUANTITIES, answers, history, summary
+from rocking.response.history import Contact
 from rocking.response.summary import time_text
 from rocking.tables import named
 
@@ -113,7 +113,7 @@ def test_a_summary_is_its_rows(shaken):
 
 def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatch):
     """A sensitivity is a pass along all steps."""
-    monkeypatch.setattr(Sensitivity, "along", None)
+    monkeypatch.setattr(answers, "sensitivity_along", None)
     assert "rocks" in repr(shaken)
     assert "rocks" in shaken._repr_html_()
 

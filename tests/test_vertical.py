@@ -17,7 +17,7 @@ from rocking import InvalidMotion, InvalidOption, Motion
 from rocking.block import Blocks
 from rocking.chattering.families import SimulationInput
 from rocking.chattering.maps import chattering_map
-from rocking.explorer.inputs import read_input, texts_of
+from rocking.explorer.inputs import read_case, texts_of
 from rocking.explorer.maps import grid_of, parts
 from rocking.explorer.uploads import UploadStore
 from rocking.kernels import state
@@ -425,7 +425,7 @@ def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:
 def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_component() -> None:
     uploads = UploadStore()
     key = uploads.add_motion(wave(20.0, 5).with_vertical(wave(40.0, 6)))
-    case = read_input({"p": "2", "alpha": "0.2", "restitution": "0.5", "motion": f"given:{key}"}, uploads)
+    case = read_case({"p": "2", "alpha": "0.2", "restitution": "0.5", "motion": f"given:{key}"}, uploads)
     axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "0.3", "points": "16"}
     grid = grid_of(case, axes)
     found = np.empty(grid.x.values.size * grid.y.values.size)
@@ -446,7 +446,7 @@ def test_a_page_of_a_response_shows_its_vertical_component_too() -> None:
     for horizontal in (pulse, record):
         for vertical in (wave(3.0, 1), wave(3.0, 2)):
             response = rocking.simulate(block, horizontal.with_vertical(vertical))
-            shown = read_input(texts_of(response, uploads), uploads).simulate()
+            shown = read_case(texts_of(response, uploads), uploads).simulate()
             assert shown.peak_rotation == response.peak_rotation
             assert shown.impacts["time"].tolist() == response.impacts["time"].tolist()
 

@@ -10,7 +10,7 @@ from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
 from .block import Block, Blocks, Side
 from .body import Bodies, Body, Coordinate
-from .ensemble import simulate_many
+from .ensemble import Product, Scales, simulate_many
 from .errors import (
     DamagedStudy,
     InvalidBlock,
@@ -30,7 +30,6 @@ from .motion.description import Description
 from .motion.formats import read
 from .motion.scaling import Measure
 from .named_pulses import PulseFamily
-from .product import Product
 from .response import Response, Sensitivity
 from .result import Row
 from .simulation import simulate
@@ -67,6 +66,7 @@ __all__ = [
     "Response",
     "RockingError",
     "Row",
+    "Scales",
     "Sensitivity",
     "Side",
     "Study",

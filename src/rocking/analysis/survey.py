@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
+from rocking.ensemble import body_coordinates, verticals_of
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, motions_by_name, names_of
-from rocking.product import body_coordinates, verticals_of
 from rocking.progress import Progress, note
 from rocking.response import Response, in_brief, ratio_text
-from rocking.response.forces import friction_coefficient
+from rocking.response.history import friction_coefficient
 from rocking.simulation import simulate
 from rocking.tables import counted, decimal, frame_of, named, text_table, to_json, write_bytes, write_text
 

@@ -22,7 +22,7 @@ from rocking.kernels import state
 from rocking.motion.measures import exceedances
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
-from rocking.response import Response
+from rocking.response import Response, trail_of
 from rocking.result import Result
 from rocking.simulation import simulate
 from rocking.tables import text_table
@@ -306,7 +306,7 @@ def _is_complete(response: Response, rests: int, uplift: float, rest: float) -> 
         return False
     states = state.new_states(1, 0)
     states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, rest
-    return bool(complete_chattering(response.trail.ground, np.array([response.trail.block]), states)[0])
+    return bool(complete_chattering(trail_of(response).ground, np.array([trail_of(response).block]), states)[0])
 
 
 def _axis(values: ArrayLike, name: str) -> Floats:

@@ -18,7 +18,7 @@ from rocking.engine import in_threads, require_finished
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
-from rocking.response import Response
+from rocking.response import Response, trail_of
 from rocking.simulation import simulate
 from rocking.tables import counted, rows_of, text_table
 from rocking.treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
@@ -317,7 +317,7 @@ def _speed_left(response: Response, rest: float) -> float:
 
 def _rotation_error(response: Response, certified: Response) -> float:
     end = min(response.duration, certified.duration)
-    nodes = np.concatenate([response.trail.nodes["time"], certified.trail.nodes["time"]])
+    nodes = np.concatenate([trail_of(response).nodes["time"], trail_of(certified).nodes["time"]])
     times = np.concatenate([np.linspace(0.0, end, _EVEN_TIMES), nodes[nodes <= end]])
     slenderness = min(side.alpha for side in certified.block.sides)
     return float(np.max(np.abs(response.rotation(times) - certified.rotation(times)))) / slenderness

@@ -80,6 +80,11 @@ class Response(Answers, Findings):
         friction : float, optional
             Coefficient of friction: says whether the block would slide, and when first.
 
+        Returns
+        -------
+        sequence of Row
+            One for each line.
+
         Examples
         --------
         >>> import rocking
@@ -90,7 +95,25 @@ class Response(Answers, Findings):
         return summary.summary_rows(self, friction)
 
     def facts(self, friction: float | None = None) -> Sequence[Row]:
-        """Return what happened for machines, as rows of name, value and unit: the entries of `to_dict`."""
+        """Return what happened for machines, as rows of name, value and unit: the entries of `to_dict`.
+
+        Parameters
+        ----------
+        friction : float, optional
+            As for `summary_rows`.
+
+        Returns
+        -------
+        sequence of Row
+            One for each entry.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response.facts()[4]
+        Row(name='overturned', value=True, unit='1', note='')
+        """
         return summary.facts(self, friction)
 
     def summary(self, friction: float | None = None) -> str:
@@ -167,10 +190,17 @@ class Response(Answers, Findings):
         ------
         InvalidOption
             If `dt` is not positive.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> dict(response.to_xarray(dt=0.1).sizes)
+        {'time': 16, 'event': 2, 'impact': 1, 'sequence': 0}
         """
         return export.dataset(self, dt)
 
-    def to_dataframe(self, table: export.Table = "histories", *, dt: float | None = None) -> pd.DataFrame:
+    def to_dataframe(self, table: export.ResponseTable = "histories", *, dt: float | None = None) -> pd.DataFrame:
         """Return one of the response's tables as a data frame; columns are named with their units.
 
         Parameters
@@ -180,6 +210,11 @@ class Response(Answers, Findings):
             `events`, `impacts` or `chattering`.
         dt : float, optional
             Step of the histories, s; by default the motion's own, or a two-thousandth of the duration.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each time, event, impact or sequence.
 
         Raises
         ------
@@ -200,14 +235,28 @@ class Response(Answers, Findings):
     def to_netcdf(self, path: str | Path, dt: float | None = None) -> None:
         """Write `to_xarray` to a NetCDF file.
 
+        Parameters
+        ----------
+        path : path
+            File to write.
+        dt : float, optional
+            As for `to_xarray`.
+
         Raises
         ------
         OutputError
             If the file cannot be written.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response.to_netcdf(pathlib.Path(tempfile.mkdtemp()) / "response.nc", dt=0.1)
         """
         write_netcdf(path, export.dataset(self, dt))
 
-    def to_csv(self, path: str | Path, table: export.Table = "histories", *, dt: float | None = None) -> None:
+    def to_csv(self, path: str | Path, table: export.ResponseTable = "histories", *, dt: float | None = None) -> None:
         """Write one of the tables of `to_dataframe` as text columns with a header.
 
         Raises
@@ -225,7 +274,7 @@ class Response(Answers, Findings):
         *,
         units: RotationUnits = "slenderness",
         window: tuple[float, float] | None = None,
-        chattering: bool = False,
+        longest_sequence: bool = False,
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
@@ -239,7 +288,7 @@ class Response(Answers, Findings):
             What rotations are drawn in: over the slenderness of their side, or as they are.
         window : (start, end), optional
             Stretch of time to draw, s; by default from a little before the first event to a little after the last.
-        chattering : bool
+        longest_sequence : bool
             Whether to show the longest chattering sequence, impact by impact, in a panel of its own.
         title : str
             Title; by default what was simulated.
@@ -251,4 +300,4 @@ class Response(Answers, Findings):
         InvalidOption
             If there is no such unit, the window is not a stretch of the response, or the size is not one.
         """
-        return export.figure(self, units, window, title, ax, figsize, chattering=chattering)
+        return export.figure(self, units, window, title, ax, figsize, longest_sequence=longest_sequence)

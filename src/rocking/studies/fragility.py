@@ -16,9 +16,9 @@ from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.levels import mean_one, only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
+from rocking.ensemble import Product, body_coordinates
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
-from rocking.product import Product, body_coordinates
 from rocking.progress import Progress
 from rocking.result import table_of_some
 from rocking.studies.spectrum import BlocksResult, peak_ratios, require_limits

@@ -16,8 +16,8 @@ from rocking.analysis.spectrum import fractiles_of
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import require_finished
+from rocking.ensemble import body_coordinates
 from rocking.errors import InvalidOption, StudyError
-from rocking.product import body_coordinates
 from rocking.progress import Progress
 from rocking.result import Result, table_of_some
 from rocking.studies.inputs import require

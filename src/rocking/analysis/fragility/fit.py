@@ -17,11 +17,10 @@ from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.constants import Model
 from rocking.engine import require_finished
-from rocking.ensemble import simulate_many
+from rocking.ensemble import Polarity, simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.product import Polarity
 from rocking.tables import counted
 from rocking.treatment import Treatment
 
