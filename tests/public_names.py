@@ -73,6 +73,8 @@ def faults() -> list[str]:
 
     found = []
     for name, member in public_members().items():
+        if not inspect.getdoc(member):
+            found.append(f"{name}: no docstring, not even an inherited one")
         wanted = CHECKS_OF_FUNCTIONS if inspect.isfunction(member) else CHECKS
         # What a property is, its one line says; and a class that only the package makes has attributes.
         if isinstance(member, property) or "Attributes\n" in (inspect.getdoc(member) or ""):

@@ -13,14 +13,13 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled, units_of, values_of
-from rocking.analysis.report import Drawn
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidOption
 from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.scaling import Measure
-from rocking.result import Result
+from rocking.result import DatasetResult
 from rocking.tables import counted, text_table
 
 if TYPE_CHECKING:
@@ -132,7 +131,7 @@ def compare_measures(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MeasureComparison(Drawn, Result):
+class MeasureComparison(DatasetResult):
     """Intensity measures side by side; from `compare_measures`.
 
     Its figure has the dispersion of each measure with its interval, the most efficient first, as the summary.
@@ -158,7 +157,6 @@ class MeasureComparison(Drawn, Result):
         return np.argsort(self.data.dispersion_of_all.values, kind="stable")
 
     def summary(self) -> str:
-        """Measures in a table, the most efficient first."""
         data = self.data
         several = data.sizes["block"] > 1
         order = self._order()
@@ -185,7 +183,6 @@ class MeasureComparison(Drawn, Result):
         return "\n".join(text + ([f"note: {REVERSED_TOO}"] if data.sides_differ else []))
 
     def to_dict(self) -> dict[str, Any]:
-        """Measures and their dispersions by name."""
         data = self.data
         names = self.TABLES["measures"]
         return {
@@ -204,7 +201,7 @@ class MeasureComparison(Drawn, Result):
             ],
         }
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot import dispersions_figure
 
         data, order = self.data, self._order()

@@ -24,7 +24,7 @@ from rocking.motion.description import labelled
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.result import Result
+from rocking.result import DatasetResult
 from rocking.tables import counted, named, text_table
 from rocking.treatment import Certified
 
@@ -153,7 +153,7 @@ def incremental_dynamic_analysis(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class IncrementalDynamicAnalysis(Result):
+class IncrementalDynamicAnalysis(DatasetResult):
     """Blocks under motions that are scaled up; from `incremental_dynamic_analysis`.
 
     Attributes
@@ -204,7 +204,6 @@ class IncrementalDynamicAnalysis(Result):
         return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
     def summary(self) -> str:
-        """Levels that overturn each block under each motion, and which levels were looked at."""
         data = self.data
         many = data.sizes["block"] > 1
         looked_at = _Levels.of(data)
@@ -233,7 +232,6 @@ class IncrementalDynamicAnalysis(Result):
         return labelled(name, (), vertical)
 
     def to_dict(self) -> dict[str, Any]:
-        """Levels, peaks and bands by name; units are in the names."""
         data, units = self.data, self.data.level.units
         peaks = data.peak_over_alpha.transpose("motion", "block", "level").values
         lowest = data.overturning_level.transpose("motion", "block").values

@@ -25,7 +25,7 @@ from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_family
 from rocking.progress import Progress
-from rocking.result import Result, table_of_some
+from rocking.result import DatasetResult, table_of_some
 from rocking.simulation import simulate
 from rocking.tables import cell, named, text_table
 from rocking.treatment import Certified
@@ -203,7 +203,7 @@ def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OverturningMap(Result):
+class OverturningMap(DatasetResult):
     """What a pulse does to a block, over amplitude and frequency; from `overturning_map`.
 
     Attributes
@@ -226,7 +226,6 @@ class OverturningMap(Result):
     )
 
     def summary(self) -> str:
-        """Shares of the map that each outcome takes, and the lowest amplitude that overturns at some frequencies."""
         modes, counts = np.unique(self.data.mode, return_counts=True)
         shares = [
             (mode_name(int(mode)), _percent(count / self.data.mode.size))
@@ -250,7 +249,6 @@ class OverturningMap(Result):
         return f"{amplitudes[0]:g} or less" if is_open_below else f"none of those up to {amplitudes[-1]:g}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Grid, modes and boundaries by name."""
         names = ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above")
         columns = (self.data[name].values for name in names)
         return {

@@ -13,10 +13,10 @@ from rocking import checks
 from rocking.analysis.fragility.curve import FragilityCurve
 from rocking.analysis.fragility.lognormal import Probit
 from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.report import Report
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
+from rocking.result import DrawnResult
 from rocking.tables import counted, known_digits, text_table
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def _period(rate: float) -> float:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Risk(Report):
+class Risk(DrawnResult):
     """Annual rates of all limit states of a fragility under a hazard curve; from `Fragility.annual_rate`.
 
     Its figure has the hazard curve, and below it for each limit state which intensities its rate comes from.
@@ -230,7 +230,7 @@ class Risk(Report):
             ],
         }
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot import RiskLine, risk_figure
 
         scale, at = self.hazard.measure.scale, self._shown()
@@ -257,9 +257,9 @@ class Risk(Report):
                 ends += [end for end in (low / reach, high * reach) if 0.0 < end < math.inf]
         return np.geomspace(min(ends), max(ends), _POINTS)
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         rates = ", ".join(f"{one.limit_state}: {one.in_words()}" for one in self.rates)
-        return f"<Risk: {self.description}; {self.hazard.name}; {rates}>"
+        return f"{self.description}; {self.hazard.name}; {rates}"
 
 
 def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:

@@ -23,7 +23,7 @@ from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
 from rocking.motion.motion import Motion
-from rocking.result import Result, table_of_some
+from rocking.result import DatasetResult, table_of_some
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RockingSpectrum(Result):
+class RockingSpectrum(DatasetResult):
     """Peak rotation against the frequency parameter or the size; from `rocking_spectrum`.
 
     Attributes
@@ -180,7 +180,6 @@ class RockingSpectrum(Result):
     )
 
     def summary(self) -> str:
-        """Fractiles of peak rotation over slenderness at some sizes, for each slenderness and restitution."""
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
         parts = [f"peak rotation over slenderness, {self._motions()}, {self.data.model} model"]
         for title, one in self._curves():
@@ -198,7 +197,6 @@ class RockingSpectrum(Result):
         return "\n\n".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
-        """Axes, fractiles and shares by name."""
         data = self.data
         axes = [str(name) for name in data.overturned_share.dims]
         return {

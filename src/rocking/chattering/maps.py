@@ -23,7 +23,7 @@ from rocking.motion.exceedance import exceedances
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response
-from rocking.result import Result
+from rocking.result import DatasetResult
 from rocking.simulation import simulate
 from rocking.tables import text_table
 
@@ -168,7 +168,7 @@ def chattering_map(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ChatteringMap(Result):
+class ChatteringMap(DatasetResult):
     """Where chattering after the first uplift is complete, over two parameters; from `chattering_map`.
 
     Attributes
@@ -184,7 +184,6 @@ class ChatteringMap(Result):
     )
 
     def summary(self) -> str:
-        """Shares of the map that each outcome takes."""
         values, counts = np.unique(self.data.outcome, return_counts=True)
         rows = [
             (Outcome(value).words, f"{100 * count / self.data.outcome.size:.1f} %")
@@ -195,7 +194,6 @@ class ChatteringMap(Result):
         return f"{head}\n\n{text_table(['outcome', 'share of the map'], rows)}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Axes and variables by name."""
         columns = {str(name): self.data[name].values for name in (*self.data.outcome.dims, *self.data.data_vars)}
         return {"outcomes": {outcome.value: outcome.words for outcome in Outcome}, **columns}
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rocking.errors import OutputError
 from rocking.progress import note
-from rocking.result import Result
+from rocking.result import DatasetResult
 from rocking.tables import to_json, write_figure, write_text
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def write(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, A
 
 
 def deliver(
-    found: Result, stem: str, read: Records | None, *, folder: Path | None, as_json: bool, **figure: Any
+    found: DatasetResult, stem: str, read: Records | None, *, folder: Path | None, as_json: bool, **figure: Any
 ) -> None:
     """Write an analysis into a folder where there is one (figure, tables, dataset, result), and print it.
 

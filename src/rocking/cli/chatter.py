@@ -49,7 +49,7 @@ def chatter(
         result, text = report.to_dict(), report.summary()
         if table:
             text += f"\n\n{report.table()}"
-            result = {**result, "asymptotic_table": report.cycle_rows()}
+            result = {**result, "asymptotic_table": report.to_dataframe("cycles").to_dict("records")}
         if folder is not None:
             report.to_csv(folder / "impacts.csv")
             if report.cycles is not None:

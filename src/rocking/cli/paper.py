@@ -57,8 +57,6 @@ def paper(
     with batch.output_folder(out) as folder:
         for number in FIGURES if figure is None else [figure]:
             drawn = paper_figure(number, **parameters)
-            print(drawn.caption)
-            for statement in drawn.statements:
-                print(f"  {statement.claim}: {statement.shown()}")
+            print(drawn.summary())
             for path in drawn.write(folder):
                 print(f"  {path}")

@@ -20,7 +20,6 @@ from rocking.analysis.calibration.space import (
     unit_of,
     value_range,
 )
-from rocking.analysis.report import Report
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.errors import InvalidOption
@@ -28,6 +27,7 @@ from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response, drawing_times
+from rocking.result import DrawnResult
 from rocking.simulation import simulate
 from rocking.tables import counted, text_table
 
@@ -82,7 +82,7 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HistoryCalibration(Report):
+class HistoryCalibration(DrawnResult):
     """The block that explains a rotation history best.
 
     Made by `calibrate_history`. Its figure has the measured rotation, that of the fitted block, and the residuals.
@@ -115,7 +115,6 @@ class HistoryCalibration(Report):
         return math.sqrt(float(np.mean(self.residuals**2)))
 
     def summary(self) -> str:
-        """Return the estimates as a table for people."""
         rows = [
             [name, one.value, float(f"{one.deviation:.2g}"), unit_of(name), "at its bound" if one.at_bound else ""]
             for name, one in self.estimates.items()
@@ -124,7 +123,6 @@ class HistoryCalibration(Report):
         return f"{table}\n\n{self._misfit_text()}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Estimates and misfit by name."""
         return {
             "model": self.response.model,
             "samples": len(self.residuals),
@@ -133,7 +131,7 @@ class HistoryCalibration(Report):
             "misfit_rad": self.misfit,
         }
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot import measured_figure
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
@@ -154,8 +152,8 @@ class HistoryCalibration(Report):
         texts = (f"{name.replace('_', ' ')} = {one.value:.4g} {unit_of(name)}" for name, one in self.estimates.items())
         return ", ".join(text.removesuffix(" 1") for text in texts)
 
-    def __repr__(self) -> str:
-        return f"<HistoryCalibration: {self._estimates_text()}; {self._misfit_text()}>"
+    def _headline(self) -> str:
+        return f"{self._estimates_text()}; {self._misfit_text()}"
 
     def _misfit_text(self) -> str:
         return f"misfit {self.misfit:.3g} rad (root mean square) over {counted(len(self.residuals), 'sample')}"

@@ -16,7 +16,6 @@ from rocking.analysis.calibration.search import Problem, posterior, search, syst
 from rocking.analysis.calibration.space import SIDED, Knowledge, Space, unit_of
 from rocking.analysis.fragility.fit import OVERTURNING, fragility
 from rocking.analysis.fragility.result import Fragility
-from rocking.analysis.report import Tabled
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
@@ -27,6 +26,7 @@ from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
+from rocking.result import DrawnResult, TableResult
 from rocking.tables import counted, named, text_table
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class Validation:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Tabled):
+class Calibration(DrawnResult, TableResult):
     """Blocks that explain which motions overturned a specimen, and what they predict.
 
     Made by `calibrate`. Its table "ensemble" has a row for each block: parameters of both sides, weight, and the
@@ -127,6 +127,7 @@ class Calibration(Tabled):
     """
 
     TABLES = ("ensemble",)
+    _FORMAT = "%.10g"
 
     blocks: Blocks
     weights: Floats
@@ -309,7 +310,6 @@ class Calibration(Tabled):
         return f"{counted(len(self.observed), 'motion')}, {overturned} overturned the specimen; {self.model} model"
 
     def summary(self) -> str:
-        """Return the estimates and scores as a table for people."""
         rows = [
             [name, one.median, one.lower, one.upper, f"{100 * one.dispersion:.0f} %", unit_of(name)]
             for name, one in self.estimates.items()
@@ -327,7 +327,6 @@ class Calibration(Tabled):
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """Estimates, scores and probabilities by name."""
         return {
             "model": self.model,
             "motions": len(self.observed),
@@ -348,7 +347,7 @@ class Calibration(Tabled):
         }
         return pd.DataFrame({**columns, "weight": self.weights, "model": self.model})
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot import outcomes_figure
 
         return outcomes_figure(

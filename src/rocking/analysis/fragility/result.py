@@ -16,7 +16,6 @@ from rocking.analysis.fragility.confidence import Resamples
 from rocking.analysis.fragility.curve import FragilityCurve, in_units, interval_text
 from rocking.analysis.fragility.lognormal import groups
 from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.report import Tabled
 from rocking.analysis.risk import Risk
 from rocking.analysis.survival import Survival
 from rocking.arrays import Floats
@@ -26,6 +25,7 @@ from rocking.errors import InvalidOption, Message
 from rocking.model import Model
 from rocking.motion.scaling import Measure
 from rocking.progress import spelled
+from rocking.result import DrawnResult, TableResult
 from rocking.tables import counted, text_table
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ _POINTS: Final = 201
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fragility(Tabled):
+class Fragility(DrawnResult, TableResult):
     """Fragility curves of one or several limit states against one intensity measure; from `fragility`.
 
     Its tables are "curves" (limit state, intensity in SI units, probability, lower and upper end of the band) and,
@@ -67,7 +67,8 @@ class Fragility(Tabled):
         What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
     """
 
-    TABLES = "curves", "outcomes"
+    TABLES = ("curves", "outcomes")
+    _FORMAT = "%.10g"
 
     curves: tuple[FragilityCurve, ...]
     measure: Measure
@@ -79,7 +80,6 @@ class Fragility(Tabled):
     source: str = "motion"
 
     def summary(self) -> str:
-        """Median and dispersion of each limit state with their intervals, in a table."""
         scale = self.measure.scale
         rows = [
             [
@@ -133,7 +133,6 @@ class Fragility(Tabled):
         return f"{count} cannot tell how far {self.source}s differ; give 3 or more"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return curves and outcomes by name; intensities in SI units."""
         return {
             "block": None if self.block is None else self.block.description,
             "description": self.description,
@@ -150,12 +149,12 @@ class Fragility(Tabled):
         """Where intervals and bands come from: "likelihood" or "bootstrap"."""
         return "bootstrap" if isinstance(self.curves[0].uncertainty, Resamples) else "likelihood"
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         curves = ", ".join(
             f"{one.limit_state}: median {in_units(one.median, self.measure)}, dispersion {one.dispersion:.3g}"
             for one in self.curves
         )
-        return f"<Fragility: {self.description}; {self.measure.label}; {curves}>"
+        return f"{self.description}; {self.measure.label}; {curves}"
 
     def curve(self, limit_state: str) -> FragilityCurve:
         """Curve of a limit state.
@@ -329,7 +328,7 @@ class Fragility(Tabled):
         about = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
         nrml.write(path, function, states, self.description, **about)
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot import FragilityLine, fragility_figure
 
         first = self.curves[0]
