@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 import rocking
 from rocking.analysis.calibration import evidence as population
-from rocking.analysis.calibration.diagnostics import Scores, leaning
+from rocking.analysis.calibration.diagnostics import Scores, bounds_reached
 from rocking.analysis.calibration.evidence import WIDENED, Candidates, Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
 from rocking.analysis.calibration.search import AGREEMENT, Problem, posterior, r_hat, search
@@ -230,7 +230,7 @@ def test_one_unknown_angle_is_found_from_forty_tests():
 
 def test_a_posterior_that_leans_on_a_bound_is_told_with_the_mend(shaken):
     found = rocking.calibrate(*shaken, candidates=256, p=(1.0, 2.5), two_sided=False, model="linear")
-    ends = {(one.name, one.end) for one in found.diagnostics.leaning}
+    ends = {(one.name, one.end) for one in found.diagnostics.bounds_reached}
     assert ("p", "upper") in ends
     assert "p leans on its upper bound of 2.5 rad/s" in found.summary()
     assert "set that of p to 5" in found.summary()
@@ -763,6 +763,6 @@ def test_a_posterior_whose_interval_ends_at_a_bound_is_told(share, told):
     space = Space.of((1.0, 10.0), 0.2, 0.9, two_sided=False)
     ends = np.log([9.9, 3.0])
     centres = np.repeat(ends, [round(1000 * share), 1000 - round(1000 * share)])[:, None]
-    notes = [str(one) for one in leaning(space, centres)]
+    notes = [str(one) for one in bounds_reached(space, centres)]
     assert len(notes) == told
     assert all("8 % of the posterior" in note and "sets the upper end of the interval" in note for note in notes)

@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 
 import rocking
 from rocking import InvalidOption, fit_fragility, fragility
-from rocking.analysis.fragility import Band
+from rocking.analysis import Band
 from rocking.block import Blocks
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "fragility.py"

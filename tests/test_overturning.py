@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 import rocking
-from rocking.analysis.boundaries import boundaries
+from rocking.analysis.levels import boundaries
 from rocking.analysis.overturning import mode_name, overturning_map
 from rocking.block import Blocks
 from rocking.engine import Setup, simulate_each

@@ -61,7 +61,9 @@ def compare_measures(
         How much each of several blocks counts, as those of a calibration; by default all alike.
     tolerance : float
         Width of the intensities at overturning, relative to them.
-    threads, progress
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
         As for `simulate_many`.
 
     Returns

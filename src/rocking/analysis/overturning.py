@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.analysis.boundaries import Boundaries, boundaries
+from rocking.analysis.levels import Boundaries, boundaries
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks, one_block
 from rocking.body import Body
@@ -110,7 +110,7 @@ def overturning_map(
         Number of threads; by default one for every core.
     progress : bool, optional
         Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
-    **parameters
+    **parameters : object
         Further numbers of a pulse given by name, as the function of that name in `rocking.pulses` takes them.
 
     Returns
@@ -147,10 +147,8 @@ def overturning_map(
     >>> print(f"{float(result.overturning_amplitude[0]):.7f}")
     1.8007239
     """
-    levels, ratios = (
-        checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption),
-        checks.increasing_numbers(frequencies, "frequencies", InvalidOption),
-    )
+    levels = checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption)
+    ratios = checks.increasing_numbers(frequencies, "frequencies", InvalidOption)
     checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
     one_block(block)
@@ -182,6 +180,16 @@ def overturning_map(
 def mode_name(mode: int) -> str:
     """Return a mode of `overturning_map` in words.
 
+    Parameters
+    ----------
+    mode : int
+        A `Mode`, or how many impacts an overturning block has had.
+
+    Returns
+    -------
+    str
+        "rocks until the pulse is over", "overturns after 2 impacts".
+
     Examples
     --------
     >>> mode_name(-2), mode_name(0), mode_name(1)
@@ -205,6 +213,8 @@ def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
 @dataclass(frozen=True, eq=False, repr=False)
 class OverturningMap(DatasetResult):
     """What a pulse does to a block, over amplitude and frequency; from `overturning_map`.
+
+    Its figure has the modes as regions between the refined boundaries.
 
     Attributes
     ----------
@@ -266,15 +276,6 @@ class OverturningMap(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the modes as regions between the refined boundaries, in a new figure or in `ax`.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
-        title, figsize
-            Title, by default the pulse and the block; width and height of a new figure, inches.
-        """
         from rocking.plot import regions_figure
 
         data = self.data

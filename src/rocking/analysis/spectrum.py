@@ -76,7 +76,13 @@ def rocking_spectrum(
         How much each block of an ensemble counts; by default all alike.
     fractiles : sequence of float
         Shares, in (0, 1), of motions (and of the ensemble's weight) that stay below the fractile curves.
-    model, chattering, threads, progress
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    chattering : str or Treatment
+        As for `simulate`.
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
         As for `simulate_many`.
 
     Returns
@@ -232,14 +238,29 @@ class RockingSpectrum(DatasetResult):
             Where to draw; by default in a new figure.
         against : {"p", "period", "size"}
             Abscissa.
-        title, figsize
-            Title, by default the motion or the number of motions, the block's slenderness (and restitution) if it is
-            one, and the model; width and height of a new figure, inches.
+        title : str
+            Title; by default the motion or the number of motions, the block's slenderness (and restitution) if it is
+            one, and the model.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The new figure, or that of `ax`.
 
         Raises
         ------
         InvalidOption
             If there are more than four combinations of slenderness and restitution, or no such abscissa.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0], alpha=[0.2], restitution=[0.9])
+        >>> spectrum = rocking_spectrum(blocks, rocking.pulses.one_sine(5.0, 1.0))
+        >>> spectrum.plot(against="size", title="pulse").axes[-1].get_xlabel()
+        'half diagonal R (m)'
         """
         from rocking.plot import SpectrumCurves, spectrum_figure
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.analysis.fragility.curve import FragilityCurve, in_units
-from rocking.analysis.hazard import HazardCurve
+from rocking.analysis.hazard import HazardCurve, hazard_line
 from rocking.analysis.risk import Rate
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
@@ -175,7 +175,7 @@ class Survival(DrawnResult):
             largest=self.curve.largest_rate(at, self.years, self.confidence),
             largest_label=f"at most, with {counted(self.years, 'year')} without {self.curve.limit_state} "
             f"({100.0 * self.confidence:g} %)",
-            hazard=None if self.hazard is None else self.hazard.line(at),
+            hazard=None if self.hazard is None else hazard_line(self.hazard, at),
             intensity_label=self.measure.label,
             title=title or self.description,
             ax=ax,

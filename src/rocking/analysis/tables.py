@@ -52,18 +52,8 @@ class Ensemble:
 
 
 @dataclass(frozen=True)
-class Table:
-    """Cells of a table by the names of its columns.
-
-    Attributes
-    ----------
-    path : Path
-        File.
-    columns : tuple of str
-        Names of the columns.
-    rows : tuple of (int, dict)
-        Line number and cells of each row.
-    """
+class _Table:
+    """Names of the columns of a file, and line number and cells by those names of each row."""
 
     path: Path
     columns: tuple[str, ...]
@@ -148,7 +138,7 @@ def read_ensemble(path: Path) -> Ensemble:
     return Ensemble(blocks, table.numbers("weight"), models.pop())
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> _Table:
     """Read a CSV table with a header.
 
     Raises
@@ -170,10 +160,10 @@ def read_table(path: Path) -> Table:
         if len(row) != len(columns):
             found = f"{counted(len(row), 'cell')} under {counted(len(columns), 'column')}"
             raise UnreadableRecord(f"{found}; correct it", path=str(path), line=line)
-    return Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
+    return _Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
 
-def _by_specimen(table: Table) -> dict[str, Table]:
+def _by_specimen(table: _Table) -> dict[str, _Table]:
     """Rows of each specimen, in the order in which the specimens come."""
     rows: dict[str, list[tuple[int, dict[str, str]]]] = {}
     for line, row in table.rows:
@@ -189,7 +179,7 @@ def _folder_name(text: str) -> str:
     return text
 
 
-def outcomes_of(table: Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
+def outcomes_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
     """Return motions and outcomes of a table with these columns; an error says the line."""
     motions, overturned = [], table.answers("overturned")
     several = len({row["motion"] for _, row in table.rows}) > 1
@@ -247,7 +237,7 @@ def read_observed(
     return observed | {"description": f"{counted(outcomes, 'observed outcome')} in {path.name}"}
 
 
-def _against_intensity(table: Table, names: dict[str, str], heading: str, measure: Measure) -> dict[str, Any]:
+def _against_intensity(table: _Table, names: dict[str, str], heading: str, measure: Measure) -> dict[str, Any]:
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
         raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period", path=str(table.path))
@@ -261,7 +251,7 @@ def _against_intensity(table: Table, names: dict[str, str], heading: str, measur
     }
 
 
-def _under_motions(table: Table, measure: Measure, **files: Any) -> dict[str, Any]:
+def _under_motions(table: _Table, measure: Measure, **files: Any) -> dict[str, Any]:
     if measure.in_block_units:
         raise InvalidOption(f"{measure.name} counts in a block's own unit, which outcomes do not tell: take pga")
     tests = outcomes_of(table, **files)

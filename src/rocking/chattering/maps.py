@@ -213,9 +213,24 @@ class ChatteringMap(DatasetResult):
             Where to draw; by default in a new figure.
         labels : mapping of str to str, optional
             What to write at the axes in place of the parameters' names.
-        title, figsize
-            Title, by default the motion, the block and the model, as far as they are the same all over the map; width
-            and height of a new figure, inches.
+        title : str
+            Title; by default the motion, the block and the model, as far as they are the same all over the map.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The new figure, or that of `ax`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> from rocking.chattering import families
+        >>> block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
+        >>> found = chattering_map(families.sine(block), {"a": [1.03, 1.05], "omega": [1.0, 2.0]})
+        >>> found.plot(labels={"omega": "ω"}).axes[0].get_xlabel()
+        'ω'
         """
         from rocking.plot.maps import outcome_figure
 

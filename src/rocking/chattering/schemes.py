@@ -198,11 +198,17 @@ def compare_schemes(
 
     Parameters
     ----------
-    block, motion, model, initial_rotation, initial_velocity
-        The case, as for `rocking.simulate`.
-    schemes : sequence of treatments
+    block : Block
+        What rocks.
+    motion : Motion or None
+        What shakes it.
+    schemes : sequence of Treatment
         By default velocity thresholds from 5e-10 to 5e-2 (both in the paper's Fig. 11), intervals of 1e-9 and 1e-3 s,
         and the paper's asymptotic time.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    initial_rotation, initial_velocity : float
+        As for `rocking.simulate`.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, astuple, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.analysis.calibration.diagnostics import Diagnostics, Scores
-from rocking.analysis.calibration.evidence import Evidence, blurred, expected_share, unpacked
+from rocking.analysis.calibration.diagnostics import Diagnostics, Scores, diagnosed
+from rocking.analysis.calibration.evidence import Evidence as _Evidence
+from rocking.analysis.calibration.evidence import blurred, expected_share, unpacked
 from rocking.analysis.calibration.search import Problem, posterior, search, systematic
 from rocking.analysis.calibration.space import SIDED, Knowledge, Space, unit_of
-from rocking.analysis.fragility.fit import OVERTURNING, fragility
+from rocking.analysis.fragility.fit import fragility
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
@@ -25,7 +26,6 @@ from rocking.errors import InvalidOption
 from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.motion import Motion
-from rocking.motion.scaling import IntensityName, Measure
 from rocking.result import DrawnResult, TableResult
 from rocking.tables import counted, named, text_table
 
@@ -89,7 +89,7 @@ class Validation:
     @property
     def scores(self) -> Scores:
         """Mean scores of the repeats."""
-        return Scores.mean(self.repeats)
+        return Scores(*np.mean([astuple(one) for one in self.repeats], axis=0).tolist())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -123,7 +123,7 @@ class Calibration(DrawnResult, TableResult):
         What the search started from.
     diagnostics : Diagnostics
         How far this can be trusted: effective candidates, agreement of runs, bounds that the posterior
-        leans on. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
+        reaches. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
     """
 
     TABLES = ("ensemble",)
@@ -139,7 +139,7 @@ class Calibration(DrawnResult, TableResult):
     lapse: float
     seed: int
     diagnostics: Diagnostics
-    _evidence: Evidence = field(repr=False)
+    _evidence: _Evidence = field(repr=False)
 
     @property
     def scores(self) -> Scores:
@@ -158,7 +158,9 @@ class Calibration(DrawnResult, TableResult):
         ----------
         motions : Motion or sequence of Motion
             m motions.
-        threads, progress
+        threads : int, optional
+            As for `simulate_many`.
+        progress : bool, optional
             As for `simulate_many`.
 
         Returns
@@ -170,6 +172,14 @@ class Calibration(DrawnResult, TableResult):
         ------
         InvalidMotion
             If one is no motion.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+        >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
+        True
         """
         if not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
@@ -199,8 +209,10 @@ class Calibration(DrawnResult, TableResult):
             Number of parts, and of random divisions into parts.
         seed : int
             Seeds the divisions.
-        threads, progress
-            As for `simulate_many`; the number of threads changes no result.
+        threads : int, optional
+            As for `simulate_many`; it changes no result.
+        progress : bool, optional
+            As for `simulate_many`.
 
         Returns
         -------
@@ -214,7 +226,15 @@ class Calibration(DrawnResult, TableResult):
 
         See Also
         --------
-        rocking.analysis.calibration.Scores : accuracy, log loss and Brier score.
+        rocking.analysis.Scores : accuracy, log loss and Brier score.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+        >>> found.cross_validate(folds=2).probabilities.shape
+        (1, 4)
         """
         labels = _labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
@@ -230,26 +250,17 @@ class Calibration(DrawnResult, TableResult):
                 row[left_out] = wanted.probabilities(drawn).mean(axis=0)
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
-    def fragility(
-        self,
-        motions: Motions,
-        *,
-        measure: IntensityName | Measure = "pga",
-        levels: ArrayLike | None = None,
-        limits: Mapping[str, float] = OVERTURNING,
-        model: Model | None = None,
-        **options: Any,
-    ) -> Fragility:
+    def fragility(self, motions: Motions, *, model: Model | None = None, **options: Any) -> Fragility:
         """Fit the specimen's fragility: the ensemble with its weights, in the equation of motion of the calibration.
 
         Parameters
         ----------
-        motions, measure, levels, limits
-            As for `rocking.fragility`.
+        motions : Motion, sequence of Motion, or mapping of str to Motion
+            m motions.
         model : {"linear", "nonlinear"}, optional
             Equation of motion, if not that of the calibration.
-        **options
-            Further arguments of `rocking.fragility`: polarity, band, ...
+        **options : object
+            Further arguments of `rocking.fragility`: measure, levels, limits, polarity, band, ...
 
         Returns
         -------
@@ -262,45 +273,48 @@ class Calibration(DrawnResult, TableResult):
         ------
         InvalidOption, InvalidMotion
             As `rocking.fragility`.
-        """
-        return fragility(
-            self.blocks,
-            motions,
-            weights=self.weights,
-            model=self.model if model is None else model,
-            measure=measure,
-            levels=levels,
-            limits=limits,
-            **options,
-        )
 
-    def spectrum(
-        self,
-        motions: Motions,
-        *,
-        model: Model | None = None,
-        **options: Any,
-    ) -> RockingSpectrum:
+        Examples
+        --------
+        >>> import rocking
+        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+        >>> found.fragility(pulses, levels=[2.0, 3.0, 4.0, 6.0]).model
+        'nonlinear'
+        """
+        chosen = self.model if model is None else model
+        return fragility(self.blocks, motions, weights=self.weights, model=chosen, **options)
+
+    def spectrum(self, motions: Motions, *, model: Model | None = None, **options: Any) -> RockingSpectrum:
         """Peak rotation of the specimen, and of larger and smaller ones of its shape, with the ensemble's weights.
 
         Parameters
         ----------
-        motions : Motion or sequence of Motion
+        motions : Motion, sequence of Motion, or mapping of str to Motion
             m motions.
         model : {"linear", "nonlinear"}, optional
             Equation of motion, if not that of the calibration.
-        **options
+        **options : object
             Further arguments of `rocking.rocking_spectrum`: p (rad/s, to which the ensemble's median is moved; by
             default half to twice its own) or size, fractiles, ...
 
         Returns
         -------
         RockingSpectrum
+            Fractiles of the motions and of the ensemble's weight together.
 
         Raises
         ------
         InvalidOption, InvalidMotion
             As `rocking.rocking_spectrum`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+        >>> found.spectrum(pulses, p=[1.0, 2.0]).sizes["p"]
+        2
         """
         chosen = self.model if model is None else model
         return rocking_spectrum(self.blocks, motions, weights=self.weights, model=chosen, **options)
@@ -333,7 +347,7 @@ class Calibration(DrawnResult, TableResult):
             "overturned": int(self.observed.sum()),
             "estimates": {name: asdict(one) for name, one in self.estimates.items()},
             "fitted": asdict(self.scores),
-            "diagnostics": self.diagnostics.to_dict(),
+            "diagnostics": {**asdict(self.diagnostics), "notes": self.diagnostics.notes},
             "probabilities": self.probabilities,
         }
 
@@ -420,7 +434,9 @@ def calibrate(
         Most blocks that are kept for predictions.
     seed : int
         The same seed gives the same result.
-    threads, progress
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
         As for `simulate_many`.
 
     Returns
@@ -502,7 +518,7 @@ def calibrate(
         model=model,
         lapse=lapse,
         seed=seed,
-        diagnostics=Diagnostics.of(found, final),
+        diagnostics=diagnosed(found, final),
         _evidence=evidence,
     )
 

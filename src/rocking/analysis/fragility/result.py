@@ -12,11 +12,10 @@ import numpy as np
 
 from rocking import checks
 from rocking.analysis.fragility import nrml
-from rocking.analysis.fragility.confidence import Resamples
 from rocking.analysis.fragility.curve import FragilityCurve, in_units, interval_text
 from rocking.analysis.fragility.lognormal import groups
 from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.risk import Risk
+from rocking.analysis.risk import Risk, risk_of
 from rocking.analysis.survival import Survival
 from rocking.arrays import Floats
 from rocking.block import Block
@@ -147,7 +146,7 @@ class Fragility(DrawnResult, TableResult):
     @property
     def band_kind(self) -> str:
         """Where intervals and bands come from: "likelihood" or "bootstrap"."""
-        return "bootstrap" if isinstance(self.curves[0].uncertainty, Resamples) else "likelihood"
+        return "likelihood" if math.isnan(self.curves[0].degenerate) else "bootstrap"
 
     def _headline(self) -> str:
         curves = ", ".join(
@@ -167,11 +166,18 @@ class Fragility(DrawnResult, TableResult):
         Returns
         -------
         FragilityCurve
+            Its curve.
 
         Raises
         ------
         InvalidOption
             If there is none of that name.
+
+        Examples
+        --------
+        >>> from rocking import fit_fragility
+        >>> fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curve("overturning").clusters
+        4
         """
         curves = {curve.limit_state: curve for curve in self.curves}
         return curves[checks.one_of(limit_state, "limit_state", InvalidOption, list(curves))]
@@ -208,7 +214,7 @@ class Fragility(DrawnResult, TableResult):
         >>> f"{one.annual_rate:.6f} {one.probability(50.0):.4f}"
         '0.000434 0.0215'
         """
-        return Risk.of(self.curves, hazard, self.measure, self.description)
+        return risk_of(self.curves, hazard, self.measure, self.description)
 
     def survival(
         self,
@@ -316,6 +322,13 @@ class Fragility(DrawnResult, TableResult):
         Units become OpenQuake's: PGA and SA in g, PGV in cm/s. A measure in a block's own unit becomes PGA or PGV of
         that block. The range of validity is that of the data. A block cannot move below its uplift acceleration, which
         is written as the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from rocking import fit_fragility
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).to_nrml(f"{folder}/model.xml")
         """
         chosen = self.block if block is None else block
         scale = nrml.scale_of(self.measure, chosen, self.model)
