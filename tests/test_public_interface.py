@@ -15,7 +15,7 @@ SHAKES = {"motion", "motions", "pulse"}
 OTHER_WORDS = {"t": "time", "scale": "levels", "pga": "measure", "pgv": "measure", "sa": "measure"}
 
 #: Most parameters of one function.
-MOST = 14
+MOST = 13
 
 
 def parameters_of(value: Any) -> dict[str, inspect.Parameter]:

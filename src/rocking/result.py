@@ -355,6 +355,11 @@ class DatasetResult(DrawnResult, TableResult):
         return f"<p><b>{type(self).__name__}</b>: {self._headline()}</p>{html}"
 
 
+def variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: str = "") -> tuple[Any, Any, Any]:
+    """Return a variable of a dataset: its dimensions, its values, and its unit and meaning where there are any."""
+    return dims, values, {name: said for name, said in (("units", unit), ("long_name", meaning)) if said}
+
+
 def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """Table of at most a dozen rows, evenly from the first to the last; it says so where there are more.
 

@@ -19,7 +19,7 @@ from rocking.errors import InvalidOption
 from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.scaling import Measure
-from rocking.result import DatasetResult
+from rocking.result import DatasetResult, variable
 from rocking.tables import counted, text_table
 
 if TYPE_CHECKING:
@@ -236,20 +236,14 @@ def _dataset(
     spread = "standard deviation of the logarithm of the intensity at overturning"
     return xr.Dataset(
         {
-            "intensity": (("measure", "motion", "block"), intensity, {"long_name": "lowest intensity that overturns"}),
-            "median_intensity": (
-                "measure",
-                np.exp(mean),
-                {"long_name": "median of the intensities at overturning, in the measure's unit"},
+            "intensity": variable(("measure", "motion", "block"), intensity, "lowest intensity that overturns"),
+            "median_intensity": variable(
+                "measure", np.exp(mean), "median of the intensities at overturning, in the measure's unit"
             ),
-            "dispersion": ("measure", about_own, {"units": "1", "long_name": f"{spread} about each block's own mean"}),
-            "dispersion_low": ("measure", low * about_own, {"units": "1", "long_name": "lower end of its interval"}),
-            "dispersion_high": ("measure", high * about_own, {"units": "1", "long_name": "upper end of its interval"}),
-            "dispersion_of_all": (
-                "measure",
-                np.sqrt(of_all),
-                {"units": "1", "long_name": f"{spread} about one mean of all blocks"},
-            ),
+            "dispersion": variable("measure", about_own, f"{spread} about each block's own mean", "1"),
+            "dispersion_low": variable("measure", low * about_own, "lower end of its interval", "1"),
+            "dispersion_high": variable("measure", high * about_own, "upper end of its interval", "1"),
+            "dispersion_of_all": variable("measure", np.sqrt(of_all), f"{spread} about one mean of all blocks", "1"),
         },
         {
             "measure": [_name(measure) for measure in measures],

@@ -215,7 +215,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         >>> pulse = rocking.pulses.one_sine(1.0, 1.0)
         >>> found = incremental_dynamic_analysis(block, pulse, measure="pga_ratio", levels=[1.0, 5.0])
         >>> [(round(start, 4), end) for start, end in found.bands()]
-        [(1.8136, nan)]
+        [(1.4425, nan)]
         """
         mine = (self.data.band_motion.values == motion) & (self.data.band_block.values == block)
         starts, ends = self.data.band_start.values[mine], self.data.band_end.values[mine]
@@ -307,8 +307,8 @@ class IncrementalDynamicAnalysis(DatasetResult):
         >>> import rocking
         >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
         >>> found = incremental_dynamic_analysis(block, rocking.pulses.one_sine(1.0, 1.0), levels=[1.0, 5.0])
-        >>> found.plot(block=0, title="pulse").axes[0].get_title()
-        'pulse'
+        >>> len(found.plot(block=0).axes)
+        2
         """
         from rocking.plot import ScaledMotion, ida_figure
 

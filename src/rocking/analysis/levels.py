@@ -88,14 +88,7 @@ def simulate_levels(
 ) -> xr.Dataset:
     """Simulate every block under every motion at every level; as `simulate_many`, with the dimension ``level``.
 
-    Parameters
-    ----------
-    blocks, motions, model, **options
-        As for `simulate_many`.
-    measure : Measure
-        What the motions are scaled to; one that counts in a block's own unit scales them for each block.
-    levels : ndarray
-        Levels of the measure.
+    A measure that counts in a block's own unit scales the motions for each block.
     """
     import xarray as xr
 

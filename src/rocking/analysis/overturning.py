@@ -25,7 +25,7 @@ from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_family
 from rocking.progress import Progress
-from rocking.result import DatasetResult, table_of_some
+from rocking.result import DatasetResult, table_of_some, variable
 from rocking.simulation import simulate
 from rocking.tables import cell, named, text_table
 from rocking.treatment import Certified
@@ -383,25 +383,19 @@ def _dataset(
     over = "over the smallest acceleration that lifts the block"
     return xr.Dataset(
         {
-            "mode": (("amplitude", "frequency"), modes, {"long_name": meaning}),
-            "peak_rotation": (
-                ("amplitude", "frequency"),
-                peaks,
-                {"units": "rad", "long_name": "largest rotation in size"},
+            "mode": variable(("amplitude", "frequency"), modes, meaning),
+            "peak_rotation": variable(("amplitude", "frequency"), peaks, "largest rotation in size", "rad"),
+            "overturning_amplitude": variable(
+                "frequency", lowest, f"lowest amplitude that overturns the block, {over}", "1"
             ),
-            "overturning_amplitude": (
-                "frequency",
-                lowest,
-                {"units": "1", "long_name": f"lowest amplitude that overturns the block, {over}"},
-            ),
-            "boundary_frequency": ("boundary", ratios[edges.column], {"units": "1"}),
-            "boundary_amplitude": ("boundary", edges.level, {"units": "1"}),
-            "mode_below": ("boundary", edges.below, {"long_name": meaning}),
-            "mode_above": ("boundary", edges.above, {"long_name": meaning}),
+            "boundary_frequency": variable("boundary", ratios[edges.column], unit="1"),
+            "boundary_amplitude": variable("boundary", edges.level, unit="1"),
+            "mode_below": variable("boundary", edges.below, meaning),
+            "mode_above": variable("boundary", edges.above, meaning),
         },
         {
-            "amplitude": ("amplitude", levels, {"units": "1", "long_name": f"amplitude of the pulse {over}"}),
-            "frequency": ("frequency", ratios, {"units": "1", "long_name": "2 pi times the pulse's frequency, over p"}),
+            "amplitude": variable("amplitude", levels, f"amplitude of the pulse {over}", "1"),
+            "frequency": variable("frequency", ratios, "2 pi times the pulse's frequency, over p", "1"),
         },
         attributes,
     )

@@ -23,7 +23,7 @@ from rocking.model import Model
 from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
 from rocking.motion.motion import Motion
-from rocking.result import DatasetResult, table_of_some
+from rocking.result import DatasetResult, table_of_some, variable
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -397,34 +397,20 @@ def _described_spectrum(
     words = "over the slenderness; infinite where the block overturns"
     return xr.Dataset(
         {
-            "peak_rotation": (
-                ("motion", *names),
-                peak,
-                {"units": "rad", "long_name": "peak rotation; pi/2: overturns"},
-            ),
-            "peak_over_alpha": (("motion", *names), over_alpha, {"units": "1", "long_name": f"peak rotation {words}"}),
+            "peak_rotation": variable(("motion", *names), peak, "peak rotation; pi/2: overturns", "rad"),
+            "peak_over_alpha": variable(("motion", *names), over_alpha, f"peak rotation {words}", "1"),
             "overturned": (("motion", *names), overturned, table.overturned.attrs),
-            "fractile_over_alpha": (
-                ("fractile", *dims),
-                fractiles,
-                {"units": "1", "long_name": f"fractile of the peak rotation {words}"},
+            "fractile_over_alpha": variable(
+                ("fractile", *dims), fractiles, f"fractile of the peak rotation {words}", "1"
             ),
-            "overturned_share": (
-                dims,
-                share,
-                {"units": "1", "long_name": "share of the motions that overturn the block"},
-            ),
+            "overturned_share": variable(dims, share, "share of the motions that overturn the block", "1"),
         },
         {
             "motion": table.motion,
             **{name: table[name] for name in ("vertical",) if name in table.coords},
-            **{name: (name, values, {"units": _UNITS[name]}) for name, values in axes.items()},
-            "period": ("p", 2.0 * np.pi / axes["p"], {"units": "s", "long_name": "2 pi/p"}),
-            "size": (
-                "p",
-                0.75 * gravity / axes["p"] ** 2,
-                {"units": "m", "long_name": "half diagonal of the rectangular block"},
-            ),
+            **{name: variable(name, values, unit=_UNITS[name]) for name, values in axes.items()},
+            "period": variable("p", 2.0 * np.pi / axes["p"], "2 pi/p", "s"),
+            "size": variable("p", 0.75 * gravity / axes["p"] ** 2, "half diagonal of the rectangular block", "m"),
         },
         {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions", "histories")},
     )

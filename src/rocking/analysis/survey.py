@@ -41,16 +41,7 @@ _SLIDING: Final = named("sliding_time", "s")
 class BlockUnderRecords(TableResult):
     """One block under several motions: a table "records" with a row for each, also for those that could not be read.
 
-    Attributes
-    ----------
-    block : Block
-        What rocks.
-    records : tuple of str
-        Name of each motion.
-    responses : tuple of Response
-        Response to each.
-    skipped : mapping of str to str
-        Records that could not be read, and why.
+    `records` are the names of the motions; `skipped` says why records could not be read.
     """
 
     TABLES = ("records",)

@@ -129,7 +129,7 @@ def ricker(
     --------
     >>> import rocking
     >>> ricker(rocking.Block(width=0.2, height=0.8))(1.5, 2.0).motion.name
-    'ricker'
+    'symmetric Ricker'
     """
     scale = _threshold(block, model)
     return lambda a, omega: SimulationInput(block, pulses.ricker(a * scale, _hertz(block, omega), kind=kind), model)

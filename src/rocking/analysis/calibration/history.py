@@ -411,13 +411,7 @@ def _result(problem: _HistoryProblem, logs: Floats) -> HistoryCalibration:
 
 
 def _covariance(problem: _HistoryProblem, logs: Floats, residuals: Floats) -> Floats:
-    """Covariance of the logarithms: inverse curvature times the residuals' variance, allowing for their correlation.
-
-    Raises
-    ------
-    InvalidOption
-        If the history says nothing of an unknown, or not enough to tell them all apart.
-    """
+    """Covariance of the logarithms: inverse curvature times the residuals' variance, allowing for their correlation."""
     variance = float((residuals**2).sum()) / (len(residuals) - len(logs)) * _integrated_autocorrelation(residuals)
     slopes = _slopes(problem, logs, math.sqrt(variance))
     sizes = np.linalg.norm(slopes, axis=0)

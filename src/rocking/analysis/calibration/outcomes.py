@@ -569,13 +569,7 @@ def _side_dispersions(space: Space, populations: Floats) -> Floats:
 
 
 def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
-    """Outcomes as an array of their own that nobody can change.
-
-    Raises
-    ------
-    InvalidOption
-        If they are not yes or no, not one for each motion, or all the same.
-    """
+    """Outcomes as an array that nobody can change: yes or no, one for each motion, and not all the same."""
     values = np.asarray(overturned)
     if values.shape != (count,):
         raise InvalidOption(

@@ -347,11 +347,6 @@ def fitted_curve(
 
     Outcomes may count in parts, as those of blocks with weights do. Without clusters every trial is on its own, also
     where several are at one intensity.
-
-    Raises
-    ------
-    InvalidOption
-        If no rising lognormal fits best, or its median is far beyond the intensities.
     """
     intensity, exceeded, trials = data
     z = np.log(intensity)

@@ -32,15 +32,7 @@ _GROUPS: Final = 10
 
 
 class Outcomes(NamedTuple):
-    """Outcomes of one data set, or of several at the same intensities.
-
-    Attributes
-    ----------
-    z : ndarray, shape (n,)
-        Logarithms of the intensity.
-    exceeded, trials : ndarray, shape (n,) or (sets, n)
-        Outcomes that exceeded, of how many, at each.
-    """
+    """Outcomes that exceeded, of how many trials, at n logarithms of the intensity, of one data set or of several."""
 
     z: Floats
     exceeded: Floats

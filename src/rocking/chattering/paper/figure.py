@@ -269,7 +269,7 @@ class PaperFigure(TableResult):
         Examples
         --------
         >>> from rocking.chattering import paper_figure
-        >>> len(paper_figure(5).draw().axes)
+        >>> len(paper_figure(6).draw("surface").axes)
         1
         """
         chosen = next(iter(self.drawings)) if drawing is None else drawing
