@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from rocking.arrays import Flags, Floats
@@ -34,3 +36,11 @@ def halved(low: Floats, high: Floats, in_upper: Flags, in_lower: Flags) -> tuple
     """
     between = middle(low, high)
     return np.where(in_upper, between, low), np.where(in_lower, between, high)
+
+
+def last_that_holds(holds: Callable[[float], bool], low: float, high: float, width: float) -> float:
+    """Return a number, from `low` where something holds to `high` where not, at which it holds and so far above not."""
+    while high - low > width:
+        between = 0.5 * (low + high)
+        low, high = (between, high) if holds(between) else (low, between)
+    return low

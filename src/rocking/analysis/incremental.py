@@ -277,12 +277,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         }
 
     def plot(
-        self,
-        ax: Axes | None = None,
-        *,
-        block: int = 0,
-        title: str = "",
-        figsize: tuple[float, float] | None = None,
+        self, ax: Axes | None = None, *, block: int = 0, title: str = "", figsize: tuple[float, float] | None = None
     ) -> Figure:
         """Draw level against peak rotation for one block, and the bands of levels that overturn it.
 

@@ -171,12 +171,7 @@ class Survey(BlockUnderRecords):
 
 
 def survey(
-    block: Block,
-    motions: Motions,
-    *,
-    friction: float | None = None,
-    progress: bool | None = None,
-    **options: Any,
+    block: Block, motions: Motions, *, friction: float | None = None, progress: bool | None = None, **options: Any
 ) -> Survey:
     """Simulate a block under many motions.
 

@@ -329,16 +329,9 @@ class Calibration(DrawnResult, TableResult):
             for name, one in self.estimates.items()
         ]
         alike = 1.0 / float((self.weights**2).sum())
-        lines = [
-            self._headline(),
-            "",
-            text_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows),
-            "",
-            f"ensemble of {counted(len(self.blocks), 'block')}, equivalent to {alike:.0f} of equal weight",
-            f"fitted motions: {self.scores}",
-            str(self.diagnostics),
-        ]
-        return "\n".join(lines)
+        table = text_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows)
+        ensemble = f"ensemble of {counted(len(self.blocks), 'block')}, equivalent to {alike:.0f} of equal weight"
+        return f"{self._headline()}\n\n{table}\n\n{ensemble}\nfitted motions: {self.scores}\n{self.diagnostics}"
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -455,16 +448,13 @@ def calibrate(
     A specimen differs a little from test to test, and no rigid plane block is a real rock. So each test is taken to
     have its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratio of the
     sides' slendernesses. The probability of an outcome is the share of the population that behaves so (and a small
-    lapse); a common dispersion of both slendernesses is, in the linear model, the same as one of the motion's
-    amplitude. The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006),
-    with the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %). The
-    likelihood is derived in the documentation's page on calibration.
+    lapse). The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with
+    the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %).
 
-    The search is global. Two independent runs each fill the bounds evenly, then try blocks where their own fits say:
-    first where they are fair, in the end where they are best. A candidate weighs what the density of candidates lacks,
-    so that the prior stays what it was (deterministic mixture; Owen and Zhou 2000). While the runs disagree, or few
-    candidates tell what a typical population does, they go on; the result is drawn from the candidates of both. What is
-    left of a disagreement, few effective candidates, or a posterior that leans on a bound, is said in the summary.
+    The search is global. Two independent runs each fill the bounds evenly, then try blocks where their own fits say. A
+    candidate weighs what the density of candidates lacks, so that the prior stays what it was (deterministic mixture;
+    Owen and Zhou 2000). What is left of a disagreement between the runs, few effective candidates, or a posterior that
+    reaches a bound, is said in the summary.
 
     Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
     predictions are not.
@@ -534,38 +524,29 @@ def _outcomes(
 
 def _distinct(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
     """Motions that differ, and which of them each one is: the same command is often given several times."""
-    places: dict[tuple[bytes, ...], int] = {}
-    distinct: list[Motion] = []
+    places: dict[tuple[bytes, ...], tuple[int, Motion]] = {}
     which = []
     for motion in motions:
         parts = [part for part in (motion, motion.vertical) if part is not None]
         key = tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients))
-        if key not in places:
-            places[key] = len(distinct)
-            distinct.append(motion)
-        which.append(places[key])
-    return distinct, which
+        which.append(places.setdefault(key, (len(places), motion))[0])
+    return [motion for _, motion in places.values()], which
 
 
 def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
-    dispersion = _side_dispersions(space, populations).mean(axis=0)
-    tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
-    estimates = {}
-    for name, values in space.named(unpacked(populations)[0]).items():
-        median, lower, upper = (float(value) for value in np.quantile(values, tails))
-        estimates[name] = Estimate(median, lower, upper, float(dispersion[space.unknown.index(name.partition("_")[0])]))
-    return estimates
-
-
-def _side_dispersions(space: Space, populations: Floats) -> Floats:
-    """Return standard deviations of the logarithm of each unknown parameter on either side, shape (c, f)."""
-    dispersion = unpacked(populations)[1]
-    sides = dispersion[:, : len(space.unknown)].copy()
+    centres, dispersions = unpacked(populations)
+    sides = dispersions[:, : len(space.unknown)].copy()
     if space.two_sided:
         # The side's logarithm is that of the mean plus or minus half that of the ratio.
         sided = space.unknown.index(SIDED)
-        sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersion[:, -1])
-    return sides
+        sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersions[:, -1])
+    dispersion = dict(zip(space.unknown, sides.mean(axis=0).tolist(), strict=True))
+    tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
+    estimates = {}
+    for name, values in space.named(centres).items():
+        median, lower, upper = np.quantile(values, tails).tolist()
+        estimates[name] = Estimate(median, lower, upper, dispersion[name.partition("_")[0]])
+    return estimates
 
 
 def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
