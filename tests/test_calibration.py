@@ -17,7 +17,7 @@ from rocking.analysis.calibration.evidence import WIDENED, Candidates, Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
 from rocking.analysis.calibration.search import AGREEMENT, Problem, posterior, r_hat, search
 from rocking.analysis.calibration.space import Space
-from rocking.analysis.tables import read_ensemble
+from rocking.analysis.tables import read_calibration, read_ensemble
 
 HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
 STEP = 0.02
@@ -747,6 +747,23 @@ def test_an_ensemble_is_read_as_it_was_written(found, tmp_path):
         (tmp_path / "spoilt.csv").write_text(spoilt)
         with pytest.raises(rocking.UnreadableRecord, match=said):
             read_ensemble(tmp_path / "spoilt.csv")
+
+
+def test_an_error_within_a_table_keeps_what_it_is_about(tmp_path):
+    ensemble, outcomes = tmp_path / "ensemble.csv", tmp_path / "outcomes.csv"
+    sides = ",".join(f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus"))
+    header = sides.replace("p_plus,p_minus", "p_plus_rad_s,p_minus_rad_s").replace("alpha_plus", "alpha_plus_rad")
+    header = header.replace("alpha_minus", "alpha_minus_rad")
+    ensemble.write_text(f"{header},weight,model\n2,2,0.2,0.2,-0.5,0.9,1,linear\n")
+    with pytest.raises(rocking.InvalidBlock, match="block 0 is in line 2: restitution must be") as caught:
+        read_ensemble(ensemble)
+    error = caught.value
+    assert (error.argument, error.path, error.value) == ("restitution", str(ensemble), -0.5)
+    outcomes.write_text("motion,overturned\nel-centro-meloland-270,1\nnothing.AT2,0\n")
+    with pytest.raises(rocking.UnreadableRecord, match="line 3: dt must be a positive number") as caught:
+        read_calibration(outcomes, channel=None, dt=-1.0, units=None)
+    error = caught.value
+    assert (error.argument, error.path, error.line, error.value) == ("dt", str(outcomes), 3, -1.0)
 
 
 def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(shaken):
