@@ -232,7 +232,7 @@ def test_a_posterior_that_leans_on_a_bound_is_told_with_the_mend(shaken):
     found = rocking.calibrate(*shaken, candidates=256, p=(1.0, 2.5), two_sided=False, model="linear")
     ends = {(one.name, one.end) for one in found.diagnostics.bounds_reached}
     assert ("p", "upper") in ends
-    assert "p leans on its upper bound of 2.5 rad/s" in found.summary()
+    assert "p reaches its upper bound of 2.5 rad/s" in found.summary()
     assert "set that of p to 5" in found.summary()
     assert found.to_dict()["diagnostics"]["notes"] == list(found.diagnostics.notes)
 

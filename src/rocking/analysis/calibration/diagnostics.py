@@ -121,7 +121,7 @@ class BoundReached:
         unit = unit_of(self.name)
         bound = f"{self.bound:g}" + ("" if unit == "1" else f" {unit}")
         return (
-            f"{self.name} leans on its {self.end} bound of {bound}: {100 * self.share:.0f} % of the posterior lies in "
+            f"{self.name} reaches its {self.end} bound of {bound}: {100 * self.share:.0f} % of the posterior lies in "
             f"the outermost {100 * _OUTERMOST:.0f} % of the range, so that the bound sets the {self.end} end of the "
             "interval; unless you know that bound, "
             f"set that of {self.name.partition('_')[0]} to {self.wider:g}"
