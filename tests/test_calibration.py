@@ -228,7 +228,7 @@ def test_one_unknown_angle_is_found_from_forty_tests():
     assert not found.diagnostics.notes
 
 
-def test_a_posterior_that_leans_on_a_bound_is_told_with_the_mend(shaken):
+def test_a_posterior_that_reaches_a_bound_is_told_with_the_mend(shaken):
     found = rocking.calibrate(*shaken, candidates=256, p=(1.0, 2.5), two_sided=False, model="linear")
     ends = {(one.name, one.end) for one in found.diagnostics.bounds_reached}
     assert ("p", "upper") in ends

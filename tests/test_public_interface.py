@@ -75,6 +75,13 @@ def test_what_is_written_to_a_file_is_called_to_format(name: str) -> None:
         assert names[0] == "path"
 
 
+def test_what_writes_several_files_is_called_write_and_takes_their_folder() -> None:
+    writers = [name for name in FUNCTIONS if name.endswith(".write")]
+    assert len(writers) >= 2
+    for name in writers:
+        assert list(parameters_of(FUNCTIONS[name])) == ["folder"]
+
+
 @pytest.mark.parametrize("name", [name for name in FUNCTIONS if name.endswith(".plot")])
 def test_every_figure_takes_axes_a_title_and_a_size(name: str) -> None:
     assert {"ax", "title", "figsize"} <= {*parameters_of(FUNCTIONS[name])}

@@ -334,13 +334,15 @@ class Calibration(DrawnResult, TableResult):
         return f"{self._headline()}\n\n{table}\n\n{ensemble}\nfitted motions: {self.scores}\n{self.diagnostics}"
 
     def to_dict(self) -> dict[str, Any]:
+        known = self.diagnostics
+        lists = {"bounds_reached": [asdict(one) for one in known.bounds_reached], "notes": [*known.notes]}
         return {
             "model": self.model,
             "motions": len(self.observed),
             "overturned": int(self.observed.sum()),
             "estimates": {name: asdict(one) for name, one in self.estimates.items()},
             "fitted": asdict(self.scores),
-            "diagnostics": {**asdict(self.diagnostics), "notes": self.diagnostics.notes},
+            "diagnostics": asdict(known) | lists,
             "probabilities": self.probabilities,
         }
 
