@@ -15,7 +15,7 @@ SHAKES = {"motion", "motions", "pulse"}
 OTHER_WORDS = {"t": "time", "scale": "levels", "pga": "measure", "pgv": "measure", "sa": "measure"}
 
 #: Most parameters of one function.
-MOST = 14
+MOST = 13
 
 
 def parameters_of(value: Any) -> dict[str, inspect.Parameter]:
@@ -73,6 +73,13 @@ def test_what_is_written_to_a_file_is_called_to_format(name: str) -> None:
     names = list(parameters_of(FUNCTIONS[name]))
     if last not in ("to_dict", "to_dataframe", "to_xarray"):
         assert names[0] == "path"
+
+
+def test_what_writes_several_files_is_called_write_and_takes_their_folder() -> None:
+    writers = [name for name in FUNCTIONS if name.endswith(".write")]
+    assert len(writers) >= 2
+    for name in writers:
+        assert list(parameters_of(FUNCTIONS[name])) == ["folder"]
 
 
 @pytest.mark.parametrize("name", [name for name in FUNCTIONS if name.endswith(".plot")])

@@ -1,8 +1,10 @@
 from . import analysis, chattering, studies
 from .analysis import rules
-from .analysis.calibration import Calibration, HistoryCalibration, calibrate, calibrate_history
+from .analysis.calibration.history import HistoryCalibration, calibrate_history
+from .analysis.calibration.outcomes import Calibration, calibrate
 from .analysis.efficiency import compare_measures
-from .analysis.fragility import Fragility, fit_fragility, fragility
+from .analysis.fragility.fit import fit_fragility, fragility
+from .analysis.fragility.result import Fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
@@ -31,7 +33,7 @@ from .motion.formats import read
 from .motion.scaling import Measure
 from .named_pulses import PulseFamily
 from .response import Response, Sensitivity
-from .result import Row
+from .result import DatasetResult, DrawnResult, Result, Row, TableResult
 from .simulation import simulate
 from .studies import Study, study
 from .treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
@@ -48,7 +50,9 @@ __all__ = [
     "Certified",
     "Coordinate",
     "DamagedStudy",
+    "DatasetResult",
     "Description",
+    "DrawnResult",
     "Fragility",
     "Frame",
     "HazardCurve",
@@ -64,6 +68,7 @@ __all__ = [
     "Product",
     "PulseFamily",
     "Response",
+    "Result",
     "RockingError",
     "Row",
     "Scales",
@@ -71,6 +76,7 @@ __all__ = [
     "Side",
     "Study",
     "StudyError",
+    "TableResult",
     "Treatment",
     "UnequalSides",
     "Unfinished",

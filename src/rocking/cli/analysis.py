@@ -27,7 +27,7 @@ from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_result
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, UnscaledOptions
 from rocking.errors import InvalidOption
 from rocking.quantities import angle, tilt, values
-from rocking.result import Result
+from rocking.result import DatasetResult
 
 
 def spectrum(
@@ -218,7 +218,7 @@ def measures(
 
 
 def _deliver(
-    found: Result, stem: str, read: ReadRecords | None, *, folder: Path | None, as_json: bool, **figure: Any
+    found: DatasetResult, stem: str, read: ReadRecords | None, *, folder: Path | None, as_json: bool, **figure: Any
 ) -> None:
     """Write an analysis into a folder where there is one (figure, tables, dataset, result), and print it.
 

@@ -52,7 +52,7 @@ def chatter(
         result, text = report.to_dict(), report.summary()
         if table:
             text += f"\n\n{report.table()}"
-            result = {**result, "asymptotic_table": report.cycle_rows()}
+            result = {**result, "asymptotic_table": report.to_dataframe("cycles").to_dict("records")}
         if folder is not None:
             report.to_csv(folder / "impacts.csv")
             if report.cycles is not None:
@@ -125,8 +125,6 @@ def paper(
     with output_folder(out) as folder:
         for number in FIGURES if figure is None else [figure]:
             drawn = paper_figure(number, **parameters)
-            print(drawn.caption)
-            for statement in drawn.statements:
-                print(f"  {statement.claim}: {statement.shown()}")
+            print(drawn.summary())
             for path in drawn.write(folder):
                 print(f"  {path}")

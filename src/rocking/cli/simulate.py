@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rocking.analysis.rules.check import check as apply_rules
-from rocking.analysis.survey import survey
+from rocking.analysis.survey import folder_names, survey
 from rocking.cli.options import BLOCK, MODEL, BlockOptions, ModelOptions, TreatmentOptions
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names
@@ -80,7 +80,8 @@ def simulate(
             if folder is not None:
                 found.write(folder)
             if folder is not None and each:
-                for name, record, response in zip(found.folders(), found.records, found.responses, strict=True):
+                folders = folder_names(found.records)
+                for name, record, response in zip(folders, found.records, found.responses, strict=True):
                     (folder / name).mkdir(exist_ok=True)
                     _result(response, record, start.friction, folder / name)
             result, text = found.to_dict(), found.summary()

@@ -13,7 +13,7 @@ from rocking import svg
 from rocking.plot.response import RotationUnits
 from rocking.response import export, summary
 from rocking.response.answers import Answers
-from rocking.result import Findings, Row, dictionary_of, text_of
+from rocking.result import DrawnResult, Row, dictionary_of, text_of
 from rocking.tables import write_csv, write_netcdf
 
 if TYPE_CHECKING:
@@ -22,12 +22,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: Letters of the column of names in a summary.
+_WIDTH = 20
+
 #: Rotations beyond this multiple of the slenderness are cut in a notebook's picture: past it a block only falls.
 _HIGHEST_PICTURED = 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Answers, Findings):
+class Response(Answers, DrawnResult):
     """Response of one body to one motion, made by `rocking.simulate`.
 
     Attributes
@@ -148,7 +151,7 @@ class Response(Answers, Findings):
         least normal force  0.8919 of the weight, until it tips at 0.9319 s
         verdict             overturns at 1.532021 s
         """
-        return text_of(self.summary_rows(friction), self.WIDTH)
+        return text_of(self.summary_rows(friction), _WIDTH)
 
     def to_dict(self, friction: float | None = None) -> dict[str, Any]:
         """Return the result in plain values for machines, as ``rocking simulate --json`` prints it.

@@ -163,7 +163,6 @@ class BlockFragilities(BlocksResult):
         )
 
     def summary(self) -> str:
-        """Medians and dispersions of some blocks, and how many have no curve."""
         data, scale = self.data, self.measure.scale
         parameters = self.block_parameters
         header = ["limit state", "block", *parameters, "exceeded", "median", "between", "dispersion"]
@@ -191,7 +190,6 @@ class BlockFragilities(BlocksResult):
         return f"{text}\n\n{table_of_some(header, rows)}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Curves by name; intensities in SI units."""
         data = self.data
         return {
             **data.attrs,

@@ -71,13 +71,21 @@ def fragility(
     limits : mapping of str to float
         Limit states: peak rotation over slenderness (the smaller one of two sides) that is exceeded; ``math.inf``
         stands for overturning, the default.
-    model, chattering, polarity, threads, progress
-        As for `simulate_many`. With both polarities each motion counts twice, unless all blocks are symmetric: they do
-        the same under a motion and its mirror image, which is no second outcome.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    chattering : str or Treatment
+        As for `simulate`.
+    polarity : {"+", "-", "both"}
+        Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric:
+        they do the same under a motion and its mirror image, which is no second outcome.
     weights : array_like, optional
         How much the outcomes of each block count, one number for each; by default all alike.
     band : Band
         How intervals and bands are made; the clusters are the motions, each with all its outcomes.
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
+        As for `simulate_many`.
 
     Returns
     -------
@@ -201,7 +209,7 @@ def fit_fragility(
     clusters : array_like of int, shape (n,), optional
         Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own. Fewer
         than three clusters of several outcomes bound nothing: then intervals go from 0 to infinity.
-    measure
+    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
         What the intensity is, as for `fragility`.
     band : Band
         How intervals and bands are made.

@@ -348,16 +348,8 @@ def rate(
 class _Oscillator:
     """Oscillators that stand for one side of a block at some rotations.
 
-    Attributes
-    ----------
-    periods : ndarray
-        Their periods, s.
-    damping : float
-        Fraction of critical.
-    capacities : ndarray
-        What the side has there.
-    per_acceleration : ndarray
-        Demand for a spectral acceleration of 1 m/s^2.
+    They have periods (s), a fraction of critical damping, capacities, and demands for a spectral acceleration of 1
+    m/s^2.
     """
 
     periods: Floats
