@@ -28,10 +28,9 @@ from .errors import (
 )
 from .explorer.launch import Frame, explore
 from .motion import Motion, pulses, records
-from .motion.description import Description
+from .motion.description import Description, Origin
 from .motion.formats import read
 from .motion.scaling import Measure
-from .named_pulses import PulseFamily
 from .response import Response, Sensitivity
 from .result import DatasetResult, DrawnResult, Result, Row, TableResult
 from .simulation import simulate
@@ -63,10 +62,10 @@ __all__ = [
     "InvalidOption",
     "Measure",
     "Motion",
+    "Origin",
     "OutputError",
     "OutsideFit",
     "Product",
-    "PulseFamily",
     "Response",
     "Result",
     "RockingError",

@@ -90,7 +90,7 @@ FAMILIES: Final = {family.name: family for family in (PulseFamily(getattr(pulses
 
 
 def pulse_family(name: str) -> PulseFamily:
-    """PulseFamily of pulses of a name; blanks, hyphens and underscores are the same.
+    """Family of pulses of a name; blanks, hyphens and underscores are the same.
 
     Examples
     --------

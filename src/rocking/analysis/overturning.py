@@ -34,9 +34,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: A pulse from its amplitude (m/s^2) and frequency (Hz), proportional to its amplitude.
-PulseFamily = Callable[[float, float], Motion]
-
 
 class Mode(IntEnum):
     """What a block does; a mode n >= 0, which is none of these, is a block that overturns after n impacts.
@@ -76,7 +73,7 @@ _LEAST_SHARE: Final = 1e-3
 
 def overturning_map(
     block: Block,
-    pulse: str | PulseFamily,
+    pulse: str | Callable[[float, float], Motion],
     *,
     amplitudes: ArrayLike,
     frequencies: ArrayLike,
@@ -346,7 +343,7 @@ class _PulseProblem:
         return int(np.sum(response.impacts["time"] >= uplifts[-1]))
 
 
-def _unit_pulse(pulse: str | PulseFamily, frequency: float, parameters: dict[str, Any]) -> Motion:
+def _unit_pulse(pulse: str | Callable[[float, float], Motion], frequency: float, parameters: dict[str, Any]) -> Motion:
     """Pulse of amplitude 1 m/s^2."""
     if callable(pulse):
         if parameters:

@@ -36,10 +36,10 @@ class SimulationInput(NamedTuple):
     model: Model = "nonlinear"
 
 
-PulseFamily = Callable[[float, float], SimulationInput]
+Family = Callable[[float, float], SimulationInput]
 
 
-def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> PulseFamily:
+def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Family:
     """Sines: (a, omega).
 
     Parameters
@@ -68,7 +68,7 @@ def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Pu
     return lambda a, omega: SimulationInput(block, pulses.sine(a * scale, _hertz(block, omega), cycles=cycles), model)
 
 
-def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> PulseFamily:
+def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> Family:
     """Half cycles of a sine with unequal amplitudes: (a, ratio).
 
     The first lobe has the amplitude a, each other one `ratio` times that of the lobe before it: the shaking grows
@@ -108,7 +108,7 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
 
 def ricker(
     block: Block, *, kind: Literal["symmetric", "antisymmetric"] = "symmetric", model: Model = "nonlinear"
-) -> PulseFamily:
+) -> Family:
     """Ricker pulses: (a, omega).
 
     Parameters
@@ -137,7 +137,7 @@ def ricker(
 
 def mavroeidis_papageorgiou(
     block: Block, *, phase: float = 0.0, gamma: float = 3.0, model: Model = "nonlinear"
-) -> PulseFamily:
+) -> Family:
     """Near-fault pulses of Mavroeidis and Papageorgiou: (a, omega).
 
     Parameters

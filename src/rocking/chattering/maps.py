@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
-from rocking.chattering.families import PulseFamily, SimulationInput
+from rocking.chattering.families import Family, SimulationInput
 from rocking.constants import VERSION
 from rocking.engine import OUTCOME, complete_chattering, in_threads
 from rocking.errors import InvalidOption
@@ -96,7 +96,7 @@ _ATTRIBUTES: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
 
 
 def chattering_map(
-    family: PulseFamily,
+    family: Family,
     parameters: Mapping[str, ArrayLike],
     *,
     threads: int | None = None,

@@ -104,12 +104,44 @@ class Description:
         return ", ".join(f"{name} {value:.5g}" for name, value in self.parameters.items())
 
     def scaled(self, factor: float) -> Description:
-        """Return the description of the motion times `factor`."""
+        """Return the description of the motion times a factor.
+
+        Parameters
+        ----------
+        factor : float
+            What the motion is multiplied with.
+
+        Returns
+        -------
+        Description
+            With amplitudes times the factor.
+
+        Examples
+        --------
+        >>> Description("sine", {"amplitude": 2.0, "frequency": 3.0}).scaled(-0.5)
+        <Description: sine, amplitude -1, frequency 3>
+        """
         parameters = {k: v * factor if k.startswith("amplitude") else v for k, v in self.parameters.items()}
         return replace(self, parameters=parameters)
 
     def changed(self, how: str) -> Description:
-        """Return the description of a motion that was `how` ("delayed", "processed") off its formula."""
+        """Return the description of a motion that no longer is what its formula says.
+
+        Parameters
+        ----------
+        how : str
+            What was done to it: "delayed", "processed".
+
+        Returns
+        -------
+        Description
+            Its family says so, once.
+
+        Examples
+        --------
+        >>> Description("sine").changed("delayed").changed("delayed")
+        <Description: delayed sine>
+        """
         family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
         return replace(self, family=family)
 

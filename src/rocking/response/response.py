@@ -262,12 +262,31 @@ class Response(Answers, DrawnResult):
     def to_csv(self, path: str | Path, table: export.ResponseTable = "histories", *, dt: float | None = None) -> None:
         """Write one of the tables of `to_dataframe` as text columns with a header.
 
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            File to write, whole or not at all.
+        table : {"histories", "impacts", "events", "chattering"}
+            The table, as `to_dataframe` takes it.
+        dt : float, optional
+            Step of the histories, s.
+
         Raises
         ------
         InvalidOption
             As `to_dataframe`.
         OutputError
             If the file cannot be written.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> file = pathlib.Path(tempfile.mkdtemp()) / "impacts.csv"
+        >>> response.to_csv(file, "impacts")
+        >>> file.read_text().splitlines()[0]
+        'time_s,side,speed_before_rad_s,speed_after_rad_s'
         """
         write_csv(path, export.frame(self, table, dt), index=table == "histories")
 
