@@ -41,6 +41,19 @@ _POSSIBLE = hasattr(Flags, "no_compile") and all(
 _IDLE_PASSES = ("InlineClosureLikes", "InlineOverloads", "NopythonRewrites")
 
 
+class KernelLibrary(JITCodeLibrary):
+    """A kernel's code."""
+
+    def finalize(self) -> None:
+        """Link parts before kernels, then optimise.
+
+        Linking drops what nothing refers to so far. A kernel brings its own copies of parts, in which others have
+        been inlined already: linked first, they would take the place of the only ones that refer to those others.
+        """
+        self._linking_libraries.sort(key=lambda library: not isinstance(library, PartLibrary))
+        super().finalize()
+
+
 class PartLibrary(JITCodeLibrary):
     """Code that is linked into other libraries, and neither optimised nor turned into machine code for itself."""
 
@@ -60,6 +73,19 @@ class PartLibrary(JITCodeLibrary):
     def finalize(self) -> None:
         """Take no more code, and do nothing with it."""
         self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):
+    """The last pass over a kernel: from typed Python to machine code."""
+
+    _name = "kernel_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower into a library of our kind."""
+        state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -86,7 +112,7 @@ class PartLowering(NativeLowering):
 class KernelCompiler(CompilerBase):
     """numba's compiler, without passes that have nothing to do, and without a look for garbage at every turn."""
 
-    lowering = NativeLowering
+    lowering = KernelLowering if _POSSIBLE else NativeLowering
 
     def define_pipelines(self) -> list[PassManager]:
         """Choose the passes."""
