@@ -13,14 +13,14 @@ from oracles.problem import Problem
 
 from rocking.kernels.arc import restoring
 from rocking.kernels.certificate import (
-    Bounded,
     Bounds,
+    MotionBounds,
     Proof,
     arc_bounds,
-    disturbed,
     geometric_bracket,
     prove_rest,
     side_bounds,
+    widened,
 )
 from rocking.kernels.ground import Window, bounds_over
 from rocking.kernels.state import new_scratch
@@ -94,7 +94,7 @@ def test_bounds_on_an_arc_hold_its_duration_and_its_impact(problem: Problem, sid
     window = 4.0 * v / problem.restoring(0.0, i)
     seen = bounds_over(ground_of(problem), 0, 0.0, window, ANYTHING, new_scratch()["ground"])
     rules = rules_for(nonlinear=problem.model == "nonlinear")
-    change, shortest, longest = arc_bounds(v, side_bounds(block_of(problem), rules, side, Bounded(seen, STILL)))
+    change, shortest, longest = arc_bounds(v, side_bounds(block_of(problem), rules, side, MotionBounds(seen, STILL)))
     assume(longest <= window)
     soon_at_rest = replace(problem, restitution=(0.01, 0.01))
     time, _, w, _ = multiprecision.follow(soon_at_rest, velocity=i * v).impacts[0]
@@ -245,7 +245,7 @@ def test_a_jump_just_past_the_end_of_a_window_is_not_ruled_out() -> None:
 def test_a_disturbed_motion_may_be_off_by_its_error_at_any_time(error: float) -> None:
     problem = Problem("linear", (2.0, 2.0), (0.2, 0.2), (0.5, 0.5), np.array([0.0, 9.0]), np.array([[0.5, 0.1]]))
     seen = bounds_over(ground_of(problem), 0, 1.0, 2.0, ANYTHING, new_scratch()["ground"])
-    wider = disturbed(seen, error)
+    wider = widened(seen, error)
     assert (wider.low, wider.high) == (seen.low - error, seen.high + error)
     assert (wider.slope, wider.jumps) == (seen.slope, seen.jumps + 2.0 * error)
 

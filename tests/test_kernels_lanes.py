@@ -14,10 +14,10 @@ from oracles.taylor import System, after
 from rocking.kernels import state
 from rocking.kernels.arc import Line, evaluate, expand
 from rocking.kernels.ground import Ground
-from rocking.kernels.lanes.pool import (
+from rocking.kernels.lane_steps import WIDTH, is_event_free, step_linear, step_nonlinear, step_weighted
+from rocking.kernels.lanes import (
     LONGEST_SUBSTEP,
     LONGEST_WEIGHTED_SUBSTEP,
-    WIDTH,
     Pool,
     load,
     pool_of,
@@ -25,7 +25,6 @@ from rocking.kernels.lanes.pool import (
     stumpff,
     unload,
 )
-from rocking.kernels.lanes.steps import is_event_free, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.state import Record, Records, new_scratch
 
 mp = mpmath.mp.clone()

@@ -11,8 +11,7 @@ from test_kernels_march import Run, record, run, with_rows
 from rocking.kernels import state
 from rocking.kernels.ground import Ground
 from rocking.kernels.rest import pass_proven_impacts
-from rocking.kernels.state import Record
-from rocking.kernels.trace import PROVEN_PER_ITERATION, has_space
+from rocking.kernels.state import PROVEN_PER_ITERATION, Record, has_space
 
 
 def one_by_one(ground: Ground) -> Ground:

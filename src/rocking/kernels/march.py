@@ -21,8 +21,20 @@ from rocking.kernels.rest import (
     time_of,
 )
 from rocking.kernels.short_arc import short_step, undecided
-from rocking.kernels.state import AT_REST, Ending, EventKind, Outcome, Record, Records, RestRule
-from rocking.kernels.trace import has_space, write_event, write_impact, write_node, write_sequence
+from rocking.kernels.state import (
+    AT_REST,
+    Ending,
+    EventKind,
+    Outcome,
+    Record,
+    Records,
+    RestRule,
+    has_space,
+    write_event,
+    write_impact,
+    write_node,
+    write_sequence,
+)
 from rocking.kernels.uplift import next_uplift
 
 #: Depth of a dip below zero rotation that is lost in rounding, over the highest rotation so far.

@@ -10,8 +10,7 @@ from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import Ground, coefficient, length_of, start_of
 from rocking.kernels.remaining import THIRD, Pair
-from rocking.kernels.state import Record, Records, RestRule
-from rocking.kernels.trace import PROVEN_PER_ITERATION, write_impact, write_node
+from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRule, write_impact, write_node
 
 ULP = 2.0**-52
 

@@ -1,4 +1,4 @@
-"""What kernels work on, as numpy records, and the integer codes that they return.
+"""What kernels work on, as numpy records; the integer codes that they return; and the rows that a march writes.
 
 Compiled code passes a record by pointer and reads its fields by name. Compiled, an integer code is a plain integer.
 """
@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 from numba import config
 from numpy.typing import NDArray
+
+from rocking.kernels.compiled import inlined
+from rocking.kernels.ground import Ground, start_of
 
 Records = NDArray[np.void]
 
@@ -164,3 +167,75 @@ def new_table(rows: int) -> Records:
 def grown(table: Records) -> Records:
     """Table with the same rows and as many more."""
     return attributed(np.concatenate([table, np.zeros_like(table)]))
+
+
+# ---- Writing rows of a table; nothing is written where the rules say so ----
+
+#: Largest number of impacts of a proven sequence in one iteration of a march, and of rows of one kind that it writes.
+PROVEN_PER_ITERATION = 64
+_ROWS_PER_ITERATION = PROVEN_PER_ITERATION + 3
+
+
+@inlined
+def has_space(rules: Record, table: Records, state: Record) -> bool:
+    """Whether the table has space for what one iteration of the march can write."""
+    most = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
+    return not rules.record or most + _ROWS_PER_ITERATION <= table.shape[0]
+
+
+@inlined
+def signed(side: int) -> int:
+    """Sign of the rotation on a side: +1, -1, and 0 at rest."""
+    return 0 if side == AT_REST else 1 - 2 * side
+
+
+@inlined
+def write_node(ground: Ground, rules: Record, table: Records, state: Record) -> None:
+    """Write the state into the table."""
+    if not rules.record:
+        return
+    row = table[state.nodes].node
+    row.time = start_of(ground, state.piece) + state.offset
+    row.piece = state.piece
+    row.offset = state.offset
+    row.side = state.side
+    row.u = state.u
+    row.v = state.v
+    state.nodes += 1
+
+
+@inlined
+def write_event(rules: Record, table: Records, state: Record, time: float, kind: int) -> None:
+    """Write an uplift, a rest or an overturning."""
+    if rules.record:
+        row = table[state.events].event
+        row.time = time
+        row.kind = kind
+        row.side = signed(state.side)
+    state.events += 1
+
+
+@inlined
+def write_impact(rules: Record, table: Records, state: Record, time: float, speed: float) -> None:
+    """Write the last impact, from the state after it and the speed before."""
+    if not rules.record:
+        return
+    row = table[state.impacts - 1].impact
+    row.time = time
+    row.side = signed(state.side)
+    row.speed_before = speed
+    row.speed_after = state.v
+
+
+@inlined
+def write_sequence(rules: Record, table: Records, state: Record, time: float, rest: tuple[float, float, float]) -> None:
+    """Write a chattering sequence that ends, from its last impact's time and (lower, upper, time) to rest."""
+    lower, upper, to_rest = rest
+    if rules.record:
+        row = table[state.sequences].sequence
+        row.start = state.run_start
+        row.end = time + to_rest
+        row.lower = time + lower
+        row.upper = time + upper
+        row.impacts = state.run
+    state.sequences += 1

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
 from rocking.errors import InvalidOption
-from rocking.kernels import state, variation
-from rocking.kernels.trace import Trail, trace
+from rocking.kernels import state
+from rocking.kernels.trace import Trail, trace, vary
 from rocking.tables import counted
 
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
@@ -134,7 +134,7 @@ class Sensitivity:
         peak, impact_times, event_times = np.zeros(count), np.zeros((count, impacts)), np.zeros((count, events))
         scratch, work = state.new_scratch(), state.record(state.VARIATION)
         for k in range(count):
-            peak[k] = variation.vary(trail, scratch, work, k, peak_time, impact_times[k], event_times[k])
+            peak[k] = vary(trail, scratch, work, k, peak_time, impact_times[k], event_times[k])
         if overturned:
             peak[:] = 0.0
         return cls(*(_by_quantity(values) for values in (peak[:, None], impact_times, event_times)))

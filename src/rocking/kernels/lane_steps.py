@@ -1,16 +1,45 @@
 """One step of all lanes of a group: linear, linear while the weight changes, nonlinear; and what may happen on the way.
 
-A step marks, counts and leaves the lanes in which it may hold an event; only the others go on. Lanes without a block
+A step marks, counts and leaves the lanes in which it may hold an event; only the others are moved. Lanes without a block
 never have an event, nor do their numbers change. A lane with a NaN always has one.
 """
 
 from typing import TypeVar
 
+import numpy as np
+
 from rocking.kernels.arc import is_left_out_nothing, strength_of
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.lanes.pool import WIDTH
 from rocking.kernels.recurrences import Line, nonlinear_rates, weighted_rates
 from rocking.kernels.state import Record
+
+#: Lanes that step together. A constant, so that their loops have a fixed length.
+WIDTH = 32
+
+_LANES = ("f8", (WIDTH,))
+_SIDES = ("f8", (2,))
+
+#: A group of lanes. Which block and whether its step may hold an event; u, u' and (nonlinear) sin and cos(alpha - u),
+#: and the same where a step would take them; constants of the side that the block is on (`STEP_CONSTANTS`); peak.
+GROUP = np.dtype(
+    [("block", "i8", (WIDTH,)), ("event", "i8", (WIDTH,))]
+    + [
+        (name, *_LANES)
+        for name in (
+            "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine",
+            "stiffness", "pull", "push", "first", "second", "third", "curve", "peak",
+        )
+    ],
+    align=True,
+)  # fmt: skip
+
+#: Constants of a step of length h on each side. Linear: lam, gain threshold, side gain (u'' = lam u - pull - push a),
+#: h c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 in place of lam, the side's sign
+#: in place of its gain. Curve bounds a bulge: (h^2/8) max |u''|.
+STEP_CONSTANTS = np.dtype(
+    [(name, *_SIDES) for name in ("stiffness", "pull", "push", "first", "second", "third", "curve")],
+    align=True,
+)
 
 MaybeLine = TypeVar("MaybeLine", Line, None, Line | None)
 
