@@ -25,7 +25,7 @@ from rocking.compiling import SEQUENCES, announce
 from rocking.engine import cores, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import Verdict
-from rocking.kernels.sine.arc import first_landing
+from rocking.kernels.sine.arc import first_impact
 from rocking.kernels.sine.lanes import GROUP, GROUPS, WIDTH, Answers, rest_phases
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
 from rocking.kernels.sine.sequence import resolve, semianalytical_phases
@@ -251,7 +251,7 @@ def first_arc(a: float, omega: float) -> tuple[float, float]:
     amplitude, frequency, _ = _single_case(a, omega, 1.0)
     if amplitude == 1.0:
         return 0.0, 0.0
-    status, phase, speed = first_landing(amplitude - 1.0, frequency)
+    status, phase, speed = first_impact(amplitude - 1.0, frequency)
     return (phase / frequency, speed / frequency) if status == Verdict.FOUND else (math.nan, math.nan)
 
 

@@ -22,7 +22,6 @@ from rocking.kernels.ground import (
     Ground,
     Window,
     bounds_over,
-    columns_of,
     has_vertical,
     length_of,
     local_series,
@@ -132,7 +131,7 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
         return unproven()
     local_series(ground, state.piece, state.offset, 1.0, clear(scratch.ground))
     weight_series(ground, state.piece, state.offset, clear(scratch.weight))
-    horizon = Horizon(motion, ground.error, columns_of(ground), upper, height)
+    horizon = Horizon(motion, ground.error, ground.columns, upper, height)
     side_i = restoring_parabola(block, rules, i, scratch, horizon)
     side_j = restoring_parabola(block, rules, j, scratch, horizon)
     if upper - lower > rules.tolerance and upper + rounding <= length_of(ground, state.piece) - state.offset:
@@ -166,7 +165,7 @@ def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float
 
 @inlined
 def is_greatest_at_zero(block: Record, height: float) -> bool:
-    """Whether the weight's part of the restoring acceleration is at zero rotation at least what it is up to a height."""
+    """Whether the weight's part of the restoring acceleration is nowhere up to a height above that at zero rotation."""
     return height <= 2.0 * min(block.slenderness[0], block.slenderness[1])
 
 

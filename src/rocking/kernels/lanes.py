@@ -1,9 +1,9 @@
-"""Many blocks through one evenly sampled record: together where nothing happens, one by one where something does.
+"""Many blocks through one evenly sampled record: together without events, one by one where there may be one.
 
-A lane is one block. Over each sample all lanes step together, in loops that vectorise; a lane in which the step may
-hold an event (an impact, a new peak, an overturning) is left where it was, and `march` takes the block through that
-sample. What may hold an event is decided by bounds, never by sampling (`lane_steps.is_event_free`). A lane's arithmetic
-depends on its block and the motion alone, never on the other lanes.
+A lane is one block. Over each sample all lanes step together, in loops that vectorise; where the step may hold an event
+(an impact, a new peak, an overturning) the lane does not change, and `march` takes the block through that sample. What
+may hold an event is decided by bounds, never by sampling (`lane_steps.is_event_free`). A lane's arithmetic depends on
+its block and the motion alone, never on the other lanes. A block with a NaN always marches alone.
 """
 
 import math
@@ -78,7 +78,7 @@ def pool_of(blocks: Records, states: Records, pieces: int, h: float, substeps: i
 
 
 def _on_cache_lines(count: int, kind: np.dtype[np.void]) -> Records:
-    """Zeroed records that start on a cache line: vectors that cross two lines load at half the speed."""
+    """Zeroed records that start on a cache line: vectors across two lines are read at half the speed."""
     line = 64
     space = np.zeros(count * kind.itemsize + line, dtype=np.uint8)
     skip = -space.ctypes.data % line
@@ -117,7 +117,7 @@ def stumpff(k: int, q: Any) -> Floats:
 
 @inlined
 def load(pool: Pool, lane: int, index: int) -> None:
-    """Put a block into a lane, but for its sine and cosine."""
+    """Write a block's state and constants into a lane, but for its sine and cosine."""
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     state, steps = pool.states[index], pool.steps[index]
     side = state.side
@@ -146,9 +146,9 @@ def set_angles(pool: Pool, lane: int, index: int) -> None:
 
 @inlined
 def unload(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
-    """Write a lane's numbers into its block's state, at the start of a piece; returns the block.
+    """Write a lane's numbers into its block's state, at the start of a piece; returns the block's index.
 
-    The highest rotation of a lane that still rises has not been written before.
+    The highest rotation of a block that still rises is not in its state yet.
     """
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     index = group.block[slot]
@@ -165,7 +165,7 @@ def unload(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
 
 @inlined
 def empty(pool: Pool, lane: int) -> None:
-    """Leave a lane without a block, with numbers that no step changes and that never mean an event."""
+    """Make a lane one without a block: no step changes its numbers or finds an event."""
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     group.block[slot] = -1
     group.u[slot] = EMPTY_ROTATION
@@ -178,17 +178,17 @@ def empty(pool: Pool, lane: int) -> None:
 @inlined
 def move_block(pool: Pool, lane: int, to: int) -> None:
     """Move a block from one lane to another."""
-    here, slot = pool.groups[lane // WIDTH], lane % WIDTH
-    there, place = pool.groups[to // WIDTH], to % WIDTH
-    index = here.block[slot]
+    source, i = pool.groups[lane // WIDTH], lane % WIDTH
+    target, j = pool.groups[to // WIDTH], to % WIDTH
+    index = source.block[i]
     state = pool.states[index]
-    state.u = here.u[slot]
-    state.v = here.v[slot]
-    peak = here.peak[slot]
-    there.sine[place] = here.sine[slot]
-    there.cosine[place] = here.cosine[slot]
+    state.u = source.u[i]
+    state.v = source.v[i]
+    peak = source.peak[i]
+    target.sine[j] = source.sine[i]
+    target.cosine[j] = source.cosine[i]
     load(pool, to, index)
-    there.peak[place] = peak
+    target.peak[j] = peak
     empty(pool, lane)
 
 
@@ -199,8 +199,8 @@ def move_block(pool: Pool, lane: int, to: int) -> None:
 def run_lanes(ground: Ground, rules: Record, scratch: Record, pool: Pool, substeps: int) -> None:
     """March every block of a pool through a record of even samples, and on to its own end.
 
-    ``substeps`` is how many a sample is divided into: 0 in the linear model under a constant weight. Afterwards
-    ``ending`` of every state is an `Ending`; RUNNING and PAUSED ones can be continued one by one.
+    ``substeps`` divide a sample: 0 in the linear model under a constant weight. Afterwards ``ending`` of every state
+    is an `Ending`; RUNNING and PAUSED ones can be continued one by one.
     """
     piece = next_waited_for(pool, 0)
     while piece < last_piece(ground) and start_of(ground, piece + 1) <= rules.stop:
@@ -286,7 +286,7 @@ def admit(rules: Record, pool: Pool, lane: int, index: int) -> None:
 
 @inlined
 def march_until(ground: Ground, rules: Record, scratch: Record, pool: Pool, index: int, until: int) -> bool:
-    """March a block up to a piece; returns whether it rocks there, else lets it wait for the piece in which it does."""
+    """March a block up to a piece; returns whether it rocks there, else it waits for the piece in which it does."""
     state = pool.states[index]
     state.until = until
     state.ending = march(ground, pool.blocks[index], rules, pool.table, scratch, state)

@@ -8,10 +8,10 @@ with a stiffness of any sign: p^2 for a block, 0 for a ball on a moving table, n
 A body that bounces on one side only has that side for both. The derivation is in the documentation ("Theory").
 
 Counted back from a candidate for the time of rest, with s the remaining time at an impact that enters side i, half the
-arc's duration is sought as a polynomial Y_i(s), so that s - 2 Y_i(s) remains at the next impact. The speeds at both ends
-of an arc between two given impacts are polynomials of the two times, so Y_i follows by comparison of coefficients. The
-terms beyond those compared are a polynomial, too, and bound the error (`remainder`). Within, z is the remaining time in
-units of that at the first impact. A NaN among the arguments makes the results NaN, and a NaN bracket proves nothing.
+arc's duration is sought as a polynomial Y_i(s), so that s - 2 Y_i(s) remains at the next impact. The speeds at both
+ends of an arc between two given impacts are polynomials of the two times, so Y_i follows by comparison of coefficients.
+The terms beyond those compared are a polynomial, too, and bound the error (`remainder`). Below, z is the remaining time
+in units of that at the first impact. A NaN among the arguments makes the results NaN, and a NaN bracket proves nothing.
 """
 
 import math
@@ -139,7 +139,7 @@ def solved(first: float, second: float, p: float, q: float) -> Pair:
 
 @inlined
 def speed_difference(m: Series, ends: Three, starts: Three, speed: Series, e: float) -> Three:
-    """Orders 2, 3, 4 of the difference of the speeds on both sides of an impact, with zero half durations of that order.
+    """Orders 2, 3, 4 of the difference of the speeds at an impact, with zero half durations of that order.
 
     ``m``: the remaining time at the next impact; ``ends``, ``starts``: `known_part` of this arc's end and the next
     one's start; ``speed``: the next arc's speed at its start.
@@ -202,7 +202,7 @@ def power(x: float, order: int) -> float:
 
 @inlined
 def with_coefficient(A: Curve, y: float, speed: float, order: int) -> Curve:
-    """A curve with the coefficients of one order set."""
+    """Set the coefficients of one order."""
     h, s = A
     if order == 2:
         return Curve((h[0], y, 0.0, 0.0), (s[0], speed, 0.0, 0.0))

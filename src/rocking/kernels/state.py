@@ -38,7 +38,7 @@ class Outcome(IntEnum):
     STOPPED = 3
     #: The block is balanced on a corner and nothing will ever move it.
     BALANCED = 4
-    #: A short step cannot tell; the full series must.
+    #: A short step does not decide it; the full series does.
     UNDECIDED = 5
 
 
@@ -76,6 +76,7 @@ class Ending(IntEnum):
 
 
 def _record(**fields: Any) -> np.dtype[np.void]:
+    """Type of a record with these fields."""
     return np.dtype(
         [(name, *(kind if isinstance(kind, tuple) else (kind,))) for name, kind in fields.items()], align=True
     )
@@ -87,7 +88,7 @@ _SERIES = ("f8", (ORDER + 2,))
 #: A block, side by side: lambda in u'' = lambda u - ...; uplift threshold in g and its gain (the restoring acceleration
 #: at zero rotation is gain (threshold + side a/g)); restitution on leaving the side, and the side entered from it; the
 #: rotation at which the block has overturned; slenderness, its sine and cosine; limit of a treatment other than the
-#: certificate. What most iterations of a march need comes first, here and below: fewer cache lines are read.
+#: certificate. The fields that most iterations of a march read come first, here and below: fewer cache lines are read.
 BLOCK = _record(
     stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, restitution=_SIDES, entered=("i8", (2,)), fallen="f8",
     slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES,
@@ -99,9 +100,9 @@ RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endles
 
 #: The state of a march. ``until`` is the first piece that is not marched through and ``budget`` the number of
 #: iterations left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a
-#: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests that came only because
-#: time hardly advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties``
-#: counts what was decided in the last digits: whether a block without weight touches the ground.
+#: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests only because time hardly
+#: advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties`` counts the
+#: decisions by the last digits whether a block without weight touches the ground.
 STATE = _record(
     piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
     run="i8", proof_speed="f8", last_impact_time="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8",
@@ -119,8 +120,8 @@ SEQUENCE_ROW = _record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8
 #: arrays by value.
 TABLE = _record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
 
-#: Scratch space: the series of one step; of the ground, the weight and sin and cos(alpha - u) about its start; a spare.
-SCRATCH = _record(rotation=_SERIES, ground=_SERIES, weight=_SERIES, sine=_SERIES, cosine=_SERIES, spare=_SERIES)
+#: Scratch space: the series of one step; of the ground, the weight and sin and cos(alpha - u) about its start; another.
+SCRATCH = _record(rotation=_SERIES, ground=_SERIES, weight=_SERIES, sine=_SERIES, cosine=_SERIES, other=_SERIES)
 
 #: Scratch space of a variation: series of the stiffness, of the forcing and of the variation itself.
 VARIATION = _record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)

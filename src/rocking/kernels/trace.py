@@ -21,7 +21,7 @@ NO_NODES = records(0, NODE_ROW)
 
 
 class Trail(NamedTuple):
-    """What a response is computed again from: the problem and the nodes of its steps."""
+    """The problem and the nodes of a response, from which it can be computed again."""
 
     ground: Ground
     block: Record
@@ -29,12 +29,16 @@ class Trail(NamedTuple):
     nodes: Records
 
 
+#: Columns of what `trace` writes.
+_ROTATION, _VELOCITY, _ACCELERATION = 0, 1, 2
+
+
 @kernel
 def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Floats) -> None:
     """Write theta, theta', theta'' at times[k], in the step that starts at trail.nodes[rows[k]], into out[k].
 
-    Between the last resolved impact and rest, or the end of the response, the unresolved ones are left out: the block
-    lies still there once its last arc is over.
+    From the end of the last resolved arc to rest, or to the end of the response, they are zero. For a
+    NaN the values mean nothing.
     """
     ground, block, rules, nodes = trail
     expanded = -1
@@ -44,7 +48,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
         node = nodes[row]
         last = row + 1 == nodes.shape[0]
         if node.side == AT_REST:
-            out[k, 0] = out[k, 1] = out[k, 2] = 0.0
+            out[k, _ROTATION] = out[k, _VELOCITY] = out[k, _ACCELERATION] = 0.0
             continue
         if row != expanded:
             left = np.inf if last else nodes[row + 1].time - node.time
@@ -55,9 +59,9 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
         if u < 0.0 and (last or nodes[row + 1].side == AT_REST):
             u = v = w = 0.0
         sign = sign_of(node.side)
-        out[k, 0] = sign * u
-        out[k, 1] = sign * v
-        out[k, 2] = sign * w
+        out[k, _ROTATION] = sign * u
+        out[k, _VELOCITY] = sign * v
+        out[k, _ACCELERATION] = sign * w
 
 
 # ---- How a response changes with what it was computed from ----
@@ -82,9 +86,9 @@ _JUMP = 1e-9
 def vary(
     trail: Trail, scratch: Record, work: Record, quantity: int, peak_time: float, impacts: Floats, events: Floats
 ) -> float:
-    """Change of the peak rotation per unit of epsilon; shifts of the times of all impacts and events into arrays.
+    """Change of the peak rotation per unit of epsilon; the shifts of all impacts and events are written into arrays.
 
-    Assumes a peak that is not an overturning. ``work`` is scratch space (`state.VARIATION`).
+    The peak must not be an overturning. ``work`` is scratch space (`state.VARIATION`).
     """
     nodes = trail.nodes
     impact_count = event_count = 0
@@ -190,7 +194,7 @@ def added_weight(W: Floats, k: int, changes: int) -> float:
 def saltation(
     trail: Trail, node: Record, following: Record, quantity: int, shift: float, rates: tuple[float, float]
 ) -> tuple[float, float]:
-    """Variation after an impact that shifts; ``rates`` are that of the velocity before it, and the speed of impact."""
+    """Variation after an impact that shifts; ``rates``: variation of the velocity before it, and speed of impact."""
     block = trail.block
     dv, speed = rates
     left = restoring(trail.ground, block, node.side, following.piece, following.offset)
@@ -220,7 +224,7 @@ def uplift_shift(trail: Trail, node: Record, quantity: int) -> float:
 
 @inlined
 def push_at(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
-    """Return what the motion adds to a side's threshold: pushes towards it, and weight."""
+    """Acceleration towards a side, and what the weight adds to its threshold."""
     added = weight_at(ground, piece, offset) - 1.0
     return sign_of(side) * acceleration(ground, piece, offset) + block.threshold[side] * added
 
@@ -228,16 +232,16 @@ def push_at(ground: Ground, block: Record, side: int, piece: int, offset: float)
 @inlined
 def push_rate(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
     """Rate of `push_at`."""
-    lifts = slope(vertical_of(ground), piece, offset) if has_vertical(ground) else 0.0
-    return sign_of(side) * slope(ground, piece, offset) + block.threshold[side] * lifts
+    vertical = slope(vertical_of(ground), piece, offset) if has_vertical(ground) else 0.0
+    return sign_of(side) * slope(ground, piece, offset) + block.threshold[side] * vertical
 
 
 @inlined
 def rest_shift(trail: Trail, node: Record, quantity: int, dv: float, shift: float, rest: Record) -> float:
     """Shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
 
-    ``shift`` is that of the impact with which the node begins, ``dv`` the variation of the velocity after it at the
-    time that it has unchanged. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g at the impact.
+    ``shift`` is that of the impact with which the node begins, ``dv`` the variation of the velocity after it, at the
+    unchanged time. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g at the impact.
     """
     if rest.time == node.time:
         return shift
@@ -266,6 +270,6 @@ def restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: fl
         change += 2.0 * restoring(ground, block, j, node.piece, node.offset)
     elif quantity == Quantity.SLENDERNESS:
         weight = weight_at(ground, node.piece, node.offset)
-        stiff = block.cosine[j] * weight - sign_of(j) * here * block.sine[j] if rules.nonlinear else weight
-        change += block.stiffness[j] * stiff * block.slenderness[j]
+        slope_of_angle = block.cosine[j] * weight - sign_of(j) * here * block.sine[j] if rules.nonlinear else weight
+        change += block.stiffness[j] * slope_of_angle * block.slenderness[j]
     return change

@@ -2,13 +2,13 @@
 
 The arithmetic is that of one sequence (``arc``, ``sequence``); only its order differs. One loop over the lanes makes an
 impact pair of every sequence of a group, without a branch, so that the compiler turns it into vector instructions. A
-lane for which the short sums or the fixed number of corrections are not exact stops before that pair, and the functions
-for one sequence continue from there.
+lane for which the short sums or the fixed number of corrections are not exact stops before that pair, and its sequence
+is continued alone.
 
 A pool of groups holds sequences that lifted off together. Lanes that have stopped are filled from the pool's end, so
 that groups stay full while the pool empties.
 
-A group is a record of arrays: with one base address and constant distances the compiler can prove_settled that stores do not
+A group is a record of arrays: with one base address and constant distances the compiler can prove that stores do not
 disturb loads. With one array per quantity it would not vectorise.
 """
 
@@ -35,14 +35,14 @@ from rocking.kernels.sine.arc import (
     REACH_SHORT,
     SHORT,
     State,
-    brief,
-    guess_brief,
-    guess_first_impact,
-    guess_landing,
-    land,
-    precise,
+    corrected_duration,
+    estimated_brief_duration,
+    estimated_duration,
+    estimated_first_impact,
+    is_brief,
+    is_precise,
     summed_basis,
-    uplift,
+    uplift_state,
 )
 from rocking.kernels.sine.sequence import (
     LEVELS,
@@ -75,7 +75,9 @@ class LaneState(IntEnum):
     EMPTY = 4
 
 
-_LANES: Final = (np.float64, WIDTH)
+_FIELDS: Final = (
+    "delta", "eta", "excess", "x", "V", "P", "D", "between_V", "between_P", "between_D", "passed", "reach",
+)  # fmt: skip
 
 #: Number of settled lanes; index, state and constants of each sequence; phase and state on entering the second side,
 #: and between the two arcs of a pair; phase and reach of the last pair; weights and last row of the extrapolation.
@@ -86,18 +88,7 @@ GROUP: Final = np.dtype(
             ("filled", np.int64),
             ("index", np.int64, WIDTH),
             ("status", np.int64, WIDTH),
-            ("delta", *_LANES),
-            ("eta", *_LANES),
-            ("excess", *_LANES),
-            ("x", *_LANES),
-            ("V", *_LANES),
-            ("P", *_LANES),
-            ("D", *_LANES),
-            ("between_V", *_LANES),
-            ("between_P", *_LANES),
-            ("between_D", *_LANES),
-            ("passed", *_LANES),
-            ("reach", *_LANES),
+            *((name, np.float64, WIDTH) for name in _FIELDS),
             ("weights", np.float64, (LEVELS, WIDTH)),
             ("row", np.float64, (LEVELS + 1, WIDTH)),
         ],
@@ -143,7 +134,7 @@ def rest_phases(sequences: Sequences, order: Integers, pool: NDArray[np.record],
 
 @shared
 def load(sequences: Sequences, some: Integers, pool: NDArray[np.record]) -> None:
-    """Put sequences into lanes and compute their first arcs; the last group is filled up with copies that do not run."""
+    """Put sequences into lanes and compute their first arcs; the last group is filled with copies that do not run."""
     a, omega, eta = sequences
     for b in range(groups_of(some.size)):
         group = pool[b]
@@ -206,7 +197,7 @@ def count_running(pool: NDArray[np.record], count: int) -> int:
 
 @shared
 def answer_stopped(pool: NDArray[np.record], count: int, answers: Answers) -> None:
-    """Answer for the lanes that have stopped; settled ones are collected until they fill a group, and proven together."""
+    """Answer for the lanes that have stopped; settled ones are collected until they fill a group, and then proven."""
     settled = pool[GROUPS]
     for slot in range(count):
         group, lane = pool[slot // WIDTH], slot % WIDTH
@@ -234,7 +225,7 @@ def compact(pool: NDArray[np.record], count: int) -> None:
 
 @inlined
 def groups_of(count: int) -> int:
-    """Number of groups that hold so many sequences."""
+    """Count the groups that hold so many sequences."""
     return (count + WIDTH - 1) // WIDTH
 
 
@@ -292,22 +283,22 @@ def first_impacts(group: Group) -> None:
     for lane in range(WIDTH):
         delta = group.delta[lane]
         eta = group.eta[lane]
-        start = uplift(min(group.excess[lane], LARGEST_EXCESS))
-        t = guess_first_impact(-start.D, delta)
-        t = land(t, start, 1.0, delta, summed_basis(t * t, delta, LONG)).t
-        landing = land(t, start, 1.0, delta, summed_basis(t * t, delta, LONGEST))
-        landed = (
-            precise(landing, t, delta)
+        start = uplift_state(min(group.excess[lane], LARGEST_EXCESS))
+        t = estimated_first_impact(-start.D, delta)
+        t = corrected_duration(t, start, 1.0, delta, summed_basis(t * t, delta, LONG)).t
+        correction = corrected_duration(t, start, 1.0, delta, summed_basis(t * t, delta, LONGEST))
+        found = (
+            is_precise(correction, t, delta)
             & (t > 0.0)
-            & (landing.t < math.pi)
+            & (correction.t < math.pi)
             & (t * t * (1.0 + delta) <= REACH_LONGEST)
             & (group.excess[lane] <= LARGEST_EXCESS)
         )
-        group.status[lane] = group.status[lane] if landed else LaneState.NO_IMPACT.value
-        group.x[lane] = landing.t
-        group.V[lane] = eta * landing.impact.V
-        group.P[lane] = landing.impact.P
-        group.D[lane] = landing.impact.D
+        group.status[lane] = group.status[lane] if found else LaneState.NO_IMPACT.value
+        group.x[lane] = correction.t
+        group.V[lane] = eta * correction.impact.V
+        group.P[lane] = correction.impact.P
+        group.D[lane] = correction.impact.D
         group.passed[lane] = 0.0
         group.reach[lane] = REACH_LONG
         weights = richardson_weights(eta)
@@ -373,7 +364,7 @@ def pass_pair(group: Group, order: int, reach: float, corrections: int) -> None:
         group.P[lane] = impact.P if moves else group.P[lane]
         group.D[lane] = impact.D if moves else group.D[lane]
         group.passed[lane] = passed
-        least = 0.0 if brief(entered_by(group, lane), delta) else REACH_BRIEF
+        least = 0.0 if is_brief(entered_by(group, lane), delta) else REACH_BRIEF
         group.reach[lane] = max(longer * longer * (1.0 + delta), least) if moves else 0.0
         group.status[lane] = status if exact else max(status, LaneState.STOPPED.value)
 
@@ -383,12 +374,12 @@ def short_arc(
     start: State, s: float, delta: float, order: int, reach: float, corrections: int
 ) -> tuple[bool, float, State]:
     """Follow an arc by a fixed number of corrections: whether they are enough, its duration, the state at its end."""
-    t = guess_landing(start, s, delta) if corrections else guess_brief(start, s, delta)
+    t = estimated_duration(start, s, delta) if corrections else estimated_brief_duration(start, s, delta)
     for _ in range(corrections - 1):
-        t = land(t, start, s, delta, summed_basis(t * t, delta, SHORT)).t
-    landing = land(t, start, s, delta, summed_basis(t * t, delta, order))
-    exact = precise(landing, t, delta) & (t * t * (1.0 + delta) <= reach)
-    return exact, landing.t, landing.impact
+        t = corrected_duration(t, start, s, delta, summed_basis(t * t, delta, SHORT)).t
+    correction = corrected_duration(t, start, s, delta, summed_basis(t * t, delta, order))
+    exact = is_precise(correction, t, delta) & (t * t * (1.0 + delta) <= reach)
+    return exact, correction.t, correction.impact
 
 
 @shared

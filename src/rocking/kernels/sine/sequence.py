@@ -15,7 +15,7 @@ from rocking.kernels.certificate import Bounds, geometric_bracket
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.sine import Verdict
-from rocking.kernels.sine.arc import LARGEST_EXCESS, State, arc, bounced, first_arc, guess_landing
+from rocking.kernels.sine.arc import LARGEST_EXCESS, State, arc, bounced, estimated_duration, first_arc
 
 #: Extrapolations above that expansion, and the relative agreement at which their result is taken.
 LEVELS: Final = 5
@@ -118,7 +118,7 @@ IMPACT: Final = np.dtype((np.record, [("interval", np.float64), ("before", np.fl
 
 @kernel
 def rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float]:
-    """Status and phase omega tau_ch of rest for a = 1 + excess > 1; the phase means something only where it is FOUND."""
+    """Status and phase omega tau_ch of rest for a = 1 + excess > 1; the phase is valid only where it is FOUND."""
     status, x, impact = first_arc(excess, delta)
     if status != Verdict.FOUND:
         return status, x
@@ -156,7 +156,7 @@ def next_arc(x: float, start: State, s: float, delta: float) -> tuple[int, float
     """Status and duration of the arc that starts at phase x, and the state before its impact; a block at rest stays."""
     if start.V < _STILL:
         return Verdict.FOUND, 0.0, State(0.0, start.P, start.D)
-    return arc(start, guess_landing(start, s, delta), s, delta, math.pi - x)
+    return arc(start, estimated_duration(start, s, delta), s, delta, math.pi - x)
 
 
 @kernel

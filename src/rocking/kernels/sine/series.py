@@ -44,7 +44,7 @@ def eq65_time(a: float, omega: float, eta: float) -> float:
 
 @kernel
 def eq65_sums(eta: float) -> tuple[float, float]:
-    """Sums of omega T_{n;1} (n even) and omega T_{n;3} (n odd) in Eq. 65; infinite for eta = 1 and for a NaN."""
+    """Return the sums of omega T_{n;1} (n even) and omega T_{n;3} (n odd) in Eq. 65; infinite for eta = 1 and NaN."""
     if not eta < 1.0:
         return math.inf, math.inf
     y = 0.0
@@ -79,7 +79,7 @@ def vanishes(z: float, y: float, eta: float) -> bool:
 
 @inlined
 def eq65_pair(y: float, v: float, eta: float) -> tuple[float, float, float]:
-    """Steps 2 and 3 of the paper's iterative procedure: omega T_{n;1}, omega T_{n+1;3} and v of the next pair.
+    """Take steps 2 and 3 of the paper's iterative procedure: omega T_{n;1}, omega T_{n+1;3} and v of the next pair.
 
     The cubic of Eq. 62, z^3/24 + c2 z^2 + c1 z = v, has one positive root: from the second pair on its coefficients
     are positive, since y > 2 sqrt(2). In the first, with y = v = 0, it is Eq. 31.
