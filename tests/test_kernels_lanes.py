@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import ULP, in_units_of_g, one_sided, rocking_block, rules_for, state_of
+from kernel_records import ULP, in_units_of_g, long_uncompiled, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import System, after
 
 from rocking.kernels import state
@@ -254,6 +254,7 @@ def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Reco
     return blocks, states
 
 
+@long_uncompiled
 @pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
 @pytest.mark.parametrize("weighted", [False, True], ids=["", "weighted"])
 def test_a_lane_is_quiet_only_if_nothing_happens_in_its_step(nonlinear: bool, weighted: bool) -> None:
