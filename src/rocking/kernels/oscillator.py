@@ -50,7 +50,7 @@ def _peak(
             force[j] = coefficients[k, j]
         for _ in range(steps):
             peak = max(peak, _advance(series, force, width / steps, frequency, damping))
-            move(force, len(force) - 1, width / steps)
+            _move(force, width / steps)
     force[:] = 0.0
     half_period = math.pi / math.sqrt(1.0 - damping * damping)
     for _ in range(math.ceil(half_period / _RADIANS_PER_STEP)):
@@ -107,3 +107,9 @@ def _slope(series: Floats, x: float) -> float:
     for k in range(len(series) - 1, 0, -1):
         result = result * x + k * series[k]
     return result
+
+
+@shared
+def _move(force: Floats, shift: float) -> None:
+    """Expand a polynomial about ``shift``, in place; inlined it would slow the loop over the steps down."""
+    move(force, len(force) - 1, shift)
