@@ -457,23 +457,32 @@ def test_the_asymptotic_time_is_for_horizontal_motions() -> None:
         rocking.simulate(block_for(2.0, 0.2), motion, chattering="time")
 
 
-@quick
-@given(st.integers(0, 10_000), st.sampled_from(MODELS), st.floats(1.0, 6.0), st.floats(0.08, 0.4), st.floats(0.5, 0.95))
-def test_certified_rests_hold_what_all_impacts_give(seed: int, model: str, p: float, alpha: float, e: float) -> None:
+def test_certified_rests_hold_what_all_impacts_give() -> None:
     """A rest proven early lies where the impacts, followed on until time stalls, accumulate."""
-    motion = wave(6.0 * alpha, seed).with_vertical(wave(3.0, seed + 1))
-    block = block_for(p, alpha, e)
-    early = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-4))
-    late = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-13))
-    if early.overturned:
-        return
-    for first, second in zip(early.chattering, late.chattering, strict=False):
-        if not math.isfinite(first["lower"]):
-            break
-        if abs(first["lower"] - second["lower"]) > 1e-3:  # another rest, once the first ones differ by rounding
-            break
-        assert first["lower"] - 1e-12 <= second["upper"]
-        assert second["lower"] <= first["upper"] + 1e-12
+    judged = []
+
+    @quick
+    @given(
+        st.integers(0, 10_000), st.sampled_from(MODELS), st.floats(1.0, 6.0), st.floats(0.08, 0.4), st.floats(0.5, 0.95)
+    )
+    def holds(seed: int, model: str, p: float, alpha: float, e: float) -> None:
+        motion = wave(6.0 * alpha, seed).with_vertical(wave(3.0, seed + 1))
+        block = block_for(p, alpha, e)
+        early = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-4))
+        late = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-13))
+        if early.overturned:
+            return
+        for first, second in zip(early.chattering, late.chattering, strict=False):
+            if not math.isfinite(first["lower"]):
+                break
+            if abs(first["lower"] - second["lower"]) > 1e-3:  # another rest, once the first ones differ by rounding
+                break
+            assert first["lower"] - 1e-12 <= second["upper"]
+            assert second["lower"] <= first["upper"] + 1e-12
+            judged.append(seed)
+
+    holds()
+    assert len(judged) >= 20
 
 
 @pytest.mark.parametrize("seconds", [1.0, 2.5])

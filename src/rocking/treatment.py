@@ -171,7 +171,7 @@ class AsymptoticTime(Treatment):
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Chattering time of every side, s; infinite where chattering is not complete."""
-        from rocking.kernels import paper
+        from rocking.kernels.sine.series import eq65_time
 
         if motion is None or motion.description.family != "sine":
             raise InvalidOption(
@@ -189,12 +189,11 @@ class AsymptoticTime(Treatment):
         frequency = 2.0 * np.pi * parameters["frequency"] / bodies.p
         complete = (amplitude >= 1.0) & (amplitude < self._critical(frequency, eta))
         cases = zip(amplitude.flat, frequency.flat, eta.flat, strict=True)
-        times = np.reshape([paper.eq65_time(*case) for case in cases], amplitude.shape)
+        times = np.reshape([eq65_time(*case) for case in cases], amplitude.shape)
         return np.where(complete, times / bodies.p, np.inf)
 
     def _critical(self, frequency: Floats, restitution: Floats) -> Floats:
-        from rocking.kernels import paper
-        from rocking.kernels.sine.sequence import critical_amplitudes
+        from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
 
         found = np.ones(frequency.size)
         lossy = np.flatnonzero(restitution.ravel() < 1.0)
@@ -204,7 +203,7 @@ class AsymptoticTime(Treatment):
             critical_amplitudes(omega, eta, there)
         else:
             warn_outside_fit(self.critical, omega, eta)
-            paper.fitted_amplitudes(omega, eta, self.critical == "eq76", there)
+            fitted_amplitudes(omega, eta, self.critical == "eq76", there)
         found[lossy] = there
         return found.reshape(frequency.shape)
 

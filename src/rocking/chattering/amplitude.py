@@ -19,8 +19,7 @@ from rocking.chattering.coefficients import COEFFICIENTS
 from rocking.chattering.parameters import broadcast, checked_frequency, checked_restitution, checked_slenderness
 from rocking.engine import in_threads, require_finished
 from rocking.errors import InvalidOption
-from rocking.kernels.paper import fitted_amplitudes
-from rocking.kernels.sine.sequence import critical_amplitudes
+from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
 from rocking.motion import pulses
 from rocking.progress import AMPLITUDES, Progress, announce
 from rocking.simulation import simulate

@@ -15,10 +15,10 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.bisection import bisected
 from rocking.body import ContactLaw
 from rocking.errors import InvalidOption
-from rocking.kernels import state, variation
+from rocking.kernels import state
 from rocking.kernels.ground import components
 from rocking.kernels.march import march
-from rocking.kernels.trace import Trail, trace
+from rocking.kernels.trace import Trail, trace, vary
 from rocking.motion import piecewise
 from rocking.tables import counted
 
@@ -154,7 +154,7 @@ def sensitivity_along(trail: Trail, peak_time: float, impacts: int, events: int,
     peak, impact_times, event_times = np.zeros(count), np.zeros((count, impacts)), np.zeros((count, events))
     scratch, work = state.new_scratch(), state.record(state.VARIATION)
     for k in range(count):
-        peak[k] = variation.vary(trail, scratch, work, k, peak_time, impact_times[k], event_times[k])
+        peak[k] = vary(trail, scratch, work, k, peak_time, impact_times[k], event_times[k])
     if overturned:
         peak[:] = 0.0
     return Sensitivity(*(_by_quantity(values) for values in (peak[:, None], impact_times, event_times)))
