@@ -40,10 +40,11 @@ latest: ## the same without constraints: with the versions of the day
 doctest: .venv/.all ## run the examples in the docstrings
 	$(BIN)/python -m pytest --doctest-modules src/rocking
 
-lint: .venv/.all ## ruff (rules and format) and the import contracts
+lint: .venv/.all ## ruff (rules and format), the import contracts, public docstrings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
+	$(BIN)/python tests/public_names.py
 
 types: .venv/.all ## mypy: strictly for the package, and whether what stands beside it still fits
 	$(BIN)/mypy --strict

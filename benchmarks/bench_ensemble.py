@@ -19,12 +19,11 @@ import numba
 import numpy as np
 
 import rocking
-from rocking.kernels import state
+from rocking.constants import Model
+from rocking.kernels import lanes, state
 from rocking.kernels.ground import Ground, last_piece
-from rocking.kernels.lanes import pool, scheduler
-from rocking.kernels.lanes.steps import step_linear
+from rocking.kernels.lane_steps import WIDTH, step_linear
 from rocking.kernels.state import Record
-from rocking.model import Model
 from rocking.problem import ground_of, rules_of
 from rocking.treatment import Certified
 
@@ -82,8 +81,8 @@ def report_vertical(blocks: rocking.Blocks) -> None:
     steps = len(blocks) * len(motion.coefficients)
     print(f"{motion.name} with {SHIPPED_UP}, ns per block-step: horizontal alone; both in lanes; both one by one")
     for model in get_args(Model):
-        alone, lanes, each = (1e9 * time / steps for time in vertical_times(model, motion, blocks))
-        print(f"  {model:10} {alone:8.2f} {lanes:8.2f} {each:8.2f}   lanes {each / lanes:.2f} times as fast")
+        alone, together, each = (1e9 * time / steps for time in vertical_times(model, motion, blocks))
+        print(f"  {model:10} {alone:8.2f} {together:8.2f} {each:8.2f}   lanes {each / together:.2f} times as fast")
     print()
 
 
@@ -103,8 +102,8 @@ def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     ground = ground_of(motion, blocks.gravity)
     bodies = blocks.kernel_records(model, how.limits(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
-    whole = pool.pool_of(bodies, states, len(ground.pieces) - 1, 1.0, 0)
-    scheduler.march_each(ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole)
+    whole = lanes.pool_of(bodies, states, len(ground.pieces) - 1, 1.0, 0)
+    lanes.march_each(ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole)
 
 
 def shortest(work: Callable[[], object]) -> float:
@@ -192,22 +191,22 @@ def lane_steps(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     states = state.new_states(len(blocks), state.TO_THE_END)
     assert motion.step is not None, "lanes take even samples"
     width = motion.step * float(blocks.p.max())
-    substeps = math.ceil(width / pool.LONGEST_SUBSTEP) if model == "nonlinear" else 0
-    whole = pool.pool_of(bodies, states, len(motion.coefficients), motion.step, substeps)
+    substeps = math.ceil(width / lanes.LONGEST_SUBSTEP) if model == "nonlinear" else 0
+    whole = lanes.pool_of(bodies, states, len(motion.coefficients), motion.step, substeps)
     return count_lane_steps(
         ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole, substeps
     )
 
 
 @numba.njit(error_model="numpy")
-def count_lane_steps(ground: Ground, rules: Record, scratch: Record, whole: pool.Pool, substeps: int) -> int:
-    """Lanes taken over all samples: the loop of `scheduler.run_lanes`, counting."""
+def count_lane_steps(ground: Ground, rules: Record, scratch: Record, whole: lanes.Pool, substeps: int) -> int:
+    """Lanes taken over all samples: the loop of `lanes.run_lanes`, counting."""
     count = 0
     for piece in range(last_piece(ground)):
         count += whole.counts.active
-        scheduler.step_groups(ground, rules, scratch, whole, piece, substeps)
-        scheduler.compact(whole)
-        scheduler.admit_waiting(ground, rules, scratch, whole, piece)
+        lanes.step_groups(ground, rules, scratch, whole, piece, substeps)
+        lanes.compact(whole)
+        lanes.admit_waiting(ground, rules, scratch, whole, piece)
     return count
 
 
@@ -217,11 +216,11 @@ OPERATIONS = 47
 
 def arithmetic() -> tuple[float, float]:
     """Time of a quiet linear step per lane, and the time its operations take at this core's measured rate, ns."""
-    bodies, states = state.records(pool.WIDTH, state.BLOCK), state.new_states(pool.WIDTH, 0)
-    groups = pool.pool_of(bodies, states, 1, 0.01, 0).groups
+    bodies, states = state.records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
+    groups = lanes.pool_of(bodies, states, 1, 0.01, 0).groups
     groups["u"] = 0.5
     calls = 20_000
-    smooth = shortest(lambda: quiet_steps(groups, calls)) / (calls * pool.WIDTH)
+    smooth = shortest(lambda: quiet_steps(groups, calls)) / (calls * WIDTH)
     work = np.full(64, 1.0)
     rate = shortest(lambda: multiply_add(work, 200_000)) / (200_000 * 64 * 2)
     return 1e9 * smooth, 1e9 * rate * OPERATIONS

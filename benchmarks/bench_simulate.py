@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import rocking
-from rocking.model import Model
+from rocking.constants import Model
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))

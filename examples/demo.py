@@ -14,7 +14,7 @@ def main() -> None:
     response = rocking.simulate(statue, motion)
     print(response.summary())
     OUT.mkdir(exist_ok=True)
-    response.plot(chattering=True).savefig(OUT / "demo.png", dpi=160)
+    response.plot(longest_sequence=True).savefig(OUT / "demo.png", dpi=160)
     print(f"\nfigure written to {OUT / 'demo.png'}")
 
 

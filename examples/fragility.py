@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import rocking
-from rocking.analysis.fragility import fragility
-from rocking.analysis.incremental import incremental_dynamic_analysis
+from rocking import fragility, incremental_dynamic_analysis
 
 OUT = Path("out")
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import rocking
-from rocking.analysis.calibration import Scores
+from rocking.analysis import Scores, Validation
 from rocking.constants import STANDARD_GRAVITY
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,8 @@ def main() -> None:
         for name, labels in (("random folds", None), ("folds of source motions", groups)):
             if options.cross_validate:
                 chances = left_out(intensities, overturned, labels, options.cross_validate)
-                report(f"logistic regression, {name}", Scores.mean([Scores.of(row, overturned) for row in chances]))
+                repeats = tuple(Scores.of(row, overturned) for row in chances)
+                report(f"logistic regression, {name}", Validation(chances, repeats).scores)
                 validation = calibration.cross_validate(groups=labels, folds=FOLDS, repeats=options.cross_validate)
                 report(f"rocking blocks, {name}", validation.scores)
 

@@ -85,7 +85,7 @@ def tables():
 
 def paper_table(figure):
     """Set what the paper states about a figure beside what is computed."""
-    rows = [(s.claim, *s.cells()) for s in figure.statements]
+    rows = [(s.claim, *s.cells) for s in figure.statements]
     return markdown(("", "paper", "here", "difference"), rows)
 
 

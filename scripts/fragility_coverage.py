@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from rocking import InvalidOption, fit_fragility
-from rocking.analysis.fragility import Band
+from rocking.analysis import Band
 
 TABLE = Path(__file__).resolve().parents[1] / "docs" / "_tables" / "fragility-coverage.txt"
 DATA_SETS = 500

@@ -14,8 +14,7 @@ import numpy as np
 import rocking
 from rocking import rules
 from rocking.analysis.rules.criteria import TITLES
-from rocking.plot.canvas import add_labels, add_legend, figure_for, labelled
-from rocking.plot.style import CURVES
+from rocking.plot.canvas import CURVES, add_labels, add_legend, figure_for, labelled
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TABLES = DOCS / "_tables"

@@ -58,7 +58,7 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
     import numpy as np
 
     from rocking.kernels import ground, state
-    from rocking.kernels.lanes.pool import pool_of
+    from rocking.kernels.lanes import pool_of
     from rocking.kernels.sine import lanes, sequence
     from rocking.kernels.trace import Trail
 
@@ -84,22 +84,22 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
     return {
         "march.march": [(seen, block, rules, table, scratch, states[0])],
         "trace.trace": [(trail, scratch, reals(), count, reals(1, 3))],
-        "variation.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
+        "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
         "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
         "ground.fill": [(given(3), given(2, 2), 1.0, seen, reals())],
-        "lanes.scheduler.run_lanes": [(seen, rules, scratch, pool, 0)],
-        "lanes.scheduler.march_each": [(seen, rules, scratch, pool)],
+        "lanes.run_lanes": [(seen, rules, scratch, pool, 0)],
+        "lanes.march_each": [(seen, rules, scratch, pool)],
         "oscillator.peak_displacements": [(given(3), given(2, 2), given(), 0.05, reals(), reals())],
-        "paper.eq65_time": [(1.0, 1.0, 1.0)],
-        "paper.eq65_sums": [(1.0,)],
-        "paper.eq65_terms": [(1.0, reals(1, 2))],
-        "paper.eq76": [(1.0, 1.0)],
-        "paper.eq77": [(1.0,)],
-        "paper.fitted_amplitudes": [(given(), given(), True, reals())],
+        "sine.series.eq65_time": [(1.0, 1.0, 1.0)],
+        "sine.series.eq65_sums": [(1.0,)],
+        "sine.series.eq65_terms": [(1.0, reals(), reals())],
+        "sine.sequence.eq76": [(1.0, 1.0)],
+        "sine.sequence.eq77": [(1.0,)],
+        "sine.sequence.fitted_amplitudes": [(given(), given(), True, reals())],
         "population.shares": [(*shares, reals(1, 1, kind=np.float32), reals())],
         "population.log_density": [(reals(1, 1), reals(1, 1), reals(), reals())],
-        "sine.arc.first_landing": [(1.0, 1.0)],
-        "sine.lanes.rest_phases": [(sequences, count, np.zeros(1, lanes.BLOCK), lanes.Answers(reals(), statuses))],
+        "sine.arc.first_impact": [(1.0, 1.0)],
+        "sine.lanes.rest_phases": [(sequences, count, np.zeros(1, lanes.GROUP), lanes.Answers(reals(), statuses))],
         "sine.sequence.rest_phase": [(1.0, 1.0, 1.0)],
         "sine.sequence.resolve": [(1.0, 1.0, 1.0, 1.0, np.zeros(1, sequence.IMPACT))],
         "sine.sequence.semianalytical_phases": [(sequences, count, reals(), statuses)],

@@ -24,7 +24,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 import rocking
 from rocking import overturning_map
-from rocking.analysis.calibration import Scores
+from rocking.analysis import Scores, Validation
 from rocking.constants import STANDARD_GRAVITY
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -473,7 +473,7 @@ def left_out_rows(specimen, motions, overturned, groups, calibrations):
     folds = min(FOLDS, len(set(groups)))
     intensities = np.log([(motion.pga, motion.pgv) for motion in motions])
     chances = left_out(intensities, overturned, groups, 1)
-    regression = Scores.mean([Scores.of(row, overturned) for row in chances])
+    regression = Validation(chances, tuple(Scores.of(row, overturned) for row in chances)).scores
     scores = {name: one.cross_validate(groups=groups, folds=folds).scores for name, one in calibrations.items()}
     told = {"logistic regression on PGA and PGV": regression, **scores}
     return [score_row(specimen, name, one) for name, one in told.items()]

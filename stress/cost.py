@@ -56,7 +56,7 @@ def as_study(blocks: rocking.Blocks, pga: float, width: int) -> Times:
         study = rocking.study(folder, blocks, pulses(4), levels=[pga], measure="pga", model="linear", unit_blocks=width)
         with timed() as taken:
             report = study.run(threads=1)
-        assert report.units == len(study.store.grid)
+        assert report.units == len(study._store.grid)
     return taken[0]
 
 
@@ -122,12 +122,12 @@ def listing(units: int) -> None:
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1000), alpha=0.2, restitution=0.9)
     with tempfile.TemporaryDirectory() as folder:
         study = rocking.study(folder, blocks, pulses(1), levels=np.linspace(1.0, 2.0, units // 2), unit_blocks=512)
-        for key in study.store.grid:
+        for key in study._store.grid:
             (Path(folder) / "result" / name_of(key)).touch()
         start = time.perf_counter()
         found = rocking.study(folder)
         opened = time.perf_counter()
-        done = len(found.store.done())
+        done = len(found._store.done())
         print(f"{done} units: opened in {opened - start:.3f} s, listed in {time.perf_counter() - opened:.3f} s")
 
 

@@ -26,7 +26,7 @@ import distributed  # noqa: F401 - imported once, and not by every process that 
 import numpy as np
 from common import digest, made, units
 
-from rocking.studies.cluster import scheduler_executor
+from rocking.studies.run import scheduler_executor
 
 HERE = ("--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0")
 ORDERS = ("as it is", "reversed")
@@ -83,9 +83,9 @@ def executor(cluster: Cluster, kind: str) -> Iterator[Executor | None]:
 def run(folder: Path, cluster: Cluster, kind: str, count: int, order: str) -> None:
     """Run the study as the setting says."""
     study = made(folder)
-    keys = list(study.store.missing())
+    keys = list(study._store.missing())
     ordered = keys[::-1] if order == "reversed" else keys
-    with executor(cluster, kind) as pool, patch.object(study.store, "missing", lambda: iter(ordered)):
+    with executor(cluster, kind) as pool, patch.object(study._store, "missing", lambda: iter(ordered)):
         study.run(threads=count if kind == "threads" else None, executor=pool)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import psutil
 
 import rocking
-from rocking.studies.cluster import local_executor
+from rocking.studies.run import local_executor
 
 
 def made(folder: str, scales: int) -> rocking.Study:

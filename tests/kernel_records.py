@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import pytest
+from numba import config
 from oracles.problem import Problem
 
 from rocking.kernels import state
@@ -14,6 +16,8 @@ from rocking.kernels.state import Record
 GRAVITY = 9.80665
 ULP = 2.0**-52
 PLUS, MINUS = 0, 1
+
+long_uncompiled = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="takes long without compilation")
 
 Pair = tuple[float, float]
 

@@ -7,12 +7,19 @@ lists the faults, one a line, and exits with 1 where there are some.
 
 from __future__ import annotations
 
+import ast
+import importlib
 import inspect
+import re
 import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import rocking
+from rocking.body import Bodies, Body
+
+#: What describes the methods of these classes, which do not inherit from it.
+PROTOCOLS: dict[Any, tuple[Any, ...]] = {rocking.Block: (Body,), rocking.Blocks: (Bodies,)}
 
 #: Checks of numpydoc: form and order of sections; parameters, returns and yields without a name, a type or a word.
 CHECKS = frozenset({"GL01", "GL03", "GL05", "GL06", "GL07", "GL08", "PR02", "PR03", "PR04", "PR07", "RT03"})
@@ -72,7 +79,8 @@ def faults() -> list[str]:
     from numpydoc.validate import validate
 
     found = []
-    for name, member in public_members().items():
+    for name, own in public_members().items():
+        member = _described(name, own)
         wanted = CHECKS_OF_FUNCTIONS if inspect.isfunction(member) else CHECKS
         # What a property is, its one line says; and a class that only the package makes has attributes.
         if isinstance(member, property) or "Attributes\n" in (inspect.getdoc(member) or ""):
@@ -80,6 +88,44 @@ def faults() -> list[str]:
         errors = validate(get_doc_object(member))["errors"]
         found += [f"{name}: {code} {text}" for code, text in errors if code in wanted]
     return found
+
+
+def unreachable() -> list[str]:
+    """List classes, but for protocols, that public functions and attributes speak of, and that have no public name."""
+    classes = [value for value in public_names().values() if inspect.isclass(value)]
+    public = {base for each in classes for base in inspect.getmro(each)}
+    found = set()
+    for name, member in public_members().items():
+        function = member.fget if isinstance(member, property) else member
+        spoken = vars(function).get("__annotations__", {}) if inspect.isclass(function) else function.__annotations__
+        names = imported(sys.modules[function.__module__])
+        for about, annotation in spoken.items():
+            words = () if about.startswith("_") else re.findall(r"[A-Za-z_]\w*", str(annotation))
+            found |= {f"{name}: {word}" for word in words if word in names and names[word] not in public}
+    return sorted(found)
+
+
+def imported(module: Any) -> dict[str, Any]:
+    """Classes of the package by the names that a module gives them, also where it imports them for types alone."""
+    found = {name: value for name, value in vars(module).items() if inspect.isclass(value)}
+    for node in ast.walk(ast.parse(inspect.getsource(module))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rocking"):
+            there = importlib.import_module(node.module or "")
+            found |= {each.asname or each.name: getattr(there, each.name, None) for each in node.names}
+    return {name: value for name, value in found.items() if _is_own_class(value)}
+
+
+def _described(name: str, member: Any) -> Any:
+    """Return a member, or the one of a base class or a protocol that it implements: that one describes it."""
+    owner = public_names().get(name.rpartition(".")[0])
+    key = name.rpartition(".")[2]
+    bases = [*inspect.getmro(owner)[1:], *PROTOCOLS.get(owner, ())] if inspect.isclass(owner) else []
+    given = [_plain(vars(base)[key]) for base in bases if key in vars(base) and base.__module__.startswith("rocking")]
+    return next((one for one in given if one.__doc__), member)
+
+
+def _is_own_class(value: Any) -> bool:
+    return inspect.isclass(value) and "rocking" in value.__module__ and not getattr(value, "_is_protocol", False)
 
 
 def _is_member(member: Any) -> bool:

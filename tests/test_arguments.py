@@ -7,7 +7,7 @@ import pytest
 
 import rocking
 from rocking import Block, Blocks, InvalidBlock, InvalidMotion, InvalidOption
-from rocking.analysis.fragility import Band
+from rocking.analysis import Band
 from rocking.analysis.survey import survey
 from rocking.named_pulses import named_pulse
 

@@ -12,12 +12,12 @@ from scipy.stats import norm
 
 import rocking
 from rocking.analysis.calibration import evidence as population
-from rocking.analysis.calibration.diagnostics import Scores, leaning
+from rocking.analysis.calibration.diagnostics import Scores, bounds_reached
 from rocking.analysis.calibration.evidence import WIDENED, Candidates, Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
 from rocking.analysis.calibration.search import AGREEMENT, Problem, posterior, r_hat, search
 from rocking.analysis.calibration.space import Space
-from rocking.analysis.tables import read_ensemble
+from rocking.analysis.tables import read_calibration, read_ensemble
 
 HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
 STEP = 0.02
@@ -228,11 +228,11 @@ def test_one_unknown_angle_is_found_from_forty_tests():
     assert not found.diagnostics.notes
 
 
-def test_a_posterior_that_leans_on_a_bound_is_told_with_the_mend(shaken):
+def test_a_posterior_that_reaches_a_bound_is_told_with_the_mend(shaken):
     found = rocking.calibrate(*shaken, candidates=256, p=(1.0, 2.5), two_sided=False, model="linear")
-    ends = {(one.name, one.end) for one in found.diagnostics.leaning}
+    ends = {(one.name, one.end) for one in found.diagnostics.bounds_reached}
     assert ("p", "upper") in ends
-    assert "p leans on its upper bound of 2.5 rad/s" in found.summary()
+    assert "p reaches its upper bound of 2.5 rad/s" in found.summary()
     assert "set that of p to 5" in found.summary()
     assert found.to_dict()["diagnostics"]["notes"] == list(found.diagnostics.notes)
 
@@ -749,6 +749,23 @@ def test_an_ensemble_is_read_as_it_was_written(found, tmp_path):
             read_ensemble(tmp_path / "spoilt.csv")
 
 
+def test_an_error_within_a_table_keeps_what_it_is_about(tmp_path):
+    ensemble, outcomes = tmp_path / "ensemble.csv", tmp_path / "outcomes.csv"
+    sides = ",".join(f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus"))
+    header = sides.replace("p_plus,p_minus", "p_plus_rad_s,p_minus_rad_s").replace("alpha_plus", "alpha_plus_rad")
+    header = header.replace("alpha_minus", "alpha_minus_rad")
+    ensemble.write_text(f"{header},weight,model\n2,2,0.2,0.2,-0.5,0.9,1,linear\n")
+    with pytest.raises(rocking.InvalidBlock, match="block 0 is in line 2: restitution must be") as caught:
+        read_ensemble(ensemble)
+    error = caught.value
+    assert (error.argument, error.path, error.value) == ("restitution", str(ensemble), -0.5)
+    outcomes.write_text("motion,overturned\nel-centro-meloland-270,1\nnothing.AT2,0\n")
+    with pytest.raises(rocking.UnreadableRecord, match="line 3: dt must be a positive number") as caught:
+        read_calibration(outcomes, channel=None, dt=-1.0, units=None)
+    error = caught.value
+    assert (error.argument, error.path, error.line, error.value) == ("dt", str(outcomes), 3, -1.0)
+
+
 def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(shaken):
     space = Space.of((3.0, 3.0), (0.1, 0.2), (0.9, 0.9), two_sided=False)
     assert space.known == {"p": 3.0, "restitution": 0.9}
@@ -763,6 +780,6 @@ def test_a_posterior_whose_interval_ends_at_a_bound_is_told(share, told):
     space = Space.of((1.0, 10.0), 0.2, 0.9, two_sided=False)
     ends = np.log([9.9, 3.0])
     centres = np.repeat(ends, [round(1000 * share), 1000 - round(1000 * share)])[:, None]
-    notes = [str(one) for one in leaning(space, centres)]
+    notes = [str(one) for one in bounds_reached(space, centres)]
     assert len(notes) == told
     assert all("8 % of the posterior" in note and "sets the upper end of the interval" in note for note in notes)

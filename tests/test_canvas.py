@@ -14,7 +14,7 @@ from rocking.errors import InvalidOption
 DRAW = """
 import sys
 import numpy as np
-from rocking.plot import regions_figure
+from rocking.plot.maps import regions_figure
 
 def draw(**options):
     return regions_figure(

@@ -8,7 +8,7 @@ import pytest
 
 import rocking
 from rocking import fragility, incremental_dynamic_analysis, overturning_map, quantities, rocking_spectrum
-from rocking.analysis.fragility import Band
+from rocking.analysis import Band
 from rocking.tables import to_json
 
 RECORD = "el-centro-meloland-270"

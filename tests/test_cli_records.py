@@ -104,13 +104,17 @@ def test_ranges_have_units_at_their_ends():
     assert quantities.values("5deg,10deg", "--alpha", quantities.angle) == pytest.approx(np.radians([5.0, 10.0]))
 
 
-@pytest.mark.parametrize(("command", "analysis"), [("ida", "incremental_dynamic_analysis"), ("fragility", "run")])
-def test_levels_of_an_acceleration_may_be_in_g_and_those_of_a_velocity_may_not(run, monkeypatch, command, analysis):
+@pytest.mark.parametrize(
+    ("command", "module", "analysis"),
+    [("ida", "analysis", "incremental_dynamic_analysis"), ("fragility", "fits", "run")],
+)
+def test_levels_of_an_acceleration_may_be_in_g_and_those_of_a_velocity_may_not(
+    run, monkeypatch, command, module, analysis
+):
     def refuse(*_, levels, **__):
         raise InvalidOption(f"{levels.round(6).tolist()}")
 
-    module = importlib.import_module(f"rocking.cli.{command}")
-    monkeypatch.setattr(module, analysis, refuse)
+    monkeypatch.setattr(importlib.import_module(f"rocking.cli.{module}"), analysis, refuse)
     assert "[0.980665, 1.96133]" in run(command, RECORD, *BLOCK, "--levels", "0.1g,0.2g")[2]
     assert "--levels takes a velocity" in run(command, RECORD, *BLOCK, "--measure", "pgv", "--levels", "0.1g,0.2g")[2]
 
@@ -463,7 +467,7 @@ def test_a_station_s_name_leads_to_its_horizontal_records(run, command):
 def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
     import warnings
 
-    from rocking.cli import critical as module
+    from rocking.cli import chattering as module
     from rocking.errors import OutsideFit
 
     def report(*_):
@@ -480,7 +484,7 @@ def test_compiling_is_said_once_for_each_work_and_not_where_it_is_short():
         "import time\n"
         "from numba import njit\n"
         "from rocking import compiling, progress\n"
-        "compiling.listen()\n"
+        "compiling._watch_compiler()\n"
         "def compiled(seconds, patience):\n"
         "    compiling._PATIENCE = patience\n"
         "    compiling.announce(seconds)\n"

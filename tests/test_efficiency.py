@@ -115,4 +115,5 @@ def test_the_figure_has_the_order_of_the_table():
     found = compare_measures(rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), motions)
     drawn = [label.get_text() for label in found.plot().axes[0].get_yticklabels()]
     rows = found.summary().splitlines()[3:]
+    assert len(drawn) == found.sizes["measure"] == 7
     assert all(row.startswith(name) for row, name in zip(rows, drawn, strict=True))

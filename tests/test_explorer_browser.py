@@ -152,6 +152,17 @@ def test_a_number_may_be_typed_and_a_bad_one_is_answered_with_a_sentence(opened)
     assert page.js(MARKED) == []
 
 
+def test_a_number_that_is_being_typed_stays_when_a_response_arrives(opened):
+    page = opened(STATUE)
+    width, move = page.page.locator("#width"), "document.getElementById('pga-slider')"
+    moved = f"{move}.value = '700'; {move}.dispatchEvent(new Event('input', {{bubbles: true}}))"
+    page.rested(lambda: (page.js(moved), width.fill("0.3")))
+    assert query_of(page)["pga"] != "0.4g" and query_of(page)["width"] == "0.24"
+    assert width.input_value() == "0.3"
+    page.rested(lambda: width.press("Enter"))
+    assert query_of(page)["width"] == "0.3" and "α = 15.3°" in page.text("#derived")
+
+
 def test_a_link_reproduces_what_is_shown(opened):
     query = STATUE + "&model=linear&chattering=velocity%3D0.001&from=231&to=234"
     page = opened(query)

@@ -179,11 +179,15 @@ def test_the_page_loads_nothing_from_elsewhere():
 
 def test_every_module_that_is_imported_is_served(page):
     files = server.page_files()
-    assert len(files) >= 15
-    for name, content in files.items():
-        for imported in re.findall(r'from "\./([\w.]+)"|import\(`\./\$\{name\}\.js`\)', content.decode()):
-            assert not imported or imported in files, name
-    for name in re.findall(r'(?:src|href)="(/[^"]+)"', files["index.html"].decode()):
+    texts = {name: content.decode() for name, content in files.items()}
+    imports = [(name, each) for name, text in texts.items() for each in re.findall(r'from "\./([\w.]+)"', text)]
+    assert len(imports) >= 25
+    for name, imported in imports:
+        assert imported in files, name
+    assert {"block.js", "map.js", "compare.js"} <= texts.keys()  # imported by the name of their view
+    asked = re.findall(r'(?:src|href)="(/[^"]+)"', texts["index.html"])
+    assert len(asked) >= 12
+    for name in asked:
         answer = page.get(name)
         assert answer.status_code == 200
         assert answer.headers["x-content-type-options"] == "nosniff"
@@ -195,6 +199,7 @@ def test_every_module_that_is_imported_is_served(page):
         ({"width": "-1"}, "width", "“Width” must be a positive number"),
         ({"restitution": "0.9999"}, "restitution", "“Restitution η”"),
         ({"pgv": "1"}, "pga", "“Peak acceleration” and “Peak velocity” scale the same motion"),
+        ({"pga": "-1g"}, "pga", "“Peak acceleration” must be a positive number, in m/s^2, not -9.80665"),
         ({"vertical": "nothing-up"}, "vertical", "“Vertical component”: there is no shipped record"),
     ],
 )

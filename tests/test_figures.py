@@ -7,27 +7,14 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from rocking.plot import (
-    DrawnSequence,
-    FragilityLine,
-    HazardLine,
-    Parameter,
-    RiskLine,
-    ScaledMotion,
-    SpectrumCurves,
-    fragility_figure,
-    ida_figure,
-    intervals_figure,
-    measured_figure,
-    outcome_figure,
-    outcomes_figure,
-    regions_figure,
-    response_figure,
-    risk_figure,
-    spectrum_figure,
-    survival_figure,
-)
-from rocking.plot.ida import levels_reaching
+from rocking.plot.calibration import Parameter, measured_figure, outcomes_figure
+from rocking.plot.fragility import FragilityLine, fragility_figure
+from rocking.plot.histories import intervals_figure
+from rocking.plot.ida import ScaledMotion, ida_figure, levels_reaching
+from rocking.plot.maps import outcome_figure, regions_figure
+from rocking.plot.response import DrawnSequence, response_figure
+from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
+from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
 LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from kernel_records import GRAVITY, block_of, ground_of, rules_for, state_of
+from kernel_records import GRAVITY, block_of, ground_of, long_uncompiled, rules_for, state_of
 from oracles import multiprecision
 from oracles.problem import Problem
 
 from rocking.kernels.arc import restoring
 from rocking.kernels.certificate import (
-    Bounded,
     Bounds,
+    MotionBounds,
     Proof,
     arc_bounds,
-    disturbed,
     geometric_bracket,
     prove_rest,
     side_bounds,
+    widened,
 )
 from rocking.kernels.ground import Window, bounds_over
 from rocking.kernels.state import new_scratch
@@ -87,6 +87,7 @@ def proof(
     return prove_rest(ground_of(problem, error), block_of(problem), rules, new_scratch(), start)
 
 
+@long_uncompiled
 @few
 @given(problems(pieces=1), st.integers(0, 1), between(1e-4, 0.6))
 def test_bounds_on_an_arc_hold_its_duration_and_its_impact(problem: Problem, side: int, share: float) -> None:
@@ -94,7 +95,7 @@ def test_bounds_on_an_arc_hold_its_duration_and_its_impact(problem: Problem, sid
     window = 4.0 * v / problem.restoring(0.0, i)
     seen = bounds_over(ground_of(problem), 0, 0.0, window, ANYTHING, new_scratch()["ground"])
     rules = rules_for(nonlinear=problem.model == "nonlinear")
-    change, shortest, longest = arc_bounds(v, side_bounds(block_of(problem), rules, side, Bounded(seen, STILL)))
+    change, shortest, longest = arc_bounds(v, side_bounds(block_of(problem), rules, side, MotionBounds(seen, STILL)))
     assume(longest <= window)
     soon_at_rest = replace(problem, restitution=(0.01, 0.01))
     time, _, w, _ = multiprecision.follow(soon_at_rest, velocity=i * v).impacts[0]
@@ -102,6 +103,7 @@ def test_bounds_on_an_arc_hold_its_duration_and_its_impact(problem: Problem, sid
     assert abs((w / v) ** 2 - 1) <= change + 1e-50
 
 
+@long_uncompiled
 @settings(few, max_examples=24)
 @given(problems(pieces=4, jumps=True), st.integers(0, 1), between(1e-5, 0.2), between(0.0, 0.3), tolerances)
 def test_the_bracket_holds_the_time_to_rest_whatever_jumps_lie_in_the_window(
@@ -116,6 +118,7 @@ def test_the_bracket_holds_the_time_to_rest_whatever_jumps_lie_in_the_window(
     assert found.lower <= found.time <= found.upper
 
 
+@long_uncompiled
 @few
 @given(problems(pieces=1, columns=4), st.integers(0, 1), between(1e-6, 1e-2))
 def test_the_bracket_of_higher_order_is_within_the_one_by_comparison_and_holds_the_rest(
@@ -128,6 +131,7 @@ def test_the_bracket_of_higher_order_is_within_the_one_by_comparison_and_holds_t
     assert narrow.lower <= multiprecision.rest_time(problem, 0.0, 1 - 2 * side, v) <= narrow.upper
 
 
+@long_uncompiled
 @few
 @given(problems(pieces=2), st.integers(0, 1), between(1e-7, 1e-3), st.sampled_from([1e-9, 1e-3]), tolerances)
 def test_the_bracket_under_an_approximated_motion_holds_for_every_motion_so_near(
@@ -245,7 +249,7 @@ def test_a_jump_just_past_the_end_of_a_window_is_not_ruled_out() -> None:
 def test_a_disturbed_motion_may_be_off_by_its_error_at_any_time(error: float) -> None:
     problem = Problem("linear", (2.0, 2.0), (0.2, 0.2), (0.5, 0.5), np.array([0.0, 9.0]), np.array([[0.5, 0.1]]))
     seen = bounds_over(ground_of(problem), 0, 1.0, 2.0, ANYTHING, new_scratch()["ground"])
-    wider = disturbed(seen, error)
+    wider = widened(seen, error)
     assert (wider.low, wider.high) == (seen.low - error, seen.high + error)
     assert (wider.slope, wider.jumps) == (seen.slope, seen.jumps + 2.0 * error)
 

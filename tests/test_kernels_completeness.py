@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from kernel_records import rocking_block, state_of
+from kernel_records import long_uncompiled, rocking_block, state_of
 
 import rocking
 from rocking.kernels.state import AT_REST, new_scratch, records
 from rocking.kernels.uplift import note_complete
-from rocking.motion.exceedance import exceedances
+from rocking.motion.measures import exceedances
 from rocking.problem import ground_of
 
 Pair = tuple[float, float]
@@ -45,6 +45,7 @@ def motions(draw: st.DrawFn) -> rocking.Motion:
     return made
 
 
+@long_uncompiled
 @settings(deadline=None, max_examples=400)
 @given(motions(), st.tuples(st.floats(0.05, 1.0), st.floats(0.05, 1.0)), st.floats(0.0, 1.1))
 def test_chattering_is_complete_where_the_next_stretch_beyond_a_threshold_starts_after_the_rest(

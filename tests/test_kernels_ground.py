@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import ULP, in_units_of_g
+from kernel_records import ULP, in_units_of_g, long_uncompiled
 from oracles.exact import exact, polynomial
 
 from rocking.kernels.arc import significant_degree
@@ -222,6 +222,7 @@ def test_a_window_over_too_many_stretches_has_no_bounds() -> None:
     assert np.all(np.isnan(bounds_over(ground, 0, 0.0, 150.0 * STRETCH, ANYTHING, work())))
 
 
+@long_uncompiled
 @quick
 @given(st.integers(0, 2**32 - 1), st.integers(1, 300), st.integers(1, 4), st.floats(0.1, 1.0), st.floats(0.1, 1.0))
 def test_no_piece_that_passes_the_threshold_is_passed_over(

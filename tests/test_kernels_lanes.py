@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import ULP, in_units_of_g, one_sided, rocking_block, rules_for, state_of
+from kernel_records import ULP, in_units_of_g, long_uncompiled, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import System, after
 
 from rocking.kernels import state
 from rocking.kernels.arc import Line, evaluate, expand
 from rocking.kernels.ground import Ground
-from rocking.kernels.lanes.pool import (
+from rocking.kernels.lane_steps import WIDTH, is_event_free, step_linear, step_nonlinear, step_weighted
+from rocking.kernels.lanes import (
     LONGEST_SUBSTEP,
     LONGEST_WEIGHTED_SUBSTEP,
-    WIDTH,
     Pool,
     load,
     pool_of,
@@ -25,7 +25,6 @@ from rocking.kernels.lanes.pool import (
     stumpff,
     unload,
 )
-from rocking.kernels.lanes.steps import is_event_free, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.state import Record, Records, new_scratch
 
 mp = mpmath.mp.clone()
@@ -255,6 +254,7 @@ def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Reco
     return blocks, states
 
 
+@long_uncompiled
 @pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
 @pytest.mark.parametrize("weighted", [False, True], ids=["", "weighted"])
 def test_a_lane_is_quiet_only_if_nothing_happens_in_its_step(nonlinear: bool, weighted: bool) -> None:

@@ -17,7 +17,13 @@ import rocking.kernels
 from rocking.kernels import compiled, library
 
 SCRIPT = Path(__file__).resolve().parent.parent / "scripts" / "ship_kernels.py"
-NAMES = ("paper.eq65_time", "paper.eq65_sums", "paper.eq65_terms", "paper.fitted_amplitudes", "ground.fill")
+NAMES = (
+    "sine.series.eq65_time",
+    "sine.series.eq65_sums",
+    "sine.series.eq65_terms",
+    "sine.sequence.fitted_amplitudes",
+    "ground.fill",
+)
 
 pytestmark = pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
 
@@ -76,8 +82,8 @@ def test_every_kernel_that_python_calls_is_listed_once() -> None:
 
 def test_numbers_and_tuples_are_those_of_numba(shipped: Path) -> None:
     random = np.random.default_rng(4)
-    time, reference = both("paper.eq65_time")
-    sums, sums_reference = both("paper.eq65_sums")
+    time, reference = both("sine.series.eq65_time")
+    sums, sums_reference = both("sine.series.eq65_sums")
     for a, omega, eta in random.uniform((1.0, 0.1, 0.3), (3.0, 9.0, 0.99), (200, 3)).tolist():
         assert np.array_equal(time(a, omega, eta), reference(a, omega, eta), equal_nan=True)
         assert sums(eta) == sums_reference(eta)
@@ -85,7 +91,7 @@ def test_numbers_and_tuples_are_those_of_numba(shipped: Path) -> None:
 
 def test_arrays_are_read_and_written_as_by_numba(shipped: Path) -> None:
     random = np.random.default_rng(5)
-    native, reference = both("paper.fitted_amplitudes")
+    native, reference = both("sine.sequence.fitted_amplitudes")
     omega, eta = random.uniform(0.5, 8.0, 50), random.uniform(0.4, 0.95, 50)
     found, expected = np.zeros(50), np.zeros(50)
     native(omega, eta, True, found)
@@ -109,13 +115,13 @@ def test_arrays_are_read_and_written_as_by_numba(shipped: Path) -> None:
     ids=["single", "strided", "two dimensions", "integer", "list", "read-only", "too few", "byte order"],
 )
 def test_arguments_of_other_types_are_left_to_numba(shipped: Path, change: Any) -> None:
-    native, _ = both("paper.fitted_amplitudes")
+    native, _ = both("sine.sequence.fitted_amplitudes")
     with pytest.raises(library.OtherTypes):
         native(*change(np.ones(4), np.full(4, 0.9), True, np.zeros(4)))
 
 
 def test_what_is_only_read_may_be_read_only(shipped: Path) -> None:
-    native, _ = both("paper.fitted_amplitudes")
+    native, _ = both("sine.sequence.fitted_amplitudes")
     omega, eta, out = np.ones(4), np.full(4, 0.9), np.zeros(4)
     omega.flags.writeable = False
     native(omega, eta, True, out)
@@ -158,7 +164,7 @@ def damage(name: str, folder: Path) -> None:
 def test_a_library_that_does_not_fit_is_not_used(shipped: Path, name: str) -> None:
     damage(name, shipped)
     assert library.opened() is None
-    assert library.function("rocking.kernels.paper.eq65_time") is None
+    assert library.function("rocking.kernels.sine.series.eq65_time") is None
 
 
 def test_the_long_way_is_chosen_by_a_variable(shipped: Path, monkeypatch: pytest.MonkeyPatch) -> None:

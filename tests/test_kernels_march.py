@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import MINUS, NO_GROUND, PLUS, ULP, Pair, in_units_of_g, rocking_block, rules_for
+from kernel_records import MINUS, NO_GROUND, PLUS, ULP, Pair, in_units_of_g, long_uncompiled, rocking_block, rules_for
 from numpy.testing import assert_array_equal
 
 from rocking.kernels import state
@@ -127,6 +127,7 @@ def test_a_march_that_runs_out_of_room_resumes_bit_for_bit(nonlinear: bool) -> N
         assert whole.at == resumed.at
 
 
+@long_uncompiled
 @pytest.mark.parametrize("nonlinear", [False, True])
 @pytest.mark.parametrize("columns", [2, 3])
 def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, columns: int) -> None:
@@ -259,6 +260,7 @@ def test_a_motion_that_never_passes_a_threshold_leaves_the_block_at_rest() -> No
     assert found.at["end"] == 2.0
 
 
+@long_uncompiled
 @pytest.mark.parametrize("shape", [[1.0, 0.0], [1.0, -1.0], [0.0, 1.0], [1.0, 1.0]])
 @pytest.mark.parametrize("ulps", range(-24, 25, 3))
 @pytest.mark.parametrize("nonlinear", [False, True])
@@ -317,6 +319,7 @@ def test_a_march_may_stop_between_the_last_impact_resolved_and_rest() -> None:
     assert_array_equal(found.traced(np.linspace(last, found.at["end"], 9)[2:]), np.zeros((7, 3)))
 
 
+@long_uncompiled
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_without_loss_the_block_rocks_on_until_the_stop(nonlinear: bool) -> None:
     found = run(NO_GROUND, velocity=0.1, e=(1.0, 1.0), nonlinear=nonlinear, stop=50.0)
@@ -417,6 +420,7 @@ def extremes(draw: st.DrawFn) -> dict[str, object]:
     }
 
 
+@long_uncompiled
 @settings(quick, max_examples=150)
 @given(extremes())
 def test_every_march_ends_and_stays_sound(case: dict[str, object]) -> None:

@@ -98,3 +98,32 @@ def test_the_search_for_garbage_goes_on_as_it_was(collects: bool) -> None:
         assert gc.isenabled() == collects
     finally:
         (gc.enable if before else gc.disable)()
+
+
+def test_a_kernel_may_call_another_that_has_parts_in_common_with_it() -> None:
+    """The other one's copies of parts must not hide what only this one's copies call."""
+
+    @inlined
+    def innermost(x: float) -> float:
+        return x + 1.0
+
+    @shared
+    def common(x: float) -> float:  # too long to be inlined
+        x = math.erf(math.expm1(math.erf(math.expm1(math.erf(math.expm1(math.erf(math.expm1(x))))))))
+        x = math.erf(math.expm1(math.erf(math.expm1(math.erf(math.expm1(math.erf(math.expm1(x))))))))
+        x = math.erf(math.expm1(math.erf(math.expm1(math.erf(math.expm1(math.erf(math.expm1(x))))))))
+        return innermost(x)
+
+    @kernel
+    def other(x: float) -> float:
+        return common(x) + common(x + 1.0)
+
+    @shared
+    def last(x: float) -> float:
+        return 2.0 * innermost(x)
+
+    @kernel
+    def whole(x: float) -> float:
+        return other(x) + common(x) + last(x)
+
+    assert whole(0.5) == other(0.5) + common(0.5) + 3.0

@@ -4,15 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from kernel_records import in_units_of_g, rocking_block, rules_for, state_of
+from kernel_records import in_units_of_g, long_uncompiled, rocking_block, rules_for, state_of
 from numpy.testing import assert_array_equal
 from test_kernels_march import Run, record, run, with_rows
 
 from rocking.kernels import state
 from rocking.kernels.ground import Ground
 from rocking.kernels.rest import pass_proven_impacts
-from rocking.kernels.state import Record
-from rocking.kernels.trace import PROVEN_PER_ITERATION, has_space
+from rocking.kernels.state import PROVEN_PER_ITERATION, Record, has_space
 
 
 def one_by_one(ground: Ground) -> Ground:
@@ -47,6 +46,7 @@ def assert_same_course(one: Run, other: Run) -> None:
     assert one.at["peak_time"] == pytest.approx(other.at["peak_time"], abs=1e-7)
 
 
+@long_uncompiled
 @pytest.mark.parametrize("seed", range(8))
 def test_impacts_in_one_go_are_those_taken_one_by_one(seed: int) -> None:
     assert_same_course(run(record(seed)), run(one_by_one(record(seed))))
@@ -100,6 +100,7 @@ def test_a_turn_passes_no_more_impacts_than_every_table_has_space_for() -> None:
     assert has_space(rules_for(), state.new_table(PROVEN_PER_ITERATION + 3), proven(1e-3))
 
 
+@long_uncompiled
 def test_a_table_that_is_full_within_a_proven_sequence_changes_no_bit() -> None:
     whole = run(STEADY, velocity=0.02)
     for rows in range(3, len(whole.nodes) + 2):

@@ -22,8 +22,7 @@ from rocking.kernels.recurrences import (
     weighted_ten,
 )
 from rocking.kernels.state import ORDER, Record, new_scratch
-from rocking.kernels.trace import Trail
-from rocking.kernels.variation import Quantity, expand_variation
+from rocking.kernels.trace import Quantity, Trail, expand_variation
 
 Start = tuple[float, float]
 Series = list[float]

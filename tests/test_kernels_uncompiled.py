@@ -1,6 +1,7 @@
 """The kernels as plain Python: the same laws, and the same numbers."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -17,35 +18,17 @@ from rocking.treatment import Certified
 
 TESTS = Path(__file__).parent
 
-#: Left out: many cases that take long without compilation, or that test the oracle's arithmetic as much.
-LONG = ["clipped", "ends_and_stays_sound", "jumps_lie", "approximated", "hold_its_duration", "higher_order_is_within"]
-LONG += ["size_of", "every_size", "never_behind_it", "without_loss", "what_a_short_step_decides", "quiet_only"]
-LONG += ["full_within_a_proven", "no_piece_that_passes", "impacts_in_one_go", "compiled_all_the_same"]
-
-#: Rooms with tests of their own; what the others hold is tested with those that they serve.
-SUBJECTS = ["arc", "certificate", "ground", "impact", "lanes", "march", "one_sided", "proven", "remaining", "root"]
-SUBJECTS += ["short_arc", "uplift", "variation"]
+#: Tests of how kernels are compiled.
+COMPILATION = ("test_kernels_compiled.py", "test_kernels_parts.py", Path(__file__).name)
 
 
 @pytest.mark.slow
 def test_uncompiled_kernels_obey_the_same_laws() -> None:
-    files = [str(TESTS / f"test_kernels_{subject}.py") for subject in SUBJECTS]
-    chosen = " and ".join(f"not {name}" for name in LONG)
+    """All tests of kernels but those that take long without compilation (`kernel_records.long_uncompiled`)."""
+    files = [str(file) for file in sorted(TESTS.glob("test_kernels_*.py")) if file.name not in COMPILATION]
+    options = ["-q", "-x", "-p", "no:cacheprovider", "-W", "ignore::RuntimeWarning", "-m", "not slow"]
     done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-q",
-            "-x",
-            "-p",
-            "no:cacheprovider",
-            "-W",
-            "ignore::RuntimeWarning",
-            "-k",
-            chosen,
-            *files,
-        ],
+        [sys.executable, "-m", "pytest", *options, *files],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         cwd=TESTS.parent,
         capture_output=True,
@@ -53,6 +36,8 @@ def test_uncompiled_kernels_obey_the_same_laws() -> None:
         check=False,
     )
     assert done.returncode == 0, done.stdout[-4000:]
+    (passed,) = re.findall(r"(\d+) passed", done.stdout)
+    assert int(passed) >= 580
 
 
 def played() -> Iterator[np.ndarray]:

@@ -11,8 +11,7 @@ from oracles.problem import Problem
 from rocking.kernels import state
 from rocking.kernels.arc import restoring
 from rocking.kernels.state import Record
-from rocking.kernels.trace import Trail
-from rocking.kernels.variation import Quantity, rest_shift
+from rocking.kernels.trace import Quantity, Trail, rest_shift
 
 
 def node_of(side: int, u: float, v: float, time: float = 0.0) -> Record:

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, Motion
+from rocking import Block, Motion, checks
 from rocking.analysis.survey import survey
 from rocking.cli import wording
-from rocking.errors import Message, RockingError
+from rocking.errors import InvalidBlock, InvalidOption, Message, RockingError, literal
 from rocking.explorer.uploads import UploadStore
 from rocking.named_pulses import named_pulse
 
@@ -216,3 +216,10 @@ def test_a_survey_of_motions_without_names_is_that_of_their_own_names():
     assert len(set(checked.records)) == 2
     np.testing.assert_array_equal(checked.margins[0], checked.margins[1])
     assert [*checked.to_dataframe()["west"]] == [ratios["west"] for ratios in checked.ratios]
+
+
+def test_braces_in_a_value_are_no_place_of_a_name():
+    error = InvalidOption(f"{literal('a{}b')} and {checks.shown('{}')} need {{}}, not {{}}", "dt")
+    assert error.text(lambda name: f"--{name}") == "a{}b and '{}' need --dt, not {}"
+    with pytest.raises(InvalidBlock, match=r"not as '\{\}': width and height for the full sizes"):
+        Block("{}")

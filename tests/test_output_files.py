@@ -10,7 +10,7 @@ import pytest
 
 import rocking
 from rocking.analysis.survey import survey
-from rocking.result import Result
+from rocking.result import DatasetResult
 from rocking.studies.results import FORMATS
 from rocking.tables import whole_file, write_figure
 
@@ -39,7 +39,7 @@ def response() -> rocking.Response:
 
 
 @pytest.fixture(scope="module")
-def analysis(response: rocking.Response) -> Result:
+def analysis(response: rocking.Response) -> DatasetResult:
     return rocking.incremental_dynamic_analysis(response.block, response.motion, tolerance=1e-2)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from rocking.plot import DrawnSequence, response_figure
+from rocking.plot.response import DrawnSequence, response_figure
 
 NO_TIMES = np.array([])
 NO_INTERVALS = np.empty((0, 2))

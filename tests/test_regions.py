@@ -8,8 +8,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 
-from rocking.plot import regions_figure
 from rocking.plot.boundaries import Stack, meeting, runs
+from rocking.plot.maps import regions_figure
 
 LOW, HIGH = 0.0, 10.0
 

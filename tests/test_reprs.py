@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 import rocking
-from rocking.analysis.fragility import Band
+from rocking.analysis import Band
 from rocking.analysis.survey import survey
 from rocking.kernels.trace import Trail
 from rocking.motion import formats, named

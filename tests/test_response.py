@@ -191,7 +191,7 @@ def test_every_kind_of_response_can_be_drawn(block, record):
     for response in (fallen, still, simulate(block, sine(1.03, 2.0, block))):
         assert len(response.plot().axes) == 2
     assert len(free.plot(units="deg").axes) == 1
-    assert len(free.plot(chattering=True).axes) == 2
+    assert len(free.plot(longest_sequence=True).axes) == 2
 
 
 def test_overturning_ends_at_a_quarter_turn(record):

@@ -13,9 +13,8 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
-from rocking.kernels import variation
-from rocking.response import QUANTITIES, Sensitivity, history, summary
-from rocking.response.forces import Contact
+from rocking.response import QUANTITIES, answers, history, summary
+from rocking.response.history import Contact
 from rocking.response.summary import time_text
 from rocking.tables import named
 
@@ -85,7 +84,7 @@ def test_a_summary_and_a_dictionary_pass_once_along_the_response_for_each_quanti
 
         return call
 
-    monkeypatch.setattr(variation, "vary", counting("vary", variation.vary))
+    monkeypatch.setattr(history, "vary", counting("vary", history.vary))
     monkeypatch.setattr(history, "trace", counting("trace", history.trace))
     response = simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
     response.summary()
@@ -113,7 +112,7 @@ def test_a_summary_is_its_rows(shaken):
 
 def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatch):
     """A sensitivity is a pass along all steps."""
-    monkeypatch.setattr(Sensitivity, "along", None)
+    monkeypatch.setattr(answers, "sensitivity_along", None)
     assert "rocks" in repr(shaken)
     assert "rocks" in shaken._repr_html_()
 

@@ -163,9 +163,9 @@ def test_the_rows_of_a_table_are_the_values_of_the_result(results):
         assert float(spectrum.peak_over_alpha.sel(at)) == row.peak_over_alpha
         assert math.isinf(row.peak_over_alpha) == row.overturned
     bands = scaled.to_dataframe("bands")
-    assert bands.motion.tolist() == ["one-sine"] * len(scaled.bands(0))
+    assert bands.motion.tolist() == ["one-sine"] * len(scaled.bands())
     ends = list(zip(bands.band_start_m_s2, bands.band_end_m_s2, strict=True))
-    assert str(ends) == str(scaled.bands(0))
+    assert str(ends) == str(scaled.bands())
 
 
 def test_a_part_of_a_result_is_a_result(spectrum):

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking import HazardCurve, InvalidOption
+from rocking.analysis.hazard import powers
 from rocking.analysis.tables import read_observed
 from rocking.motion.scaling import Measure
 
@@ -34,7 +35,7 @@ def fragility_with(median: float, dispersion: float) -> rocking.Fragility:
 def by_quadrature(curve: object, hazard: HazardCurve) -> float:
     """Integral of rate(x) dP(x), digit by digit."""
     a, b = (mpmath.mpf(float(value[0])) for value in curve.fitted)
-    exponents, factors = hazard.powers()
+    exponents, factors = powers(hazard)
     corners = [float(x) for x in hazard.intensity]
 
     def integrand(z: mpmath.mpf) -> mpmath.mpf:

@@ -88,9 +88,9 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
     owner = importlib.import_module("rocking.studies.study")
     monkeypatch.setattr(owner, "fitting_unit", lambda product: (2, 1, 2, 1024))
     study = made(tmp_path, unit_blocks=None)
-    keys = list(study.store.grid)
+    keys = list(study._store.grid)
     assert len(keys) == 2 * 2 * 1 * 2
-    assert sum(map(study.store.grid.simulations, keys)) == reference.overturned.size
+    assert sum(map(study._store.grid.simulations, keys)) == reference.overturned.size
     study.run(threads=2)
     xr.testing.assert_identical(rocking.study(tmp_path).results().load(), reference)
     lazy = rocking.study(tmp_path).results()
@@ -102,7 +102,7 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
     (tmp_path / "result" / name_of(keys[3])).unlink()
     found = rocking.study(tmp_path).results().load()
     np.testing.assert_array_equal(np.isnan(found.impacts.values), ~found.done.values)
-    assert (~found.done.values).sum() == study.store.grid.simulations(keys[3])
+    assert (~found.done.values).sum() == study._store.grid.simulations(keys[3])
 
 
 @pytest.mark.parametrize(("blocks", "motions", "scales"), [(1, 200, 5), (700, 3, 20), (9_000, 2, 2)])
@@ -110,8 +110,8 @@ def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_pat
     pulses = [rocking.pulses.one_sine(4.0, frequency) for frequency in np.linspace(0.5, 2.0, motions)]
     many = rocking.Blocks(p=np.linspace(1.0, 6.0, blocks), alpha=0.2, restitution=0.9)
     study = rocking.study(tmp_path, many, pulses, levels=np.linspace(0.5, 2.0, scales), model="linear")
-    assert 20 <= len(study.store.grid) <= 120
-    sizes = list(map(study.store.grid.simulations, study.store.grid))
+    assert 20 <= len(study._store.grid) <= 120
+    sizes = list(map(study._store.grid.simulations, study._store.grid))
     assert sum(sizes) == blocks * motions * scales
     study.run()
     stored = sum(path.stat().st_size for path in (tmp_path / "result").iterdir())
@@ -136,8 +136,8 @@ def test_whoever_computes_it_the_store_is_the_same_to_the_byte(complete, tmp_pat
         with ProcessPoolExecutor(2) as pool:
             study.run(executor=pool)
     else:
-        keys = list(study.store.missing())
-        monkeypatch.setattr(type(study.store), "missing", lambda self: iter(keys[::-1]))
+        keys = list(study._store.missing())
+        monkeypatch.setattr(type(study._store), "missing", lambda self: iter(keys[::-1]))
         study.run(threads=1)
     assert digest(tmp_path) == digest(complete)
 
@@ -211,7 +211,7 @@ def test_the_second_signal_stops_in_the_middle_of_a_unit(complete, tmp_path, mon
             assert stop.wait(60.0)
         return units.compute(work)
 
-    put = study.store.put
+    put = study._store.put
 
     def put_and_stop(key, data):
         put(key, data)
@@ -219,7 +219,7 @@ def test_the_second_signal_stops_in_the_middle_of_a_unit(complete, tmp_path, mon
 
     with monkeypatch.context() as patched:
         patched.setattr("rocking.studies.run.compute", compute)
-        patched.setattr(study.store, "put", put_and_stop)
+        patched.setattr(study._store, "put", put_and_stop)
         start = time.monotonic()
         with pytest.raises(Interrupted):
             study.run(threads=2)
@@ -399,7 +399,7 @@ def test_verify_sees_a_log_that_ends_before_the_last_run(tmp_path):
     log = tmp_path / "runs.jsonl"
     first = log.read_bytes()
     assert len(first.splitlines()) == 2
-    (tmp_path / "result" / name_of(next(iter(study.store.grid)))).unlink()
+    (tmp_path / "result" / name_of(next(iter(study._store.grid)))).unlink()
     study.run()
     whole = log.read_bytes()
     assert study.verify() == []
@@ -433,7 +433,7 @@ def test_a_damaged_plan_of_a_report_is_told(tmp_path):
 def test_a_unit_that_is_another_s_is_found_by_computing_it_again(tmp_path):
     study = made(tmp_path)
     study.run()
-    names = [name_of(key) for key in study.store.grid]
+    names = [name_of(key) for key in study._store.grid]
     (tmp_path / "result" / names[0]).write_bytes((tmp_path / "result" / names[7]).read_bytes())
     assert any(names[0] in fault for fault in study.verify(recompute=len(names)))
 
@@ -476,7 +476,7 @@ def test_a_unit_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):
 
 def test_two_runs_at_once_are_refused(tmp_path):
     study = made(tmp_path)
-    with study.place.locked(), pytest.raises(rocking.StudyError, match=f"process {os.getpid()} on"):
+    with study._store.place.locked(), pytest.raises(rocking.StudyError, match=f"process {os.getpid()} on"):
         study.run()
     assert not study.run().failed
 
@@ -489,7 +489,7 @@ def test_a_lock_that_was_left_behind_is_taken_over_and_noted(tmp_path):
 
 
 def test_who_asks_for_the_holder_reads_beyond_the_byte_that_windows_locks(tmp_path):
-    place = made(tmp_path).place
+    place = made(tmp_path)._store.place
     assert place.holder() == ""
     with place.locked():
         assert (tmp_path / "lock").read_bytes() == f" {places.this_process()}".encode()
@@ -635,13 +635,13 @@ def test_a_hundred_thousand_units_are_listed_in_a_second_and_opened_in_a_tenth(t
     # Of processor time: others may use the machine.
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1000), alpha=0.2, restitution=0.9)
     study = rocking.study(tmp_path, blocks, MOTIONS[0], levels=np.linspace(1.0, 2.0, 50_000), unit_blocks=512)
-    for key in study.store.grid:
+    for key in study._store.grid:
         (tmp_path / "result" / name_of(key)).touch()
     start = time.process_time()
     found = rocking.study(tmp_path)
     opened = time.process_time()
     assert opened - start < 0.1
-    assert len(found.store.done()) == 100_000
+    assert len(found._store.done()) == 100_000
     assert time.process_time() - opened < 1.0
 
 

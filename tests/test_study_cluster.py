@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.studies import cluster as clusters
-from rocking.studies.cluster import scheduler_executor
+from rocking.studies import run as clusters
+from rocking.studies.run import scheduler_executor
 from rocking.studies.units import compute
 
 pytest.importorskip("distributed")
@@ -91,14 +91,14 @@ def cluster(tmp_path):
 
 def after_the_first_unit(monkeypatch, study, action):
     """Do something once the first unit of a study is stored."""
-    put = study.store.put
+    put = study._store.put
 
     def first(key, data):
         put(key, data)
-        monkeypatch.setattr(study.store, "put", put)
+        monkeypatch.setattr(study._store, "put", put)
         action()
 
-    monkeypatch.setattr(study.store, "put", first)
+    monkeypatch.setattr(study._store, "put", first)
 
 
 def test_a_cluster_loses_a_unit_a_worker_and_its_scheduler_but_no_result(complete, tmp_path, cluster, run, monkeypatch):
@@ -120,7 +120,7 @@ def test_a_cluster_loses_a_unit_a_worker_and_its_scheduler_but_no_result(complet
 
     # A unit kills its worker, every time: it fails, alone, and can be computed later.
     study = made(tmp_path / "unit")
-    poison = study.store.work((0, 7, 0, 0)).factors[0, 0, 0]
+    poison = study._store.work((0, 7, 0, 0)).factors[0, 0, 0]
 
     def deadly(work):
         if work.factors[0, 0, 0] == poison:
@@ -189,7 +189,7 @@ def test_local_workers_go_with_the_run_that_is_killed(complete, tmp_path):
 
 
 def test_a_worker_with_another_program_is_told_so(tmp_path):
-    work = made(tmp_path).store.work((0, 0, 0, 0))
+    work = made(tmp_path)._store.work((0, 0, 0, 0))
     with pytest.raises(rocking.StudyError, match=r"has rocking .*, the study needs rocking 9\.9\.9"):
         compute(replace(work, program="rocking 9.9.9 (kernels 0)"))
 

@@ -62,21 +62,21 @@ def same(study, folder):
     """Whether a study holds the objects of one in a folder, to the byte."""
     files = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     kept = {name: data for name, data in files.items() if name not in ("lock", "runs.jsonl")}
-    return len(kept) == UNITS + 4 and all(study.place.get(name) == data for name, data in kept.items())
+    return len(kept) == UNITS + 4 and all(study._store.place.get(name) == data for name, data in kept.items())
 
 
 def test_a_study_in_an_object_store_holds_the_same_bytes(complete, url, tmp_path):
     study = made(url)
-    half = sorted(study.store.missing())[::2]
+    half = sorted(study._store.missing())[::2]
     for key in half:
-        study.store.put(key, (complete / "result" / f"c.0.{key[0]}.{key[1]}.{key[2]}.{key[3]}").read_bytes())
+        study._store.put(key, (complete / "result" / f"c.0.{key[0]}.{key[1]}.{key[2]}.{key[3]}").read_bytes())
     assert study.run(threads=2).units == UNITS - len(half)
     assert same(study, complete)
     assert study.verify(recompute=2) == []
     again = rocking.study(url)
     np.testing.assert_array_equal(again.results().impacts.values, rocking.study(complete).results().impacts.values)
     assert [entry["event"] for entry in again.status.runs] == ["start", "end"]
-    assert again.place.get("lock") is None
+    assert again._store.place.get("lock") is None
 
 
 def test_any_zarr_reader_opens_it_there(complete, url):
@@ -108,9 +108,9 @@ def test_the_commands_take_a_url(url, run, tmp_path):
 def test_a_killed_run_loses_nothing_and_its_lock_is_taken_over(complete, url):
     study = made(url)
     script = (
-        "import sys, time, rocking\nstudy = rocking.study(sys.argv[1])\nput = study.store.put\n"
+        "import sys, time, rocking\nstudy = rocking.study(sys.argv[1])\nput = study._store.put\n"
         "def slow(key, data):\n    put(key, data)\n    print('stored', flush=True)\n    time.sleep(0.5)\n"
-        "study.store.put = slow\nstudy.run()\n"
+        "study._store.put = slow\nstudy.run()\n"
     )
     with subprocess.Popen([sys.executable, "-c", script, url], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "stored\n"
@@ -128,7 +128,7 @@ def test_a_killed_run_loses_nothing_and_its_lock_is_taken_over(complete, url):
 
 def put_lock(study, holder):
     text = json.dumps({"holder": holder, "renewal": "0"}).encode()
-    obstore.put(study.place._store, "lock", text)
+    obstore.put(study._store.place._store, "lock", text)
 
 
 def test_a_lock_of_a_host_that_is_not_heard_of_is_taken_over(complete, url, monkeypatch):
@@ -146,15 +146,15 @@ def test_a_lock_of_a_host_that_is_not_heard_of_is_taken_over(complete, url, monk
 def test_a_lock_is_renewed_and_a_run_that_lost_it_stops(url, monkeypatch):
     monkeypatch.setattr(places, "_RENEWAL", 0.05)
     study = made(url)
-    with study.place.locked():
-        first = study.place.get("lock")
+    with study._store.place.locked():
+        first = study._store.place.get("lock")
         time.sleep(0.5)
-        assert study.place.get("lock") != first
+        assert study._store.place.get("lock") != first
         put_lock(study, "process 17 on elsewhere")
         time.sleep(0.5)
         with pytest.raises(rocking.StudyError, match="taken over by another run"):
-            study.place.put("anything", b"")
-    assert b"elsewhere" in study.place.get("lock")  # and leaves the other's lock alone
+            study._store.place.put("anything", b"")
+    assert b"elsewhere" in study._store.place.get("lock")  # and leaves the other's lock alone
 
 
 def test_of_many_who_come_at_once_one_runs_it(url):
@@ -176,7 +176,7 @@ def test_of_many_who_come_at_once_one_runs_it(url):
     for thread in threads:
         thread.join()
     assert (len(ran), len(refused)) == (1, 5)
-    assert study.place.get("lock") is None
+    assert study._store.place.get("lock") is None
 
 
 def test_a_store_that_is_not_there_is_one_sentence(run, bucket, monkeypatch):

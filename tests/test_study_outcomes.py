@@ -238,7 +238,7 @@ def test_a_refinement_keeps_as_little_as_its_verdict_needs_and_finds_the_same(tm
     assert few.critical_scales(verdict).sizes["change"] > 100
     assert few.critical_scales(verdict).identical(all_.critical_scales(verdict))
     assert few.verify(recompute=20) == []
-    assert json.loads((few.place.path / "round.1" / "zarr.json").read_text())["attributes"]["outcomes"] == [
+    assert json.loads((few._store.place.path / "round.1" / "zarr.json").read_text())["attributes"]["outcomes"] == [
         name for name in OUTCOMES if name in {*outcomes, *ALWAYS_KEPT}
     ]
 

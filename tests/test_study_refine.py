@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.motion.exceedance import exceedances
+from rocking.motion.measures import exceedances
 from rocking.progress import Progress
 from rocking.studies import read_study, refine
 from rocking.studies.inputs import OUTCOMES
@@ -144,8 +144,8 @@ def test_a_refinement_says_how_far_it_is_and_goes_on_at_the_unit_that_is_missing
     unit.unlink()
     assert f"round {count - 1}: " in str(study.status)
     assert not study.status.complete
-    with study.place.locked():
-        Log(study.place).add({"event": "start", "done": 5400})
+    with study._store.place.locked():
+        Log(study._store.place).add({"event": "start", "done": 5400})
         running = study.status.running
     assert running.rate > 0.0
     assert 0.0 < running.seconds_left < 10.0

@@ -17,12 +17,12 @@ from rocking import InvalidMotion, InvalidOption, Motion
 from rocking.block import Blocks
 from rocking.chattering.families import SimulationInput
 from rocking.chattering.maps import chattering_map
-from rocking.explorer.inputs import read_input, texts_of
+from rocking.explorer.inputs import read_case, texts_of
 from rocking.explorer.maps import grid_of, parts
 from rocking.explorer.uploads import UploadStore
 from rocking.kernels import state
 from rocking.kernels.certificate import arc_bounds, bounds_on_motion, prove_rest, side_bounds
-from rocking.motion.exceedance import exceedances, lifting_factors
+from rocking.motion.measures import exceedances, lifting_factors
 from rocking.plausibility import vertical_notes
 from rocking.problem import ground_of, rules_of
 from rocking.tables import plain
@@ -425,7 +425,7 @@ def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:
 def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_component() -> None:
     uploads = UploadStore()
     key = uploads.add_motion(wave(20.0, 5).with_vertical(wave(40.0, 6)))
-    case = read_input({"p": "2", "alpha": "0.2", "restitution": "0.5", "motion": f"given:{key}"}, uploads)
+    case = read_case({"p": "2", "alpha": "0.2", "restitution": "0.5", "motion": f"given:{key}"}, uploads)
     axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "0.3", "points": "16"}
     grid = grid_of(case, axes)
     found = np.empty(grid.x.values.size * grid.y.values.size)
@@ -446,7 +446,7 @@ def test_a_page_of_a_response_shows_its_vertical_component_too() -> None:
     for horizontal in (pulse, record):
         for vertical in (wave(3.0, 1), wave(3.0, 2)):
             response = rocking.simulate(block, horizontal.with_vertical(vertical))
-            shown = read_input(texts_of(response, uploads), uploads).simulate()
+            shown = read_case(texts_of(response, uploads), uploads).simulate()
             assert shown.peak_rotation == response.peak_rotation
             assert shown.impacts["time"].tolist() == response.impacts["time"].tolist()
 
@@ -457,23 +457,32 @@ def test_the_asymptotic_time_is_for_horizontal_motions() -> None:
         rocking.simulate(block_for(2.0, 0.2), motion, chattering="time")
 
 
-@quick
-@given(st.integers(0, 10_000), st.sampled_from(MODELS), st.floats(1.0, 6.0), st.floats(0.08, 0.4), st.floats(0.5, 0.95))
-def test_certified_rests_hold_what_all_impacts_give(seed: int, model: str, p: float, alpha: float, e: float) -> None:
+def test_certified_rests_hold_what_all_impacts_give() -> None:
     """A rest proven early lies where the impacts, followed on until time stalls, accumulate."""
-    motion = wave(6.0 * alpha, seed).with_vertical(wave(3.0, seed + 1))
-    block = block_for(p, alpha, e)
-    early = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-4))
-    late = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-13))
-    if early.overturned:
-        return
-    for first, second in zip(early.chattering, late.chattering, strict=False):
-        if not math.isfinite(first["lower"]):
-            break
-        if abs(first["lower"] - second["lower"]) > 1e-3:  # another rest, once the first ones differ by rounding
-            break
-        assert first["lower"] - 1e-12 <= second["upper"]
-        assert second["lower"] <= first["upper"] + 1e-12
+    judged = []
+
+    @quick
+    @given(
+        st.integers(0, 10_000), st.sampled_from(MODELS), st.floats(1.0, 6.0), st.floats(0.08, 0.4), st.floats(0.5, 0.95)
+    )
+    def holds(seed: int, model: str, p: float, alpha: float, e: float) -> None:
+        motion = wave(6.0 * alpha, seed).with_vertical(wave(3.0, seed + 1))
+        block = block_for(p, alpha, e)
+        early = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-4))
+        late = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-13))
+        if early.overturned:
+            return
+        for first, second in zip(early.chattering, late.chattering, strict=False):
+            if not math.isfinite(first["lower"]):
+                break
+            if abs(first["lower"] - second["lower"]) > 1e-3:  # another rest, once the first ones differ by rounding
+                break
+            assert first["lower"] - 1e-12 <= second["upper"]
+            assert second["lower"] <= first["upper"] + 1e-12
+            judged.append(seed)
+
+    holds()
+    assert len(judged) >= 20
 
 
 @pytest.mark.parametrize("seconds", [1.0, 2.5])

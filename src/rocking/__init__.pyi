@@ -1,8 +1,10 @@
 from . import analysis, chattering, studies
 from .analysis import rules
-from .analysis.calibration import Calibration, HistoryCalibration, calibrate, calibrate_history
+from .analysis.calibration.history import HistoryCalibration, calibrate_history
+from .analysis.calibration.outcomes import Calibration, calibrate
 from .analysis.efficiency import compare_measures
-from .analysis.fragility import Fragility, fit_fragility, fragility
+from .analysis.fragility.fit import fit_fragility, fragility
+from .analysis.fragility.result import Fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
@@ -10,7 +12,7 @@ from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
 from .block import Block, Blocks, Side
 from .body import Bodies, Body, Coordinate
-from .ensemble import simulate_many
+from .ensemble import Product, Scales, simulate_many
 from .errors import (
     DamagedStudy,
     InvalidBlock,
@@ -26,13 +28,11 @@ from .errors import (
 )
 from .explorer.launch import Frame, explore
 from .motion import Motion, pulses, records
-from .motion.description import Description
+from .motion.description import Description, Origin
 from .motion.formats import read
 from .motion.scaling import Measure
-from .named_pulses import PulseFamily
-from .product import Product
 from .response import Response, Sensitivity
-from .result import Row
+from .result import DatasetResult, DrawnResult, Result, Row, TableResult
 from .simulation import simulate
 from .studies import Study, study
 from .treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
@@ -49,7 +49,9 @@ __all__ = [
     "Certified",
     "Coordinate",
     "DamagedStudy",
+    "DatasetResult",
     "Description",
+    "DrawnResult",
     "Fragility",
     "Frame",
     "HazardCurve",
@@ -60,17 +62,20 @@ __all__ = [
     "InvalidOption",
     "Measure",
     "Motion",
+    "Origin",
     "OutputError",
     "OutsideFit",
     "Product",
-    "PulseFamily",
     "Response",
+    "Result",
     "RockingError",
     "Row",
+    "Scales",
     "Sensitivity",
     "Side",
     "Study",
     "StudyError",
+    "TableResult",
     "Treatment",
     "UnequalSides",
     "Unfinished",

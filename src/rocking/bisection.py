@@ -1,10 +1,26 @@
-"""Brackets of changes, halved: which are still too wide, and what is left of each once its middle is known."""
+"""Brackets of changes, halved: one until it is narrow, or many of which each middle takes long to know."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Callable
 
 import numpy as np
 
 from rocking.arrays import Flags, Floats
+
+
+def bisected(
+    low: float, high: float, holds: Callable[[float], bool], *, width: float = 0.0, halvings: float = math.inf
+) -> tuple[float, float]:
+    """Return a bracket of where something begins to hold: at most so wide, halved so often, or as narrow as can be."""
+    while high - low > width and halvings > 0:
+        between = 0.5 * (low + high)
+        if not low < between < high:
+            break
+        low, high = (low, between) if holds(between) else (between, high)
+        halvings -= 1
+    return low, high
 
 
 def middle(low: Floats, high: Floats) -> Floats:
@@ -19,18 +35,6 @@ def is_wide(low: Floats, high: Floats, tolerance: Floats | float) -> Flags:
 
 
 def halved(low: Floats, high: Floats, in_upper: Flags, in_lower: Flags) -> tuple[Floats, Floats]:
-    """Return brackets of which some are cut at their middle.
-
-    Parameters
-    ----------
-    low, high : ndarray, shape (n,)
-        Ends of the brackets.
-    in_upper, in_lower : ndarray of bool, shape (n,)
-        Whether the change lies above the middle, or below it. A bracket with neither stays as it is.
-
-    Returns
-    -------
-    low, high : ndarray, shape (n,)
-    """
+    """Return brackets cut at their middle, where it is known whether the change lies above it or below it."""
     between = middle(low, high)
     return np.where(in_upper, between, low), np.where(in_lower, between, high)

@@ -6,6 +6,7 @@ are not, though ``float`` takes them: "0.2" is more often a mistake than a wish.
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral, Real
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.arrays import Floats
-from rocking.errors import RockingError
+from rocking.errors import RockingError, literal
 
 #: Characters of a value in a message.
 _SHOWN: Final = 60
@@ -159,7 +160,24 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
 def shown(value: object) -> str:
     """Return a value as a message shows it: in one line that is not too long."""
     text = " ".join((f"{value:g}" if isinstance(value, float) else repr(value)).split())
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 10]}...{text[-7:]}"
+    return literal(text if len(text) <= _SHOWN else f"{text[: _SHOWN - 10]}...{text[-7:]}")
+
+
+def nearest(name: str, known: Iterable[str], likeness: float = 0.6) -> str | None:
+    """Return the known name that `name` is like, by this part of its letters at least; None where it is like none."""
+    close = difflib.get_close_matches(name, [*known], n=1, cutoff=likeness)
+    return close[0] if close else None
+
+
+def meant(name: str, known: Iterable[str], otherwise: str = "", likeness: float = 0.6) -> str:
+    """Return the end of a sentence that refuses an unknown name: the one that may be meant, or else what else helps.
+
+    A mapping says how each known name is written.
+    """
+    found = nearest(name, known, likeness)
+    if found is None:
+        return otherwise
+    return f"did you mean {known[found] if isinstance(known, Mapping) else found}?"
 
 
 def hint_of_degrees(angle: float) -> str:

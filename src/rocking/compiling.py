@@ -1,11 +1,11 @@
-"""A word while kernels are compiled: that takes a while, and happens once."""
+"""A note while kernels are compiled: that takes a while, and happens once."""
 
 from __future__ import annotations
 
-import functools
 import time
 from typing import Final
 
+from rocking.kernels import compiled
 from rocking.progress import note
 
 #: Processor time, s, that takes to compile what is missing, with nothing there: for the simulation of any motion, alone
@@ -18,11 +18,11 @@ AMPLITUDES: Final = 5
 _PATIENCE: Final = 1.0
 
 
-class _Word:
+class _Compilations:
     """Speaks as soon as the compiler has been at work for some time; a kernel is compiled with its parts."""
 
     def __init__(self) -> None:
-        self.expected, self.spoken = 0, set[int]()
+        self.expected, self.noted = 0, set[int]()
         self.functions, self.since, self.spent = 0, 0.0, 0.0
 
     def expect(self, seconds: int) -> None:
@@ -34,8 +34,8 @@ class _Word:
         if self.functions == 0:
             self.since = now
         self.functions += 1
-        if self.expected and self.spent + now - self.since >= _PATIENCE and self.expected not in self.spoken:
-            self.spoken.add(self.expected)
+        if self.expected not in {0, *self.noted} and self.spent + now - self.since >= _PATIENCE:
+            self.noted.add(self.expected)
             note(f"compiling what this needs, up to {self.expected} s of processor time; later runs find it ready")
 
     def end(self) -> None:
@@ -44,34 +44,29 @@ class _Word:
             self.spent += time.process_time() - self.since
 
 
-_WORD: Final = _Word()
+_compilations: Final = _Compilations()
 
 
 def announce(seconds: int) -> None:
     """From now on, note on stderr when kernels are not found in the cache and must be compiled; once for each work.
 
-    Parameters
-    ----------
-    seconds : int
-        Processor time that it takes at most: `SIMULATIONS`, `SEQUENCES` or `AMPLITUDES`.
-
-    Notes
-    -----
     The compiler itself says when it is at work: what is cached, for which sources and processor, is known to it alone.
     """
-    _WORD.expect(seconds)
+    _compilations.expect(seconds)
 
 
-@functools.cache
-def listen() -> None:
-    """Listen to numba's compiler; called before anything is compiled, since numba is imported no earlier."""
+def _watch_compiler() -> None:
+    """Hear from numba's compiler when it works; numba is imported no earlier."""
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, event: object) -> None:
-            _WORD.start()
+            _compilations.start()
 
         def on_end(self, event: object) -> None:
-            _WORD.end()
+            _compilations.end()
 
     event.register("numba:compile", Listener())
+
+
+compiled.before_compiling.append(_watch_compiler)

@@ -1,6 +1,6 @@
-"""Physical constants shared by every layer."""
+"""Constants that every layer shares, and the equations of motion that can be solved."""
 
-from typing import Final
+from typing import Final, Literal
 
 #: Standard acceleration of gravity, m/s^2; readers and blocks use the same value.
 STANDARD_GRAVITY: Final = 9.80665
@@ -10,3 +10,8 @@ HIGHEST_DEGREE: Final = 20
 
 #: Version of the package.
 VERSION: Final = "0.1.0"
+
+#: Exact, or linearised for slender blocks (paper, Eqs 2 and 3).
+Model = Literal["nonlinear", "linear"]
+
+MODELS: Final[tuple[Model, ...]] = ("nonlinear", "linear")

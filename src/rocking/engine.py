@@ -16,15 +16,14 @@ from numpy.typing import NDArray
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies
 from rocking.compiling import SIMULATIONS, announce
+from rocking.constants import Model
 from rocking.errors import Unfinished
-from rocking.kernels import state
+from rocking.kernels import lanes, state
 from rocking.kernels.ground import Ground, greatest_weight, has_vertical
-from rocking.kernels.lanes import pool as lanes
-from rocking.kernels.lanes import scheduler
+from rocking.kernels.lane_steps import WIDTH
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.problem import ground_of, rules_of, step_of
 from rocking.treatment import Treatment
@@ -53,7 +52,7 @@ SLICE: Final = 50_000
 _FIRST_SLICE: Final = 5_000
 
 #: Bodies that go through a motion together: as many as the fastest cache holds.
-_TOGETHER: Final = 16 * lanes.WIDTH
+_TOGETHER: Final = 16 * WIDTH
 
 #: Steps of all bodies of one task: enough to pay for the call, few enough to stop soon when interrupted.
 _TASK: Final = 8_000_000
@@ -273,9 +272,9 @@ def _march_together(
     finer = max(substeps, 0) if rules["nonlinear"] else 0
     together = lanes.pool_of(records[chosen], states[chosen], pieces, step or 1.0, finer)
     if substeps < 0:
-        scheduler.march_each(ground, rules, state.new_scratch(), together)
+        lanes.march_each(ground, rules, state.new_scratch(), together)
     else:
-        scheduler.run_lanes(ground, rules, state.new_scratch(), together, substeps)
+        lanes.run_lanes(ground, rules, state.new_scratch(), together, substeps)
     states[chosen] = together.states
 
 

@@ -1,29 +1,277 @@
-"""Blocks by motions: the full product of simulations, compiled, on every core."""
+"""Blocks by motions: the full product of simulations with scales and polarities, compiled, on every core."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.block import Block
+from rocking.arrays import Floats
+from rocking.block import Block, Blocks
 from rocking.body import Bodies, Body
-from rocking.engine import OUTCOME, cores, simulate_tasks
+from rocking.constants import VERSION, Model
+from rocking.engine import OUTCOME, Setup, Task, cores, parts_of, simulate_tasks
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
-from rocking.motion.scaling import Measure, MeasureName
-from rocking.problem import bodies_of
-from rocking.product import VARIABLES, Polarity, Product, Scales
+from rocking.motion.motion import Motion
+from rocking.motion.named import Motions, names_of, several_motions
+from rocking.motion.piecewise import STRONGEST
+from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
+from rocking.problem import bodies_of, rules_of
 from rocking.progress import Progress
 from rocking.treatment import Treatment, treatment
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Polarity = Literal["+", "-", "both"]
+
+_SIGNS: Final[Mapping[str, tuple[int, ...]]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
+
+#: Outcomes that are kept of a simulation, from the fields of the engine's: units, and what each one means.
+VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
+    "overturned": ("1", "whether the rotation reached pi/2"),
+    "peak_rotation": ("rad", "largest rotation in size"),
+    "peak_time": ("s", "time of the peak rotation"),
+    "impacts": ("1", "impacts that were resolved"),
+    "uplifts": ("1", "uplifts from rest"),
+    "rests": ("1", "times the block came to rest"),
+    "time_at_rest": ("s", "time spent at rest"),
+    "complete_chattering": (
+        "1",
+        "whether the block came to rest after its first uplift before the motion passed a threshold again",
+    ),
+    "stalled": ("1", "rests that were not proven, as time no longer advanced between impacts"),
+    "unfinished": ("1", "whether the simulation was given up after too many steps; the rest is as far as it came"),
+    "stopped": (
+        "1",
+        "whether the duration ended it while the block moved or the motion went on, and left the verdict open",
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """Levels of a measure that motions are scaled to; without a measure, motions as they are.
+
+    Attributes
+    ----------
+    measure : Measure or None
+        What `values` are: factors, peak accelerations (m/s^2), peak velocities (m/s), spectral accelerations (m/s^2).
+    values : ndarray
+        Levels of the measure.
+    """
+
+    measure: Measure | None = None
+    values: Floats = field(default_factory=lambda: np.ones(1))
+
+    @classmethod
+    def of(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
+        """Scales from arguments.
+
+        Parameters
+        ----------
+        levels : array_like or None
+            Levels of the measure; None takes motions as they are.
+        measure : str or Measure
+            As for `simulate_many`.
+
+        Returns
+        -------
+        Scales
+            With the levels as floats.
+
+        Examples
+        --------
+        >>> Scales.of([0.5, 1.0], "factor").count
+        2
+        """
+        known = Measure.of(measure, among=SCALES)
+        if levels is None:
+            if known.name != "factor":
+                raise InvalidOption("{} says what {} are: give those as well", "measure", "levels")
+            return cls()
+        return cls(known, checks.positive_numbers(levels, "levels", InvalidOption))
+
+    @property
+    def count(self) -> int:
+        """Number of scales."""
+        return len(self.values)
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Name of the measure, its units, and its period (s) and damping where it has them."""
+        measure = self.measure or FACTOR
+        return {"measure": measure.name, "units": measure.units, **measure.options()}
+
+    def factors(self, motion: Motion) -> Floats:
+        """Return the factors that bring a motion to the levels.
+
+        Parameters
+        ----------
+        motion : Motion
+            Motion as it is.
+
+        Returns
+        -------
+        ndarray
+            One for each level.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> Scales.of([1.5, 6.0], "pga").factors(rocking.pulses.one_sine(amplitude=3.0, frequency=1.0)).tolist()
+        [0.5, 2.0]
+        """
+        with np.errstate(over="ignore"):
+            factors = self.values / measured(self, motion)
+        if not factors.max() * np.abs(motion.coefficients).max() <= STRONGEST:
+            motion.scaled(float(factors.max()))  # refused where it is too strong, and not only steep
+        return factors
+
+
+@dataclass(frozen=True, eq=False)
+class Product:
+    """Every body under every motion at every scale and polarity.
+
+    Attributes
+    ----------
+    bodies : Bodies
+        n bodies.
+    motions : tuple of Motion
+        m motions.
+    scales : Scales
+        What the motions are scaled to.
+    polarity : {"+", "-", "both"}
+        Motions as they are, reversed, or both.
+    model, treatment, duration
+        As for `rocking.simulate`.
+
+    Raises
+    ------
+    InvalidOption
+        If a rule is out of its range.
+    """
+
+    bodies: Bodies
+    motions: tuple[Motion, ...]
+    scales: Scales
+    polarity: Polarity
+    model: Model
+    treatment: Treatment
+    duration: float | None
+
+    def __post_init__(self) -> None:
+        checks.one_of(self.polarity, "polarity", InvalidOption, list(_SIGNS))
+        rules_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # checked before any work
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """Factors of the polarities."""
+        return _SIGNS[self.polarity]
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Numbers of motions, scales, polarities and bodies."""
+        return len(self.motions), self.scales.count, len(self.signs), len(self.bodies)
+
+    @property
+    def blocks(self) -> Blocks:
+        """The bodies, for what only blocks can answer.
+
+        Raises
+        ------
+        InvalidOption
+            If they are of another kind.
+        """
+        if not isinstance(self.bodies, Blocks):
+            raise InvalidOption(f"this is known of blocks alone, not of {self.bodies.kind}")
+        return self.bodies
+
+
+def product_of(
+    blocks: Bodies | Body | Sequence[Block],
+    motions: Motions,
+    levels: ArrayLike | None,
+    measure: MeasureName | Measure,
+    polarity: Polarity,
+    model: Model,
+    chattering: str | Treatment,
+    duration: float | None,
+) -> Product:
+    """Product from the arguments of `simulate_many`."""
+    bodies, shaking = bodies_of(blocks), tuple(several_motions(motions))
+    return Product(bodies, shaking, Scales.of(levels, measure), polarity, model, treatment(chattering), duration)
+
+
+def measured(scales: Scales, motion: Motion) -> float:
+    """Return what a motion measures as it is; 1 where scales are factors."""
+    return (scales.measure or FACTOR).positive(motion, motion.name)
+
+
+def setup_of(product: Product, bodies: slice | None = None) -> Setup:
+    """Return how to simulate the bodies of a product, or some of them."""
+    chosen = product.bodies if bodies is None else product.bodies.select(bodies)
+    return Setup(chosen, product.model, product.treatment, product.duration)
+
+
+def _tasks(product: Product) -> Iterator[Task]:
+    """Cut a product into tasks for the engine; their keys are (motion, scale, polarity)."""
+    for m, motion in enumerate(product.motions):
+        for s, factor in enumerate(product.scales.factors(motion).tolist()):
+            for k, sign in enumerate(product.signs):
+                for part in parts_of(len(product.bodies), motion):
+                    yield Task(part, motion, sign * factor, (m, s, k))
+
+
+def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
+    """Label arrays of the product's shape, by the names of `VARIABLES`; drop dimensions that nobody asked for."""
+    import xarray as xr
+
+    dimensions = ("motion", "scale", "polarity", "block")
+    gone = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
+    described = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in VARIABLES.items()}
+    variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}
+    coordinates = {
+        "motion": ("motion", names_of(product.motions)),
+        **verticals_of(product.motions),
+        "scale": ("scale", product.scales.values, product.scales.about),
+        "polarity": ("polarity", ["+" if sign > 0 else "-" for sign in product.signs]),
+        **body_coordinates(product.bodies),
+    }
+    attributes = {
+        "program": f"rocking {VERSION}",
+        "model": product.model,
+        "chattering": repr(product.treatment),
+        "polarity": product.polarity,
+        "gravity": product.bodies.gravity,
+        "motions": [f"{motion.name}: {motion.description.text}" for motion in product.motions],
+        "histories": ["; ".join(motion.history) for motion in product.motions],
+    }
+    whole = xr.Dataset(variables, coordinates, attributes)
+    return whole.isel({name: 0 for name, is_gone in gone.items() if is_gone}, drop=True)
+
+
+def verticals_of(motions: Sequence[Motion]) -> dict[str, Any]:
+    """Names of the vertical components, as a coordinate of the dimension ``motion``; none where no motion has one."""
+    names = ["" if motion.vertical is None else motion.vertical.name for motion in motions]
+    return {"vertical": ("motion", names)} if any(motion.vertical for motion in motions) else {}
+
+
+def body_coordinates(bodies: Bodies) -> dict[str, Any]:
+    """Parameters of bodies as coordinates of the dimension ``block``, with units; of unequal sides one for each."""
+    columns = bodies.parameters()
+    if bodies.is_symmetric:
+        return {name: ("block", values[:, 0], {"units": units}) for name, (values, units) in columns.items()}
+    return {
+        f"{name}_{side}": ("block", values[:, k], {"units": units})
+        for name, (values, units) in columns.items()
+        for k, side in enumerate(("plus", "minus"))
+    }
 
 
 def simulate_many(
@@ -47,7 +295,9 @@ def simulate_many(
         n blocks, or bodies of another kind (`rocking.body.Bodies`).
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
-    model, chattering, duration
+    model : {"nonlinear", "linear"}
+        As for `simulate`.
+    chattering : str or Treatment
         As for `simulate`.
     levels : array_like, optional
         Simulate every motion scaled to each of these levels of `measure`. Adds the dimension ``scale``.
@@ -56,6 +306,8 @@ def simulate_many(
         accelerations (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
     polarity : {"+", "-", "both"}
         Motions as they are, reversed, or both (adds the dimension ``polarity``).
+    duration : float, optional
+        As for `simulate`.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional
@@ -92,20 +344,12 @@ def simulate_many(
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    product = Product(
-        bodies_of(blocks),
-        tuple(several_motions(motions)),
-        Scales.of(levels, measure),
-        polarity,
-        model,
-        treatment(chattering),
-        duration,
-    )
+    product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
     count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     results = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in VARIABLES}
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:
-        for task, outcomes in simulate_tasks(product.setup(), product.tasks(), threads=count):
+        for task, outcomes in simulate_tasks(setup_of(product), _tasks(product), threads=count):
             for name, values in results.items():
                 values[(*task.key, task.bodies)] = outcomes[name]
             bar.advance(len(outcomes))
-    return product.dataset(results)
+    return dataset_of(product, results)

@@ -6,8 +6,13 @@ data, so that no code needs to read a sentence.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
+
+#: Where a name of an argument stands in a template; or "{}" itself, as `literal` writes it.
+_PLACE: Final = re.compile(r"\{\{\}\}|\{\}")
 
 #: How a name of an argument is written: the command line writes its option, a page the label of its field.
 Spelling = Callable[[str], str]
@@ -18,6 +23,11 @@ def as_argument(name: str) -> str:
     return name
 
 
+def literal(text: str) -> str:
+    """Write a text so that a template has it as it is: a "{}" in it is no place of a name."""
+    return text.replace("{}", "{{}}")
+
+
 @dataclass(frozen=True)
 class Message:
     """A sentence that may name arguments.
@@ -25,7 +35,7 @@ class Message:
     Attributes
     ----------
     template : str
-        The sentence; each "{}" in it stands for a name of an argument.
+        The sentence; each "{}" in it stands for a name of an argument, as long as there are names.
     arguments : tuple of str
         Those names, in their order.
     """
@@ -41,9 +51,10 @@ class Message:
         >>> Message("{} needs {}, in s", ("sa", "period")).text(lambda name: f"--{name}")
         '--sa needs --period, in s'
         """
-        first, *others = self.template.split("{}", len(self.arguments))
         names = map(spelling, self.arguments)
-        return " ".join("".join([first, *(name + rest for name, rest in zip(names, others, strict=False))]).split())
+        return " ".join(
+            _PLACE.sub(lambda place: "{}" if place[0] == "{{}}" else next(names, "{}"), self.template).split()
+        )
 
     def __str__(self) -> str:
         return self.text()
@@ -99,7 +110,23 @@ class RockingError(Exception):
         return self.message.arguments[0] if self.message.arguments else None
 
     def text(self, spelling: Spelling = as_argument) -> str:
-        """Return file, line and sentence, with names of arguments as ``spelling`` writes them."""
+        """Return file, line and sentence.
+
+        Parameters
+        ----------
+        spelling : callable
+            How a name of an argument is written.
+
+        Returns
+        -------
+        str
+            One line.
+
+        Examples
+        --------
+        >>> InvalidOption("{} must be positive", "half_width").text(lambda name: "--" + name.replace("_", "-"))
+        '--half-width must be positive'
+        """
         where = (
             "" if self.path is None else f"{self.path}: " if self.line is None else f"{self.path}, line {self.line}: "
         )

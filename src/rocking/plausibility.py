@@ -102,14 +102,7 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
 
 
 def reading_notes(motion: Motion) -> tuple[str, ...]:
-    """Return what looks like a mistake in the units or the step that a motion was read with; empty if nothing does.
-
-    Examples
-    --------
-    >>> from rocking import Motion
-    >>> reading_notes(Motion.from_samples([0.0, 1.0, -2.0, 0.0], 20.0))
-    ('the peak velocity is 20 m/s, too much for a ground motion: are units and step right, or is an offset left?',)
-    """
+    """Return what looks like a mistake in the units or the step that a motion was read with."""
     notes = [*_strength_notes(motion)]
     step = motion.step or motion.duration / len(motion.coefficients)
     if motion.description.family.endswith("record") and step > _COARSEST:
@@ -138,16 +131,7 @@ def _gap_notes(motion: Motion) -> list[str]:
 
 
 def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
-    """Return what looks like a mistake in an acceleration that a motion is scaled to; empty if nothing does.
-
-    Parameters
-    ----------
-    text : str
-        As it was written.
-    value : float
-        What it was taken for, m/s^2.
-    name : str
-        Name of the argument that it was written for.
+    """Return what looks like a mistake in an acceleration (m/s^2) that a text was taken for; empty if nothing does.
 
     Examples
     --------
@@ -162,6 +146,16 @@ def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
 
 def block_notes(block: Block) -> tuple[Message | str, ...]:
     """Return what looks like a mistake in the sizes or the sides of a block; empty if nothing does.
+
+    Parameters
+    ----------
+    block : Block
+        The block.
+
+    Returns
+    -------
+    tuple of Message or str
+        Sentences.
 
     Examples
     --------

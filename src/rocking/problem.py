@@ -13,10 +13,10 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks, one_block
 from rocking.body import Bodies, Body
+from rocking.constants import MODELS, Model
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
 from rocking.kernels.ground import Ground
-from rocking.model import MODELS, Model
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.treatment import Treatment
@@ -24,9 +24,7 @@ from rocking.treatment import Treatment
 
 @functools.lru_cache(maxsize=8)
 def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Ground:
-    """Ground of a motion times a factor; without a motion, no piece at all.
-
-    A negative factor reverses the polarity of the horizontal component alone.
+    """Ground of a motion times a factor, a negative one for the horizontal component alone; without a motion no piece.
 
     The last few are kept: laying out a record takes as long as a block's march through it.
     """
@@ -51,13 +49,7 @@ def step_of(motion: Motion) -> float | None:
 
 
 def bodies_of(given: Bodies | Body | Iterable[Block]) -> Bodies:
-    """Return bodies as they are, a single one as `Bodies` of which it is the only one, and blocks as `Blocks`.
-
-    Raises
-    ------
-    InvalidBlock
-        As `Blocks.of`.
-    """
+    """Return bodies as they are, a single one as `Bodies` of which it is the only one, and blocks as `Blocks`."""
     if isinstance(given, type):  # has what its objects have, but is none
         return Blocks.of(cast("Iterable[Block]", given))
     if isinstance(given, Bodies):
@@ -66,13 +58,7 @@ def bodies_of(given: Bodies | Body | Iterable[Block]) -> Bodies:
 
 
 def one_body(body: Body) -> Body:
-    """Return the body.
-
-    Raises
-    ------
-    InvalidBlock
-        If it is neither a block nor another body.
-    """
+    """Return the body, or say that it is none."""
     if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # a protocol is slow to ask
         return body
     return one_block(cast("Block", body))
@@ -81,13 +67,7 @@ def one_body(body: Body) -> Body:
 def rules_of(
     bodies: Bodies, model: Model, treatment: Treatment, duration: float | None, *, record: bool
 ) -> state.Record:
-    """Rules of a simulation, checked.
-
-    Raises
-    ------
-    InvalidOption
-        If the model is unknown, the duration is not positive, or it is not given where nothing comes to rest.
-    """
+    """Return the rules of a simulation, checked; its end must be given where nothing comes to rest."""
     checks.one_of(model, "model", InvalidOption, MODELS)
     if duration is None:
         if np.any(np.prod(bodies.restitution, axis=1) == 1.0):

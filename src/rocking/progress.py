@@ -1,4 +1,4 @@
-"""What is written to stderr beside the result: a bar for work that takes long, and notes, each a line."""
+"""What is written to stderr beside the result: a bar for work that takes long; notes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from rocking.errors import Message, OutsideFit, Spelling, as_argument
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import rich.progress
 
 #: Work that is over sooner than this shows no bar, s.
-_PATIENCE = 1.0
+_PATIENCE: Final = 1.0
 
 #: Who reads notes: a person at a terminal, everybody, nobody.
 Audience = Literal["terminal", "everybody", "nobody"]
@@ -37,23 +37,12 @@ _listener = _Listener()
 
 
 def spelled(message: Message) -> str:
-    """Return a message with names of arguments as the present reader knows them: on the command line its options.
-
-    Examples
-    --------
-    >>> spelled(Message('{} "both" counts both', ("polarity",)))
-    'polarity "both" counts both'
-    """
+    """Return a message with names of arguments as the present reader knows them: on the command line its options."""
     return message.text(_listener.spelling)
 
 
 def note(message: Message | str) -> None:
-    """Print a sentence on stderr, on a line of its own, for those whom `notes_for` has chosen.
-
-    Examples
-    --------
-    >>> note("nobody reads this where stderr is not a terminal")
-    """
+    """Print a sentence on stderr, on a line of its own, for those whom `notes_for` has chosen."""
     # The template of a sentence in which no argument is named has no places to fill.
     whole = message if isinstance(message, Message) else Message(message)
     if _listener.seen is not None:
@@ -69,11 +58,6 @@ def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[
     """Choose who reads notes while a command runs, and how arguments are named; each note is given once.
 
     Warnings that a formula is used outside its fit are notes as well.
-
-    Examples
-    --------
-    >>> with notes_for("nobody"):
-    ...     note("not even a person at a terminal sees this")
     """
     global _listener
 
@@ -98,22 +82,8 @@ def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[
 class Progress:
     """Progress bar on stderr with the rate and the time left, drawn once the work has taken a second.
 
-    Parameters
-    ----------
-    what : str
-        What is being done.
-    total : int
-        Number of steps.
-    show : bool, optional
-        By default only if stderr is a terminal.
-    done : int
-        Steps that were done before; they do not count for the rate.
-
-    Examples
-    --------
-    >>> with Progress("counting", total=3, show=False) as progress:
-    ...     for _ in range(3):
-    ...         progress.advance()
+    It is shown only if stderr is a terminal, unless `show` says otherwise; steps that were `done` before do not count
+    for the rate.
     """
 
     def __init__(self, what: str, total: int, *, show: bool | None = None, done: int = 0) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
-from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.source import find_unit
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.tables import decimal
 
@@ -133,12 +133,8 @@ def values(text: str, name: str, quantity: Quantity = number) -> Floats:
 def scaling(given: Mapping[str, str | float | None], quantity: Quantity = acceleration) -> tuple[float, Measure] | None:
     """Return the level that a motion is scaled to, and the measure that it is of; None where nothing is given.
 
-    Parameters
-    ----------
-    given : mapping
-        At most one of scale (a factor), pga, pgv (m/s) and sa ("0.4g@1.0", at a period, s), as texts or numbers.
-    quantity : callable
-        What reads accelerations.
+    Given is at most one of scale (a factor), pga, pgv (m/s) and sa ("0.4g@1.0", at a period, s), as a text or a number;
+    `quantity` reads accelerations.
 
     Examples
     --------

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
@@ -11,7 +12,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.errors import InvalidOption
-from rocking.tables import data_frame, named, plain, text_table, write_csv, write_netcdf
+from rocking.tables import data_frame, named, plain, text_table, to_json, write_netcdf, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,37 +71,43 @@ def dictionary_of(rows: Iterable[Row]) -> dict[str, Any]:
     return {named(row.name, row.unit): plain(row.value) for row in rows}
 
 
-class Findings:
-    """Base of results: from rows follow the summary and the dictionary, from a table its file, from `_draw` the figure.
+class Result(ABC):
+    """What was found, in words and as plain values; base of all that analyses return."""
 
-    A subclass gives `summary_rows`, `facts`, `to_dataframe` and `_draw`, those that it has.
-    """
-
-    #: Letters of the column of names in a summary.
-    WIDTH: ClassVar[int] = 20
-
-    def summary_rows(self) -> Sequence[Row]:
-        """Return what was found, for people: the lines of `summary`."""
-        raise NotImplementedError
-
-    def facts(self) -> Sequence[Row]:
-        """Return what was found, for machines: the entries of `to_dict`."""
-        raise NotImplementedError
-
+    @abstractmethod
     def summary(self) -> str:
-        """Return what was found in words, line by line."""
-        return text_of(self.summary_rows(), self.WIDTH)
+        """Say in words what was found.
 
+        Returns
+        -------
+        str
+            Lines of text and tables.
+
+        Examples
+        --------
+        >>> from rocking.chattering import critical_report
+        >>> print(critical_report(2.0, 0.92).summary().splitlines()[0])
+        exact                   1.03801554
+        """
+
+    @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """Return what was found as plain values by name: units are in the names, None is no finite number."""
-        return dictionary_of(self.facts())
+        """Return what was found as plain values by name.
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the table as a data frame, columns named with their units."""
-        raise NotImplementedError
+        Returns
+        -------
+        dict of str to object
+            Units are in the names, or SI.
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write the table of `to_dataframe` as text columns with a header; "inf" stands for infinity.
+        Examples
+        --------
+        >>> from rocking.chattering import critical_report
+        >>> sorted(critical_report(2.0, 0.92).to_dict())
+        ['critical_amplitude', 'eta', 'omega']
+        """
+
+    def to_json(self, path: str | Path) -> None:
+        """Write what `to_dict` returns as JSON; NaN and infinity are null.
 
         Parameters
         ----------
@@ -111,35 +118,15 @@ class Findings:
         ------
         OutputError
             If the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from rocking.chattering import critical_report
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     critical_report(2.0, 0.92).to_json(f"{folder}/critical.json")
         """
-        write_csv(path, self.to_dataframe())
-
-    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw what was found.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
-        title : str
-            Title; by default one that says what is drawn.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-
-        Raises
-        ------
-        InvalidOption
-            If the size is not two positive numbers, or `ax` are no axes.
-        """
-        return self._draw(ax, title, figsize)
-
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        """Draw what was found; an empty title stands for the default one."""
-        raise NotImplementedError
+        write_text(path, to_json(self.to_dict()) + "\n")
 
     def _headline(self) -> str:
         """Return what was found in one line, for the representation."""
@@ -149,16 +136,129 @@ class Findings:
         return f"<{type(self).__name__}: {self._headline()}>"
 
 
+class DrawnResult(Result):
+    """A result that has a figure."""
+
+    @abstractmethod
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw what was found.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw, of several panels the main one alone; by default in a new figure with all panels.
+        title : str
+            Title; by default one that says what is drawn.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The new figure, or that of `ax`.
+
+        Raises
+        ------
+        InvalidOption
+            If the size is not two positive numbers, or `ax` are no axes.
+
+        Examples
+        --------
+        >>> from rocking.chattering import chattering_report
+        >>> chattering_report(1.03, 2.0, 0.92).plot(figsize=(4.0, 3.0)).get_size_inches().tolist()
+        [4.0, 3.0]
+        """
+
+
+class TableResult(Result):
+    """A result that has tables, one row for each point, in columns named with their units.
+
+    Attributes
+    ----------
+    TABLES : collection of str
+        Names of the tables, the default one first.
+    """
+
+    TABLES: ClassVar[Collection[str]] = ()
+
+    #: How numbers and NaN are written to files.
+    _FORMAT: ClassVar[str | None] = "%.15g"
+    _NAN: ClassVar[str] = ""
+
+    def _names(self) -> list[str]:
+        """Return the names of the tables."""
+        return [*self.TABLES]
+
+    @abstractmethod
+    def _frame(self, table: str) -> pd.DataFrame:
+        """Return a table by its name."""
+
+    def to_dataframe(self, table: str | None = None) -> pd.DataFrame:
+        """Return one of the tables as a data frame.
+
+        Parameters
+        ----------
+        table : str, optional
+            One of `TABLES`; by default the first.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns are named with their units.
+
+        Raises
+        ------
+        InvalidOption
+            If there is no such table.
+
+        Examples
+        --------
+        >>> from rocking.chattering import chattering_report
+        >>> [*chattering_report(1.03, 2.0, 0.92).to_dataframe("impacts").columns]
+        ['time', 'side', 'interval', 'speed_before', 'speed_after']
+        """
+        names = self._names()
+        name = next(iter(names), "") if table is None else table
+        return self._frame(checks.one_of(name, "table", InvalidOption, names))
+
+    def to_csv(self, path: str | Path, table: str | None = None) -> None:
+        """Write one of the tables of `to_dataframe` as text columns with a header; "inf" stands for infinity.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            File to write, whole or not at all.
+        table : str, optional
+            One of `TABLES`; by default the first.
+
+        Raises
+        ------
+        InvalidOption
+            If there is no such table.
+        OutputError
+            If the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from rocking.chattering import chattering_report
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     chattering_report(1.03, 2.0, 0.92).to_csv(f"{folder}/cycles.csv", "cycles")
+        """
+        frame = self.to_dataframe(table)
+        write_text(path, frame.to_csv(index=False, float_format=self._FORMAT, na_rep=self._NAN, lineterminator="\n"))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Findings):
-    """Result of an analysis. The variables, coordinates and methods of its dataset are its own as well.
+class DatasetResult(DrawnResult, TableResult):
+    """Result whose numbers are a dataset with labels; its variables, coordinates and methods are the result's own.
 
     Attributes
     ----------
     data : xarray.Dataset
         All numbers, with units and meaning of each variable.
     TABLES : mapping of str to tuple of str
-        Tables that `to_dataframe` and `to_csv` know, the first by default, and the variables of each.
+        Tables, the default one first, and the variables of each.
     """
 
     TABLES: ClassVar[Mapping[str, tuple[str, ...]]]
@@ -170,13 +270,26 @@ class Result(Findings):
 
         Parameters
         ----------
-        **labels
+        **labels : object
             Label or labels for each dimension, as ``alpha=0.2`` or ``motion=["a", "b"]``; the nearest of numbers.
+
+        Returns
+        -------
+        same type
+            The result there.
 
         Raises
         ------
         InvalidOption
             If there is no such dimension or label.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> spectrum = rocking.rocking_spectrum(blocks, rocking.pulses.one_sine(5.0, 1.0))
+        >>> spectrum.select(alpha=0.2).sizes["alpha"]
+        1
         """
         wanted = {name: np.atleast_1d(values) for name, values in labels.items()}
         data = self.data
@@ -192,38 +305,8 @@ class Result(Findings):
             ) from None
         return type(self)(data)
 
-    def to_dataframe(self, table: str | None = None) -> pd.DataFrame:
-        """Return one of the tables as a data frame: a row for each point, columns named with their units.
-
-        Parameters
-        ----------
-        table : str, optional
-            One of `TABLES`; by default the first.
-
-        Returns
-        -------
-        pandas.DataFrame
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such table.
-        """
-        names = [*self.TABLES]
-        part = self._table(names[0] if table is None else checks.one_of(table, "table", InvalidOption, names))
-        return data_frame(part)
-
-    def to_csv(self, path: str | Path, table: str | None = None) -> None:
-        """Write one of the tables of `to_dataframe` as text columns with a header; "inf" stands for infinity.
-
-        Raises
-        ------
-        InvalidOption
-            As `to_dataframe`.
-        OutputError
-            If the file cannot be written.
-        """
-        write_csv(path, self.to_dataframe(table))
+    def _frame(self, table: str) -> pd.DataFrame:
+        return data_frame(self._table(table))
 
     def _table(self, name: str) -> xr.Dataset:
         return self.data[[*self.TABLES[name]]]
@@ -231,10 +314,23 @@ class Result(Findings):
     def to_netcdf(self, path: str | Path) -> None:
         """Write the dataset to a NetCDF file.
 
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            File to write, whole or not at all.
+
         Raises
         ------
         OutputError
             If the file cannot be written.
+
+        Examples
+        --------
+        >>> import rocking, tempfile
+        >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+        >>> found = rocking.overturning_map(block, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     found.to_netcdf(f"{folder}/map.nc")
         """
         write_netcdf(path, self.data)
 
@@ -257,6 +353,11 @@ class Result(Findings):
     def _repr_html_(self) -> str:
         html: str = self.data._repr_html_()
         return f"<p><b>{type(self).__name__}</b>: {self._headline()}</p>{html}"
+
+
+def variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: str = "") -> tuple[Any, Any, Any]:
+    """Return a variable of a dataset: its dimensions, its values, and its unit and meaning where there are any."""
+    return dims, values, {name: said for name, said in (("units", unit), ("long_name", meaning)) if said}
 
 
 def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

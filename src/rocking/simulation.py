@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rocking import checks
 from rocking.body import Body
 from rocking.compiling import SIMULATIONS, announce
+from rocking.constants import Model
 from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
-from rocking.model import Model
-from rocking.motion.arguments import one_motion
 from rocking.motion.motion import Motion
+from rocking.motion.named import one_motion
 from rocking.problem import ground_of, one_body, rules_of
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
+
+_EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
+_IMPACT = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
+_CHATTERING = np.dtype([("start", "f8"), ("end", "f8"), ("lower", "f8"), ("upper", "f8"), ("impacts", "i8")])
+
+#: Kinds of events by their codes, see `rocking.kernels.state`.
+_KINDS = np.array(["uplift", "rest", "overturn"])
 
 #: Rows of the first table per piece of the motion.
 _FIRST_ROWS = 1.25
@@ -98,7 +108,26 @@ def simulate(
     ending, table = _marched(trail, start)
     if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
-    return Response.from_march(block, motion, model, how, trail, table, start)
+    events = table["event"][: start["events"]]
+    overturned = bool(len(events)) and int(events["kind"][-1]) == state.EventKind.OVERTURN
+    return Response(
+        body=block,
+        motion=motion,
+        model=model,
+        treatment=how,
+        overturned=overturned,
+        unfinished=ending == state.Ending.UNFINISHED,
+        overturn_time=float(events["time"][-1]) if overturned else math.nan,
+        peak_rotation=float(start["peak"]),
+        peak_time=float(start["peak_time"]),
+        duration=float(start["end"]),
+        events=_events(events),
+        impacts=_public(table["impact"][: start["impacts"]], _IMPACT),
+        chattering=_public(table["sequence"][: start["sequences"]], _CHATTERING),
+        stalled=int(start["stalled"]),
+        near_ties=int(start["near_ties"]),
+        _trail=trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]]))),
+    )
 
 
 def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
@@ -143,3 +172,16 @@ def _initial_state(body: Body, record: state.Record, rotation: float, velocity: 
             "{} and {} must lead to side +, the only one of this body", "initial_rotation", "initial_velocity"
         )
     return (0 if sign > 0.0 else 1), abs(u), sign * v
+
+
+def _public(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    public = np.empty(len(rows), dtype=dtype)
+    for name in dtype.names or ():
+        public[name] = rows[name]
+    return public
+
+
+def _events(rows: state.Records) -> NDArray[np.void]:
+    events = np.empty(len(rows), dtype=_EVENT)
+    events["time"], events["side"], events["kind"] = rows["time"], rows["side"], _KINDS[rows["kind"]]
+    return events

@@ -44,15 +44,7 @@ _WITH_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*[a-zA-Z°/%]*)")
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """Columns of text at least two spaces apart: numbers, to five digits, on the right, texts on the left.
-
-    Examples
-    --------
-    >>> print(text_table(["record", "peak"], [["Pacoima Dam 164", 6.63581], ["Lone Pine", 0.5]]))
-    record             peak
-    Pacoima Dam 164  6.6358
-    Lone Pine           0.5
-    """
+    """Columns of text at least two spaces apart: numbers, to five digits, on the right, texts on the left."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -91,10 +83,8 @@ def known_digits(value: float, interval: tuple[float, float]) -> tuple[str, str]
 
     Examples
     --------
-    >>> known_digits(464.8, (206.1, 826.0)), known_digits(2.1515, (2.1503, 2.1534))
-    (('460', '210 to 830'), ('2.1515', '2.1503 to 2.1534'))
-    >>> known_digits(276.0, (0.0, math.inf))
-    ('280', '0 to infinity')
+    >>> known_digits(464.8, (206.1, 826.0)), known_digits(276.0, (0.0, math.inf))
+    (('460', '210 to 830'), ('280', '0 to infinity'))
     """
     low, high = interval
     width = high - low
@@ -111,13 +101,7 @@ def known_digits(value: float, interval: tuple[float, float]) -> tuple[str, str]
 
 
 def range_text(values: Floats) -> str:
-    """Lowest and highest of some numbers, or the one that they all are.
-
-    Examples
-    --------
-    >>> range_text(np.array([1.0, 2.5])), range_text(np.array([2.0, 2.0]))
-    ('from 1 to 2.5', '2')
-    """
+    """Lowest and highest of some numbers, or the one that they all are."""
     low, high = float(np.min(values)), float(np.max(values))
     return f"{low:.5g}" if low == high else f"from {low:.5g} to {high:.5g}"
 
@@ -127,20 +111,14 @@ def named(quantity: str, unit: str) -> str:
 
     Examples
     --------
-    >>> named("ground_acceleration", "m/s^2"), named("rotation", "rad"), named("impacts", "1")
-    ('ground_acceleration_m_s2', 'rotation_rad', 'impacts')
+    >>> named("ground_acceleration", "m/s^2"), named("impacts", "1")
+    ('ground_acceleration_m_s2', 'impacts')
     """
     return quantity if unit == "1" else f"{quantity}_{unit.replace('/', '_').replace('^', '')}"
 
 
 def decimal(value: float) -> float:
-    """Return a number without the rounding in its last digit, so that it is written as people write it.
-
-    Examples
-    --------
-    >>> 0.1 + 0.2, decimal(0.1 + 0.2), decimal(1.0 / 3.0)
-    (0.30000000000000004, 0.3, 0.3333333333333333)
-    """
+    """Return a number without the rounding in its last digit, so that it is written as people write it."""
     written = float(f"{value:.12g}")
     return written if abs(written - value) <= _ROUNDING * abs(value) else value
 
@@ -149,13 +127,6 @@ def frame_of(rows: Sequence[Mapping[str, Any]], unread: Mapping[str, str]) -> pd
     """Rows of records as a data frame, and a row for each that could not be read, with the reason as its verdict.
 
     Whole numbers and truth values stay such beside rows that have none.
-
-    Examples
-    --------
-    >>> print(frame_of([{"record": "a", "rests": 2, "verdict": "rocks"}], {"b": "no numbers"}))
-      record  rests              verdict
-    0      a      2                rocks
-    1      b   <NA>  skipped: no numbers
     """
     import pandas as pd
 
@@ -229,23 +200,8 @@ def to_json(result: Mapping[str, Any]) -> str:
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Give a path to write to, beside a file, which it then becomes: whole, on the disk, or not at all.
 
-    What is no file but can be written to (a device, a pipe) is given itself.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written; what was there before is then left as it is.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> file = Path(tempfile.mkdtemp()) / "table.csv"
-    >>> with whole_file(file) as beside:
-    ...     _ = beside.write_text("time_s")
-    ...     file.exists()
-    False
-    >>> file.read_text()
-    'time_s'
+    What is no file but can be written to (a device, a pipe) is given itself. Where it cannot be written, an
+    `OutputError` says why, and what was there before is left as it is.
     """
     wanted = checks.path(path, "path of a file", OutputError)
     try:
@@ -275,47 +231,23 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text file, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
+    """Write a text file, whole or not at all."""
     write_bytes(path, text.encode())
 
 
 def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
-    """Write a file, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
+    """Write a file, whole or not at all."""
     with whole_file(path) as beside:
         beside.write_bytes(content)
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, *, index: bool = False) -> None:
-    """Write a data frame as text columns with a header, whole or not at all; numbers to 15 digits.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
+    """Write a data frame as text columns with a header, whole or not at all; numbers to 15 digits."""
     write_text(path, frame.to_csv(index=index, float_format="%.15g", lineterminator="\n"))
 
 
 def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
-    """Write a dataset to a NetCDF file, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
+    """Write a dataset to a NetCDF file, whole or not at all."""
     # HDF5 ends the process where it meets a full disk; so it writes to memory as long as that is no burden.
     if dataset.nbytes <= _IN_MEMORY:
         content: Any = dataset.to_netcdf(engine="h5netcdf")
@@ -331,13 +263,7 @@ def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
 
 
 def write_figure(path: str | Path, figure: Figure, **options: Any) -> None:
-    """Write a figure in the format of the file's suffix, whole or not at all; options are those of its ``savefig``.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
+    """Write a figure in the format of the file's suffix, whole or not at all; options are those of its ``savefig``."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format=Path(path).suffix.removeprefix("."), **options)
     write_bytes(path, drawn.getvalue())

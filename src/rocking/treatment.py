@@ -13,9 +13,9 @@ from rocking import checks
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.body import Bodies
+from rocking.constants import Model
 from rocking.errors import InvalidOption, OutsideFit
 from rocking.kernels import state
-from rocking.model import Model
 from rocking.motion.motion import Motion
 
 Critical = Literal["eq76", "eq77", "exact"]
@@ -54,7 +54,36 @@ class Treatment(ABC):
 
     @abstractmethod
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
-        """Limits of both sides of every body under a motion times a factor, shape (n, 2)."""
+        """Limits of both sides of every body, with which its impacts are compared; what they are, `code` says.
+
+        Parameters
+        ----------
+        bodies : Bodies
+            The n bodies.
+        motion : Motion or None
+            What shakes them; None is free rocking.
+        model : {"nonlinear", "linear"}
+            Equation of motion.
+        factor : float
+            What the motion is multiplied by.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            In the treatment's own unit.
+
+        Raises
+        ------
+        InvalidOption
+            If the treatment does not know such bodies or motions.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block = rocking.Block(width=0.4, height=2.0)
+        >>> rocking.IntervalThreshold(1e-6).limits(block.alone(), None, "nonlinear")
+        array([[1.e-06, 1.e-06]])
+        """
 
     def __str__(self) -> str:
         """Write the treatment so that `treatment` reads it back."""
@@ -65,10 +94,25 @@ class Treatment(ABC):
     def from_text(cls, value: str) -> Treatment:
         """Make the treatment of its one parameter as it is written after "NAME=".
 
+        Parameters
+        ----------
+        value : str
+            The parameter.
+
+        Returns
+        -------
+        Treatment
+            One of this class.
+
         Raises
         ------
         InvalidOption
             If it takes no parameter, or the text is not one.
+
+        Examples
+        --------
+        >>> VelocityThreshold.from_text("1e-6")
+        VelocityThreshold(threshold=1e-06)
         """
         if not fields(cls):
             raise InvalidOption(f"the chattering treatment {cls.name} takes no parameter, not {value!r}")
@@ -127,7 +171,7 @@ class AsymptoticTime(Treatment):
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Chattering time of every side, s; infinite where chattering is not complete."""
-        from rocking.kernels import paper
+        from rocking.kernels.sine.series import eq65_time
 
         if motion is None or motion.description.family != "sine":
             raise InvalidOption(
@@ -145,12 +189,11 @@ class AsymptoticTime(Treatment):
         frequency = 2.0 * np.pi * parameters["frequency"] / bodies.p
         complete = (amplitude >= 1.0) & (amplitude < self._critical(frequency, eta))
         cases = zip(amplitude.flat, frequency.flat, eta.flat, strict=True)
-        times = np.reshape([paper.eq65_time(*case) for case in cases], amplitude.shape)
+        times = np.reshape([eq65_time(*case) for case in cases], amplitude.shape)
         return np.where(complete, times / bodies.p, np.inf)
 
     def _critical(self, frequency: Floats, restitution: Floats) -> Floats:
-        from rocking.kernels import paper
-        from rocking.kernels.sine.sequence import critical_amplitudes
+        from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
 
         found = np.ones(frequency.size)
         lossy = np.flatnonzero(restitution.ravel() < 1.0)
@@ -160,7 +203,7 @@ class AsymptoticTime(Treatment):
             critical_amplitudes(omega, eta, there)
         else:
             warn_outside_fit(self.critical, omega, eta)
-            paper.fitted_amplitudes(omega, eta, self.critical == "eq76", there)
+            fitted_amplitudes(omega, eta, self.critical == "eq76", there)
         found[lossy] = there
         return found.reshape(frequency.shape)
 
@@ -277,19 +320,10 @@ class IntervalThreshold(Treatment):
 def treatment(chattering: str | Treatment) -> Treatment:
     """Treatment of a name, or of a name and its parameter, or the treatment itself.
 
-    Raises
-    ------
-    InvalidOption
-        If there is none of that name, or its parameter is out of its range.
-
     Examples
     --------
-    >>> treatment("certified")
-    Certified(tolerance=1e-12)
-    >>> treatment("velocity=1e-6")
-    VelocityThreshold(threshold=1e-06)
-    >>> str(treatment("interval"))
-    'interval=1e-09'
+    >>> treatment("certified"), treatment("velocity=1e-6"), str(treatment("interval"))
+    (Certified(tolerance=1e-12), VelocityThreshold(threshold=1e-06), 'interval=1e-09')
     """
     if isinstance(chattering, Treatment):
         return chattering
@@ -307,15 +341,7 @@ def treatment(chattering: str | Treatment) -> Treatment:
 
 
 def warn_outside_fit(fit: str, omega: Floats, eta: Floats) -> None:
-    """Warn where one of the paper's fits is asked beyond what it was made for.
-
-    Parameters
-    ----------
-    fit : str
-        "eq76" or "eq77".
-    omega, eta : ndarray
-        Frequencies over p, and restitutions.
-    """
+    """Warn where one of the paper's fits, "eq76" or "eq77", is asked beyond what it was made for."""
     low, high = FITTED_FREQUENCIES
     least, most = FITTED_RESTITUTIONS
     outside: Flags = (omega < low) | (omega > high) | (eta < least) | (eta > most)

@@ -1,10 +1,10 @@
 from . import rules
-from .calibration.diagnostics import Diagnostics, Leaning, Scores
-from .calibration.evidence import Evidence
+from .calibration.diagnostics import BoundReached, Diagnostics, Scores
 from .calibration.history import Measured
 from .calibration.outcomes import Estimate, Validation
 from .efficiency import MeasureComparison
-from .fragility import Band, FragilityCurve
+from .fragility.curve import Band, FragilityCurve
+from .fragility.lognormal import Goodness, Likelihood, Probit
 from .incremental import IncrementalDynamicAnalysis
 from .overturning import Mode, OverturningMap, mode_name
 from .risk import Rate, Risk
@@ -14,16 +14,18 @@ from .survival import Survival
 
 __all__ = [
     "Band",
+    "BoundReached",
     "Diagnostics",
     "Estimate",
-    "Evidence",
     "FragilityCurve",
+    "Goodness",
     "IncrementalDynamicAnalysis",
-    "Leaning",
+    "Likelihood",
     "MeasureComparison",
     "Measured",
     "Mode",
     "OverturningMap",
+    "Probit",
     "Rate",
     "Risk",
     "RockingSpectrum",

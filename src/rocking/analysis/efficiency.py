@@ -13,14 +13,13 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled, units_of, values_of
-from rocking.analysis.report import Drawn
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
+from rocking.constants import Model
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
+from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import Measure
-from rocking.result import Result
+from rocking.result import DatasetResult, variable
 from rocking.tables import counted, text_table
 
 if TYPE_CHECKING:
@@ -62,7 +61,9 @@ def compare_measures(
         How much each of several blocks counts, as those of a calibration; by default all alike.
     tolerance : float
         Width of the intensities at overturning, relative to them.
-    threads, progress
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
         As for `simulate_many`.
 
     Returns
@@ -132,7 +133,7 @@ def compare_measures(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MeasureComparison(Drawn, Result):
+class MeasureComparison(DatasetResult):
     """Intensity measures side by side; from `compare_measures`.
 
     Its figure has the dispersion of each measure with its interval, the most efficient first, as the summary.
@@ -158,7 +159,6 @@ class MeasureComparison(Drawn, Result):
         return np.argsort(self.data.dispersion_of_all.values, kind="stable")
 
     def summary(self) -> str:
-        """Measures in a table, the most efficient first."""
         data = self.data
         several = data.sizes["block"] > 1
         order = self._order()
@@ -185,7 +185,6 @@ class MeasureComparison(Drawn, Result):
         return "\n".join(text + ([f"note: {REVERSED_TOO}"] if data.sides_differ else []))
 
     def to_dict(self) -> dict[str, Any]:
-        """Measures and their dispersions by name."""
         data = self.data
         names = self.TABLES["measures"]
         return {
@@ -204,8 +203,8 @@ class MeasureComparison(Drawn, Result):
             ],
         }
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import dispersions_figure
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.fragility import dispersions_figure
 
         data, order = self.data, self._order()
         return dispersions_figure(
@@ -237,20 +236,14 @@ def _dataset(
     spread = "standard deviation of the logarithm of the intensity at overturning"
     return xr.Dataset(
         {
-            "intensity": (("measure", "motion", "block"), intensity, {"long_name": "lowest intensity that overturns"}),
-            "median_intensity": (
-                "measure",
-                np.exp(mean),
-                {"long_name": "median of the intensities at overturning, in the measure's unit"},
+            "intensity": variable(("measure", "motion", "block"), intensity, "lowest intensity that overturns"),
+            "median_intensity": variable(
+                "measure", np.exp(mean), "median of the intensities at overturning, in the measure's unit"
             ),
-            "dispersion": ("measure", about_own, {"units": "1", "long_name": f"{spread} about each block's own mean"}),
-            "dispersion_low": ("measure", low * about_own, {"units": "1", "long_name": "lower end of its interval"}),
-            "dispersion_high": ("measure", high * about_own, {"units": "1", "long_name": "upper end of its interval"}),
-            "dispersion_of_all": (
-                "measure",
-                np.sqrt(of_all),
-                {"units": "1", "long_name": f"{spread} about one mean of all blocks"},
-            ),
+            "dispersion": variable("measure", about_own, f"{spread} about each block's own mean", "1"),
+            "dispersion_low": variable("measure", low * about_own, "lower end of its interval", "1"),
+            "dispersion_high": variable("measure", high * about_own, "upper end of its interval", "1"),
+            "dispersion_of_all": variable("measure", np.sqrt(of_all), f"{spread} about one mean of all blocks", "1"),
         },
         {
             "measure": [_name(measure) for measure in measures],

@@ -1,8 +1,9 @@
-"""Seismic hazard curves: how often a year the ground motion at a site exceeds an intensity."""
+"""Seismic hazard curves: how often a year the motion at a site exceeds an intensity, or a lognormal limit."""
 
 from __future__ import annotations
 
 import csv
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,14 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
+from rocking.analysis.fragility.lognormal import Probit
 from rocking.arrays import Floats, as_asked
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import IntensityName, Measure, intensities
+from rocking.result import Result
 from rocking.tables import csv_rows, text_table
 
 if TYPE_CHECKING:
-    from rocking.plot import HazardLine
+    from rocking.plot.risk import HazardLine
 
 #: Headings of an intensity in a table, with its measure and the factor to SI units.
 HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
@@ -41,11 +44,16 @@ _OPENQUAKE: Final[dict[str, tuple[IntensityName, float]]] = {
 #: Rates that a figure shows.
 _DRAWN: Final = (1e-200, 1e200)
 
+#: Shares of the risk up to an intensity: what a standard deviation leaves on either side, and half.
+_QUANTILES: Final = (0.16, 0.5, 0.84)
+
+_ROOT: Final = math.sqrt(0.5)
+
 _POE: Final = re.compile(r"poe-([0-9.eE+-]+)")
 
 
-@dataclass(frozen=True, eq=False)
-class HazardCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class HazardCurve(Result):
     """Mean annual rate at which the motion at a site exceeds an intensity.
 
     Between its points the rate is a power of the intensity, a straight line in logarithms; the first and the last such
@@ -100,7 +108,7 @@ class HazardCurve:
 
     @classmethod
     def read(cls, path: str | Path, *, site: int = 0, period: float | None = None) -> HazardCurve:
-        """Read a hazard curve: a table of two columns, or what OpenQuake exports.
+        r"""Read a hazard curve: a table of two columns, or what OpenQuake exports.
 
         Parameters
         ----------
@@ -114,10 +122,24 @@ class HazardCurve:
         period : float, optional
             Period of a table's spectral acceleration, s.
 
+        Returns
+        -------
+        HazardCurve
+            Named like the file.
+
         Raises
         ------
         InvalidOption
             If the file cannot be read, or is neither, or has no such site.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     file = Path(folder, "museum.csv")
+        ...     _ = file.write_text("pga_g,annual_rate\n0.1,1e-2\n0.4,1e-4\n")
+        ...     HazardCurve.read(file)
+        <HazardCurve: museum; peak ground acceleration (g) from 0.1 to 0.4, annual rate from 0.01 to 0.0001>
         """
         file = checks.path(path, "path of a hazard curve", InvalidOption)
         checks.whole(site, "site", InvalidOption, 0)
@@ -137,34 +159,35 @@ class HazardCurve:
             raise
 
     def rate_of(self, intensity: ArrayLike) -> Floats:
-        """Annual rate of exceeding intensities, shaped like them; infinite at 0.
+        """Annual rate of exceeding intensities.
+
+        Parameters
+        ----------
+        intensity : array_like
+            Intensities in SI units, 0 or more.
+
+        Returns
+        -------
+        ndarray
+            Rates (1/year), shaped like the intensities; infinite at 0.
 
         Raises
         ------
         InvalidOption
             If an intensity is no number, or negative.
+
+        Examples
+        --------
+        >>> float(HazardCurve([1.0, 2.0], [1e-2, 2.5e-3]).rate_of(4.0))
+        0.000625
         """
         at = intensities(intensity)
-        exponents, factors = self.powers()
+        exponents, factors = powers(self)
         segment = np.clip(np.searchsorted(self.intensity, at, side="right") - 1, 0, len(self.rate) - 2)
         with np.errstate(divide="ignore", over="ignore"):
             return as_asked(np.asarray(np.exp(factors[segment] - exponents[segment] * np.log(at))))
 
-    def line(self, intensity: Floats) -> HazardLine:
-        """Return rates at intensities (SI) as a figure takes them: neither 0 nor infinite."""
-        from rocking.plot import HazardLine
-
-        low, high = self.measure.scale * self.intensity[[0, -1]]
-        return HazardLine(np.clip(self.rate_of(intensity), *_DRAWN), (float(low), float(high)))
-
-    def powers(self) -> tuple[Floats, Floats]:
-        """Exponent k and logarithm of c of each segment, on which the rate is c intensity^-k."""
-        x, y = np.log(self.intensity), np.log(self.rate)
-        exponents = -np.diff(y) / np.diff(x)
-        return exponents, y[:-1] + exponents * x[:-1]
-
     def to_dict(self) -> dict[str, Any]:
-        """Points and measure by name."""
         return {
             "name": self.name,
             "measure": {"name": self.measure.name, **self.measure.options()},
@@ -173,16 +196,30 @@ class HazardCurve:
         }
 
     def summary(self) -> str:
-        """Points in a table, with return periods."""
         rows = [[self.measure.scale * x, rate, 1.0 / rate] for x, rate in zip(self.intensity, self.rate, strict=True)]
         return text_table([self.measure.label, "annual rate", "return period (years)"], rows)
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         low, high = self.measure.scale * self.intensity[[0, -1]]
         return (
-            f"<HazardCurve: {self.name}; {self.measure.label} from {low:.4g} to {high:.4g}, "
-            f"annual rate from {self.rate[0]:.3g} to {self.rate[-1]:.3g}>"
+            f"{self.name}; {self.measure.label} from {low:.4g} to {high:.4g}, "
+            f"annual rate from {self.rate[0]:.3g} to {self.rate[-1]:.3g}"
         )
+
+
+def powers(hazard: HazardCurve) -> tuple[Floats, Floats]:
+    """Return exponent k and logarithm of c of each segment, on which the rate is c intensity^-k."""
+    x, y = np.log(hazard.intensity), np.log(hazard.rate)
+    exponents = -np.diff(y) / np.diff(x)
+    return exponents, y[:-1] + exponents * x[:-1]
+
+
+def hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
+    """Return rates at intensities (SI) as a figure takes them: neither 0 nor infinite."""
+    from rocking.plot.risk import HazardLine
+
+    low, high = hazard.measure.scale * hazard.intensity[[0, -1]]
+    return HazardLine(np.clip(hazard.rate_of(intensity), *_DRAWN), (float(low), float(high)))
 
 
 def _check_order(what: str, values: Floats, way: float) -> None:
@@ -253,3 +290,110 @@ def _from_openquake(lines: list[str], site: int) -> tuple[Floats, Floats, Measur
     rate = -np.log1p(-exceeded[useful]) / years
     falling = np.append(True, np.diff(np.minimum.accumulate(rate)) < 0.0) if len(rate) else np.zeros(0, dtype=bool)
     return factor * intensity[useful][falling], rate[falling], measure
+
+
+def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Floats:
+    """Logarithms of integrals below the hazard curve, over each of its segments, and above, up to `until` (ln x).
+
+    Their shape is (fits, n + 1). The rate is the integral of rate(x) dP(x). On a segment rate(x) = c x^-k, and with
+    P = Phi(z), z = a + b ln x, its part is c exp(k a/b + k^2/(2 b^2)) [Phi(z + k/b)] between the segment's ends.
+    Where both lie on one side of z = -k/b the large terms cancel: with the scaled erfcx the part is
+    rate(x) exp(-z^2/2) erfcx(|z + k/b|/sqrt(2))/2 at the nearer end, less that at the other.
+    """
+    from scipy.special import erfcx, ndtr
+
+    k, log_c = (_extended(values) for values in powers(hazard))
+    ends = [np.minimum(each, until) for each in _ends(hazard)]
+    a, b = (values[:, None] for values in fits)
+    with np.errstate(all="ignore"):
+        shift = k / b
+        lower, upper = (a + b * end + shift for end in ends)
+        mirrored = lower > 0.0
+        near, far = np.where(mirrored, lower, -upper), np.where(mirrored, upper, -lower)
+        end = np.where(mirrored, *ends)
+        z = a + b * end
+        fall = np.exp(-0.5 * b * (ends[1] - ends[0]) * (near + far)) * erfcx(far * _ROOT) / erfcx(near * _ROOT)
+        tail = log_c - k * end - 0.5 * z * z + np.log(0.5 * erfcx(near * _ROOT)) + np.log1p(-fall)
+        middle = log_c + shift * a + 0.5 * shift * shift + np.log(ndtr(upper) - ndtr(lower))
+    # A curve that does not rise is exceeded by the weakest motions as often as they come.
+    return np.where(b > 0.0, np.where(near > 0.0, tail, middle), np.inf)
+
+
+def _extended(values: Floats) -> Floats:
+    """One value for each segment of a hazard curve, with those of the first and the last also beyond them."""
+    return np.concatenate([values[:1], values, values[-1:]])
+
+
+def _ends(hazard: HazardCurve) -> tuple[Floats, Floats]:
+    """Logarithms of the lower and upper ends of the segments, and of what is below and above."""
+    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])
+    return corners[:-1], corners[1:]
+
+
+def _log_total(fitted: Probit, hazard: HazardCurve) -> float:
+    return float(np.logaddexp.reduce(log_parts(fitted, hazard)[0]))
+
+
+def _log_seen(fitted: Probit, hazard: HazardCurve, log_at: Floats) -> tuple[Floats, Floats]:
+    """Logarithms of P(x) rate(x), and of its part k P(x) rate(x) = P(x) |d rate(x)/d ln x|, at logarithms of x."""
+    from scipy.special import log_ndtr
+
+    segment = np.searchsorted(np.log(hazard.intensity), log_at, side="right")
+    k, log_c = (_extended(values)[segment] for values in powers(hazard))
+    score = fitted.intercept[0] + fitted.slope[0] * log_at
+    product = np.asarray(log_c - k * log_at + log_ndtr(score))
+    return product, np.log(k) + product
+
+
+def shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
+    """Shares of a rate from motions below the hazard curve's first point, and above its last.
+
+    By parts the integral of P(x) |d rate(x)| is that of rate(x) dP(x), less P(x) rate(x) at its upper end, and with
+    that at its lower end.
+    """
+    parts, total = log_parts(fitted, hazard)[0], _log_total(fitted, hazard)
+    first, last = _log_seen(fitted, hazard, np.log(hazard.intensity[[0, -1]]))[0]
+    with np.errstate(all="ignore"):
+        below = np.exp(parts[0] - total) * max(-math.expm1(min(first - parts[0], 0.0)), 0.0)
+        above = np.exp(np.logaddexp(parts[-1], last) - total)
+    return float(below), float(above)
+
+
+def quantile_intensities(fitted: Probit, hazard: HazardCurve) -> tuple[float, float, float]:
+    """Intensities below which the quantiles of a rate arise: shares of the motions P(x) |d rate(x)|.
+
+    The share below x is that of the integral of rate(x) dP(x), less P(x) rate(x), which is never above the whole rate:
+    neither loses more than the last digits of the share.
+    """
+    from scipy.optimize import brentq
+
+    total, (k, log_c) = _log_total(fitted, hazard), powers(hazard)
+    if not math.isfinite(total):
+        return 0.0, 0.0, 0.0
+
+    def excess(log_at: float, share: float) -> float:
+        cumulative = np.logaddexp.reduce(log_parts(fitted, hazard, log_at)[0])
+        product = _log_seen(fitted, hazard, np.array([log_at]))[0][0]
+        return float(np.exp(cumulative - total) - np.exp(product - total)) - share
+
+    def found(share: float) -> float:
+        # What comes from above x is at most rate(x): where that is what remains of the whole rate, x is high enough.
+        left = total + math.log1p(-share)
+        segment = np.searchsorted(-np.log(hazard.rate[1:-1]), -left)
+        high, step = float((log_c[segment] - left) / k[segment]), 1.0
+        low, step = high, 1.0
+        while excess(high, share) < 0.0:  # by rounding
+            high, step = high + step, 2.0 * step
+        while excess(low, share) > 0.0:
+            low, step = low - step, 2.0 * step
+        return float(np.exp(brentq(excess, low, high, args=(share,), xtol=1e-13)))
+
+    with np.errstate(all="ignore"):
+        sixteenth, half, rest = (found(share) for share in _QUANTILES)
+    return sixteenth, half, rest
+
+
+def share_density(fitted: Probit, hazard: HazardCurve, at: Floats) -> Floats:
+    """Share of the rate from motions of about an intensity, for each factor of e: its integral over ln x is 1."""
+    with np.errstate(under="ignore"):
+        return np.asarray(np.exp(_log_seen(fitted, hazard, np.log(at))[1] - _log_total(fitted, hazard)))

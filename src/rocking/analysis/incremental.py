@@ -12,19 +12,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.boundaries import Boundaries, boundaries
-from rocking.analysis.levels import REVERSED_TOO, described, simulate_levels, units_of, values_of
+from rocking.analysis.levels import (
+    REVERSED_TOO,
+    Boundaries,
+    boundaries,
+    described,
+    simulate_levels,
+    units_of,
+    values_of,
+)
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
+from rocking.constants import Model
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
-from rocking.motion.exceedance import lifting_factors
+from rocking.motion.measures import lifting_factors
 from rocking.motion.motion import Motion
+from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.result import Result
+from rocking.result import DatasetResult
 from rocking.tables import counted, named, text_table
 from rocking.treatment import Certified
 
@@ -77,7 +84,9 @@ def incremental_dynamic_analysis(
         Equation of motion.
     tolerance : float
         Ends of bands are refined to this width, relative to the level.
-    threads, progress
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
         As for `simulate_many`.
 
     Returns
@@ -153,7 +162,7 @@ def incremental_dynamic_analysis(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class IncrementalDynamicAnalysis(Result):
+class IncrementalDynamicAnalysis(DatasetResult):
     """Blocks under motions that are scaled up; from `incremental_dynamic_analysis`.
 
     Attributes
@@ -186,7 +195,7 @@ class IncrementalDynamicAnalysis(Result):
         block = ("band", self.data.band_block.values)
         return part[[]].assign(labels | {"block": block, "band_start": part.band_start, "band_end": part.band_end})
 
-    def bands(self, block: int = 0, motion: int = 0) -> list[tuple[float, float]]:
+    def bands(self, *, block: int = 0, motion: int = 0) -> list[tuple[float, float]]:
         """Return the bands of levels that overturn a block under a motion.
 
         Parameters
@@ -198,13 +207,21 @@ class IncrementalDynamicAnalysis(Result):
         -------
         list of (float, float)
             Start and end, in SI units or the block's own; NaN where the band goes on below or above the levels.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+        >>> pulse = rocking.pulses.one_sine(1.0, 1.0)
+        >>> found = incremental_dynamic_analysis(block, pulse, measure="pga_ratio", levels=[1.0, 5.0])
+        >>> [(round(start, 4), end) for start, end in found.bands()]
+        [(1.4425, nan)]
         """
         mine = (self.data.band_motion.values == motion) & (self.data.band_block.values == block)
         starts, ends = self.data.band_start.values[mine], self.data.band_end.values[mine]
         return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
     def summary(self) -> str:
-        """Levels that overturn each block under each motion, and which levels were looked at."""
         data = self.data
         many = data.sizes["block"] > 1
         looked_at = _Levels.of(data)
@@ -213,7 +230,7 @@ class IncrementalDynamicAnalysis(Result):
             [
                 self._with_vertical(str(data[what].values[m]), m),
                 *([b] if many else []),
-                looked_at.overturning(self.bands(b, m)),
+                looked_at.overturning(self.bands(block=b, motion=m)),
             ]
             for m in range(data.sizes["motion"])
             for b in range(data.sizes["block"])
@@ -233,7 +250,6 @@ class IncrementalDynamicAnalysis(Result):
         return labelled(name, (), vertical)
 
     def to_dict(self) -> dict[str, Any]:
-        """Levels, peaks and bands by name; units are in the names."""
         data, units = self.data, self.data.level.units
         peaks = data.peak_over_alpha.transpose("motion", "block", "level").values
         lowest = data.overturning_level.transpose("motion", "block").values
@@ -250,7 +266,8 @@ class IncrementalDynamicAnalysis(Result):
                     "block": b,
                     named("overturning_level", units): float(lowest[m, b]),
                     "overturns": [
-                        {named("from", units): low, named("to", units): high} for low, high in self.bands(b, m)
+                        {named("from", units): low, named("to", units): high}
+                        for low, high in self.bands(block=b, motion=m)
                     ],
                     "peak_over_alpha": peaks[m, b],
                 }
@@ -260,12 +277,7 @@ class IncrementalDynamicAnalysis(Result):
         }
 
     def plot(
-        self,
-        ax: Axes | None = None,
-        *,
-        block: int = 0,
-        title: str = "",
-        figsize: tuple[float, float] | None = None,
+        self, ax: Axes | None = None, *, block: int = 0, title: str = "", figsize: tuple[float, float] | None = None
     ) -> Figure:
         """Draw level against peak rotation for one block, and the bands of levels that overturn it.
 
@@ -279,8 +291,21 @@ class IncrementalDynamicAnalysis(Result):
             Title; by default the block and the model.
         figsize : (float, float), optional
             Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The new figure, or that of `ax`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+        >>> found = incremental_dynamic_analysis(block, rocking.pulses.one_sine(1.0, 1.0), levels=[1.0, 5.0])
+        >>> len(found.plot(block=0).axes)
+        2
         """
-        from rocking.plot import ScaledMotion, ida_figure
+        from rocking.plot.ida import ScaledMotion, ida_figure
 
         data = self.data
         levels = data.level.scale * data.level.values
@@ -288,7 +313,7 @@ class IncrementalDynamicAnalysis(Result):
         peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
         motions = []
         for m in range(data.sizes["motion"]):
-            bands = data.level.scale * np.array(self.bands(block, m)).reshape(-1, 2)
+            bands = data.level.scale * np.array(self.bands(block=block, motion=m)).reshape(-1, 2)
             bands = np.where(np.isnan(bands), ends, bands)
             motions.append(ScaledMotion(self._label(m), levels, peaks[m], bands))
         what = data.blocks if data.sizes["block"] == 1 else f"block {block}"
@@ -302,13 +327,7 @@ class IncrementalDynamicAnalysis(Result):
 
 
 def _lowest_uplift(blocks: Blocks, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
-    """Lowest level of the measure from which on a motion lifts a block; its vertical component is scaled with it.
-
-    Raises
-    ------
-    InvalidOption
-        If none does at any level.
-    """
+    """Lowest level of the measure from which on a motion lifts a block; its vertical component is scaled with it."""
     thresholds = np.array([block.uplift_thresholds(model) for block in blocks])
     factors = np.array([lifting_factors(motion, thresholds, blocks.gravity) for motion in motions])
     lowest = float(np.min(factors * values[:, None] / units_of(blocks, measure, model)))
@@ -381,17 +400,7 @@ def _dataset(table: xr.Dataset, bands: _Bands, blocks: Blocks, measure: Measure)
 
 @dataclass(frozen=True)
 class _Levels:
-    """Levels that motions were scaled to, and bands of them, in words: never more than was looked at.
-
-    Attributes
-    ----------
-    at : ndarray
-        Levels as people read them: accelerations in g.
-    unit : str
-        Their unit, after a blank; empty if they have none.
-    scale : float
-        Factor from SI units.
-    """
+    """Levels that motions were scaled to as people read them, and bands of them, in words: only what was looked at."""
 
     at: Floats
     unit: str
@@ -399,15 +408,13 @@ class _Levels:
 
     @classmethod
     def of(cls, data: xr.Dataset) -> _Levels:
-        """Levels of an incremental dynamic analysis."""
         level = data.level
         unit = {"m/s^2": " g", "m/s": " m/s", "1": ""}[level.units]
         return cls(level.scale * level.values, unit, level.scale)
 
     def summary(self, lowest_uplift: float) -> str:
         """Say what was looked at, and whether it is all below the level (SI) from which on a motion lifts a block."""
-        count = f"{len(self.at)} levels" if len(self.at) > 1 else "1 level"
-        text = f"looked at: {count}, {self._range(self.at[0], self.at[-1])}{self._step()}"
+        text = f"looked at: {counted(len(self.at), 'level')}, {self._range(self.at[0], self.at[-1])}{self._step()}"
         lifting = self.scale * lowest_uplift
         if self.at[-1] < lifting:
             text += f"\nnone of them lifts a block; that begins at {lifting:.5g}{self.unit}: are the levels right?"

@@ -1,22 +1,24 @@
-"""Every block under every motion, scaled to levels of an intensity measure."""
+"""Blocks under motions that are scaled to levels of a measure, and where between levels an outcome changes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking import bisection, checks
+from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Block, Blocks
+from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
+from rocking.progress import Progress
 from rocking.tables import counted
 
 if TYPE_CHECKING:
@@ -25,6 +27,9 @@ if TYPE_CHECKING:
 
 #: Where only motions as they are were simulated, though the sides of a block differ.
 REVERSED_TOO: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
+
+#: From so many changes on, no further ones are looked for in an interval of the grid.
+_MOST: Final = 64
 
 
 def described(blocks: Blocks | Block | Sequence[Block]) -> str:
@@ -83,14 +88,7 @@ def simulate_levels(
 ) -> xr.Dataset:
     """Simulate every block under every motion at every level; as `simulate_many`, with the dimension ``level``.
 
-    Parameters
-    ----------
-    blocks, motions, model, **options
-        As for `simulate_many`.
-    measure : Measure
-        What the motions are scaled to; one that counts in a block's own unit scales them for each block.
-    levels : ndarray
-        Levels of the measure.
+    A measure that counts in a block's own unit scales the motions for each block.
     """
     import xarray as xr
 
@@ -104,3 +102,76 @@ def simulate_levels(
     whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
     require_finished(whole.unfinished.values)
     return whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
+
+
+@dataclass(frozen=True)
+class Boundaries:
+    """Changes of the outcome in columns of a grid, ordered by column, then level.
+
+    Each lies between a low and a high level, which have the outcomes below and above.
+    """
+
+    column: Integers
+    low: Floats
+    high: Floats
+    below: Integers
+    above: Integers
+
+    @property
+    def level(self) -> Floats:
+        """Middle of every bracket."""
+        return bisection.middle(self.low, self.high)
+
+
+def boundaries(
+    levels: Floats,
+    outcome: Integers,
+    outcome_of: Callable[[Integers, Floats], Integers],
+    *,
+    tolerance: float,
+    progress: bool | None = None,
+) -> Boundaries:
+    """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
+
+    `outcome_of` tells outcomes for arrays of columns and levels; the tolerance is relative to the level.
+
+    Where a bisection meets a third outcome both halves are followed, so each bracket ends with two outcomes that are
+    neighbours to within the tolerance. Only where an interval of the grid holds 64 changes or more, as between the
+    regions of a fractal, one is followed up for all that lie between two outcomes. Outcomes between two levels of the
+    grid with the same outcome are not seen.
+    """
+    here = _on_grid(levels, outcome)
+    origin = np.arange(len(here.level))
+    halvings = np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (tolerance * here.high))))
+    with Progress("refining", int(halvings.sum()), show=progress) as bar:
+        while (wide := bisection.is_wide(here.low, here.high, tolerance)).any():
+            found = here.below.copy()
+            found[wide] = outcome_of(here.column[wide], here.level[wide])
+            here, origin = _halved(here, wide, found, origin)
+            bar.advance(int(wide.sum()))
+    return _ordered(here)
+
+
+def _on_grid(levels: Floats, outcome: Integers) -> Boundaries:
+    row, column = np.nonzero(outcome[1:] != outcome[:-1])
+    return Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
+
+
+def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
+    """Brackets after one bisection of the wide ones; those that hold a third outcome become two.
+
+    `origin` is the interval of the grid that each comes from.
+    """
+    few = np.bincount(origin)[origin] < _MOST
+    third = wide & few & (found != here.below) & (found != here.above)
+    up = wide & (found == here.below)
+    low, high = bisection.halved(here.low, here.high, up, wide & ~up)
+    lower = Boundaries(here.column, low, high, here.below, np.where(third, found, here.above))
+    upper = Boundaries(here.column[third], here.level[third], here.high[third], found[third], here.above[third])
+    both = (np.concatenate(pair) for pair in zip(vars(lower).values(), vars(upper).values(), strict=True))
+    return Boundaries(*both), np.concatenate([origin, origin[third]])
+
+
+def _ordered(here: Boundaries) -> Boundaries:
+    order = np.lexsort((here.low, here.column))
+    return Boundaries(*(values[order] for values in vars(here).values()))

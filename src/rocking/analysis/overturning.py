@@ -13,19 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.analysis.boundaries import Boundaries, boundaries
+from rocking.analysis.levels import Boundaries, boundaries
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks, one_block
 from rocking.body import Body
-from rocking.constants import VERSION
+from rocking.constants import VERSION, Model
 from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_family
 from rocking.progress import Progress
-from rocking.result import Result, table_of_some
+from rocking.result import DatasetResult, table_of_some, variable
 from rocking.simulation import simulate
 from rocking.tables import cell, named, text_table
 from rocking.treatment import Certified
@@ -34,9 +33,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-#: A pulse from its amplitude (m/s^2) and frequency (Hz), proportional to its amplitude.
-PulseFamily = Callable[[float, float], Motion]
 
 
 class Mode(IntEnum):
@@ -77,7 +73,7 @@ _LEAST_SHARE: Final = 1e-3
 
 def overturning_map(
     block: Block,
-    pulse: str | PulseFamily,
+    pulse: str | Callable[[float, float], Motion],
     *,
     amplitudes: ArrayLike,
     frequencies: ArrayLike,
@@ -110,7 +106,7 @@ def overturning_map(
         Number of threads; by default one for every core.
     progress : bool, optional
         Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
-    **parameters
+    **parameters : object
         Further numbers of a pulse given by name, as the function of that name in `rocking.pulses` takes them.
 
     Returns
@@ -147,10 +143,8 @@ def overturning_map(
     >>> print(f"{float(result.overturning_amplitude[0]):.7f}")
     1.8007239
     """
-    levels, ratios = (
-        checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption),
-        checks.increasing_numbers(frequencies, "frequencies", InvalidOption),
-    )
+    levels = checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption)
+    ratios = checks.increasing_numbers(frequencies, "frequencies", InvalidOption)
     checks.grid_size({"amplitudes": len(levels), "frequencies": len(ratios)}, InvalidOption)
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
     one_block(block)
@@ -182,6 +176,16 @@ def overturning_map(
 def mode_name(mode: int) -> str:
     """Return a mode of `overturning_map` in words.
 
+    Parameters
+    ----------
+    mode : int
+        A `Mode`, or how many impacts an overturning block has had.
+
+    Returns
+    -------
+    str
+        "rocks until the pulse is over", "overturns after 2 impacts".
+
     Examples
     --------
     >>> mode_name(-2), mode_name(0), mode_name(1)
@@ -203,8 +207,10 @@ def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OverturningMap(Result):
+class OverturningMap(DatasetResult):
     """What a pulse does to a block, over amplitude and frequency; from `overturning_map`.
+
+    Its figure has the modes as regions between the refined boundaries.
 
     Attributes
     ----------
@@ -226,7 +232,6 @@ class OverturningMap(Result):
     )
 
     def summary(self) -> str:
-        """Shares of the map that each outcome takes, and the lowest amplitude that overturns at some frequencies."""
         modes, counts = np.unique(self.data.mode, return_counts=True)
         shares = [
             (mode_name(int(mode)), _percent(count / self.data.mode.size))
@@ -250,7 +255,6 @@ class OverturningMap(Result):
         return f"{amplitudes[0]:g} or less" if is_open_below else f"none of those up to {amplitudes[-1]:g}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Grid, modes and boundaries by name."""
         names = ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above")
         columns = (self.data[name].values for name in names)
         return {
@@ -268,16 +272,7 @@ class OverturningMap(Result):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the modes as regions between the refined boundaries, in a new figure or in `ax`.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
-        title, figsize
-            Title, by default the pulse and the block; width and height of a new figure, inches.
-        """
-        from rocking.plot import regions_figure
+        from rocking.plot.maps import regions_figure
 
         data = self.data
         modes = data.mode.values
@@ -348,7 +343,7 @@ class _PulseProblem:
         return int(np.sum(response.impacts["time"] >= uplifts[-1]))
 
 
-def _unit_pulse(pulse: str | PulseFamily, frequency: float, parameters: dict[str, Any]) -> Motion:
+def _unit_pulse(pulse: str | Callable[[float, float], Motion], frequency: float, parameters: dict[str, Any]) -> Motion:
     """Pulse of amplitude 1 m/s^2."""
     if callable(pulse):
         if parameters:
@@ -384,25 +379,19 @@ def _dataset(
     over = "over the smallest acceleration that lifts the block"
     return xr.Dataset(
         {
-            "mode": (("amplitude", "frequency"), modes, {"long_name": meaning}),
-            "peak_rotation": (
-                ("amplitude", "frequency"),
-                peaks,
-                {"units": "rad", "long_name": "largest rotation in size"},
+            "mode": variable(("amplitude", "frequency"), modes, meaning),
+            "peak_rotation": variable(("amplitude", "frequency"), peaks, "largest rotation in size", "rad"),
+            "overturning_amplitude": variable(
+                "frequency", lowest, f"lowest amplitude that overturns the block, {over}", "1"
             ),
-            "overturning_amplitude": (
-                "frequency",
-                lowest,
-                {"units": "1", "long_name": f"lowest amplitude that overturns the block, {over}"},
-            ),
-            "boundary_frequency": ("boundary", ratios[edges.column], {"units": "1"}),
-            "boundary_amplitude": ("boundary", edges.level, {"units": "1"}),
-            "mode_below": ("boundary", edges.below, {"long_name": meaning}),
-            "mode_above": ("boundary", edges.above, {"long_name": meaning}),
+            "boundary_frequency": variable("boundary", ratios[edges.column], unit="1"),
+            "boundary_amplitude": variable("boundary", edges.level, unit="1"),
+            "mode_below": variable("boundary", edges.below, meaning),
+            "mode_above": variable("boundary", edges.above, meaning),
         },
         {
-            "amplitude": ("amplitude", levels, {"units": "1", "long_name": f"amplitude of the pulse {over}"}),
-            "frequency": ("frequency", ratios, {"units": "1", "long_name": "2 pi times the pulse's frequency, over p"}),
+            "amplitude": variable("amplitude", levels, f"amplitude of the pulse {over}", "1"),
+            "frequency": variable("frequency", ratios, "2 pi times the pulse's frequency, over p", "1"),
         },
         attributes,
     )

@@ -10,13 +10,20 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking import checks
-from rocking.analysis.fragility.curve import FragilityCurve
+from rocking.analysis.fragility.curve import FragilityCurve, interval_of
 from rocking.analysis.fragility.lognormal import Probit
-from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.report import Report
+from rocking.analysis.hazard import (
+    HazardCurve,
+    hazard_line,
+    log_parts,
+    quantile_intensities,
+    share_density,
+    shares_beyond,
+)
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
+from rocking.result import DrawnResult
 from rocking.tables import counted, known_digits, text_table
 
 if TYPE_CHECKING:
@@ -28,11 +35,6 @@ _STEP: Final = 1e-5
 
 #: A figure shows what is between quantiles of a rate, and so many times as far beyond them.
 _BEYOND: Final = 2.0
-
-#: Shares of the risk up to an intensity: what a standard deviation leaves on either side, and half.
-_QUANTILES: Final = (0.16, 0.5, 0.84)
-
-_ROOT: Final = math.sqrt(0.5)
 
 #: Points of a line in a figure.
 _POINTS: Final = 400
@@ -69,7 +71,12 @@ class Rate:
         return f"<Rate: {self.limit_state}: {rate} a year ({between}), {self.in_words()}>"
 
     def in_words(self) -> str:
-        """Return period with its interval, to the digits that this leaves.
+        """Say the return period with its interval, to the digits that this leaves.
+
+        Returns
+        -------
+        str
+            "once in ... years", with the interval.
 
         Examples
         --------
@@ -87,15 +94,46 @@ class Rate:
         years : float
             Time, above 0.
 
+        Returns
+        -------
+        float
+            1 - exp(-annual_rate years).
+
         Raises
         ------
         InvalidOption
-            If it is no positive number.
+            If the time is no positive number.
+
+        Examples
+        --------
+        >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0, (1.0, 2.0, 3.0)).probability(50.0), 4)
+        0.0488
         """
         return -math.expm1(-self.annual_rate * checks.positive(years, "years", InvalidOption))
 
     def survival(self, years: float) -> float:
-        """Probability of no exceedance in some years: of standing, for overturning; as `probability`."""
+        """Probability of no exceedance in some years: of standing, for overturning.
+
+        Parameters
+        ----------
+        years : float
+            Time, above 0.
+
+        Returns
+        -------
+        float
+            exp(-annual_rate years).
+
+        Raises
+        ------
+        InvalidOption
+            If the time is no positive number.
+
+        Examples
+        --------
+        >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0, (1.0, 2.0, 3.0)).survival(50.0), 4)
+        0.9512
+        """
         return math.exp(-self.annual_rate * checks.positive(years, "years", InvalidOption))
 
     @property
@@ -116,7 +154,7 @@ def _period(rate: float) -> float:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Risk(Report):
+class Risk(DrawnResult):
     """Annual rates of all limit states of a fragility under a hazard curve; from `Fragility.annual_rate`.
 
     Its figure has the hazard curve, and below it for each limit state which intensities its rate comes from.
@@ -138,22 +176,6 @@ class Risk(Report):
     hazard: HazardCurve
     description: str
 
-    @classmethod
-    def of(cls, curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Measure, description: str) -> Risk:
-        """Integrate curves against a measure over a hazard curve; see `Fragility.annual_rate`."""
-        if not isinstance(hazard, HazardCurve):
-            raise InvalidOption(
-                f"a HazardCurve is needed, not a {type(hazard).__name__}: make one with HazardCurve(intensity, rate), "
-                "or read one with HazardCurve.read(path)",
-                value=hazard,
-            )
-        if measure != hazard.measure:
-            raise InvalidOption(
-                f"the fragility is against {measure.label}, the hazard curve of {hazard.measure.label}; "
-                "fit the one against the other's measure"
-            )
-        return cls(tuple(_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
-
     def rate(self, limit_state: str) -> Rate:
         """Return the rate of a limit state.
 
@@ -165,17 +187,44 @@ class Risk(Report):
         Returns
         -------
         Rate
+            Its rate.
 
         Raises
         ------
         InvalidOption
             If there is none of that name.
+
+        Examples
+        --------
+        >>> from rocking import HazardCurve, fit_fragility
+        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
+        >>> round(fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4])).rate("overturning").annual_rate, 6)
+        0.000434
         """
         rates = {one.limit_state: one for one in self.rates}
         return rates[checks.one_of(limit_state, "limit_state", InvalidOption, [*rates])]
 
     def summary(self, years: float = 50.0) -> str:
-        """Return rates, return periods and probabilities in some years, in a table."""
+        """Say in words what was found: rates, return periods and probabilities, in a table.
+
+        Parameters
+        ----------
+        years : float
+            Time that the probabilities are for.
+
+        Returns
+        -------
+        str
+            Lines of text and tables.
+
+        Examples
+        --------
+        >>> from rocking import HazardCurve, fit_fragility
+        >>> fitted = fit_fragility([1.0, 2.0, 3.0], [0, 2, 4], trials=5)
+        >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
+        >>> "probability in 10 years" in risk.summary(10)
+        True
+        """
         years = checks.positive(years, "years", InvalidOption)
         scale, confidence = self.hazard.measure.scale, 100 * self.curves[0].confidence
         rows = []
@@ -208,7 +257,26 @@ class Risk(Report):
         return "\n".join([text_table(header, rows), *notes])
 
     def to_dict(self, years: float = 50.0) -> dict[str, Any]:
-        """Return rates, and probabilities in some years, by name, and the hazard curve."""
+        """Return what was found as plain values by name.
+
+        Parameters
+        ----------
+        years : float
+            Time that the probabilities are for.
+
+        Returns
+        -------
+        dict of str to object
+            Rates, probabilities, and the hazard curve; units are in the names, or SI.
+
+        Examples
+        --------
+        >>> from rocking import HazardCurve, fit_fragility
+        >>> fitted = fit_fragility([1.0, 2.0, 3.0], [0, 2, 4], trials=5)
+        >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
+        >>> risk.to_dict(10.0)["years"]
+        10.0
+        """
         return {
             "description": self.description,
             "hazard": self.hazard.to_dict(),
@@ -230,15 +298,15 @@ class Risk(Report):
             ],
         }
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import RiskLine, risk_figure
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.risk import RiskLine, risk_figure
 
         scale, at = self.hazard.measure.scale, self._shown()
         return risk_figure(
             intensity=scale * at,
-            hazard=self.hazard.line(at),
+            hazard=hazard_line(self.hazard, at),
             lines=[
-                RiskLine(f"{one.limit_state}: {one.in_words()}", _share_density(curve.fitted, self.hazard, at))
+                RiskLine(f"{one.limit_state}: {one.in_words()}", share_density(curve.fitted, self.hazard, at))
                 for one, curve in zip(self.rates, self.curves, strict=True)
             ],
             intensity_label=self.hazard.measure.label,
@@ -257,29 +325,43 @@ class Risk(Report):
                 ends += [end for end in (low / reach, high * reach) if 0.0 < end < math.inf]
         return np.geomspace(min(ends), max(ends), _POINTS)
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         rates = ", ".join(f"{one.limit_state}: {one.in_words()}" for one in self.rates)
-        return f"<Risk: {self.description}; {self.hazard.name}; {rates}>"
+        return f"{self.description}; {self.hazard.name}; {rates}"
+
+
+def risk_of(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Measure, description: str) -> Risk:
+    """Integrate curves against a measure over a hazard curve."""
+    if not isinstance(hazard, HazardCurve):
+        raise InvalidOption(
+            f"a HazardCurve is needed, not a {type(hazard).__name__}: make one with HazardCurve(intensity, rate), "
+            "or read one with HazardCurve.read(path)",
+            value=hazard,
+        )
+    if measure != hazard.measure:
+        raise InvalidOption(
+            f"the fragility is against {measure.label}, the hazard curve of {hazard.measure.label}; "
+            "fit the one against the other's measure"
+        )
+    return Risk(tuple(_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
 
 
 def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
-    parts = _log_parts(curve.fitted, hazard)[0]
+    parts = log_parts(curve.fitted, hazard)[0]
     total = np.logaddexp.reduce(parts)
 
     def logarithm(fits: Probit) -> Floats:
-        return np.asarray(np.logaddexp.reduce(_log_parts(fits, hazard), axis=1)[:, None])
+        return np.asarray(np.logaddexp.reduce(log_parts(fits, hazard), axis=1)[:, None])
 
-    low, high = curve.uncertainty.interval(
-        logarithm, logarithm(curve.fitted)[0], _gradient(logarithm, curve.fitted), curve.confidence
-    )
+    low, high = interval_of(curve, logarithm, logarithm(curve.fitted)[0], _gradient(logarithm, curve.fitted))
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
     return Rate(
         curve.limit_state,
         rate,
         (lower, upper),
-        *_shares_beyond(curve.fitted, hazard),
-        _intensities(curve.fitted, hazard),
+        *shares_beyond(curve.fitted, hazard),
+        quantile_intensities(curve.fitted, hazard),
     )
 
 
@@ -292,110 +374,3 @@ def _gradient(quantity: Any, fitted: Probit) -> Floats:
         up, down = (quantity(fitted._replace(**{name: value + sign * step}))[0] for sign in (1.0, -1.0))
         rows.append((up - down) / (2.0 * step))
     return np.array(rows)
-
-
-def _log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Floats:
-    """Logarithms of integrals below the hazard curve, over each of its segments, and above, up to `until` (ln x).
-
-    Their shape is (fits, n + 1). The rate is the integral of rate(x) dP(x). On a segment rate(x) = c x^-k, and with
-    P = Phi(z), z = a + b ln x, its part is c exp(k a/b + k^2/(2 b^2)) [Phi(z + k/b)] between the segment's ends.
-    Where both lie on one side of z = -k/b the large terms cancel: with the scaled erfcx the part is
-    rate(x) exp(-z^2/2) erfcx(|z + k/b|/sqrt(2))/2 at the nearer end, less that at the other.
-    """
-    from scipy.special import erfcx, ndtr
-
-    k, log_c = (_extended(values) for values in hazard.powers())
-    ends = [np.minimum(each, until) for each in _ends(hazard)]
-    a, b = (values[:, None] for values in fits)
-    with np.errstate(all="ignore"):
-        shift = k / b
-        lower, upper = (a + b * end + shift for end in ends)
-        mirrored = lower > 0.0
-        near, far = np.where(mirrored, lower, -upper), np.where(mirrored, upper, -lower)
-        end = np.where(mirrored, *ends)
-        z = a + b * end
-        fall = np.exp(-0.5 * b * (ends[1] - ends[0]) * (near + far)) * erfcx(far * _ROOT) / erfcx(near * _ROOT)
-        tail = log_c - k * end - 0.5 * z * z + np.log(0.5 * erfcx(near * _ROOT)) + np.log1p(-fall)
-        middle = log_c + shift * a + 0.5 * shift * shift + np.log(ndtr(upper) - ndtr(lower))
-    # A curve that does not rise is exceeded by the weakest motions as often as they come.
-    return np.where(b > 0.0, np.where(near > 0.0, tail, middle), np.inf)
-
-
-def _extended(values: Floats) -> Floats:
-    """One value for each segment of a hazard curve, with those of the first and the last also beyond them."""
-    return np.concatenate([values[:1], values, values[-1:]])
-
-
-def _ends(hazard: HazardCurve) -> tuple[Floats, Floats]:
-    """Logarithms of the lower and upper ends of the segments, and of what is below and above."""
-    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])
-    return corners[:-1], corners[1:]
-
-
-def _log_total(fitted: Probit, hazard: HazardCurve) -> float:
-    return float(np.logaddexp.reduce(_log_parts(fitted, hazard)[0]))
-
-
-def _log_seen(fitted: Probit, hazard: HazardCurve, log_at: Floats) -> tuple[Floats, Floats]:
-    """Logarithms of P(x) rate(x), and of its part k P(x) rate(x) = P(x) |d rate(x)/d ln x|, at logarithms of x."""
-    from scipy.special import log_ndtr
-
-    segment = np.searchsorted(np.log(hazard.intensity), log_at, side="right")
-    k, log_c = (_extended(values)[segment] for values in hazard.powers())
-    score = fitted.intercept[0] + fitted.slope[0] * log_at
-    product = np.asarray(log_c - k * log_at + log_ndtr(score))
-    return product, np.log(k) + product
-
-
-def _shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
-    """Shares of a rate from motions below the hazard curve's first point, and above its last.
-
-    By parts the integral of P(x) |d rate(x)| is that of rate(x) dP(x), less P(x) rate(x) at its upper end, and with
-    that at its lower end.
-    """
-    parts, total = _log_parts(fitted, hazard)[0], _log_total(fitted, hazard)
-    first, last = _log_seen(fitted, hazard, np.log(hazard.intensity[[0, -1]]))[0]
-    with np.errstate(all="ignore"):
-        below = np.exp(parts[0] - total) * max(-math.expm1(min(first - parts[0], 0.0)), 0.0)
-        above = np.exp(np.logaddexp(parts[-1], last) - total)
-    return float(below), float(above)
-
-
-def _intensities(fitted: Probit, hazard: HazardCurve) -> tuple[float, float, float]:
-    """Intensities below which the quantiles of a rate arise: shares of the motions P(x) |d rate(x)|.
-
-    The share below x is that of the integral of rate(x) dP(x), less P(x) rate(x), which is never above the whole rate:
-    neither loses more than the last digits of the share.
-    """
-    from scipy.optimize import brentq
-
-    total, (k, log_c) = _log_total(fitted, hazard), hazard.powers()
-    if not math.isfinite(total):
-        return 0.0, 0.0, 0.0
-
-    def excess(log_at: float, share: float) -> float:
-        cumulative = np.logaddexp.reduce(_log_parts(fitted, hazard, log_at)[0])
-        product = _log_seen(fitted, hazard, np.array([log_at]))[0][0]
-        return float(np.exp(cumulative - total) - np.exp(product - total)) - share
-
-    def found(share: float) -> float:
-        # What comes from above x is at most rate(x): where that is what remains of the whole rate, x is high enough.
-        left = total + math.log1p(-share)
-        segment = np.searchsorted(-np.log(hazard.rate[1:-1]), -left)
-        high, step = float((log_c[segment] - left) / k[segment]), 1.0
-        low, step = high, 1.0
-        while excess(high, share) < 0.0:  # by rounding
-            high, step = high + step, 2.0 * step
-        while excess(low, share) > 0.0:
-            low, step = low - step, 2.0 * step
-        return float(np.exp(brentq(excess, low, high, args=(share,), xtol=1e-13)))
-
-    with np.errstate(all="ignore"):
-        sixteenth, half, rest = (found(share) for share in _QUANTILES)
-    return sixteenth, half, rest
-
-
-def _share_density(fitted: Probit, hazard: HazardCurve, at: Floats) -> Floats:
-    """Share of the rate from motions of about an intensity, for each factor of e: its integral over ln x is 1."""
-    with np.errstate(under="ignore"):
-        return np.asarray(np.exp(_log_seen(fitted, hazard, np.log(at))[1] - _log_total(fitted, hazard)))

@@ -16,14 +16,14 @@ from rocking.analysis.levels import mean_one, pooled
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.block.many import rates_of
+from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.description import labelled
 from rocking.motion.motion import Motion
-from rocking.result import Result, table_of_some
+from rocking.motion.named import Motions, several_motions
+from rocking.result import DatasetResult, table_of_some, variable
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -76,7 +76,13 @@ def rocking_spectrum(
         How much each block of an ensemble counts; by default all alike.
     fractiles : sequence of float
         Shares, in (0, 1), of motions (and of the ensemble's weight) that stay below the fractile curves.
-    model, chattering, threads, progress
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    chattering : str or Treatment
+        As for `simulate`.
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
         As for `simulate_many`.
 
     Returns
@@ -159,7 +165,7 @@ def weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RockingSpectrum(Result):
+class RockingSpectrum(DatasetResult):
     """Peak rotation against the frequency parameter or the size; from `rocking_spectrum`.
 
     Attributes
@@ -180,7 +186,6 @@ class RockingSpectrum(Result):
     )
 
     def summary(self) -> str:
-        """Fractiles of peak rotation over slenderness at some sizes, for each slenderness and restitution."""
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
         parts = [f"peak rotation over slenderness, {self._motions()}, {self.data.model} model"]
         for title, one in self._curves():
@@ -198,7 +203,6 @@ class RockingSpectrum(Result):
         return "\n\n".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
-        """Axes, fractiles and shares by name."""
         data = self.data
         axes = [str(name) for name in data.overturned_share.dims]
         return {
@@ -234,16 +238,31 @@ class RockingSpectrum(Result):
             Where to draw; by default in a new figure.
         against : {"p", "period", "size"}
             Abscissa.
-        title, figsize
-            Title, by default the motion or the number of motions, the block's slenderness (and restitution) if it is
-            one, and the model; width and height of a new figure, inches.
+        title : str
+            Title; by default the motion or the number of motions, the block's slenderness (and restitution) if it is
+            one, and the model.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The new figure, or that of `ax`.
 
         Raises
         ------
         InvalidOption
             If there are more than four combinations of slenderness and restitution, or no such abscissa.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0], alpha=[0.2], restitution=[0.9])
+        >>> spectrum = rocking_spectrum(blocks, rocking.pulses.one_sine(5.0, 1.0))
+        >>> spectrum.plot(against="size", title="pulse").axes[-1].get_xlabel()
+        'half diagonal R (m)'
         """
-        from rocking.plot import SpectrumCurves, spectrum_figure
+        from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
         checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
         named_curves = self._curves()
@@ -378,34 +397,20 @@ def _described_spectrum(
     words = "over the slenderness; infinite where the block overturns"
     return xr.Dataset(
         {
-            "peak_rotation": (
-                ("motion", *names),
-                peak,
-                {"units": "rad", "long_name": "peak rotation; pi/2: overturns"},
-            ),
-            "peak_over_alpha": (("motion", *names), over_alpha, {"units": "1", "long_name": f"peak rotation {words}"}),
+            "peak_rotation": variable(("motion", *names), peak, "peak rotation; pi/2: overturns", "rad"),
+            "peak_over_alpha": variable(("motion", *names), over_alpha, f"peak rotation {words}", "1"),
             "overturned": (("motion", *names), overturned, table.overturned.attrs),
-            "fractile_over_alpha": (
-                ("fractile", *dims),
-                fractiles,
-                {"units": "1", "long_name": f"fractile of the peak rotation {words}"},
+            "fractile_over_alpha": variable(
+                ("fractile", *dims), fractiles, f"fractile of the peak rotation {words}", "1"
             ),
-            "overturned_share": (
-                dims,
-                share,
-                {"units": "1", "long_name": "share of the motions that overturn the block"},
-            ),
+            "overturned_share": variable(dims, share, "share of the motions that overturn the block", "1"),
         },
         {
             "motion": table.motion,
             **{name: table[name] for name in ("vertical",) if name in table.coords},
-            **{name: (name, values, {"units": _UNITS[name]}) for name, values in axes.items()},
-            "period": ("p", 2.0 * np.pi / axes["p"], {"units": "s", "long_name": "2 pi/p"}),
-            "size": (
-                "p",
-                0.75 * gravity / axes["p"] ** 2,
-                {"units": "m", "long_name": "half diagonal of the rectangular block"},
-            ),
+            **{name: variable(name, values, unit=_UNITS[name]) for name, values in axes.items()},
+            "period": variable("p", 2.0 * np.pi / axes["p"], "2 pi/p", "s"),
+            "size": variable("p", 0.75 * gravity / axes["p"] ** 2, "half diagonal of the rectangular block", "m"),
         },
         {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions", "histories")},
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rocking.block import Block, Blocks
 from rocking.constants import STANDARD_GRAVITY
-from rocking.motion.arguments import Motions, motions_by_name, names_of
+from rocking.ensemble import body_coordinates, verticals_of
 from rocking.motion.motion import Motion
-from rocking.product import body_coordinates, verticals_of
+from rocking.motion.named import Motions, motions_by_name, names_of
 from rocking.progress import Progress, note
 from rocking.response import Response, in_brief, ratio_text
-from rocking.response.forces import friction_coefficient
+from rocking.response.history import friction_coefficient
+from rocking.result import TableResult
 from rocking.simulation import simulate
-from rocking.tables import counted, decimal, frame_of, named, text_table, to_json, write_bytes, write_text
+from rocking.tables import counted, decimal, frame_of, named, text_table, write_bytes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,21 +37,14 @@ _SHOWN: Final = {
 _SLIDING: Final = named("sliding_time", "s")
 
 
-@dataclass(frozen=True, eq=False)
-class BlockUnderRecords(ABC):
-    """One block under several motions: a table with a row for each.
+@dataclass(frozen=True, eq=False, repr=False)
+class BlockUnderRecords(TableResult):
+    """One block under several motions: a table "records" with a row for each, also for those that could not be read.
 
-    Attributes
-    ----------
-    block : Block
-        What rocks.
-    records : tuple of str
-        Name of each motion.
-    responses : tuple of Response
-        Response to each.
-    skipped : mapping of str to str
-        Records that could not be read, and why.
+    `records` are the names of the motions; `skipped` says why records could not be read.
     """
+
+    TABLES = ("records",)
 
     block: Block
     records: tuple[str, ...]
@@ -59,26 +53,26 @@ class BlockUnderRecords(ABC):
 
     @abstractmethod
     def rows(self) -> list[dict[str, Any]]:
-        """Return what became of the block under each record; units are in the names."""
+        """Return what became of the block under each record.
+
+        Returns
+        -------
+        list of dict
+            Values by name, with units in the names.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> found = rocking.survey(rocking.Block(width=0.24, height=1.1), [rocking.pulses.one_sine(6.0, 1.0)])
+        >>> found.rows()[0]["overturned"]
+        True
+        """
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table for machines."""
         return {"block": str(self.block), "records": self.rows(), "skipped": dict(self.skipped)}
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the table as a data frame, with a row for each record that could not be read."""
+    def _frame(self, table: str) -> pd.DataFrame:
         return frame_of(self.rows(), self.skipped)
-
-    def to_csv(self, path: str | Path) -> None:
-        """Write the table as text columns with a header.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        """
-        frame = self.to_dataframe()
-        write_text(path, frame.to_csv(index=False, float_format="%.15g", lineterminator="\n"))
 
     def _labels(self) -> list[dict[str, Any]]:
         """First columns of each row: the record, its motion, the block."""
@@ -87,13 +81,13 @@ class BlockUnderRecords(ABC):
         labels = record_columns(self.records, [motion_of(response) for response in self.responses])
         return [{**label, "block": self.block.description, **numbers} for label in labels]
 
-    def _count(self) -> str:
+    def _headline(self) -> str:
         """Say under how many records the block overturns."""
         overturned = sum(response.overturned for response in self.responses)
         return f"{self.block.description}: {counted(len(self.records), 'record')}, overturned by {overturned}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Survey(BlockUnderRecords):
     """Responses of a block to several motions; from `survey`.
 
@@ -102,19 +96,16 @@ class Survey(BlockUnderRecords):
     friction : float or None
         Coefficient of friction at which sliding is looked for.
     block, records, responses, skipped
-        As in `BlockUnderRecords`.
-
+        What rocks, the name of each motion, the response to each, and why records could not be read.
     """
 
     friction: float | None = None
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return what became of the block under each record; units are in the names."""
         each = zip(self._labels(), self.responses, strict=True)
         return [label | _row(response) | self._sliding(response) for label, response in each]
 
     def summary(self) -> str:
-        """Return the table for people."""
         known = [{"peak_over_slenderness": float(ratio_text(response))} for response in self.responses]
         rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
         shown = (
@@ -123,19 +114,15 @@ class Survey(BlockUnderRecords):
         if any(row["processing"] for row in rows):
             shown = shown | {"processing": "done to the record"}
         table = text_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
-        return f"{self._count()}\n\n{table}"
+        return f"{self._headline()}\n\n{table}"
 
-    def _count(self) -> str:
+    def _headline(self) -> str:
         undecided = sum(response.stopped or response.unfinished for response in self.responses)
         known = f", not decided under {undecided}" if undecided else ""
         unread = f"; {counted(len(self.skipped), 'record')} skipped" if self.skipped else ""
-        return super()._count() + known + unread
-
-    def __repr__(self) -> str:
-        return f"<Survey: {self._count()}>"
+        return super()._headline() + known + unread
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table for machines."""
         sides = self.block.sides
         block = {
             "description": self.block.description,
@@ -151,24 +138,27 @@ class Survey(BlockUnderRecords):
             return {}
         return {"friction": self.friction, _SLIDING: response.sliding_time(self.friction)}
 
-    def folders(self) -> list[str]:
-        """Return a name for a folder of each record, no two alike."""
-        names: dict[str, None] = {}
-        for record in self.records:
-            # A pulse is named by its text, with a colon, which not every system has in a name.
-            stem = Path(record).stem.replace(":", "-") if record != "-" else "standard-input"
-            others = (f"{stem}-{k}" for k in range(2, len(self.records) + 2))
-            names[stem if stem not in names else next(name for name in others if name not in names)] = None
-        return list(names)
-
-    def write(self, folder: Path) -> None:
+    def write(self, folder: str | Path) -> None:
         """Write summary.csv, summary.json and, if openpyxl is installed, summary.xlsx.
+
+        Parameters
+        ----------
+        folder : str or pathlib.Path
+            Folder that exists.
 
         Raises
         ------
         OutputError
             If they cannot be written.
+
+        Examples
+        --------
+        >>> import rocking, tempfile
+        >>> found = rocking.survey(rocking.Block(width=0.24, height=1.1), [rocking.pulses.one_sine(6.0, 1.0)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     found.write(folder)
         """
+        folder = Path(folder)
         self.to_csv(folder / "summary.csv")
         try:
             workbook = io.BytesIO()
@@ -177,16 +167,11 @@ class Survey(BlockUnderRecords):
             write_bytes(folder / "summary.xlsx", workbook.getvalue())
         except ImportError:
             note("no summary.xlsx: install rocking[excel] for a workbook; summary.csv holds the same table")
-        write_text(folder / "summary.json", to_json(self.to_dict()) + "\n")
+        self.to_json(folder / "summary.json")
 
 
 def survey(
-    block: Block,
-    motions: Motions,
-    *,
-    friction: float | None = None,
-    progress: bool | None = None,
-    **options: Any,
+    block: Block, motions: Motions, *, friction: float | None = None, progress: bool | None = None, **options: Any
 ) -> Survey:
     """Simulate a block under many motions.
 
@@ -200,12 +185,13 @@ def survey(
         Coefficient of friction at which to look for sliding.
     progress : bool, optional
         Show a progress bar; by default if stderr is a terminal.
-    **options
+    **options : object
         As for `rocking.simulate`: model, chattering, duration, ...
 
     Returns
     -------
     Survey
+        All responses, in a table with a row for each.
 
     Raises
     ------
@@ -226,7 +212,6 @@ def survey(
     named_motions = motions_by_name(motions)
     if friction is not None:
         friction_coefficient(friction)
-    named_motions = motions_by_name(motions)
     responses = []
     with Progress("simulating", total=len(named_motions), show=progress) as bar:
         for motion in named_motions.values():
@@ -234,6 +219,17 @@ def survey(
             _row(responses[-1])  # what takes long in it, the response keeps: while the bar is there
             bar.advance()
     return Survey(block, tuple(named_motions), tuple(responses), friction)
+
+
+def folder_names(records: Sequence[str]) -> list[str]:
+    """Return a name for a folder of each record, no two alike."""
+    names: dict[str, None] = {}
+    for record in records:
+        # A pulse is named by its text, with a colon, which not every system has in a name.
+        stem = Path(record).stem.replace(":", "-") if record != "-" else "standard-input"
+        others = (f"{stem}-{k}" for k in range(2, len(records) + 2))
+        names[stem if stem not in names else next(name for name in others if name not in names)] = None
+    return list(names)
 
 
 def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:

@@ -10,12 +10,12 @@ import numpy as np
 
 from rocking import checks
 from rocking.analysis.fragility.curve import FragilityCurve, in_units
-from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.report import Report
+from rocking.analysis.hazard import HazardCurve, hazard_line
 from rocking.analysis.risk import Rate
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
+from rocking.result import DrawnResult
 from rocking.tables import counted, known_digits, text_table
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ _POINTS: Final = 200
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Survival(Report):
+class Survival(DrawnResult):
     """A limit state that was not exceeded in a time, and what that says of the shaking; from `Fragility.survival`.
 
     Its figure has the largest rates that fit with the survival, and the hazard curve beside them.
@@ -100,7 +100,6 @@ class Survival(Report):
         return self.rate is not None and self.interval[1] < 1.0 - self.confidence
 
     def summary(self) -> str:
-        """Return what was most likely never met, the largest rates, and how a hazard curve fits with them."""
         measure, share = self.measure, f"{100.0 * self.confidence:g} %"
         header = [measure.label, "probability", "at most a year", "at most once in (years)"]
         columns: list[list[Any]] = [
@@ -144,7 +143,6 @@ class Survival(Report):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Rates, intensities and probabilities by name; intensities in SI units."""
         column = self.measure.column
         found = {
             "limit_state": self.curve.limit_state,
@@ -164,8 +162,8 @@ class Survival(Report):
             "contradicts": self.contradicts,
         }
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import survival_figure
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.risk import survival_figure
 
         ends = [self.curve.intensity_of(chance) for chance in _SHOWN]
         if self.hazard is not None:
@@ -177,13 +175,13 @@ class Survival(Report):
             largest=self.curve.largest_rate(at, self.years, self.confidence),
             largest_label=f"at most, with {counted(self.years, 'year')} without {self.curve.limit_state} "
             f"({100.0 * self.confidence:g} %)",
-            hazard=None if self.hazard is None else self.hazard.line(at),
+            hazard=None if self.hazard is None else hazard_line(self.hazard, at),
             intensity_label=self.measure.label,
             title=title or self.description,
             ax=ax,
             figsize=figsize,
         )
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         time, never = counted(self.years, "year"), in_units(self.unlikely, self.measure)
-        return f"<Survival: {self.curve.limit_state}: not in {time}; most likely never {never} or more>"
+        return f"{self.curve.limit_state}: not in {time}; most likely never {never} or more"

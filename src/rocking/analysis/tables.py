@@ -13,8 +13,8 @@ import numpy as np
 from rocking.analysis.hazard import HEADINGS, heading_of
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.constants import Model
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.motion.named import named_motion
 from rocking.motion.scaling import Measure
@@ -52,18 +52,8 @@ class Ensemble:
 
 
 @dataclass(frozen=True)
-class Table:
-    """Cells of a table by the names of its columns.
-
-    Attributes
-    ----------
-    path : Path
-        File.
-    columns : tuple of str
-        Names of the columns.
-    rows : tuple of (int, dict)
-        Line number and cells of each row.
-    """
+class _Table:
+    """Names of the columns of a file, and line number and cells by those names of each row."""
 
     path: Path
     columns: tuple[str, ...]
@@ -83,11 +73,11 @@ class Table:
         try:
             return how(text)
         except (ValueError, KeyError):
-            raise self.error(f"{text!r} is not {what}; correct it", line, value=text) from None
+            raise self.error(f"{text!r} is not {what}; correct it", line=line, value=text) from None
 
-    def error(self, message: str, line: int | None = 1, **about: Any) -> UnreadableRecord:
+    def error(self, message: str, *arguments: str, line: int | None = 1, value: object = None) -> UnreadableRecord:
         """Return an error about a line of the table, by default its header."""
-        return UnreadableRecord(message, path=str(self.path), line=line, **about)
+        return UnreadableRecord(message, *arguments, path=str(self.path), line=line, value=value)
 
 
 def read_calibration(
@@ -98,11 +88,6 @@ def read_calibration(
     Outcomes: `motion` (a record file, relative to the table's folder, or a shipped record) and `overturned` (1 or 0,
     yes or no); also, if there are such columns, `scale`, `channel` and `group`. With a column `specimen`, outcomes of
     several specimens by their names. A history: `time_s`, and `rotation_rad` or `rotation_deg`.
-
-    Raises
-    ------
-    UnreadableRecord
-        If it is no such table, or a cell or a record cannot be read; the message has the line.
     """
     table = read_table(path)
     if {"motion", "overturned"} <= set(table.columns):
@@ -120,15 +105,7 @@ def read_calibration(
 
 
 def read_ensemble(path: Path) -> Ensemble:
-    """Read what `Calibration.to_csv` writes.
-
-    Raises
-    ------
-    UnreadableRecord
-        If it is no such table.
-    InvalidBlock
-        If a row is no block.
-    """
+    """Read what `Calibration.to_csv` writes."""
     table = read_table(path)
     columns = [
         [named(f"{name}_{side}", unit) for side in ("plus", "minus")]
@@ -140,22 +117,18 @@ def read_ensemble(path: Path) -> Ensemble:
     known: dict[str, Model] = {name: name for name in get_args(Model)}
     models = {table.convert(line, row["model"], known.__getitem__, "linear or nonlinear") for line, row in table.rows}
     if len(models) > 1:
-        raise table.error("an ensemble has one model, not both; correct the column model", None)
+        raise table.error("an ensemble has one model, not both; correct the column model", line=None)
     try:
         blocks = Blocks(*(np.column_stack([table.numbers(side) for side in sides]) for sides in columns))
     except RockingError as error:
-        raise type(error)(f"block 0 is in line 2: {error}", path=str(path)) from None
+        error.message = replace(error.message, template=f"block 0 is in line 2: {error.message.template}")
+        error.path = str(path)
+        raise
     return Ensemble(blocks, table.numbers("weight"), models.pop())
 
 
-def read_table(path: Path) -> Table:
-    """Read a CSV table with a header.
-
-    Raises
-    ------
-    UnreadableRecord
-        If it cannot be read, or a row is not like its header.
-    """
+def read_table(path: Path) -> _Table:
+    """Read a CSV table with a header."""
     try:
         text = path.read_text("utf-8-sig")
     except OSError as error:
@@ -170,10 +143,10 @@ def read_table(path: Path) -> Table:
         if len(row) != len(columns):
             found = f"{counted(len(row), 'cell')} under {counted(len(columns), 'column')}"
             raise UnreadableRecord(f"{found}; correct it", path=str(path), line=line)
-    return Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
+    return _Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
 
-def _by_specimen(table: Table) -> dict[str, Table]:
+def _by_specimen(table: _Table) -> dict[str, _Table]:
     """Rows of each specimen, in the order in which the specimens come."""
     rows: dict[str, list[tuple[int, dict[str, str]]]] = {}
     for line, row in table.rows:
@@ -189,7 +162,7 @@ def _folder_name(text: str) -> str:
     return text
 
 
-def outcomes_of(table: Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
+def outcomes_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
     """Return motions and outcomes of a table with these columns; an error says the line."""
     motions, overturned = [], table.answers("overturned")
     several = len({row["motion"] for _, row in table.rows}) > 1
@@ -202,7 +175,10 @@ def outcomes_of(table: Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
         try:
             motions.append(named_motion(name, **about, scale=scale, several=several and not own))
         except RockingError as error:
-            raise table.error(str(error), line) from error
+            where = str(error).removesuffix(str(error.message))  # the record's file, before the table's
+            raise table.error(
+                where + error.message.template, *error.message.arguments, line=line, value=error.value
+            ) from error
     groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None
     return Outcomes(tuple(motions), overturned, groups)
 
@@ -212,24 +188,11 @@ def read_observed(
 ) -> dict[str, Any]:
     """Read a table of observed outcomes as arguments of `fit_fragility`.
 
-    Parameters
-    ----------
-    path : Path
-        CSV table with a column overturned (1 or 0, yes or no; with a column trials, how many of them), and either an
-        intensity (pga_g, pga_m_s2, pgv_m_s, pgv_cm_s, sa_g or sa_m_s2; "PGA (g)" is pga_g as well) or a motion (a
-        record file, or a shipped record; with columns scale and channel where wanted). A column group holds labels of
-        outcomes that belong together, as those of one earthquake; tests under one motion do in any case.
-    measure : Measure
-        What is taken of motions; the period and damping of a spectral acceleration in the table.
-    channel, dt, units
-        What record files do not say.
-
-    Raises
-    ------
-    UnreadableRecord
-        If it is no such table, or a cell or a record cannot be read; the message has the line.
-    InvalidOption
-        If the measure counts in a block's own unit, or a spectral acceleration has no period.
+    It has a column overturned (1 or 0, yes or no; with a column trials, how many of them), and either an intensity
+    (`HEADINGS`; "PGA (g)" is pga_g as well) or a motion (a record file, or a shipped record; with columns scale and
+    channel where wanted), of which the measure is taken. A column group holds labels of outcomes that belong together,
+    as those of one earthquake; tests under one motion do in any case. Channel, dt and units are what record files do
+    not say.
     """
     table = read_table(path)
     names = {heading_of(cell): cell for cell in table.columns}
@@ -247,7 +210,7 @@ def read_observed(
     return observed | {"description": f"{counted(outcomes, 'observed outcome')} in {path.name}"}
 
 
-def _against_intensity(table: Table, names: dict[str, str], heading: str, measure: Measure) -> dict[str, Any]:
+def _against_intensity(table: _Table, names: dict[str, str], heading: str, measure: Measure) -> dict[str, Any]:
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
         raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period", path=str(table.path))
@@ -261,7 +224,7 @@ def _against_intensity(table: Table, names: dict[str, str], heading: str, measur
     }
 
 
-def _under_motions(table: Table, measure: Measure, **files: Any) -> dict[str, Any]:
+def _under_motions(table: _Table, measure: Measure, **files: Any) -> dict[str, Any]:
     if measure.in_block_units:
         raise InvalidOption(f"{measure.name} counts in a block's own unit, which outcomes do not tell: take pga")
     tests = outcomes_of(table, **files)

@@ -15,16 +15,17 @@ from rocking.arrays import Floats
 from rocking.block.rigid_body import refusal, rigid_bodies
 from rocking.block.single import Block, checked_gravity, checked_sides, one_block
 from rocking.body import KINDS
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock
 from rocking.kernels import state
-from rocking.model import Model
 from rocking.tables import range_text
 
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """Any number n of blocks, each array of shape (n, 2): side +, side -.
+
+    What is given broadcasts against each other: a number, shape (n,) for symmetric blocks, or shape (n, 2).
 
     Parameters
     ----------
@@ -37,8 +38,6 @@ class Blocks:
         `alpha` where both sides are equal, else of the one rigid body whose sides have these p and alpha.
     gravity : float
         Acceleration of gravity, m/s^2.
-
-    All broadcast against each other: a number, shape (n,) for symmetric blocks, or shape (n, 2).
 
     Attributes
     ----------
@@ -150,6 +149,16 @@ class Blocks:
     def of(cls, blocks: Blocks | Block | Iterable[Block]) -> Blocks:
         """Gather single blocks, all under the same gravity; what is gathered already stays as it is.
 
+        Parameters
+        ----------
+        blocks : Block, iterable of Block, or Blocks
+            The blocks.
+
+        Returns
+        -------
+        Blocks
+            In their order.
+
         Raises
         ------
         InvalidBlock
@@ -190,15 +199,7 @@ class Blocks:
         return share * self.p * self.alpha
 
     def kernel_records(self, model: Model, limits: Floats) -> state.Records:
-        """Return every block as kernels take it (`kernels.state.BLOCK`), shape (n,).
-
-        Parameters
-        ----------
-        model : {"nonlinear", "linear"}
-            Equation of motion.
-        limits : ndarray, shape (n, 2)
-            Limits of a treatment of chattering.
-        """
+        """Return every block as kernels take it (`kernels.state.BLOCK`), shape (n,)."""
         p, alpha = self.p, self.alpha
         made = state.records(len(self), state.BLOCK)
         made["stiffness"] = p * p
@@ -239,13 +240,7 @@ class Blocks:
         return (self[index] for index in range(len(self)))
 
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
-        """Return some of the blocks: a slice, indices, or a mask.
-
-        Raises
-        ------
-        InvalidBlock
-            If it is none of these, or an index is out of range.
-        """
+        """Return some of the blocks: a slice, indices, or a mask."""
         if not isinstance(index, slice):
             index = self._indices(index)
         return self._of_checked(self.p[index], self.alpha[index], self.restitution[index], gravity=self.gravity)

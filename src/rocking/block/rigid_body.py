@@ -33,10 +33,9 @@ class RigidBodies(NamedTuple):
     ----------
     restitution : ndarray, shape (n, 2)
         On leaving side + and side -, by angular momentum about the new pivot; NaN where no body fits.
-    depth : ndarray, shape (n,)
-        Height of the centre of mass above the pivots over gravity, s^2.
-    uncertainty : ndarray, shape (n,)
-        How far the restitution may be off, since p and alpha have only the digits that they were given to.
+    depth, uncertainty : ndarray, shape (n,)
+        Height of the centre of mass above the pivots over gravity, s^2; how far the restitution may be off, since p and
+        alpha have only the digits that they were given to.
     differing, most, margin : ndarray, shape (n,)
         By how much the p of the sides differ, by how much those of a body may, and by how much either may be off by the
         digits of p and alpha; logarithms of ratios.
@@ -61,11 +60,10 @@ class RigidBodies(NamedTuple):
 def rigid_bodies(p: Floats, alpha: Floats) -> RigidBodies:
     """Find the rigid bodies whose sides have these parameters, arrays of shape (n, 2).
 
-    Notes
-    -----
-    Depth h, radius of gyration k: R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2. The difference of both sides gives
-    h, and angular momentum e_i = 1 - (h p_j^2/g) sin(alpha_j) (tan(alpha_+) + tan(alpha_-)), j the other side. A body
-    with positive h and k exists where |ln(p_+/p_-)| < |ln(cos(alpha_+)/cos(alpha_-))|/2 (derived in the documentation).
+    With depth h and radius of gyration k, R_i = h/cos(alpha_i) and g R_i/p_i^2 = k^2 + R_i^2. The difference of both
+    sides gives h, and angular momentum e_i = 1 - (h p_j^2/g) sin(alpha_j) (tan(alpha_+) + tan(alpha_-)), j the other
+    side. A body with positive h and k exists where |ln(p_+/p_-)| < |ln(cos(alpha_+)/cos(alpha_-))|/2 (derived in the
+    documentation).
     """
     cosine, tangent = np.cos(alpha), np.tan(alpha)
     quotient = 1.0 / (cosine * p**2)  # (k^2 + R^2)/(g h)
@@ -124,18 +122,10 @@ def refusal(found: RigidBodies, p: Floats, alpha: Floats, index: int = 0) -> str
 
 
 def eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
-    """Rectangles whose centre of mass is so far off the middle that their sides have these slendernesses.
+    """Rectangles whose centre of mass is so far off the middle that their sides have these slendernesses, shape (n, 2).
 
-    Parameters
-    ----------
-    alpha : ndarray, shape (n, 2)
-        Slendernesses, rad.
-
-    Returns
-    -------
-    p, restitution : ndarray, shape (n, 2)
-        p of each side over that of the rectangle with its centre of mass in the middle; the factor on leaving each
-        side, by angular momentum.
+    Returned are p of each side over that of the rectangle with its centre of mass in the middle, and the factor on
+    leaving each side, by angular momentum.
     """
     distances = np.tan(alpha)  # over the height of the centre of mass
     half_width, offset = 0.5 * distances.sum(axis=1), 0.5 * (distances[:, 1] - distances[:, 0])
@@ -165,21 +155,10 @@ def contact_forces(
 ) -> tuple[Floats, Floats]:
     """Horizontal and vertical force on the block over its weight, all arrays of one shape.
 
-    Parameters
-    ----------
-    motion : tuple of ndarray
-        theta (rad), and its first and second rate.
-    ground_over_g : tuple of ndarray
-        Ground acceleration in units of g, horizontal and vertical.
-    side : ndarray
-        +1 or -1, the side that the block leans to; 0 at rest.
-    slenderness, radius_over_g : ndarray
-        alpha (rad) and R/g (s^2) of that side.
-
-    Notes
-    -----
-    On side i = +-1, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
-    pivot; forces are m (a + x'') and m (g + a_v + y''). At rest they are (a/g, 1 + a_v/g).
+    The motion is theta and its two rates, the ground acceleration in units of g, horizontal and vertical, and the side
+    +1 or -1, 0 at rest; slenderness and R/g (s^2) are those of that side. On side i, with psi = alpha - |theta|, the
+    centre of mass is at x = -i R sin(psi), y = R cos(psi) from the pivot; forces are m (a + x'') and m (g + a_v + y'').
+    At rest they are (a/g, 1 + a_v/g).
     """
     rotation, velocity, acceleration = motion
     psi = slenderness - np.abs(rotation)

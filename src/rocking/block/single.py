@@ -13,14 +13,11 @@ from rocking import checks, svg
 from rocking.arrays import Floats, Integers
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
 from rocking.body import ContactLaw, Coordinate
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
-from rocking.model import MODELS, Model
 
 if TYPE_CHECKING:
     from rocking.block.many import Blocks
-
-Number = float | int
 
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
@@ -147,7 +144,7 @@ class Block:
         width: float | None = None,
         height: float | None = None,
         offset: float = 0.0,
-        restitution: Number | Sequence[Number] | None = None,
+        restitution: float | Sequence[float] | None = None,
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
@@ -184,9 +181,9 @@ class Block:
     @classmethod
     def from_parameters(
         cls,
-        p: Number | Sequence[Number],
-        alpha: Number | Sequence[Number],
-        restitution: Number | Sequence[Number] | None = None,
+        p: float | Sequence[float],
+        alpha: float | Sequence[float],
+        restitution: float | Sequence[float] | None = None,
         *,
         gravity: float = STANDARD_GRAVITY,
     ) -> Block:
@@ -255,11 +252,11 @@ class Block:
     @classmethod
     def from_pivots(
         cls,
-        distances: Sequence[Number],
+        distances: Sequence[float],
         height: float,
         radius_of_gyration: float,
         *,
-        restitution: Number | Sequence[Number] | None = None,
+        restitution: float | Sequence[float] | None = None,
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> Block:
@@ -280,6 +277,11 @@ class Block:
             Mass, kg.
         gravity : float
             Acceleration of gravity, m/s^2.
+
+        Returns
+        -------
+        Block
+            With two sides, which are equal where the distances are.
 
         Raises
         ------
@@ -314,7 +316,7 @@ class Block:
         half_width: float,
         half_height: float,
         mass_ratio: float,
-        restitution: Number | Sequence[Number] | None = None,
+        restitution: float | Sequence[float] | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> Block:
         """Solitary block that rocks like a frame: equal columns that carry a freely supported rigid beam.
@@ -329,6 +331,11 @@ class Block:
             By default from angular momentum: (1 - 1.5 sin(alpha)^2 + 3 gamma cos(2 alpha))/(1 + 3 gamma).
         gravity : float
             Acceleration of gravity, m/s^2.
+
+        Returns
+        -------
+        Block
+            Symmetric.
 
         Raises
         ------
@@ -455,58 +462,18 @@ class Block:
         return Blocks.of([self])
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
-        """Ground accelerations, m/s^2, that lift the block: to side + when -a passes the first, to - when a the second.
-
-        Parameters
-        ----------
-        model : {"nonlinear", "linear"}
-            g tan(alpha), or g alpha for the slender block.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such model.
-
-        Examples
-        --------
-        >>> Block.from_parameters(p=1.0, alpha=0.2, restitution=0.9, gravity=10.0).uplift_thresholds("linear")
-        (2.0, 2.0)
-        """
+        """Ground accelerations, m/s^2, that lift the block to side + (when -a passes the first) and to side -."""
         steepness = math.tan if checks.one_of(model, "model", InvalidOption, MODELS) == "nonlinear" else float
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
 def housner_restitution(alpha: float) -> float:
-    """Restitution of a rectangular block that conserves angular momentum: 1 - 1.5 sin(alpha)^2 (Housner 1963).
-
-    Raises
-    ------
-    InvalidBlock
-        If the slenderness is no number.
-
-    Examples
-    --------
-    >>> round(housner_restitution(0.2), 6)
-    0.940796
-    """
+    """Restitution of a rectangular block that conserves angular momentum: 1 - 1.5 sin(alpha)^2 (Housner 1963)."""
     return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", InvalidBlock)) ** 2
 
 
 def one_block(block: Block) -> Block:
-    """Return the block.
-
-    Raises
-    ------
-    InvalidBlock
-        If it is anything else.
-
-    Examples
-    --------
-    >>> one_block((0.2, 1.0))
-    Traceback (most recent call last):
-        ...
-    rocking.errors.InvalidBlock: a Block is needed, not a tuple: make one with Block(width=, height=), in m
-    """
+    """Return the block, or say that it is none."""
     if not isinstance(block, Block):
         raise InvalidBlock(
             f"a Block is needed, not a {type(block).__name__}: make one with Block(width=, height=), in m"

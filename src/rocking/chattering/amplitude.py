@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Floats
+from rocking.bisection import bisected
 from rocking.block import Block
 from rocking.chattering.coefficients import COEFFICIENTS
 from rocking.chattering.parameters import broadcast, checked_frequency, checked_restitution, checked_slenderness
 from rocking.compiling import AMPLITUDES, announce
 from rocking.engine import in_threads, require_finished
 from rocking.errors import InvalidOption
-from rocking.kernels.paper import fitted_amplitudes
-from rocking.kernels.sine.sequence import critical_amplitudes
+from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
 from rocking.motion import pulses
 from rocking.progress import Progress
 from rocking.simulation import simulate
@@ -148,12 +148,7 @@ def parameters_at(x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def critical_amplitude_nonlinear(
-    omega: ArrayLike,
-    eta: ArrayLike,
-    alpha: ArrayLike,
-    *,
-    threads: int | None = None,
-    progress: bool | None = None,
+    omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike, *, threads: int | None = None, progress: bool | None = None
 ) -> Floats:
     """Critical amplitude of the nonlinear block, which `critical_amplitude` gives in the slender limit.
 
@@ -213,10 +208,7 @@ def _critical(omega: float, eta: float, alpha: float) -> float:
     low, high = 1.0, _FIRST_HIGH
     while _comes_to_rest(block, high, omega):
         low, high = high, 2.0 * high
-    while high - low > _WIDTH:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if _comes_to_rest(block, middle, omega) else (low, middle)
-    return low
+    return bisected(low, high, lambda a: not _comes_to_rest(block, a, omega), width=_WIDTH)[0]
 
 
 def _comes_to_rest(block: Block, a: float, omega: float) -> bool:

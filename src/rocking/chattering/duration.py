@@ -25,8 +25,8 @@ from rocking.compiling import SEQUENCES, announce
 from rocking.engine import cores, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import Verdict
-from rocking.kernels.sine.arc import first_landing
-from rocking.kernels.sine.lanes import BLOCK, BLOCKS, LANES, Answers, rest_phases
+from rocking.kernels.sine.arc import first_impact
+from rocking.kernels.sine.lanes import GROUP, GROUPS, WIDTH, Answers, rest_phases
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
 from rocking.kernels.sine.sequence import resolve, semianalytical_phases
 from rocking.tables import counted
@@ -251,7 +251,7 @@ def first_arc(a: float, omega: float) -> tuple[float, float]:
     amplitude, frequency, _ = _single_case(a, omega, 1.0)
     if amplitude == 1.0:
         return 0.0, 0.0
-    status, phase, speed = first_landing(amplitude - 1.0, frequency)
+    status, phase, speed = first_impact(amplitude - 1.0, frequency)
     return (phase / frequency, speed / frequency) if status == Verdict.FOUND else (math.nan, math.nan)
 
 
@@ -327,7 +327,7 @@ def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     def part(some: slice) -> None:
         sequences = amplitudes[some], frequencies[some], restitutions[some]
         order = _alike_together(sequences[0], sequences[2])
-        rest_phases(sequences, order, np.zeros(BLOCKS + 1, BLOCK), Answers(phases[some], statuses[some]))
+        rest_phases(sequences, order, np.zeros(GROUPS + 1, GROUP), Answers(phases[some], statuses[some]))
 
     # The compiled function holds no lock.
     parts = [slice(start, start + _PART) for start in range(0, phases.size, _PART)]
@@ -346,7 +346,7 @@ def _marked(phases: Floats, statuses: NDArray[np.int8]) -> Floats:
 def _alike_together(a: Floats, eta: Floats) -> NDArray[np.int64]:
     """Pick the sequences that rock, sorted coarsely by eta and then by a: those of a block take like steps."""
     rock = np.flatnonzero((a > 1.0) & (eta < 1.0))
-    if rock.size <= LANES:
+    if rock.size <= WIDTH:
         return rock
     loss = 1.0 - eta[rock]
     classes = (_CLASSES * loss).astype(np.uint16)

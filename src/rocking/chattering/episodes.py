@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.errors import InvalidOption
-from rocking.motion.exceedance import exceedances
+from rocking.motion.measures import exceedances
 from rocking.response import Response
+from rocking.result import Result
 from rocking.tables import rows_of, text_table
 
 EPISODE: Final = np.dtype(
@@ -28,9 +29,9 @@ EPISODE: Final = np.dtype(
 )
 
 
-@dataclass(frozen=True, eq=False)
-class ChatteringEpisodes:
-    """The episodes of a response; ``print`` it for a table.
+@dataclass(frozen=True, eq=False, repr=False)
+class ChatteringEpisodes(Result):
+    """The episodes of a response, from `chattering_episodes`; ``print`` it for a table.
 
     Attributes
     ----------
@@ -50,8 +51,8 @@ class ChatteringEpisodes:
     shaking: tuple[float, float]
     at_rest: float
 
-    def __repr__(self) -> str:
-        return f"<ChatteringEpisodes: {len(self.episodes)}, at rest for {self.at_rest:.3f} s of the shaking>"
+    def _headline(self) -> str:
+        return f"{len(self.episodes)}, at rest for {self.at_rest:.3f} s of the shaking"
 
     @property
     def share_at_rest(self) -> float:
@@ -68,7 +69,6 @@ class ChatteringEpisodes:
         return self.summary()
 
     def summary(self) -> str:
-        """Return a table of the episodes, and how much of the shaking the block is at rest."""
         header = ["uplift, s", "rest, s", "bracket, s", "duration, s", "impacts", "ground, m/s^2"]
         rows = [
             [
@@ -90,7 +90,6 @@ class ChatteringEpisodes:
         return f"{text_table(header, rows)}\n{about}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the episodes and the shares by name; times in s, accelerations in m/s^2."""
         return {
             "episodes": rows_of(self.episodes),
             "shaking_s": self.shaking,

@@ -21,8 +21,7 @@ from rocking.chattering.parameters import (
     single,
 )
 from rocking.errors import InvalidOption
-from rocking.kernels.paper import eq65_sums, eq65_terms
-from rocking.kernels.sine.series import phase_coefficients
+from rocking.kernels.sine.series import eq65_sums, eq65_terms, phase_coefficients
 
 #: Terms of the consistent expansion.
 HIGHEST_ORDER: Final = 40
@@ -104,19 +103,19 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     frequency = single(checked_frequency(omega), "omega")
     restitution = single(checked_loss(eta), "eta")
     pairs = 64
-    while (count := eq65_terms(restitution, terms := np.zeros((pairs, 2)))) == pairs:
+    while (count := eq65_terms(restitution, *(terms := np.zeros((2, pairs))))) == pairs:
         pairs *= 2
     table = np.zeros(2 * count, CYCLE)
     even = np.arange(2 * count) % 2 == 0
     table["n"] = np.arange(2 * count)
     table["sign"] = np.where(even, -1, 1)
     table["order"] = np.where(even, 1, 3)
-    table["term"] = terms[:count].ravel() / frequency
+    table["term"] = terms[:, :count].T.ravel() / frequency
     table["interval"] = table["term"] * np.sqrt(excess) ** table["order"]
     table["time"] = np.cumsum(table["interval"])
     table["phase"] = frequency * table["time"] + math.asin(1.0 / (1.0 + excess))
     # An arc of the second side takes as long, in these units, as the speed that it starts with, and keeps it.
-    entering = np.repeat(terms[:count, 1], 2)
+    entering = np.repeat(terms[1, :count], 2)
     table["speed_before"] = np.where(even, entering / restitution, entering) * excess**1.5 / frequency
     table["speed_after"] = restitution * table["speed_before"]
     return table

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 from rocking.block import Block
-from rocking.model import Model
+from rocking.constants import Model
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 
@@ -36,11 +36,25 @@ class SimulationInput(NamedTuple):
     model: Model = "nonlinear"
 
 
-PulseFamily = Callable[[float, float], SimulationInput]
+Family = Callable[[float, float], SimulationInput]
 
 
-def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> PulseFamily:
+def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Family:
     """Sines: (a, omega).
+
+    Parameters
+    ----------
+    block : Block
+        What rocks.
+    cycles : float
+        Number of periods.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+
+    Returns
+    -------
+    callable
+        Makes a `SimulationInput` of a and omega.
 
     Examples
     --------
@@ -54,11 +68,35 @@ def sine(block: Block, *, cycles: float = 2.5, model: Model = "nonlinear") -> Pu
     return lambda a, omega: SimulationInput(block, pulses.sine(a * scale, _hertz(block, omega), cycles=cycles), model)
 
 
-def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> PulseFamily:
+def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "nonlinear") -> Family:
     """Half cycles of a sine with unequal amplitudes: (a, ratio).
 
     The first lobe has the amplitude a, each other one `ratio` times that of the lobe before it: the shaking grows
     (ratio above 1) or fades. Here a is the first lobe's, not the largest.
+
+    Parameters
+    ----------
+    block : Block
+        What rocks.
+    omega : float
+        Frequency of the lobes.
+    count : int
+        How many there are.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+
+    Returns
+    -------
+    callable
+        Makes a `SimulationInput` of a and the ratio.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> case = lobes(block, count=3)(1.2, 2.0)
+    >>> round(case.motion.pga / block.minimum_acceleration, 9)
+    4.8
     """
     scale, frequency = _threshold(block, model), _hertz(block, omega)
 
@@ -70,16 +108,58 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
 
 def ricker(
     block: Block, *, kind: Literal["symmetric", "antisymmetric"] = "symmetric", model: Model = "nonlinear"
-) -> PulseFamily:
-    """Ricker pulses: (a, omega)."""
+) -> Family:
+    """Ricker pulses: (a, omega).
+
+    Parameters
+    ----------
+    block : Block
+        What rocks.
+    kind : {"symmetric", "antisymmetric"}
+        Second or third derivative of a Gaussian.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+
+    Returns
+    -------
+    callable
+        Makes a `SimulationInput` of a and omega.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> ricker(rocking.Block(width=0.2, height=0.8))(1.5, 2.0).motion.name
+    'symmetric Ricker'
+    """
     scale = _threshold(block, model)
     return lambda a, omega: SimulationInput(block, pulses.ricker(a * scale, _hertz(block, omega), kind=kind), model)
 
 
 def mavroeidis_papageorgiou(
     block: Block, *, phase: float = 0.0, gamma: float = 3.0, model: Model = "nonlinear"
-) -> PulseFamily:
-    """Near-fault pulses of Mavroeidis and Papageorgiou: (a, omega)."""
+) -> Family:
+    """Near-fault pulses of Mavroeidis and Papageorgiou: (a, omega).
+
+    Parameters
+    ----------
+    block : Block
+        What rocks.
+    phase, gamma : float
+        As for `rocking.pulses.mavroeidis_papageorgiou`.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+
+    Returns
+    -------
+    callable
+        Makes a `SimulationInput` of a and omega.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> mavroeidis_papageorgiou(rocking.Block(width=0.2, height=0.8), gamma=2.0)(1.5, 2.0).model
+    'nonlinear'
+    """
     scale = _threshold(block, model)
 
     def case(a: float, omega: float) -> SimulationInput:
@@ -95,6 +175,28 @@ def record(
     """One motion, scaled, under blocks of one shape and any size: (a, p), p in rad/s.
 
     By dimensional analysis a smaller p is also the same block under a faster motion.
+
+    Parameters
+    ----------
+    motion : Motion
+        What is scaled.
+    alpha : float
+        Slenderness of the blocks, rad.
+    restitution : float, optional
+        Their restitution; by default Housner's.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+
+    Returns
+    -------
+    callable
+        Makes a `SimulationInput` of a and p.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> record(rocking.pulses.one_sine(1.0, 1.0), 0.2, 0.9)(1.5, 2.0).block.p
+    2.0
     """
 
     def case(a: float, p: float) -> SimulationInput:

@@ -14,16 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
-from rocking.chattering.families import PulseFamily, SimulationInput
+from rocking.chattering.families import Family, SimulationInput
 from rocking.constants import VERSION
 from rocking.engine import OUTCOME, complete_chattering, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.motion.exceedance import exceedances
+from rocking.motion.measures import exceedances
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
-from rocking.response import Response
-from rocking.result import Result
+from rocking.response import Response, trail_of
+from rocking.result import DatasetResult
 from rocking.simulation import simulate
 from rocking.tables import text_table
 
@@ -96,7 +96,7 @@ _ATTRIBUTES: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
 
 
 def chattering_map(
-    family: PulseFamily,
+    family: Family,
     parameters: Mapping[str, ArrayLike],
     *,
     threads: int | None = None,
@@ -168,7 +168,7 @@ def chattering_map(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ChatteringMap(Result):
+class ChatteringMap(DatasetResult):
     """Where chattering after the first uplift is complete, over two parameters; from `chattering_map`.
 
     Attributes
@@ -184,7 +184,6 @@ class ChatteringMap(Result):
     )
 
     def summary(self) -> str:
-        """Shares of the map that each outcome takes."""
         values, counts = np.unique(self.data.outcome, return_counts=True)
         rows = [
             (Outcome(value).words, f"{100 * count / self.data.outcome.size:.1f} %")
@@ -195,7 +194,6 @@ class ChatteringMap(Result):
         return f"{head}\n\n{text_table(['outcome', 'share of the map'], rows)}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Axes and variables by name."""
         columns = {str(name): self.data[name].values for name in (*self.data.outcome.dims, *self.data.data_vars)}
         return {"outcomes": {outcome.value: outcome.words for outcome in Outcome}, **columns}
 
@@ -215,9 +213,24 @@ class ChatteringMap(Result):
             Where to draw; by default in a new figure.
         labels : mapping of str to str, optional
             What to write at the axes in place of the parameters' names.
-        title, figsize
-            Title, by default the motion, the block and the model, as far as they are the same all over the map; width
-            and height of a new figure, inches.
+        title : str
+            Title; by default the motion, the block and the model, as far as they are the same all over the map.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The new figure, or that of `ax`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> from rocking.chattering import families
+        >>> block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
+        >>> found = chattering_map(families.sine(block), {"a": [1.03, 1.05], "omega": [1.0, 2.0]})
+        >>> found.plot(labels={"omega": "ω"}).axes[0].get_xlabel()
+        'ω'
         """
         from rocking.plot.maps import outcome_figure
 
@@ -306,7 +319,7 @@ def _is_complete(response: Response, rests: int, uplift: float, rest: float) -> 
         return False
     states = state.new_states(1, 0)
     states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, rest
-    return bool(complete_chattering(response.trail.ground, np.array([response.trail.block]), states)[0])
+    return bool(complete_chattering(trail_of(response).ground, np.array([trail_of(response).block]), states)[0])
 
 
 def _axis(values: ArrayLike, name: str) -> Floats:

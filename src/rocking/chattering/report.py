@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import warnings
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -18,9 +15,11 @@ from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.duration import chattering_time, first_arc, sequence
 from rocking.chattering.expansions import asymptotic_table, first_impact_speed, first_interval, series_diagnosis
 from rocking.errors import InvalidOption, OutsideFit
-from rocking.tables import counted, rows_of, text_table, to_json, write_text
+from rocking.result import DrawnResult, Result, TableResult
+from rocking.tables import counted, text_table
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -33,9 +32,12 @@ _TAKES_FOR_COMPLETE: Final = ", worthless: it takes chattering for complete"
 _AMPLITUDES: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77", "approximation": "Chebyshev expansion"}
 
 
-@dataclass(frozen=True, eq=False)
-class ChatteringReport:
-    """What becomes of one chattering sequence of a slender block under a sine.
+@dataclass(frozen=True, eq=False, repr=False)
+class ChatteringReport(DrawnResult, TableResult):
+    """What becomes of one chattering sequence of a slender block under a sine; from `chattering_report`.
+
+    Its tables are "impacts", those that are resolved, and "cycles", the paper's iterative procedure. Its figure has the
+    intervals between the impacts, and the ratios that tend to eta^2 where chattering is complete.
 
     Attributes
     ----------
@@ -49,21 +51,22 @@ class ChatteringReport:
         The block's frequency parameter, rad/s, by which times are given in seconds, too.
     """
 
+    TABLES = ("impacts", "cycles")
+    _FORMAT = None
+
     values: dict[str, Any]
     impacts: NDArray[np.void]
     cycles: NDArray[np.void] | None
     p: float | None
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         case = ", ".join(f"{name} = {self.values[name]:g}" for name in ("a", "omega", "eta"))
-        return f"<ChatteringReport: {case}: {self._verdict()}>"
+        return f"{case}: {self._verdict()}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all numbers by name."""
         return self.values
 
     def summary(self) -> str:
-        """Return the report for people."""
         result = self.values
         times, bracket, critical = result["chattering_time"], result["bracket"], result["critical_amplitude"]
         lines = [
@@ -86,25 +89,25 @@ class ChatteringReport:
         units = "times are p t, counted from uplift; speeds are theta'/(p alpha)"
         return "\n".join(f"{name:<30}{text}" for name, text in lines) + f"\n\n{units}"
 
-    def cycle_rows(self) -> list[dict[str, Any]]:
-        """Return the cycles of the paper's iterative procedure.
-
-        Raises
-        ------
-        InvalidOption
-            Without loss at impacts, when there is no such procedure.
-        """
-        return rows_of(self._table("cycles"))
-
     def table(self) -> str:
-        """Return the first cycles of the paper's iterative procedure, and its last.
+        """Return the first cycles of the paper's iterative procedure, and its last, for people.
+
+        Returns
+        -------
+        str
+            A row for each cycle.
 
         Raises
         ------
         InvalidOption
             Without loss at impacts, when there is no such procedure.
+
+        Examples
+        --------
+        >>> print(chattering_report(1.03, 2.0, 0.92).table().splitlines()[1][:25])
+        0    -1    T_0;1 = 2.8284
         """
-        cycles = self.cycle_rows()
+        cycles = self.to_dataframe("cycles").to_dict("records")
         shown = [*cycles[: _SHOWN - 1], cycles[-1]] if len(cycles) > _SHOWN else cycles
         header = ["n", "sign", "term", "interval, p t", "time, p t", "phase, rad", "speed before", "speed after"]
         rows: list[list[Any]] = [
@@ -125,55 +128,8 @@ class ChatteringReport:
             rows.insert(-1, ["...", "", f"({left_out} more)", "", "", "", "", ""])
         return text_table(header, rows)
 
-    def to_json(self, path: str | Path) -> None:
-        """Write all numbers as JSON; NaN and infinity are null.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        """
-        write_text(path, to_json(self.values) + "\n")
-
-    def to_csv(self, path: str | Path, table: str = "impacts") -> None:
-        """Write a table as text columns with a header.
-
-        Parameters
-        ----------
-        path : str or path
-            The file.
-        table : {"impacts", "cycles"}
-            The impacts that are resolved, or the cycles of the paper's iterative procedure.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such table: without loss at impacts there are no cycles.
-        OutputError
-            If the file cannot be written.
-        """
-        rows = self._table(checks.one_of(table, "table", InvalidOption, ["impacts", "cycles"]))
-        text = io.StringIO()
-        writer = csv.DictWriter(text, rows.dtype.names or (), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows_of(rows))
-        write_text(path, text.getvalue())
-
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the intervals between the impacts, and the ratios that tend to eta^2 where chattering is complete.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Draw the intervals here, without the ratios; by default in a new figure.
-        title, figsize
-            Title, by default the parameters and the time of rest; width and height of a new figure, inches.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
-        from rocking.plot import intervals_figure
+        from rocking.plot.histories import intervals_figure
 
         values = self.values
         rest = values["chattering_time"]["exact"]
@@ -186,14 +142,15 @@ class ChatteringReport:
             figsize=figsize,
         )
 
-    def _table(self, name: str) -> NDArray[np.void]:
-        if name == "impacts":
-            return self.impacts
-        if self.cycles is None:
+    def _frame(self, table: str) -> pd.DataFrame:
+        import pandas as pd
+
+        rows = self.impacts if table == "impacts" else self.cycles
+        if rows is None:
             raise InvalidOption(
                 "{} must be below 1 for the iterative procedure: without loss at impacts nothing ends", "eta"
             )
-        return self.cycles
+        return pd.DataFrame(rows)
 
     def _verdict(self) -> str:
         half_period = self._time(self.values["half_period"])
@@ -226,9 +183,9 @@ def chattering_report(
 
     Parameters
     ----------
-    a, omega, eta
+    a, omega, eta : float
         As in `chattering_time`, each one number.
-    order, resolved
+    order, resolved : int
         As in `chattering_time`.
     p : float, optional
         The block's frequency parameter, rad/s: times are then given in seconds as well.
@@ -236,6 +193,7 @@ def chattering_report(
     Returns
     -------
     ChatteringReport
+        Time of rest by every method, critical amplitude, first impact.
 
     Raises
     ------
@@ -279,9 +237,9 @@ def chattering_report(
     return ChatteringReport(values, exact.impacts, cycles, p)
 
 
-@dataclass(frozen=True)
-class CriticalReport:
-    """The critical amplitude under a sine, by every method.
+@dataclass(frozen=True, eq=False, repr=False)
+class CriticalReport(Result):
+    """The critical amplitude under a sine, by every method; from `critical_report`.
 
     Attributes
     ----------
@@ -295,18 +253,14 @@ class CriticalReport:
     eta: float
     amplitudes: dict[str, float | None]
 
-    def __repr__(self) -> str:
-        return (
-            f"<CriticalReport: omega = {self.omega:g}, eta = {self.eta:g}: chattering is complete up to "
-            f"{self.amplitudes['exact']:.9g} g alpha>"
-        )
+    def _headline(self) -> str:
+        exact = self.amplitudes["exact"]
+        return f"omega = {self.omega:g}, eta = {self.eta:g}: chattering is complete up to {exact:.9g} g alpha"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all numbers by name."""
         return {"omega": self.omega, "eta": self.eta, "critical_amplitude": self.amplitudes}
 
     def summary(self) -> str:
-        """Return the report for people."""
         exact = self.amplitudes["exact"]
         assert exact is not None
         lines = []
@@ -320,16 +274,6 @@ class CriticalReport:
                 lines.append(f"{name:<24}{amplitude:<16.9g}off by {amplitude - exact:+.2e}")
         return "\n".join([*lines, "", "amplitudes of the ground acceleration over g alpha"])
 
-    def to_json(self, path: str | Path) -> None:
-        """Write all numbers as JSON.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        """
-        write_text(path, to_json(self.to_dict()) + "\n")
-
 
 def critical_report(omega: float, eta: float) -> CriticalReport:
     """Give the amplitude up to which chattering under a sine is complete, by every method.
@@ -342,6 +286,7 @@ def critical_report(omega: float, eta: float) -> CriticalReport:
     Returns
     -------
     CriticalReport
+        Amplitude by every method.
 
     Raises
     ------

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block
+from rocking.constants import Model
 from rocking.engine import in_threads, require_finished
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
-from rocking.response import Response
+from rocking.response import Response, trail_of
+from rocking.result import Result
 from rocking.simulation import simulate
 from rocking.tables import counted, rows_of, text_table
 from rocking.treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
@@ -106,9 +107,9 @@ class SchemeOutcome:
         return "; ".join(faults) or "every rest found, no other"
 
 
-@dataclass(frozen=True, eq=False)
-class SchemeComparison:
-    """One case by several schemes; ``print`` it for a table.
+@dataclass(frozen=True, eq=False, repr=False)
+class SchemeComparison(Result):
+    """One case by several schemes, from `compare_schemes`; ``print`` it for a table.
 
     Attributes
     ----------
@@ -124,18 +125,17 @@ class SchemeComparison:
     outcomes: tuple[SchemeOutcome, ...]
     not_applicable: tuple[tuple[Treatment, str], ...]
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         right = sum(outcome.is_right for outcome in self.outcomes)
         return (
-            f"<SchemeComparison: {right} of {len(self.outcomes)} schemes find what the certified one finds; "
-            f"{len(self.not_applicable)} not applicable>"
+            f"{right} of {len(self.outcomes)} schemes find what the certified one finds; "
+            f"{len(self.not_applicable)} not applicable"
         )
 
     def __str__(self) -> str:
         return self.summary()
 
     def summary(self) -> str:
-        """Return a table with a row for the certified response and for each scheme."""
         header = ["scheme", "rests", "false", "missed", "worst error, s", "impacts", "rotation off by", "verdict"]
         certified = self.certified
         rows: list[list[Any]] = [
@@ -159,7 +159,6 @@ class SchemeComparison:
         return "\n".join([text_table(header, rows), *refused])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what each scheme makes of the case by name; times in s."""
         return {
             "certified": {"rests_s": _rests(self.certified)[:, 0], "impacts": len(self.certified.impacts)},
             "schemes": [
@@ -199,11 +198,17 @@ def compare_schemes(
 
     Parameters
     ----------
-    block, motion, model, initial_rotation, initial_velocity
-        The case, as for `rocking.simulate`.
-    schemes : sequence of treatments
+    block : Block
+        What rocks.
+    motion : Motion or None
+        What shakes it.
+    schemes : sequence of Treatment
         By default velocity thresholds from 5e-10 to 5e-2 (both in the paper's Fig. 11), intervals of 1e-9 and 1e-3 s,
         and the paper's asymptotic time.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    initial_rotation, initial_velocity : float
+        As for `rocking.simulate`.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional
@@ -317,7 +322,7 @@ def _speed_left(response: Response, rest: float) -> float:
 
 def _rotation_error(response: Response, certified: Response) -> float:
     end = min(response.duration, certified.duration)
-    nodes = np.concatenate([response.trail.nodes["time"], certified.trail.nodes["time"]])
+    nodes = np.concatenate([trail_of(response).nodes["time"], trail_of(certified).nodes["time"]])
     times = np.concatenate([np.linspace(0.0, end, _EVEN_TIMES), nodes[nodes <= end]])
     slenderness = min(side.alpha for side in certified.block.sides)
     return float(np.max(np.abs(response.rotation(times) - certified.rotation(times)))) / slenderness

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from rocking.cli.options import OUTPUT, QuietOptions
+from rocking.cli.output import OUTPUT, QuietOptions
 from rocking.errors import UnreadableRecord
 from rocking.motion.named import is_shipped
 

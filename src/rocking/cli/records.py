@@ -1,23 +1,244 @@
-"""`rocking records` and `rocking pulses`: what may shake a block."""
+"""Records and pulses: the options by which commands take them; `rocking records` and `rocking pulses` list them."""
 
 from __future__ import annotations
 
+import functools
 import sys
-from collections.abc import Mapping
-from typing import Annotated, Any, Final
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, NamedTuple
 
-from rocking.cli.options import OUTPUT, RECORDS, FileOptions, Names, PrintOptions, refusal
-from rocking.errors import InvalidMotion, UnreadableRecord
-from rocking.motion.named import STANDARD_INPUT, Contents, contents, expanded, is_shipped, refuse_what_is_known, shipped
-from rocking.named_pulses import FAMILIES, PulseFamily
-from rocking.plausibility import reading_notes
+from cyclopts import Group, Parameter
+
+from rocking.cli.options import hint, noted_acceleration, written
+from rocking.cli.output import OUTPUT, PrintOptions
+from rocking.cli.wording import option_of
+from rocking.errors import InvalidMotion, InvalidOption, RockingError, UnreadableRecord
+from rocking.motion.motion import Motion
+from rocking.motion.named import (
+    STANDARD_INPUT,
+    Contents,
+    contents,
+    expanded,
+    is_shipped,
+    named_motion,
+    named_vertical,
+    refuse_what_is_known,
+    shipped,
+)
+from rocking.motion.scaling import Measure
+from rocking.named_pulses import FAMILIES, PulseFamily, named_pulse
+from rocking.plausibility import motion_notes, reading_notes, vertical_notes
 from rocking.progress import Progress, note
+from rocking.quantities import scaling
 from rocking.tables import text_table, to_json
+
+#: What a message about a record file may name.
+_OF_FILES: Final = ("channel", "dt", "units")
 
 #: Names of files in one sentence.
 _SHOWN: Final = 5
 
 _EXAMPLE = "rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1"
+
+RECORDS: Final = Parameter(name="*", group=Group("Records", sort_key=2))
+
+#: Records as arguments: a lone hyphen is one, too.
+Names = Annotated[
+    str,
+    Parameter(
+        name="RECORDS",
+        allow_leading_hyphen=True,
+        help="Record files, folders, patterns (*.AT2), names of shipped records (see rocking records), or - for "
+        "standard input. A file's format is recognised by its content.",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class FileOptions:
+    """What a record file does not say."""
+
+    channel: Annotated[str | None, hint("Channel, by number or name, of files that hold several.")] = None
+    dt: Annotated[float | None, hint("Sampling step, s, of files that do not say theirs.")] = None
+    units: Annotated[str | None, hint("Units of files that do not say theirs: g, m/s2, cm/s2, gal, mm/s2, mg.")] = None
+
+    def read(self, name: str, *, several: bool = False) -> Motion:
+        """Return the motion of a record, alone or one of several."""
+        motion = named_motion(name, channel=self.channel, dt=self.dt, units=self.units, several=several)
+        return self.finished(name, motion)
+
+    def finished(self, name: str, motion: Motion) -> Motion:
+        """Return a motion as the simulations take it, with notes on what looks like a mistake."""
+        for sentence in motion_notes(motion):
+            note(f"{name}: {sentence}")
+        return motion
+
+
+def refusal(name: str, error: RockingError) -> str:
+    """Return why a record cannot be read, with its name, in the words of the command line."""
+    reason = error.text(lambda argument: option_of(argument) if argument in _OF_FILES else argument)
+    return reason if error.path == name else f"{name}: {reason}"
+
+
+@dataclass(frozen=True)
+class VerticalOptions(FileOptions):
+    """What a record file does not say, and the vertical motion that comes with it."""
+
+    vertical: Annotated[
+        str | None,
+        hint("Vertical motion, scaled alike: a channel of the same file, or another file or shipped record."),
+    ] = None
+
+    def finished(self, name: str, motion: Motion) -> Motion:
+        """Return a motion with its vertical component, if one is asked for, with notes on that as well."""
+        noted = super().finished(name, motion)
+        if self.vertical is None:
+            return noted
+        noted = noted.with_vertical(
+            named_vertical(self.vertical, name, channel=self.channel, dt=self.dt, units=self.units)
+        )
+        for sentence in vertical_notes(noted):
+            note(f"{name}: {sentence}")
+        return noted
+
+
+@dataclass(frozen=True)
+class ScaledOptions(VerticalOptions):
+    """What a record file does not say, its vertical motion, and how they are scaled; at most one way."""
+
+    scale: Annotated[float | None, hint("Factor on the motion; negative: reversed.")] = None
+    pga: Annotated[str | None, written("Scale to this peak ground acceleration: 0.5g, 4.9m/s2 or 4.9 (m/s^2).")] = None
+    pgv: Annotated[float | None, hint("Scale to this peak ground velocity, m/s.")] = None
+    sa: Annotated[
+        str | None,
+        written("Scale to this spectral acceleration (5 % damping) at a period: 0.4g@1.0 is 0.4 g at 1.0 s."),
+    ] = None
+
+    def read(self, name: str, *, several: bool = False) -> Motion:
+        """Return the motion of a record, scaled."""
+        _ = self._target  # A mistake in the options is told before a long file is read.
+        return super().read(name, several=several)
+
+    def finished(self, name: str, motion: Motion) -> Motion:
+        """Return a motion with its vertical component, if one is asked for, scaled; with notes on that as well."""
+        noted = super().finished(name, motion)
+        if self._target is None:
+            return noted
+        scaled = noted.scaled_to(*self._target)
+        for sentence in motion_notes(scaled):
+            if sentence not in motion_notes(noted):
+                note(f"{name}, scaled: {sentence}")
+        return scaled
+
+    @functools.cached_property
+    def _target(self) -> tuple[float, Measure] | None:
+        given = {"scale": self.scale, "pga": self.pga, "pgv": self.pgv, "sa": self.sa}
+        return scaling(given, noted_acceleration)
+
+
+@dataclass(frozen=True)
+class PulseOptions(FileOptions):
+    """Pulses beside the records."""
+
+    pulse: Annotated[
+        tuple[str, ...],
+        Parameter(
+            consume_multiple=False,
+            negative="",
+            help="A pulse as the ground motion, sine:amplitude=0.2g,frequency=2Hz,cycles=5 (see rocking pulses); once "
+            "for each.",
+        ),
+    ] = ()
+
+    def pulses(self) -> dict[str, Motion]:
+        """Return the pulses by their texts."""
+        return {text: self.finished(text, named_pulse(text)) for text in self.pulse}
+
+
+class ReadRecords(NamedTuple):
+    """Records that were read, and pulses.
+
+    Attributes
+    ----------
+    motions : dict of str to Motion
+        Motions by the names that were asked for.
+    skipped : dict of str to str
+        Why records could not be read.
+    single : bool
+        Whether one record or pulse was named by itself, and no folder or pattern that happens to hold one.
+    """
+
+    motions: dict[str, Motion]
+    skipped: dict[str, str]
+    single: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return for machines what stands for each record in other tables, and what was skipped."""
+        from rocking.analysis.survey import record_columns
+
+        listed = record_columns([*self.motions], [*self.motions.values()])
+        return {"records": listed, "skipped": self.skipped}
+
+
+@dataclass(frozen=True)
+class RecordOptions(PulseOptions):
+    """Several records, and pulses."""
+
+    keep_going: Annotated[
+        bool, Parameter(name="--keep-going", negative="", help="Skip records that cannot be read, and list them.")
+    ] = False
+
+    def read_all(self, names: Sequence[str]) -> ReadRecords:
+        """Return the motions of records, folders of them and patterns, and the pulses, by the name of each.
+
+        Raises
+        ------
+        UnreadableRecord
+            If one cannot be read, or with --keep-going none.
+        """
+        records = expanded(names)
+        if not records and not self.pulse:
+            raise InvalidOption(
+                "give one record or more: files, folders, or names of shipped records (see rocking records), or {}",
+                "pulse",
+            )
+        pulses = self.pulses()
+        motions: dict[str, Motion] = {}
+        skipped: dict[str, str] = {}
+        with Progress("reading records", total=len(records)) as progress:
+            for name in records:
+                try:
+                    motions[name] = self.read(name, several=len(records) > 1)
+                except (UnreadableRecord, InvalidMotion) as error:
+                    if not self.keep_going:
+                        raise
+                    skipped[name] = refusal(name, error)
+                progress.advance()
+        if records and not motions:
+            raise UnreadableRecord(
+                f"none of {len(records)} records could be read; the first: {next(iter(skipped.values()))}"
+            )
+        for reason in skipped.values():
+            note(f"skipped: {reason}")
+        motions |= pulses
+        single = [*motions] == [*names, *self.pulse] and len(motions) == 1
+        return ReadRecords(motions, skipped, single)
+
+
+@dataclass(frozen=True)
+class UnscaledOptions(RecordOptions, VerticalOptions):
+    """Several records, and pulses, with their vertical motions, that an analysis scales itself."""
+
+
+@dataclass(frozen=True)
+class MotionOptions(RecordOptions, ScaledOptions):
+    """Several records, and pulses, scaled."""
+
+
+@dataclass(frozen=True)
+class ScaledPulseOptions(PulseOptions, ScaledOptions):
+    """One record at a time, and pulses, scaled."""
 
 
 def records(

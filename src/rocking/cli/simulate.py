@@ -9,24 +9,14 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rocking.analysis.rules.check import check as apply_rules
-from rocking.analysis.survey import survey
-from rocking.cli import batch
-from rocking.cli.options import (
-    BLOCK,
-    MODEL,
-    OUTPUT,
-    RECORDS,
-    BlockOptions,
-    ModelOptions,
-    MotionOptions,
-    Names,
-    OutputOptions,
-    TreatmentOptions,
-)
+from rocking.analysis.survey import folder_names, survey
+from rocking.cli.options import BLOCK, MODEL, BlockOptions, ModelOptions, TreatmentOptions
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.errors import InvalidOption
 from rocking.quantities import tilt
 from rocking.response import Response
-from rocking.response.forces import friction_coefficient
+from rocking.response.history import friction_coefficient
 from rocking.simulation import simulate as run
 
 
@@ -90,11 +80,12 @@ def simulate(
             if folder is not None:
                 found.write(folder)
             if folder is not None and each:
-                for name, record, response in zip(found.folders(), found.records, found.responses, strict=True):
+                folders = folder_names(found.records)
+                for name, record, response in zip(folders, found.records, found.responses, strict=True):
                     (folder / name).mkdir(exist_ok=True)
                     _result(response, record, start.friction, folder / name)
             result, text = found.to_dict(), found.summary()
-        batch.show(result, text, as_json=output.as_json, folder=folder)
+        print_result(result, text, as_json=output.as_json, folder=folder)
 
 
 def _result(response: Response, record: str, friction: float | None, folder: Path | None) -> dict[str, Any]:
@@ -107,7 +98,7 @@ def _result(response: Response, record: str, friction: float | None, folder: Pat
         response.to_csv(folder / "events.csv", "events")
         response.to_csv(folder / "impacts.csv", "impacts")
         response.to_netcdf(folder / "response.nc")
-        batch.write(folder, figures={"response": response.plot()}, result=result)
+        write_results(folder, figures={"response": response.plot()}, result=result)
     return result
 
 
@@ -137,5 +128,5 @@ def check(
         result = found.to_dict()
         if folder is not None:
             found.to_csv(folder / "check.csv")
-            batch.write(folder, figures={}, result=result)
-        batch.show(result, found.summary(), as_json=output.as_json, folder=folder)
+            write_results(folder, figures={}, result=result)
+        print_result(result, found.summary(), as_json=output.as_json, folder=folder)

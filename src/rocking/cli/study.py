@@ -12,14 +12,14 @@ from cyclopts import App, Parameter
 
 import rocking
 from rocking import checks
-from rocking.cli import batch
+from rocking.cli.output import output_folder, print_result, write_results
 from rocking.errors import InvalidOption, OutputError, StudyError
 from rocking.progress import note
-from rocking.studies.cluster import local_executor, scheduler_executor
 from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.place import place_of
-from rocking.studies.refine import Verdict
+from rocking.studies.refine import StudyVerdict
 from rocking.studies.results import FORMATS
+from rocking.studies.run import local_executor, scheduler_executor
 from rocking.studies.study import Study, study_of
 from rocking.tables import counted, to_json, write_text
 
@@ -81,10 +81,10 @@ def run(
     scheduler
         Address of a scheduler of dask.distributed whose workers compute instead, as tcp://127.0.0.1:8786.
     """
-    given = {"--threads": threads, "--workers": workers, "--scheduler": scheduler}
+    given = {"threads": threads, "workers": workers, "scheduler": scheduler}
     chosen = [option for option, value in given.items() if value is not None]
     if len(chosen) > 1:
-        raise InvalidOption(f"{' and '.join(chosen)} both say who computes; give one of them")
+        raise InvalidOption(f"{' and '.join(['{}'] * len(chosen))} both say who computes; give one of them", *chosen)
     found = _opened(folder, into)
     with _executor(workers, scheduler) as executor:
         report = found.run(threads=threads, executor=executor)
@@ -134,12 +134,12 @@ def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter
         print(fault)
     if faults and not repair:
         found_faults = f"{counted(len(faults), 'fault')} found"
-        raise StudyError(f"{found_faults}; --repair corrects what can be computed or written again")
+        raise StudyError(f"{found_faults}; {{}} corrects what can be computed or written again", "repair")
     print(_sound(found, folder, len(faults)))
 
 
 @study.command
-def export(folder: str, file: Path, *, critical: Verdict | None = None) -> None:
+def export(folder: str, file: Path, *, critical: StudyVerdict | None = None) -> None:
     """Write the results to one file.
 
     Parameters
@@ -179,14 +179,14 @@ def report(
     found = rocking.study(folder)
     if out is None and "://" in folder:
         raise InvalidOption("this is no folder for figures and tables: name one as well", path=folder)
-    with batch.output_folder(out or Path(folder) / "report") as target:
+    with output_folder(out or Path(folder) / "report") as target:
         made = found.report()
         for name, one in made.items():
             one.to_csv(target / f"{name}.csv")
         result = {name: one.to_dict() for name, one in made.items()}
-        batch.write(target, figures={name: one.plot() for name, one in made.items()}, result=result)
+        write_results(target, figures={name: one.plot() for name, one in made.items()}, result=result)
         text = "\n\n".join(one.summary() for one in made.values())
-        batch.show(result, text, as_json=as_json, folder=target)
+        print_result(result, text, as_json=as_json, folder=target)
 
 
 def _opened(folder: str, into: str | None) -> Study:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 from collections.abc import Iterable, Sequence
 from inspect import Parameter
@@ -11,6 +10,7 @@ from typing import Final
 from cyclopts import App, Argument, CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError
 from cyclopts.exceptions import UnknownOptionError
 
+from rocking.checks import meant
 from rocking.errors import DamagedStudy, InvalidOption, RockingError, Spelling
 
 #: How alike two names must be for the one to be a slip of the other: a letter or two in a word of six.
@@ -67,10 +67,8 @@ def of(error: RockingError | CycloptsError, app: App, arguments: Sequence[str]) 
     if isinstance(error, UnknownCommandError):
         unknown = (error.unused_tokens or arguments)[0]
         commands = [each for each in called(app, arguments) if not each.startswith("-")]
-        close = difflib.get_close_matches(unknown, commands, n=1)
-        return f"there is no command {unknown}; " + (
-            f"did you mean {close[0]}?" if close else f"there are {', '.join(commands)}"
-        )
+        hint = meant(unknown, commands, f"there are {', '.join(commands)}")
+        return f"there is no command {unknown}; {hint}"
     if isinstance(error, UnknownOptionError):
         return _unknown_option(error.token.keyword or error.token.value, app, arguments)
     sentence = " ".join(str(error).split()).rstrip(".")
@@ -90,8 +88,7 @@ def _unknown_option(typed: str, app: App, arguments: Sequence[str]) -> str:
     name = typed.partition("=")[0]
     known = {*_options(called(app, arguments)), "--help", "--version"}
     words = {each.lstrip("-"): each for each in known if len(each) > _SHORT}
-    close = difflib.get_close_matches(name.lstrip("-"), words, n=1, cutoff=_ALIKE) if len(name) > _SHORT else []
-    hint = f"did you mean {words[close[0]]}?" if close else "see its --help"
+    hint = meant(name.lstrip("-"), words if len(name) > _SHORT else {}, "see its --help", _ALIKE)
     return f"{_named(app, arguments)} has no option {name}; {hint}"
 
 

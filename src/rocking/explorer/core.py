@@ -20,12 +20,13 @@ from rocking.block import Block
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.schemes import compare_schemes
 from rocking.errors import InvalidOption
-from rocking.explorer.inputs import SimulationInput, Texts, as_command, as_python, read_input
+from rocking.explorer.code import case_as_command, case_as_python
+from rocking.explorer.inputs import Case, Texts, read_case
 from rocking.explorer.parameters import names_of
 from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
-from rocking.response import Response, active_span, in_words
+from rocking.response import Response, active_span, in_words, trail_of
 from rocking.treatment import Certified
 
 #: Times at which a rotation is evaluated across a window, and points of a line that are sent.
@@ -72,7 +73,7 @@ class Payload:
 class Simulated:
     """A case with its response, and what is made of it when it is first asked for."""
 
-    case: SimulationInput
+    case: Case
     response: Response
 
     @functools.cached_property
@@ -120,7 +121,7 @@ class Explorer:
             if key in self._kept:
                 self._kept.move_to_end(key)
                 return self._kept[key]
-        case = read_input(texts, self.uploads)
+        case = read_case(texts, self.uploads)
         shown = Simulated(case, case.simulate())
         with self._lock:
             self._kept[key] = shown
@@ -173,7 +174,7 @@ class Explorer:
     def code(self, texts: Texts) -> dict[str, str | None]:
         """Return a case as Python, and as a command where the command line does it."""
         case = self.show(texts).case
-        return {"python": as_python(case), "command": as_command(case)}
+        return {"python": case_as_python(case), "command": case_as_command(case)}
 
     def schemes(self, texts: Texts) -> list[dict[str, Any]]:
         """Return what each treatment of chattering makes of a case, against the proven response."""
@@ -204,7 +205,7 @@ class Explorer:
             return file.read_bytes()
 
     def _steps(self) -> int:
-        return sum(len(shown.response.trail.nodes) for shown in self._kept.values())
+        return sum(len(trail_of(shown.response).nodes) for shown in self._kept.values())
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
@@ -276,7 +277,7 @@ def _window_arrays(shown: Simulated, start: float, end: float, points: int = _PO
     }
 
 
-def _shaking(case: SimulationInput, start: float, end: float, points: int) -> dict[str, Floats]:
+def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Floats]:
     """Ground acceleration in a window, g; with a vertical component, the weight, by which thresholds are multiplied."""
     motion, gravity = case.motion, case.block.gravity
     if motion is None:
@@ -427,7 +428,7 @@ def _drifts(motion: Motion) -> bool:
 def _draw(response: Response, file: Path, window: tuple[float, float] | None) -> None:
     from matplotlib import rc_context
 
-    figure = response.plot(window=window, chattering=bool(len(response.chattering)))
+    figure = response.plot(window=window, longest_sequence=bool(len(response.chattering)))
     with rc_context({"svg.hashsalt": "rocking"}):
         figure.savefig(file, dpi=160)
     if "matplotlib.pyplot" in sys.modules:

@@ -1,4 +1,4 @@
-"""What is simulated, read from texts, and written as Python, as a command, and as texts again.
+"""What is simulated, read from texts, and written as texts again.
 
 The texts are those of the page's address: names of the command line's options and values as people write them
 (``alpha=12deg``, ``pga=0.5g``), so that an address says what it shows.
@@ -7,26 +7,25 @@ The texts are those of the page's address: names of the command line's options a
 from __future__ import annotations
 
 import functools
-import itertools
 import math
-import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from rocking import checks
 from rocking.block import Block
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.explorer.parameters import DEFAULT, PARAMETERS, PULSES, SCALINGS, SHAPES, names_of
 from rocking.explorer.uploads import UploadStore
-from rocking.model import Model
 from rocking.motion import records
 from rocking.motion.motion import Motion
-from rocking.motion.scaling import FACTOR, Measure, MeasureName
+from rocking.motion.scaling import Measure
 from rocking.named_pulses import FAMILIES, pulse_values
-from rocking.response import Response
+from rocking.quantities import acceleration, scaling
+from rocking.response import Response, trail_of
 from rocking.simulation import simulate
 from rocking.treatment import Treatment, treatment
 
@@ -56,7 +55,7 @@ _ARGUMENTS: Final = {"pivots": "distances", "height_of_mass": "height", "gyratio
 
 
 @dataclass(frozen=True, eq=False)
-class SimulationInput:
+class Case:
     """What `rocking.simulate` takes, with the texts from which it was read.
 
     ``python`` is the expression that makes the motion, ``words`` are the arguments that name it on the command line;
@@ -87,7 +86,7 @@ class SimulationInput:
         )
 
 
-def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
+def read_case(texts: Texts, uploads: UploadStore) -> Case:
     """Read what is simulated from texts; those that are not given have the command line's defaults.
 
     Parameters
@@ -102,7 +101,7 @@ def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
     Examples
     --------
     >>> texts = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
-    >>> case = read_input(texts, UploadStore())
+    >>> case = read_case(texts, UploadStore())
     >>> case.block, round(case.motion.pga, 6)
     (<Block: rectangular block, 0.24 m x 1.1 m; p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184>, 3.92266)
     """
@@ -110,14 +109,14 @@ def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
     values = _values(given)
     maker, arguments = _block_call(values)
     block = _MAKERS[maker](**arguments)
-    found = _motion(values, uploads)
+    found = _motion(given, values, uploads)
     if "duration" not in values and math.prod(side.restitution for side in block.sides) > _LIVELIEST:
         raise InvalidOption(
             f"the product of {{}} on both sides is above {_LIVELIEST:g}, so that the block hardly comes to rest: lower "
             "it, or simulate it in Python",
             "restitution",
         )
-    return SimulationInput(
+    return Case(
         texts=given,
         block=block,
         motion=found.motion,
@@ -131,56 +130,6 @@ def read_input(texts: Texts, uploads: UploadStore) -> SimulationInput:
     )
 
 
-def as_python(case: SimulationInput) -> str:
-    """Write the case as a script that runs as it stands.
-
-    Examples
-    --------
-    >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
-    >>> print(as_python(read_input(texts, UploadStore())))
-    import rocking
-    <BLANKLINE>
-    block = rocking.Block.from_parameters(p=2.0, alpha=0.2)
-    motion = None
-    response = rocking.simulate(block, motion, initial_rotation=0.02)
-    print(response.summary())
-    """
-    numbers = {
-        "model": None if case.model == "nonlinear" else case.model,
-        "chattering": case.texts.get("chattering"),
-        "duration": case.duration,
-        "initial_rotation": case.initial_rotation or None,
-        "initial_velocity": case.initial_velocity or None,
-    }
-    options = "".join(f", {name}={value!r}" for name, value in numbers.items() if value is not None)
-    return "\n".join(
-        [
-            "import rocking",
-            "",
-            f"block = rocking.{block_as_python(case.texts)}",
-            f"motion = {case.python}",
-            f"response = rocking.simulate(block, motion{options})",
-            "print(response.summary())",
-        ]
-    )
-
-
-def as_command(case: SimulationInput) -> str | None:
-    """Write the case as a command; None for what the command line does not do.
-
-    Examples
-    --------
-    >>> texts = {"p": "2", "alpha": "12deg", "motion": "ridgecrest-clc-090", "sa": "0.4g@1"}
-    >>> as_command(read_input(texts, UploadStore()))
-    'rocking simulate ridgecrest-clc-090 --p 2 --alpha 12deg --sa 0.4g@1'
-    """
-    if not case.words or "gravity" in case.texts:
-        return None
-    options = [name for name in NAMES if name in case.texts and name not in ("motion", "vertical")]
-    each = ([f"--{name.replace('_', '-')}", case.texts[name]] for name in options)
-    return shlex.join(["rocking", "simulate", *case.words, *itertools.chain.from_iterable(each)])
-
-
 def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
     """Write a response as the texts of its case; the store keeps its motion if no text can name it."""
     block, motion = response.block, response.motion
@@ -190,7 +139,7 @@ def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
         texts["model"] = response.model
     if str(response.treatment) != str(treatment("certified")):
         texts["chattering"] = str(response.treatment)
-    rules = response.trail.rules
+    rules = trail_of(response).rules
     if not rules["endless"]:
         texts["duration"] = repr(float(rules["stop"]))
     rotation, velocity = float(response.rotation(0.0)), float(response.angular_velocity(0.0))
@@ -266,8 +215,8 @@ class _Found(NamedTuple):
     words: tuple[str, ...]
 
 
-def _motion(values: Values, uploads: UploadStore) -> _Found:
-    target = _target(values)
+def _motion(given: Texts, values: Values, uploads: UploadStore) -> _Found:
+    target = scaling({name: given[name] for name in SCALINGS if name in given}, _level)
     name = values.get("motion", DEFAULT["motion"])
     found = _unscaled(name, values, uploads)
     if "vertical" in values:
@@ -279,18 +228,8 @@ def _motion(values: Values, uploads: UploadStore) -> _Found:
     return _Found(_scaled(found.motion, *target), f"{found.python}.{_scaling_as_python(*target)}", found.words)
 
 
-def _target(values: Values) -> tuple[float, Measure] | None:
-    """Level that the motion is scaled to, and the measure that it is of."""
-    chosen = [name for name in SCALINGS if name in values]
-    if len(chosen) > 1:
-        raise InvalidOption(f"{' and '.join(['{}'] * len(chosen))} scale the same motion; give one of them", *chosen)
-    if not chosen:
-        return None
-    (name,) = chosen
-    if name == "sa":
-        level, period = values["sa"]
-        return level, Measure("sa", period)
-    return values[name], FACTOR if name == "scale" else Measure(cast(MeasureName, name))
+def _level(text: str, name: str) -> float:
+    return checks.positive(acceleration(text, name), name, InvalidOption, "m/s^2")
 
 
 def _scaling_as_python(level: float, measure: Measure) -> str:

@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 import webbrowser
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import util
@@ -161,20 +161,19 @@ class Frame:
 
     texts: dict[str, str]
     height: int
-    _server: Server = field(repr=False)
+    _link: Callable[[Mapping[str, str]], str] = field(repr=False)
 
     @property
     def link(self) -> str:
         """A link that opens the page once, in a browser on this machine."""
-        return self._server.link(self.texts)
+        return self._link(self.texts)
 
     def _repr_html_(self) -> str:
-        query = urlencode({**self.texts, "token": self._server.authentication.new_token()})
         # The cookie goes to frames of the notebook's own site only: the frame takes the name that the notebook has.
         choose = (
             "const frame = document.currentScript.previousElementSibling;"
             "const host = location.hostname === 'localhost' ? 'localhost' : '127.0.0.1';"
-            f"frame.src = `http://${{host}}:{self._server.port}/?{query}`;"
+            f"frame.src = `http://${{host}}{self.link.removeprefix(f'http://{HERE}')}`;"
         )
         style = f"width:100%;height:{self.height}px;border:0"
         return f'<iframe title="rocking explorer" style="{style}"></iframe><script>{choose}</script>'
@@ -223,7 +222,7 @@ def explore(response: Response, *, height: int = 760) -> Frame:
     from rocking.explorer.inputs import texts_of
 
     explorer, server = _server_of_this_process()
-    return Frame(texts_of(response, explorer.uploads), height, server)
+    return Frame(texts_of(response, explorer.uploads), height, server.link)
 
 
 def _server_of_this_process() -> tuple[Explorer, Server]:

@@ -19,7 +19,7 @@ from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import Setup, Task, simulate_tasks
 from rocking.errors import InvalidOption
-from rocking.explorer.inputs import BLOCK_NAMES, SimulationInput, Texts, arguments_of, is_pulse, pulse_of
+from rocking.explorer.inputs import BLOCK_NAMES, Case, Texts, arguments_of, is_pulse, pulse_of
 from rocking.motion.motion import Motion
 from rocking.quantities import number
 from rocking.treatment import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
@@ -75,7 +75,7 @@ class Axis(NamedTuple):
 class MapGrid:
     """A case, the motion that shakes it, and the two parameters over which it is mapped: to the right and upwards."""
 
-    case: SimulationInput
+    case: Case
     motion: Motion
     x: Axis
     y: Axis
@@ -94,7 +94,7 @@ class Part(NamedTuple):
     values: NDArray[np.float32]
 
 
-def axes_of(case: SimulationInput) -> list[str]:
+def axes_of(case: Case) -> list[str]:
     """Names of the axes that a case may be mapped over."""
     if case.motion is None:
         return []
@@ -106,7 +106,7 @@ def axes_of(case: SimulationInput) -> list[str]:
     return [name for name in AXES if name not in unusable]
 
 
-def _has_one_slenderness(case: SimulationInput) -> bool:
+def _has_one_slenderness(case: Case) -> bool:
     """Whether blocks of another slenderness, the same on both sides, follow from this one.
 
     Their restitution is Housner's where none is given; two p, pivots and eccentric sizes belong to another.
@@ -115,7 +115,7 @@ def _has_one_slenderness(case: SimulationInput) -> bool:
     return "restitution" in case.texts or (plus.p == minus.p and not {"pivots", "offset"} & case.texts.keys())
 
 
-def grid_of(case: SimulationInput, texts: Texts) -> MapGrid:
+def grid_of(case: Case, texts: Texts) -> MapGrid:
     """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same of ``y``, and how many ``points`` each has.
 
     Raises
@@ -229,7 +229,7 @@ def _described(axis: Axis) -> dict[str, Any]:
     return {"name": axis.name, "label": kind.label, "unit": kind.unit, "values": axis.values.tolist()}
 
 
-def _axis(which: str, case: SimulationInput, texts: Texts, points: int) -> Axis:
+def _axis(which: str, case: Case, texts: Texts, points: int) -> Axis:
     name = texts.get(which, "")
     if name not in axes_of(case):
         raise InvalidOption(f"this case is mapped over {', '.join(axes_of(case))}, not over {name[:20]!r}")

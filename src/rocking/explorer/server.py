@@ -25,10 +25,11 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer import map_code, maps
+from rocking.explorer import maps
 from rocking.explorer.background import Compilation, low_priority
+from rocking.explorer.code import map_as_code
 from rocking.explorer.core import EXPORTS, Explorer, Payload
-from rocking.explorer.inputs import read_input
+from rocking.explorer.inputs import read_case
 from rocking.explorer.parameters import PARAMETERS, field_label, specification
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST
@@ -224,7 +225,7 @@ class App:
         return self.explorer.window(query.texts(), query.numbers("from", "to"), ground=ground, points=points)
 
     def _grid(self, query: Query) -> maps.MapGrid:
-        return maps.grid_of(read_input(query.texts(), self.explorer.uploads), query.others)
+        return maps.grid_of(read_case(query.texts(), self.explorer.uploads), query.others)
 
     def _study(self) -> StudyView:
         if self.study is None:
@@ -236,7 +237,7 @@ class App:
 
         def described() -> tuple[maps.MapGrid, dict[str, Any]]:
             grid = self._grid(Query(request.query_params))
-            return grid, {**maps.described(grid), **map_code.described(grid)}
+            return grid, {**maps.described(grid), **map_as_code(grid)}
 
         grid, about = await self._in_thread(described)
         return StreamingResponse(self._parts(grid, about), media_type="application/octet-stream", headers=_FRESH)

@@ -60,7 +60,7 @@ class StudyView:
         self.study = rocking.study(folder)
         if not self.study.status.done:
             raise StudyError(f"nothing of the study in {folder} is done yet: rocking study run {folder}")
-        kept = self.study.store.grid.outcomes
+        kept = self.study.outcomes
         self.quantities = {name: label for name, label in QUANTITIES.items() if name in kept}
         if not self.quantities:
             raise StudyError(

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion import formats
+from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
 from rocking.plausibility import motion_notes
 
@@ -115,7 +116,7 @@ class UploadStore:
         missing: list[str] = []
         while True:
             try:
-                identification, channels = formats.content(upload.stream(), **given)
+                identification, channels = formats.content(upload.stream(), None, Request.checked(**given))
                 break
             except (UnreadableRecord, InvalidMotion) as error:
                 name = error.argument

@@ -1,1 +1,1 @@
-"""Compiled leaves: numbers in, numbers and a status out; they never raise."""
+"""Compiled functions: numbers in, numbers and a code out; they never raise."""

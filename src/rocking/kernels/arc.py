@@ -1,6 +1,7 @@
-"""One arc between two events as a Taylor series (paper, Eq. 15): its order, the length of a step, what it leaves out.
+"""One arc between two events as a Taylor series (paper, Eq. 15): its order, the length of a step, its truncation.
 
-The equations and the recurrences for the coefficients are in `recurrences`.
+The equations and the recurrences for the coefficients are in `recurrences`. A NaN among the numbers makes series and
+bounds NaN.
 """
 
 import math
@@ -22,22 +23,22 @@ from rocking.kernels.recurrences import (
 )
 from rocking.kernels.state import ORDER, Record
 
-#: Terms of the velocity below this fraction of the largest one no longer count. (Those of the rotation are no measure:
-#: over a step that is short beside 1/p they vanish beside u long before the velocity has converged.)
+#: Terms of the velocity below this fraction of the largest one are negligible. (Those of the rotation are no measure:
+#: over a step that is short beside 1/p they are negligible beside u long before the velocity has converged.)
 NEGLIGIBLE = 2.0**-56
 
-#: Bound on all that is left out of a velocity, as a fraction of its largest term: a quarter of the last place.
-_LEFT_OUT = 2.0**-54
+#: Largest bound on the truncation of a velocity, over its largest term: a quarter of the last place.
+_TRUNCATION = 2.0**-54
 
-#: Nine times the largest bound on all that nine terms leave out of a nonlinear velocity, over the sum of their sizes.
-#: The bound is a few times what they leave out. It holds where two sums are below a quarter.
-_LEFT_OUT_OF_NINE = 9.0 * 2.0**-52
+#: Nine times the largest bound on the truncation of a nonlinear velocity after nine terms, over the sum of their
+#: absolute values. The bound is a few times the truncation. It holds where two sums are below a quarter.
+_TRUNCATION_OF_NINE = 9.0 * 2.0**-52
 _QUARTER = 0.25
 
-#: Of the velocity's terms: none that is smaller counts.
+#: Smaller terms of the velocity are negligible.
 _SMALLEST = 1e-290
 
-#: Steps are shortened so often at most; each time by a tenth at least.
+#: Largest number of times that a step is shortened; each time by a tenth at least.
 _SHORTENINGS = 200
 
 #: First step from an impact, over the arc's duration under constant acceleration.
@@ -105,7 +106,7 @@ def expand(
 
 @inlined
 def raise_degree(A: Floats, degree: int, W: Floats, other: int) -> int:
-    """Larger degree of two polynomials, both of which are filled up with zeros to it."""
+    """Larger degree of two polynomials; both are filled up with zeros to it."""
     highest = max(degree, other)
     for k in range(degree + 1, highest + 1):
         A[k] = 0.0
@@ -127,7 +128,7 @@ def step_length(ground: Ground, block: Record, state: Record, left: float) -> fl
 
 @inlined
 def significant_degree(A: Floats, degree: int, h: float) -> int:
-    """Degree of a polynomial without the highest powers that do not count within h."""
+    """Degree of a polynomial without the highest powers that are negligible within h."""
     while degree > 1 and abs(A[degree]) * h**degree < NEGLIGIBLE * abs(A[0]):
         degree -= 1
     return degree
@@ -137,8 +138,8 @@ def significant_degree(A: Floats, degree: int, h: float) -> int:
 def linear_order(lam: float, h: float) -> int:
     """Order at which a linear arc's series has converged over h, for a motion of degree 0 or 1.
 
-    Every coefficient after the motion's own follows from the one two before, so the ratio of c[k] h^k to c[2] h^2
-    (slower than all that comes from the initial state) is known beforehand.
+    Every coefficient after the motion's own follows from the one two before, so the ratio of c[k] h^k to c[2] h^2,
+    which falls the most slowly, is known beforehand.
     """
     squared = abs(lam) * h * h
     ratio = 1.0
@@ -153,7 +154,7 @@ def linear_order(lam: float, h: float) -> int:
 def converged(c: Floats, degree: int, h: float) -> int:
     """Order at which a full series under a constant weight has converged over h; above `ORDER` where it has not.
 
-    Past the motion's degree a coefficient follows from the one two before: two that do not count end the series.
+    Past the motion's degree a coefficient follows from the one two before: two negligible ones end the series.
     """
     largest = term = abs(c[1]) * h
     power = h * h
@@ -171,7 +172,7 @@ def converged(c: Floats, degree: int, h: float) -> int:
 def expand_linear_weighted(block: Record, state: Record, scratch: Record, degree: int, h: float) -> tuple[int, float]:
     """Series of a linear arc while the weight changes; the motion's polynomials are of one degree.
 
-    Returns (order, h'). The series ends where what it leaves out is proven not to count.
+    Returns (order, h'). The series ends where a bound shows that its truncation is negligible.
     """
     c, lam = scratch.rotation, block.stiffness[state.side]
     c[0] = state.u
@@ -185,8 +186,8 @@ def expand_linear_weighted(block: Record, state: Record, scratch: Record, degree
         largest = max(largest, term)
         power *= h
         if k > degree and term + previous <= NEGLIGIBLE * largest:
-            beyond, _ = left_out_linear(scratch, lam, degree, k + 2, h)
-            if beyond <= _LEFT_OUT * largest:
+            beyond, _ = truncation_linear(scratch, lam, degree, k + 2, h)
+            if beyond <= _TRUNCATION * largest:
                 return k + 2, h
     return ORDER, shortened_linear(scratch, lam, degree, h)
 
@@ -197,7 +198,7 @@ def expand_nonlinear(
 ) -> tuple[int, float]:
     """Series of a nonlinear arc, and of sin and cos(alpha - u), for a motion and a weight of these degrees.
 
-    Returns (order, h'). The series ends where what it leaves out is proven not to count.
+    Returns (order, h'). The series ends where a bound shows that its truncation is negligible.
     """
     c, lam = scratch.rotation, block.stiffness[state.side]
     psi = block.slenderness[state.side] - state.u
@@ -213,14 +214,14 @@ def expand_nonlinear(
         term = (k + 2) * abs(c[k + 2]) * power
         largest = max(largest, term)
         if k > degrees[0] and term + previous <= NEGLIGIBLE * largest:
-            beyond, _ = left_out_nonlinear(scratch, lam, degrees, k + 2, h)
-            if beyond <= _LEFT_OUT * largest:
+            beyond, _ = truncation_nonlinear(scratch, lam, degrees, k + 2, h)
+            if beyond <= _TRUNCATION * largest:
                 return k + 2, h
         angle_coefficients(scratch, k)
         power *= h
     for _ in range(_SHORTENINGS):
-        beyond, largest = left_out_nonlinear(scratch, lam, degrees, ORDER, h)
-        excess = beyond / max(_LEFT_OUT * largest, _SMALLEST)
+        beyond, largest = truncation_nonlinear(scratch, lam, degrees, ORDER, h)
+        excess = beyond / max(_TRUNCATION * largest, _SMALLEST)
         if excess <= 1.0:
             break
         h *= shortening(excess)
@@ -229,13 +230,13 @@ def expand_nonlinear(
 
 @shared
 def shortened_linear(scratch: Record, lam: float, changes: int, h: float) -> float:
-    """Step, not longer than h, over which a full linear series leaves out nothing that counts.
+    """Step, not longer than h, over which the truncation of a full linear series is negligible.
 
     ``changes`` is the degree of the weight.
     """
     for _ in range(_SHORTENINGS):
-        beyond, largest = left_out_linear(scratch, lam, changes, ORDER, h)
-        excess = beyond / max(_LEFT_OUT * largest, _SMALLEST)
+        beyond, largest = truncation_linear(scratch, lam, changes, ORDER, h)
+        excess = beyond / max(_TRUNCATION * largest, _SMALLEST)
         if excess <= 1.0:
             break
         h *= shortening(excess)
@@ -244,19 +245,19 @@ def shortened_linear(scratch: Record, lam: float, changes: int, h: float) -> flo
 
 @inlined
 def shortening(excess: float) -> float:
-    """Factor on a step whose series leaves out so many times what it may."""
+    """Factor on a step whose series has so many times the truncation that is allowed."""
     return max(0.5, 0.9 * excess ** (-1.0 / ORDER))
 
 
 @shared
-def left_out_linear(scratch: Record, lam: float, changes: int, order: int, h: float) -> tuple[float, float]:
-    """Bound on all terms that a linear series leaves out of the velocity over h, and its largest term; times h.
+def truncation_linear(scratch: Record, lam: float, changes: int, order: int, h: float) -> tuple[float, float]:
+    """Bound on the truncation of a linear arc's velocity over h, and its largest term; both times h.
 
     With u_k = |c_k| h^k and w_j = |W_j| h^j the products w_j u_k with j + k >= order - 1 are left out of u'' h^2, and
-    what they make feeds on itself: see "Where a series may end" in the documentation. The motion's degree is below
-    order - 1.
+    all terms that follow from them: see "Where a series may end" in the documentation. The motion's degree is below
+    order - 1. inf: h is too long for a bound.
     """
-    c, W, d = scratch.rotation, scratch.weight, scratch.spare
+    c, W, d = scratch.rotation, scratch.weight, scratch.other
     power = 1.0
     largest = 0.0
     for k in range(order + 1):
@@ -265,29 +266,29 @@ def left_out_linear(scratch: Record, lam: float, changes: int, order: int, h: fl
         power *= h
     for k in range(order - 1, order - 2 - changes, -1):  # from here on: sums of all later terms
         d[k] += d[k + 1]
-    heaviest = fed = 0.0
+    weight = products = 0.0
     power = 1.0
     for j in range(changes + 1):
-        heaviest += abs(W[j]) * power
-        fed += abs(W[j]) * power * d[order - 1 - j]
+        weight += abs(W[j]) * power
+        products += abs(W[j]) * power * d[order - 1 - j]
         power *= h
-    stiff = abs(lam) * h * h
-    back = stiff * heaviest / (order * (order + 1))
-    return (stiff * fed / (order * (1.0 - back)) if back < 1.0 else np.inf), largest
+    stiffness = abs(lam) * h * h
+    feedback = stiffness * weight / (order * (order + 1))
+    return (stiffness * products / (order * (1.0 - feedback)) if feedback < 1.0 else np.inf), largest
 
 
 @shared
-def left_out_nonlinear(
+def truncation_nonlinear(
     scratch: Record, lam: float, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
-    """Bound on all terms that a nonlinear series leaves out of the velocity over h, and its largest term; times h.
+    """Bound on the truncation of a nonlinear arc's velocity over h, and its largest term; both times h.
 
     With r the velocity's terms, z those of sin and cos(alpha - u), b those of motion and weight, the products r z from
-    order - 2 on are left out of z', and b z from order - 1 on of u''; what they make feeds on itself and on the terms
-    that are there. See "Where a series may end" in the documentation. inf: h is too long for a bound.
+    order - 2 on are left out of z', and b z from order - 1 on of u'', and all terms that follow from them. See "Where a
+    series may end" in the documentation. inf: h is too long for a bound.
     """
     c, A, W = scratch.rotation, scratch.ground, scratch.weight
-    S, C, d = scratch.sine, scratch.cosine, scratch.spare
+    S, C, d = scratch.sine, scratch.cosine, scratch.other
     last = order - 2
     largest = 0.0
     power = h
@@ -297,15 +298,15 @@ def left_out_nonlinear(
         power *= h
     for k in range(order - 2, -1, -1):  # from here on: sums of all later terms
         d[k] += d[k + 1]
-    turned = d[last]
+    angle_products = d[last]
     angles = 1.0
     power = h
     for k in range(1, last + 1):
         term = (abs(S[k]) + abs(C[k])) * power
         angles += term
-        turned += term * d[last - k]
+        angle_products += term * d[last - k]
         power *= h
-    turning = d[0]
+    velocity = d[0]
     d[0] = 1.0
     power = h
     for k in range(1, last + 1):
@@ -314,27 +315,27 @@ def left_out_nonlinear(
     for k in range(last - 1, -1, -1):
         d[k] += d[k + 1]
     degree, changes = degrees
-    strongest = pushed = 0.0
+    strength = push_products = 0.0
     power = 1.0
     for j in range(max(degree, changes) + 1):
         push = ((abs(A[j]) if j <= degree else 0.0) + (abs(W[j]) if j <= changes else 0.0)) * power
-        strongest += push
+        strength += push
         if j > 0:
-            pushed += push * d[max(0, last + 1 - j)]
+            push_products += push * d[max(0, last + 1 - j)]
         power *= h
-    # What is left out of z is at most (turned + turning z + (what is left out of u') (angles + z))/(order - 1), with
-    # z below 1; what is left out of u' at most stiff (pushed + strongest z)/order.
-    stiff = abs(lam) * h * h
-    back = (turning + stiff * strongest * (angles + 1.0) / order) / (order - 1)
-    if not back < 0.5:
+    # The truncation of z is at most (angle_products + velocity z + (that of u') (angles + z))/(order - 1), with z below
+    # 1; that of u' at most stiffness (push_products + strength z)/order.
+    stiffness = abs(lam) * h * h
+    feedback = (velocity + stiffness * strength * (angles + 1.0) / order) / (order - 1)
+    if not feedback < 0.5:
         return np.inf, largest
-    z = (turned + stiff * pushed * (angles + 1.0) / order) / ((order - 1) * (1.0 - back))
-    return (stiff * (pushed + strongest * z) / order if z < 1.0 else np.inf), largest
+    z = (angle_products + stiffness * push_products * (angles + 1.0) / order) / ((order - 1) * (1.0 - feedback))
+    return (stiffness * (push_products + strength * z) / order if z < 1.0 else np.inf), largest
 
 
 @inlined
 def strength_of(weight: Line | None, push: Line, t: float) -> Line:
-    """Sum of the sizes of weight and push within t, and of what they change; given are their values and slopes."""
+    """Return the sums of |weight| and |push| within t, and of their changes; lines are values and slopes."""
     if weight is None:
         return 1.0 + abs(push[0]) + abs(push[1]) * t, abs(push[1]) * t
     change = (abs(push[1]) + abs(weight[1])) * t
@@ -342,11 +343,11 @@ def strength_of(weight: Line | None, push: Line, t: float) -> Line:
 
 
 @inlined
-def is_left_out_nothing(r: Nine, z: Seven, stiff: float, strength: Line) -> tuple[bool, float]:
-    """Whether nine terms leave out next to nothing (2^-52); and the size of all that the first leaves out of u''.
+def truncation_is_negligible(r: Nine, z: Seven, stiffness: float, strength: Line) -> tuple[bool, float]:
+    """Whether the truncation after nine terms is below 2^-52; and a bound on all terms of u'' after the first.
 
-    `left_out_nonlinear` for a motion and a weight that change evenly, with time, as in u'', counted in steps of length
-    h; ``stiff`` is lam h^2.
+    `truncation_nonlinear` for a motion and a weight that are linear in time, which is counted in steps of length h;
+    ``stiffness`` is lam h^2. Of a NaN it is False.
     """
     t8 = r[7] + r[8]  # sums of all later terms from here on
     t7 = r[6] + t8
@@ -355,13 +356,13 @@ def is_left_out_nothing(r: Nine, z: Seven, stiff: float, strength: Line) -> tupl
     t4 = r[3] + t5
     t3 = r[2] + t4
     t2 = r[1] + t3
-    turning = r[0] + t2
-    turned = (t8 + z[0] * t7) + (z[1] * t6 + z[2] * t5) + ((z[3] * t4 + z[4] * t3) + (z[5] * t2 + z[6] * turning))
-    most, change = stiff * strength[0], stiff * strength[1]
-    # Where all terms of the velocity, and stiff times the strength, are below a quarter, what feeds back adds so much.
-    beyond = 1.01 * change * z[6] + 0.131 * (most * turned)
-    nothing = (beyond <= _LEFT_OUT_OF_NINE * turning) & (turning <= _QUARTER) & (most <= _QUARTER)
-    return nothing, (t3 + t3) + ((t4 + t5) + (t6 + t7) + (t8 + r[8]))
+    velocity = r[0] + t2
+    products = (t8 + z[0] * t7) + (z[1] * t6 + z[2] * t5) + ((z[3] * t4 + z[4] * t3) + (z[5] * t2 + z[6] * velocity))
+    most, change = stiffness * strength[0], stiffness * strength[1]
+    # The factors include the feedback where velocity and most are below a quarter.
+    beyond = 1.01 * change * z[6] + 0.131 * (most * products)
+    negligible = (beyond <= _TRUNCATION_OF_NINE * velocity) & (velocity <= _QUARTER) & (most <= _QUARTER)
+    return negligible, (t3 + t3) + ((t4 + t5) + (t6 + t7) + (t8 + r[8]))
 
 
 @inlined

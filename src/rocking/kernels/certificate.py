@@ -6,7 +6,7 @@ At an impact the block enters side i with speed v. Over a window, side j's resto
 
 stays within [m_j, M_j]. Comparison of the arc with two of constant acceleration bounds its duration and its height,
 energy bounds the next impact's speed, and a geometric sum bounds all that follows. The derivation is in the
-documentation ("Theory").
+documentation ("Theory"). A NaN among the arguments gives NaN: no proof.
 """
 
 import math
@@ -22,7 +22,6 @@ from rocking.kernels.ground import (
     Ground,
     Window,
     bounds_over,
-    columns_of,
     has_vertical,
     length_of,
     local_series,
@@ -37,19 +36,19 @@ _WINDOW = 1.5
 
 
 class Bounds(NamedTuple):
-    """What is known of one side over a window.
+    """Bounds on one side over a window.
 
-    The restoring acceleration at zero rotation stays within [least, greatest] and changes by at most ``stiff`` per unit
-    of rotation; what the motion adds to it changes by at most ``swing``, and within a time by at most ``rate`` times
-    that time and ``leap``.
+    The restoring acceleration at zero rotation stays within [least, greatest] and changes by at most ``stiffness`` per
+    unit of rotation; what the motion adds to it changes by at most ``change``, and within a time by at most ``rate``
+    times that time and ``jumps``.
     """
 
-    stiff: float
+    stiffness: float
     least: float
     greatest: float
-    swing: float
+    change: float
     rate: float
-    leap: float
+    jumps: float
 
 
 @inlined
@@ -74,23 +73,23 @@ def geometric_bracket(v: float, first: Bounds, second: Bounds, e_i: float, e_j: 
 
 @inlined
 def arc_bounds(v: float, bounds: Bounds) -> tuple[float, float, float]:
-    """Bounds on one arc of initial speed v: (|w^2/v^2 - 1| for its impact speed w, duration from, to); NaN: none.
+    """Bounds on one arc of initial speed v: |w^2/v^2 - 1| for its impact speed w, least and greatest duration.
 
-    The durations (2/sqrt(stiff)) atan(x), atanh(x), with x = sqrt(stiff) v/greatest and /least, are replaced by the
-    rational bounds x - x^3/3 and x + x^3/(3 (1 - x^2)), which need no transcendental function.
+    The durations (2/sqrt(k)) atan(x), atanh(x), with k the stiffness and x = sqrt(k) v/greatest and /least, are
+    replaced by the rational bounds x - x^3/3 and x + x^3/(3 (1 - x^2)), which need no transcendental function.
     """
-    stiff, m, M, swing, rate, leap = bounds
-    if not (m > 0.0 and stiff * v * v < m * m):
+    k, m, M, change, rate, jumps = bounds
+    if not (m > 0.0 and k * v * v < m * m):
         return np.nan, np.nan, np.nan
-    squared = stiff * v * v / (m * m)
-    shortest = 2.0 * v / M * (1.0 - stiff * v * v / (3.0 * M * M))
+    squared = k * v * v / (m * m)
+    shortest = 2.0 * v / M * (1.0 - k * v * v / (3.0 * M * M))
     longest = 2.0 * v / m * (1.0 + squared / (3.0 * (1.0 - squared)))
-    change = 2.0 * min(swing, rate * longest + leap) / (m * (1.0 + math.sqrt(1.0 - squared)))
-    return change, shortest, longest
+    energy = 2.0 * min(change, rate * longest + jumps) / (m * (1.0 + math.sqrt(1.0 - squared)))
+    return energy, shortest, longest
 
 
 class Proof(NamedTuple):
-    """Bounds on the time to rest from an impact, the likeliest time, and a bound on all rotations until then.
+    """Bounds on the time to rest from an impact, an estimate of it, and a bound on all rotations until then.
 
     All NaN where nothing is proven.
     """
@@ -109,7 +108,7 @@ def unproven() -> Proof:
 
 @shared
 def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record) -> Proof:
-    """Bracket on the time to rest from an impact just passed."""
+    """Bracket on the time to rest from the state after an impact; all NaN: no proof."""
     v, i = state.v, state.side
     j = block.entered[i]
     e_i, e_j = block.restitution[i], block.restitution[j]
@@ -119,31 +118,31 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
         return unproven()
     window = _WINDOW * 2.0 * v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)
     # The rounding of the times decides on which side of a jump of the motion the window ends.
-    doubt = ROUNDING * (start_of(ground, state.piece) + state.offset)
-    motion = bounds_on_motion(ground, block, state, window + doubt, scratch)
+    rounding = ROUNDING * (start_of(ground, state.piece) + state.offset)
+    motion = bounds_on_motion(ground, block, state, window + rounding, scratch)
     first = side_bounds(block, rules, i, motion)
     second = side_bounds(block, rules, j, motion)
     lower, upper = geometric_bracket(v, first, second, e_i, e_j)
     if not upper <= window:
         return unproven()
-    least, swing = min(first.least, second.least), max(first.swing, second.swing)
-    height = v * v * (1.0 + 2.0 * swing / least) / least
-    if has_vertical(ground) and not is_low(block, height):
+    least, change = min(first.least, second.least), max(first.change, second.change)
+    height = v * v * (1.0 + 2.0 * change / least) / least
+    if has_vertical(ground) and not is_greatest_at_zero(block, height):
         return unproven()
     local_series(ground, state.piece, state.offset, 1.0, clear(scratch.ground))
     weight_series(ground, state.piece, state.offset, clear(scratch.weight))
-    seen_up_to = Seen(motion, ground.error, columns_of(ground), upper, height)
-    one = side_here(block, rules, i, scratch, seen_up_to)
-    other = side_here(block, rules, j, scratch, seen_up_to)
-    if upper - lower > rules.tolerance and upper + doubt <= length_of(ground, state.piece) - state.offset:
-        finer = refined_bracket(v, one, other, upper)
-        if finer[1] >= finer[0]:
-            lower, upper = max(lower, finer[0]), min(upper, finer[1])
+    horizon = Horizon(motion, ground.error, ground.columns, upper, height)
+    side_i = restoring_parabola(block, rules, i, scratch, horizon)
+    side_j = restoring_parabola(block, rules, j, scratch, horizon)
+    if upper - lower > rules.tolerance and upper + rounding <= length_of(ground, state.piece) - state.offset:
+        refined = refined_bracket(v, side_i, side_j, upper)
+        if refined[1] >= refined[0]:
+            lower, upper = max(lower, refined[0]), min(upper, refined[1])
             return Proof(lower, upper, 0.5 * (lower + upper), height)
-    return Proof(lower, upper, min(max(remaining_time(v, one, other), lower), upper), height)
+    return Proof(lower, upper, min(max(remaining_time(v, side_i, side_j), lower), upper), height)
 
 
-class Bounded(NamedTuple):
+class MotionBounds(NamedTuple):
     """Bounds on both components of the motion over a window; the vertical one adds to a weight of 1."""
 
     horizontal: Window
@@ -151,31 +150,32 @@ class Bounded(NamedTuple):
 
 
 @inlined
-def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float, scratch: Record) -> Bounded:
+def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float, scratch: Record) -> MotionBounds:
     """Bounds on the motion from a state on, its error included; NaN where it passes a threshold."""
-    lifts = Window(0.0, 0.0, 0.0, 0.0)
+    vertical = Window(0.0, 0.0, 0.0, 0.0)
     if has_vertical(ground):
-        upright = bounds_over(vertical_of(ground), state.piece, state.offset, window, (-1.0, np.inf), scratch.ground)
-        lifts = disturbed(upright, ground.error)
-    weight = 1.0 + lifts.high
+        limits = (-1.0, np.inf)
+        exact = bounds_over(vertical_of(ground), state.piece, state.offset, window, limits, scratch.ground)
+        vertical = widened(exact, ground.error)
+    weight = 1.0 + vertical.high
     limits = (-block.threshold[0] * weight, block.threshold[1] * weight)
-    pushes = bounds_over(ground, state.piece, state.offset, window, limits, scratch.ground)
-    return Bounded(disturbed(pushes, ground.error), lifts)
+    horizontal = bounds_over(ground, state.piece, state.offset, window, limits, scratch.ground)
+    return MotionBounds(widened(horizontal, ground.error), vertical)
 
 
 @inlined
-def is_low(block: Record, height: float) -> bool:
-    """Whether rotations up to a height leave the weight's part of the restoring acceleration below that at zero."""
+def is_greatest_at_zero(block: Record, height: float) -> bool:
+    """Whether the weight's part of the restoring acceleration is nowhere up to a height above that at zero rotation."""
     return height <= 2.0 * min(block.slenderness[0], block.slenderness[1])
 
 
-class Seen(NamedTuple):
-    """What is known of the time to come.
+class Horizon(NamedTuple):
+    """Bounds over the window of a proof.
 
-    Bounds on the motion, its error and the number of its coefficients, how long that holds, the highest rotation.
+    Those on the motion, its error and the number of its coefficients, the window's length, the highest rotation.
     """
 
-    motion: Bounded
+    motion: MotionBounds
     error: float
     columns: int
     window: float
@@ -183,46 +183,47 @@ class Seen(NamedTuple):
 
 
 @inlined
-def side_here(block: Record, rules: Record, j: int, scratch: Record, seen: Seen) -> Restoring:
-    """Side j as seen from an impact: its restoring acceleration as a parabola in time, a stiffness, and what is left.
+def restoring_parabola(block: Record, rules: Record, j: int, scratch: Record, horizon: Horizon) -> Restoring:
+    """Side j from an impact on: its restoring acceleration as a parabola in time, its stiffness, and their error.
 
     ``scratch`` holds the ground acceleration and the weight about the impact.
     """
     A, W = scratch.ground, scratch.weight
     sign, gain, threshold, lam = sign_of(j), block.gain[j], block.threshold[j], block.stiffness[j]
-    horizontal, vertical = seen.motion
-    error = seen.error + beyond_parabola(A, seen)
-    # Where next to nothing presses the block down, weight and push cancel, and the rounding of both stays.
+    horizontal, vertical = horizon.motion
+    error = horizon.error + beyond_parabola(A, horizon)
+    # Where almost no weight presses the block down, weight and push cancel, and the rounding of both remains.
     error += ROUNDING * (threshold * (1.0 + largest(vertical)) + largest(horizontal))
-    weighs = vertical.high > vertical.low
-    lift = seen.error + beyond_parabola(W, seen) if weighs else 0.0
-    sway = vertical.slope * seen.window + 2.0 * seen.error if weighs else 0.0
+    weight_changes = vertical.high > vertical.low
+    weight_error = horizon.error + beyond_parabola(W, horizon) if weight_changes else 0.0
+    weight_change = vertical.slope * horizon.window + 2.0 * horizon.error if weight_changes else 0.0
     if not rules.nonlinear:
         stiffness = lam * W[0]
-        error = gain * (error + threshold * lift)
-        if weighs:
-            error = deviation(error, abs(lam) * sway, 0.0, seen.height)
+        error = gain * (error + threshold * weight_error)
+        if weight_changes:
+            error = deviation(error, abs(lam) * weight_change, 0.0, horizon.height)
     else:
         sine, cosine = block.sine[j], block.cosine[j]
         stiffness = lam * (cosine * W[0] - sign * A[0] * sine)
-        drift = lam * (sine * (horizontal.slope * seen.window + 2.0 * seen.error) + cosine * sway)
-        bend = lam * math.hypot(heaviest(vertical), largest(horizontal))
-        error = deviation(lam * (error + lift), drift, bend, seen.height)
+        push_change = horizontal.slope * horizon.window + 2.0 * horizon.error
+        change = lam * (sine * push_change + cosine * weight_change)
+        curvature = lam * math.hypot(largest_weight(vertical), largest(horizontal))
+        error = deviation(lam * (error + weight_error), change, curvature, horizon.height)
     g = gain * (threshold * W[0] + sign * A[0])
-    rate, curvature = gain * (sign * A[1]), gain * (sign * A[2]) if seen.columns > 2 else 0.0
-    if weighs:
+    rate, half_curvature = gain * (sign * A[1]), gain * (sign * A[2]) if horizon.columns > 2 else 0.0
+    if weight_changes:
         rate += gain * threshold * W[1]
-        curvature += gain * threshold * W[2]
-    return Restoring(g, rate, curvature, stiffness, block.restitution[j], error)
+        half_curvature += gain * threshold * W[2]
+    return Restoring(g, rate, half_curvature, stiffness, block.restitution[j], error)
 
 
 @inlined
-def beyond_parabola(A: Floats, seen: Seen) -> float:
-    """Bound on what a polynomial holds beyond degree 2."""
+def beyond_parabola(A: Floats, horizon: Horizon) -> float:
+    """Bound on the terms of a polynomial beyond degree 2."""
     beyond = 0.0
-    for k in range(seen.columns - 1, 2, -1):
-        beyond = (beyond + abs(A[k])) * seen.window
-    return beyond * seen.window * seen.window
+    for k in range(horizon.columns - 1, 2, -1):
+        beyond = (beyond + abs(A[k])) * horizon.window
+    return beyond * horizon.window * horizon.window
 
 
 @inlined
@@ -233,42 +234,41 @@ def clear(A: Floats) -> Floats:
 
 
 @inlined
-def disturbed(motion: Window, error: float) -> Window:
+def widened(motion: Window, error: float) -> Window:
     """Bounds on a motion that differs from a bounded one by at most ``error`` at any time."""
     return Window(motion.low - error, motion.high + error, motion.slope, motion.jumps + 2.0 * error)
 
 
 @inlined
 def largest(motion: Window) -> float:
-    """Largest size of an acceleration."""
+    """Largest absolute value of an acceleration."""
     return max(abs(motion.low), abs(motion.high))
 
 
 @inlined
-def heaviest(lifts: Window) -> float:
-    """Largest size of the weight."""
-    return max(1.0 + lifts.high, -(1.0 + lifts.low))
+def largest_weight(vertical: Window) -> float:
+    """Largest absolute value of the weight, over that at rest."""
+    return max(1.0 + vertical.high, -(1.0 + vertical.low))
 
 
 @inlined
-def side_bounds(block: Record, rules: Record, j: int, motion: Bounded) -> Bounds:
+def side_bounds(block: Record, rules: Record, j: int, motion: MotionBounds) -> Bounds:
     """Bounds on side j, rounding included, for bounds on the motion."""
     horizontal, vertical = motion
     sign, threshold = sign_of(j), block.threshold[j]
-    light, heavy = threshold * (1.0 + vertical.low), threshold * (1.0 + vertical.high)
-    one, other = sign * horizontal.low, sign * horizontal.high
-    strongest, weight = largest(horizontal), heaviest(vertical)
-    slack = ROUNDING * (threshold * weight + strongest)
+    from_weight = (threshold * (1.0 + vertical.low), threshold * (1.0 + vertical.high))
+    from_push = (sign * horizontal.low, sign * horizontal.high)
+    push, weight = largest(horizontal), largest_weight(vertical)
+    rounding = ROUNDING * (threshold * weight + push)
     # A rotation changes both models' stiffness and, in the nonlinear one, what the motion adds (at most p^2 a/g).
-    stiff = abs(block.stiffness[j]) * (math.hypot(weight, strongest) if rules.nonlinear else weight) * (1.0 + ROUNDING)
-    push = (block.stiffness[j] if rules.nonlinear else block.gain[j]) * (1.0 + ROUNDING)
-    # What weight adds is largest at zero rotation (`is_low`).
-    lift = block.gain[j] * threshold * (1.0 + ROUNDING)
+    stiffness = abs(block.stiffness[j]) * (math.hypot(weight, push) if rules.nonlinear else weight) * (1.0 + ROUNDING)
+    per_push = (block.stiffness[j] if rules.nonlinear else block.gain[j]) * (1.0 + ROUNDING)
+    per_weight = block.gain[j] * threshold * (1.0 + ROUNDING)  # largest at zero rotation: `is_greatest_at_zero`
     return Bounds(
-        stiff,
-        block.gain[j] * (light + min(one, other) - slack),
-        block.gain[j] * (heavy + max(one, other) + slack),
-        push * (horizontal.high - horizontal.low) + lift * (vertical.high - vertical.low),
-        push * horizontal.slope + lift * vertical.slope,
-        push * horizontal.jumps + lift * vertical.jumps,
+        stiffness,
+        block.gain[j] * (from_weight[0] + min(from_push[0], from_push[1]) - rounding),
+        block.gain[j] * (from_weight[1] + max(from_push[0], from_push[1]) + rounding),
+        per_push * (horizontal.high - horizontal.low) + per_weight * (vertical.high - vertical.low),
+        per_push * horizontal.slope + per_weight * vertical.slope,
+        per_push * horizontal.jumps + per_weight * vertical.jumps,
     )

@@ -15,7 +15,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rocking import compiling
 from rocking.kernels import library
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -24,6 +23,10 @@ _HERE = Path(__file__).parent
 
 #: Whether kernels run as Python reads them, in numba's own words: slow, and the same to the last bit.
 UNCOMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+
+
+#: What is called once, before anything is compiled.
+before_compiling: list[Callable[[], None]] = []
 
 
 class OnUse:
@@ -38,7 +41,8 @@ class OnUse:
     @functools.cached_property
     def compiled(self) -> Any:
         """What numba makes of it."""
-        compiling.listen()
+        while before_compiling:
+            before_compiling.pop()()
         return self._compile(self.py_func)
 
     @property
@@ -114,9 +118,9 @@ def _part(function: F, *, inline: bool) -> F:
 def cache_folder() -> Path | None:
     """Folder for what is compiled from exactly these sources; None where nothing can be written.
 
-    numba looks for changes in the file of an entry point alone, and would go on with stale code when another kernel
-    that it calls has changed. So the folder's name holds a hash of all of them. numba writes its files under another
-    name and renames them, so that any number of processes may share the folder.
+    numba checks the file of an entry point only, and would use old code when another kernel that it calls has changed.
+    So the folder's name is a hash of all of them. numba writes its files under another name and renames them, so that
+    any number of processes may share the folder.
     """
     name = f"kernels-{fingerprint()}"
     for parent in _parents():

@@ -1,15 +1,14 @@
 """How numba compiles kernels and their parts: `compiled` imports this where something has to be compiled.
 
-IEEE arithmetic, no exceptions, no reference counts. A part is code that is only ever linked into kernels: numba makes a
-library of every function that it compiles; it optimises the function together with all that it calls, turns all of it
-into machine code, and wraps it for callers from Python and from C. Where a kernel calls the function all of that is
-done again for the kernel, and so at every level of calls. Here a part ends as intermediate code, each function
-simplified by itself (else branches in a part would keep the loops that it is inlined into from being vectorised). The
-kernel links all of its parts, and they are optimised once and together. That halves the time of a first call, and the
-kernel that results is as fast.
+IEEE arithmetic, no exceptions, no reference counts. A part is code that is only linked into kernels. numba makes a
+library of every function that it compiles: it optimises the function together with all that it calls, makes machine
+code of it, and wraps it for callers from Python and from C; and it does all of that again at every level of calls. Here
+a part ends as intermediate code, each function simplified by itself (otherwise branches in a part would prevent that
+loops into which it is inlined are vectorised). The kernel links all of its parts, and they are optimised once and
+together. That halves the time of a first call, and the kernel is as fast.
 
-It uses numba's documented ways to choose the passes over a function, and two methods of its libraries. `_POSSIBLE`
-checks for the latter; without them parts are compiled in numba's own way.
+This uses numba's documented ways to choose the passes over a function, and some members of its libraries. `_POSSIBLE`
+checks for them; without them parts are compiled in numba's own way.
 """
 
 import contextlib
@@ -29,13 +28,26 @@ from numba.core.typed_passes import NativeLowering
 from numba.core.types.misc import unliteral
 from numba.extending import register_model
 
-#: Whether numba's libraries are as `PartLibrary` takes them to be.
+#: Whether numba's libraries have the members that `PartLibrary` uses.
 _POSSIBLE = hasattr(Flags, "no_compile") and all(
     hasattr(JITCodeLibrary, name) for name in ("_finalized", "_ensure_finalized", "_get_module_for_linking")
 )
 
 #: Passes over what kernels have none of: closures, array expressions, functions that numba inlines for itself.
 _IDLE_PASSES = ("InlineClosureLikes", "InlineOverloads", "NopythonRewrites")
+
+
+class KernelLibrary(JITCodeLibrary):
+    """A kernel's code."""
+
+    def finalize(self) -> None:
+        """Link parts before kernels, then optimise.
+
+        Linking drops what nothing refers to so far. A kernel brings its own copies of parts, in which others have
+        been inlined already: linked first, they would take the place of the only ones that refer to those others.
+        """
+        self._linking_libraries.sort(key=lambda library: not isinstance(library, PartLibrary))
+        super().finalize()
 
 
 class PartLibrary(JITCodeLibrary):
@@ -46,17 +58,30 @@ class PartLibrary(JITCodeLibrary):
         self._needed: dict[CodeLibrary, None] = {}
 
     def add_linking_library(self, library: CodeLibrary) -> None:
-        """Remember what this code calls: who links this library has to link that one, too."""
+        """Remember a library that this code calls: with this library that one has to be linked, too."""
         super().add_linking_library(library)
         self._needed[library] = None
 
     def with_needed(self) -> list[CodeLibrary]:
-        """List this library and all that it calls, directly or not."""
+        """List this library and all that it calls, directly or indirectly."""
         return [self, *self._needed]
 
     def finalize(self) -> None:
-        """Take no more code, and do nothing with it."""
+        """Accept no more code; do not optimise it."""
         self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):
+    """The last pass over a kernel: from typed Python to machine code."""
+
+    _name = "kernel_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower into a library of our kind."""
+        state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -66,14 +91,14 @@ class PartLowering(NativeLowering):
     _name = "part_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        """Lower into a library of our kind, and tell where callers find the code and all that it needs."""
+        """Lower into a `PartLibrary`, and register the code with all that it needs for its callers."""
         context = state.targetctx
         state.library = PartLibrary(context.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
         lowered = state["cr"]
-        # Compiled functions are known by what Python calls, a function of C's. A part has none: any that is nobody
-        # else's will do, and is never called, for Python calls a `Part`.
+        # Compiled functions are identified by the function of C's that Python calls. A part has none: any unique one
+        # will do, and is never called, for Python calls a `Part`.
         name: Callable[[Any], None] = [].append
         context.insert_user_function(name, lowered.fndesc, state.library.with_needed())
         state["cr"] = lowered._replace(cfunc=name)
@@ -81,9 +106,9 @@ class PartLowering(NativeLowering):
 
 
 class KernelCompiler(CompilerBase):
-    """numba's compiler, without passes that have nothing to do, and without a look for garbage at every turn."""
+    """numba's compiler, without passes that have nothing to do, and without searches for garbage."""
 
-    lowering = NativeLowering
+    lowering = KernelLowering if _POSSIBLE else NativeLowering
 
     def define_pipelines(self) -> list[PassManager]:
         """Choose the passes."""
@@ -97,7 +122,7 @@ class KernelCompiler(CompilerBase):
 
     def compile_extra(self, func: Callable[..., Any]) -> CompileResult:
         """Compile a function."""
-        with _garbage_left_alone():
+        with _without_garbage_collection():
             return super().compile_extra(func)
 
 
@@ -108,8 +133,8 @@ class PartCompiler(KernelCompiler):
 
 
 @contextlib.contextmanager
-def _garbage_left_alone() -> Iterator[None]:
-    """No search for cyclic garbage meanwhile: there is little, and a tenth of the time went into looking for it."""
+def _without_garbage_collection() -> Iterator[None]:
+    """Switch the search for cyclic garbage off: there is little, and the search took a tenth of the time."""
     collecting = gc.isenabled()
     gc.disable()
     try:
@@ -120,7 +145,7 @@ def _garbage_left_alone() -> Iterator[None]:
 
 
 class PartType(types.Dispatcher):
-    """Type of a part, as its callers see it: a compiled function, the same for a constant as for any other integer."""
+    """Type of a part for its callers: a compiled function, the same for a constant as for any other integer."""
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
         """Type of a call."""
@@ -131,7 +156,7 @@ register_model(PartType)(OpaqueModel)
 
 
 class Part:
-    """A part of kernels. Python, too, may call it: through a kernel that does nothing else."""
+    """A part of kernels. Python may call it, too: through a kernel that does nothing else."""
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         functools.update_wrapper(self, function)
@@ -158,15 +183,15 @@ class Part:
         return compiled
 
 
-# - error_model: a kernel that divides by zero goes on with inf or NaN and reports through its status.
+# - error_model: a kernel that divides by zero continues with inf or NaN; its code says what became of it.
 # - fast-math is never switched on: the proofs rest on IEEE rounding, and every machine gives the same answer.
-# - _nrt=False: kernels never allocate, so counting references to their array arguments (atomic operations, dearer
-#   than a whole Taylor step) is switched off.
+# - _nrt=False: kernels never allocate, so counting references to their array arguments (atomic operations, which take
+#   longer than a whole Taylor step) is switched off.
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
 
-# - forceinline is said of every function: numba hands an unsaid one down from the first caller, so that one inlined
-#   function would inline all that it calls, a march included.
-# - no_cfunc_wrapper: nobody calls a kernel from C.
+# - forceinline is set for every function: else numba takes it from the first caller, so that one inlined function would
+#   inline all that it calls, a march included.
+# - no_cfunc_wrapper: kernels are not called from C.
 _KERNEL = {"forceinline": False, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
 
 

@@ -16,26 +16,23 @@ from rocking.kernels.state import Outcome, Record
 
 _EPSILON = 2.0**-53
 
-#: After so many steps the search goes on within a window that is so many times as long as what has been searched.
+#: After so many steps the search continues within a window so many times as long as what has been searched.
 _STEPS_PER_WINDOW = 8
 _WINDOW = 4.0
 
-#: Some six steps find a simple root; a near touch takes tens to thousands. A series that is still not negative after
-#: so many lies within 1e-10 of zero, relative to its curvature: that counts as a touch.
+#: Some six steps find a simple root, tens to thousands a minimum near zero. A series that is still not negative after
+#: so many is within 1e-10 of zero, relative to its curvature: that counts as a root.
 _MAXIMUM_STEPS = 100_000
 
 
 @shared
 def first_root(c: Floats, lead: int, order: int, h: float) -> float:
-    """First root in (0, h] of sum_k c[lead + k] t^k; NaN when there is none.
+    """First root in (0, h] of sum_k c[lead + k] t^k (Eq. 20: Eq. 15 divided by t^lead); NaN when there is none.
 
-    The series is the paper's Eq. 20: what is left of Eq. 15 after division by t^lead. It must not be negative
-    at 0. On [0, h] the second derivative is never below -bound, so the parabola with that curvature through the
-    current value and slope lies below the series, and its root is a step that no root of the series can precede.
-    Near a simple root the steps converge quadratically, always from the left. Where they are short because the bound
-    holds for all of a much longer interval, a window, with a bound of its own, goes before them.
-
-    A series that rounding makes negative at 0 counts as zero there, and that zero not as a root.
+    A zero at 0 is no root, nor is a negative value there, which is rounding. The parabola through the current value and
+    slope with the least curvature on [0, h] is below the series, so no root precedes the parabola's: a step to it
+    passes none, and near a simple root these steps converge quadratically. Where that curvature is much larger than
+    needed, a shorter window with its own bound is searched first.
     """
     while lead < order and c[lead] == 0.0:
         lead += 1
@@ -70,7 +67,7 @@ def first_root(c: Floats, lead: int, order: int, h: float) -> float:
 
 @inlined
 def curvature_bound(c: Floats, lead: int, order: int, h: float) -> float:
-    """Bound B >= 0 with f'' >= -B on [0, h] for the deflated series f: terms that help are left out."""
+    """Bound B >= 0 with f'' >= -B on [0, h] for the deflated series f, from its negative terms."""
     lowest = 0.0
     power = 1.0
     for k in range(2, order - lead + 1):
@@ -93,7 +90,7 @@ def deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float, float]:
 
 
 class StepEnd(NamedTuple):
-    """How a step ends (`Outcome`); time, u, u' there; time and size of the highest rotation on it.
+    """How a step ends (`Outcome`); time, u, u' there; time and value of the highest rotation on it.
 
     Where no rotation on it is above the highest so far, the last two are those of its end.
     """
@@ -109,7 +106,7 @@ class StepEnd(NamedTuple):
 @shared
 def advance(state: Record, scratch: Record, order: int, h: float, fallen: float) -> StepEnd:
     """Follow the series of an arc to its first event within h; the outcome is STEP, IMPACT or OVERTURN."""
-    c, d = scratch.rotation, scratch.spare
+    c, d = scratch.rotation, scratch.other
     lead = 0 if state.u > 0.0 else (1 if state.v > 0.0 else 2)
     time = first_root(c, lead, order, h)
     outcome = Outcome.IMPACT
@@ -117,7 +114,7 @@ def advance(state: Record, scratch: Record, order: int, h: float, fallen: float)
         time = h
         outcome = Outcome.STEP
     end, speed, _ = evaluate(c, order, time)
-    if end <= 0.0:  # also without a root: one within rounding of the step's end must not be left behind
+    if end <= 0.0:  # also without a root: one within rounding of the step's end must not be missed
         outcome, end = Outcome.IMPACT, 0.0
     peak_time, peak = time, end
     if is_higher_between(state, end, c, order, time):

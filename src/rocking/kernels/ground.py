@@ -2,7 +2,7 @@
 
 A row of `Ground.pieces` is one piece: start (s), length (s), coefficients in powers of the time since the start, those
 of the vertical component, where there is one, after the horizontal ones. The last row has no end and no acceleration,
-so that nothing here or above needs to ask whether the motion is over.
+so that no function has to check whether the motion is over. Nothing here checks for NaN; it is passed on.
 """
 
 from typing import NamedTuple
@@ -15,21 +15,22 @@ from rocking.kernels.compiled import inlined, kernel, shared
 #: Relative allowance for rounding in bounds.
 ROUNDING = 2.0**-48
 
-#: Pieces of one stretch: `next_beyond` and `bounds_over` pass over whole stretches.
+#: Pieces of one stretch: `next_beyond` and `bounds_over` skip whole stretches.
 STRETCH = 16
 
-#: Pieces and whole stretches that a window may span; longer windows wait for a slower impact.
+#: Pieces and whole stretches that a window may span.
 _LONGEST_WINDOW = 128
 
+#: Columns of a piece: start, length, first coefficient; and of the bounds on a stretch, which are those of a `Window`.
 _START, _LENGTH, _FIRST = 0, 1, 2
+_LOW, _HIGH, _SLOPE, _JUMPS = 0, 1, 2, 3
 
 
 class Ground(NamedTuple):
-    """A motion, seen by one of its components.
+    """One component of a motion.
 
-    Its pieces; bounds on each stretch of them of shape (stretches, components, 4), the last as in `Window`; its
-    approximation error (g); the number of coefficients
-    of a component, and the column of the first one of this component: the horizontal one, but for `vertical_of`.
+    The motion's pieces; bounds on stretches of them, shape (stretches, components, 4); approximation error (g); number
+    of coefficients of a component; column of this component's first one (the horizontal one's, but for `vertical_of`).
     """
 
     pieces: Floats
@@ -42,7 +43,7 @@ class Ground(NamedTuple):
 class Window(NamedTuple):
     """Bounds on the acceleration over some time: least, greatest, steepest slope, sum of all jumps.
 
-    Of a piece or a stretch, ``jumps`` counts the one at its end.
+    The jump at the end of a stretch is one of its jumps.
     """
 
     low: float
@@ -56,7 +57,7 @@ def ground_of(
 ) -> Ground:
     """Ground from a motion's breakpoints (s), coefficients of both components on the same pieces, and error.
 
-    ``unit``: what coefficients and error are multiplied with, to be in units of g.
+    ``unit``: factor that makes of coefficients and error units of g.
     """
     components = [coefficients] if vertical is None else [coefficients, vertical]
     columns = max(2, *(component.shape[1] for component in components))
@@ -64,8 +65,7 @@ def ground_of(
     stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), len(Window._fields)))
     ground = Ground(pieces, stretches, error * unit, columns, _FIRST)
     for k, component in enumerate(components):
-        seen = ground._replace(first=_FIRST + k * columns)
-        fill(breakpoints, component, unit, seen, np.zeros(columns))
+        fill(breakpoints, component, unit, ground._replace(first=_FIRST + k * columns), np.zeros(columns))
     return ground
 
 
@@ -76,14 +76,13 @@ def components(ground: Ground, pieces: Integers) -> list[Floats]:
 
 
 def greatest_weight(ground: Ground) -> float:
-    """Greatest size of the weight in the ground's frame, over that at rest."""
-    lifts = Window(*np.moveaxis(ground.stretches[:, 1:], -1, 0))
-    return float(np.max(np.abs(1.0 + np.array([lifts.low, lifts.high])), initial=1.0))
+    """Greatest absolute value of the weight in the ground's frame, over that at rest."""
+    return float(np.max(np.abs(1.0 + ground.stretches[:, 1:, _LOW : _HIGH + 1]), initial=1.0))
 
 
 @kernel
 def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground, A: Floats) -> None:
-    """Fill the rows of a ground for one component: pieces, and bounds on stretches of them. ``A`` is scratch space."""
+    """Write the pieces of one component, and the bounds on stretches of them. ``A`` is scratch space."""
     pieces, last = ground.pieces, coefficients.shape[0]
     for k in range(last):
         pieces[k, _START] = breakpoints[k]
@@ -93,33 +92,32 @@ def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground,
     pieces[last, _START] = breakpoints[last]
     pieces[last, _LENGTH] = np.inf
     for stretch in range(ground.stretches.shape[0]):
-        put_stretch(ground, stretch, Window(np.inf, -np.inf, 0.0, 0.0))
+        set_stretch(ground, stretch, Window(np.inf, -np.inf, 0.0, 0.0))
     for k in range(last + 1):
         piece = bounds_within(ground, k, 0.0, pieces[k, _LENGTH], A)
         jumps = piece.jumps + jump_after(ground, k) if k < last else 0.0
-        so_far = stretch_bounds(ground, k // STRETCH)
-        low, high = min(so_far.low, piece.low), max(so_far.high, piece.high)
-        together = Window(low, high, max(so_far.slope, piece.slope), so_far.jumps + jumps)
-        put_stretch(ground, k // STRETCH, together)
+        before = stretch_bounds(ground, k // STRETCH)
+        low, high = min(before.low, piece.low), max(before.high, piece.high)
+        set_stretch(ground, k // STRETCH, Window(low, high, max(before.slope, piece.slope), before.jumps + jumps))
 
 
 @inlined
-def put_stretch(ground: Ground, stretch: int, bounds: Window) -> None:
+def set_stretch(ground: Ground, stretch: int, bounds: Window) -> None:
     """Write the bounds on a stretch."""
     row = ground.stretches[stretch, component_of(ground)]
-    row[0], row[1], row[2], row[3] = bounds
+    row[_LOW], row[_HIGH], row[_SLOPE], row[_JUMPS] = bounds
 
 
 @inlined
 def stretch_bounds(ground: Ground, stretch: int) -> Window:
     """Bounds on a stretch."""
     row = ground.stretches[stretch, component_of(ground)]
-    return Window(row[0], row[1], row[2], row[3])
+    return Window(row[_LOW], row[_HIGH], row[_SLOPE], row[_JUMPS])
 
 
 @inlined
 def component_of(ground: Ground) -> int:
-    """Return 0 for the horizontal component, 1 for the vertical one."""
+    """Index of the component among the bounds on stretches: 0 for the horizontal one, 1 for the vertical one."""
     return 0 if ground.first == _FIRST else 1
 
 
@@ -131,14 +129,14 @@ def has_vertical(ground: Ground) -> bool:
 
 @inlined
 def vertical_of(ground: Ground) -> Ground:
-    """Return the motion as seen by its vertical component, for all functions of this module."""
+    """Take the motion's vertical component in place of the horizontal one."""
     return Ground(ground.pieces, ground.stretches, ground.error, ground.columns, ground.first + ground.columns)
 
 
 @inlined
 def is_straight(ground: Ground) -> bool:
-    """Whether the motion changes evenly on each piece, as records do."""
-    return columns_of(ground) == 2
+    """Whether the motion is linear in time on each piece, as records are."""
+    return ground.columns == 2
 
 
 @inlined
@@ -160,12 +158,6 @@ def length_of(ground: Ground, piece: int) -> float:
 
 
 @inlined
-def columns_of(ground: Ground) -> int:
-    """Count the coefficients of a piece."""
-    return ground.columns
-
-
-@inlined
 def coefficient(ground: Ground, piece: int, power: int) -> float:
     """Coefficient of a power of the time since a piece's start."""
     return ground.pieces[piece, ground.first + power]
@@ -175,7 +167,7 @@ def coefficient(ground: Ground, piece: int, power: int) -> float:
 def acceleration(ground: Ground, piece: int, offset: float) -> float:
     """Ground acceleration within a piece, g."""
     value = 0.0
-    for k in range(columns_of(ground) - 1, -1, -1):
+    for k in range(ground.columns - 1, -1, -1):
         value = value * offset + ground.pieces[piece, ground.first + k]
     return value
 
@@ -184,7 +176,7 @@ def acceleration(ground: Ground, piece: int, offset: float) -> float:
 def slope(ground: Ground, piece: int, offset: float) -> float:
     """Rate of the ground acceleration within a piece, g/s."""
     value = 0.0
-    for k in range(columns_of(ground) - 1, 0, -1):
+    for k in range(ground.columns - 1, 0, -1):
         value = value * offset + k * ground.pieces[piece, ground.first + k]
     return value
 
@@ -192,11 +184,11 @@ def slope(ground: Ground, piece: int, offset: float) -> float:
 @inlined
 def local_series(ground: Ground, piece: int, offset: float, sign: float, A: Floats) -> int:
     """Put a piece's polynomial about ``offset``, times ``sign``, into A; returns its degree."""
-    degree = columns_of(ground) - 1
+    degree = ground.columns - 1
     while degree > 0 and coefficient(ground, piece, degree) == 0.0:
         A[degree] = 0.0
         degree -= 1
-    # Horner's rule, for all coefficients at once; the sums of a turn do not wait for one another as those of `move` do.
+    # Horner's rule, for all coefficients at once: unlike in `move` the sums of one turn do not depend on each other.
     A[0] = sign * coefficient(ground, piece, degree)
     for k in range(1, degree + 1):
         A[k] = A[k - 1]
@@ -208,7 +200,7 @@ def local_series(ground: Ground, piece: int, offset: float, sign: float, A: Floa
 
 @inlined
 def move(c: Floats, degree: int, t: float) -> None:
-    """Centre of a polynomial moved by t, in place."""
+    """Expand a polynomial about t, in place (repeated synthetic division)."""
     for k in range(degree):
         for j in range(degree - 1, k - 1, -1):
             c[j] += t * c[j + 1]
@@ -216,11 +208,11 @@ def move(c: Floats, degree: int, t: float) -> None:
 
 @inlined
 def bounds_within(ground: Ground, piece: int, offset: float, window: float, A: Floats) -> Window:
-    """Bounds over [offset, offset + window] of one piece, with ``jumps`` the allowance for rounding in the others.
+    """Bounds over [offset, offset + window] of one piece; ``jumps`` is the allowance for rounding in the others.
 
-    Exact but for rounding for degree 1, else tight. ``A`` is scratch space.
+    Exact but for rounding for degree 1. ``A`` is scratch space.
     """
-    columns = columns_of(ground)
+    columns = ground.columns
     if columns == 2:
         rate = ground.pieces[piece, ground.first + 1]
         first = ground.pieces[piece, ground.first] + rate * offset
@@ -236,16 +228,16 @@ def bounds_within(ground: Ground, piece: int, offset: float, window: float, A: F
         power *= window
         low += min(0.0, A[k] * power)
         high += max(0.0, A[k] * power)
-    size, size_of_slope = sizes(ground, piece, offset + window if degree > 0 else offset)
+    size, size_of_slope = absolute_sums(ground, piece, offset + window if degree > 0 else offset)
     rounding = ROUNDING * columns * size
     return Window(low - rounding, high + rounding, steepest + ROUNDING * columns * size_of_slope, rounding)
 
 
 @inlined
-def sizes(ground: Ground, piece: int, t: float) -> tuple[float, float]:
-    """Sizes of the terms of a piece and of its slope at t, added up: what their rounding is a fraction of."""
+def absolute_sums(ground: Ground, piece: int, t: float) -> tuple[float, float]:
+    """Return the sums of the |terms| of a piece and of its slope at t, of which rounding is a fraction."""
     size = size_of_slope = 0.0
-    for k in range(columns_of(ground) - 1, -1, -1):
+    for k in range(ground.columns - 1, -1, -1):
         size_of_slope = size_of_slope * t + size
         size = size * t + abs(ground.pieces[piece, ground.first + k])
     return size, size_of_slope
@@ -257,7 +249,7 @@ def bounds_over(
 ) -> Window:
     """Bounds over a window that starts in a piece, rounding included; ``A`` is scratch space.
 
-    NaN where they are not within limits, or the window spans too many pieces.
+    NaN where they are not within ``limits``, or the window spans too many pieces.
     """
     low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
     for _ in range(_LONGEST_WINDOW):
@@ -298,9 +290,9 @@ def jump_after(ground: Ground, piece: int) -> float:
 
 @inlined
 def next_beyond(ground: Ground, piece: int, below: float, above: float) -> int:
-    """First piece from this one on whose stretch passes out of [below, above]; the last one where none does.
+    """First piece from this one on whose stretch is not within [below, above]; the last one where none is.
 
-    The limits are those at rest under gravity alone: a vertical acceleration scales them with the weight.
+    The limits are those under gravity alone: a vertical acceleration scales them with the weight.
     """
     while piece < last_piece(ground):
         stretch = piece // STRETCH

@@ -21,25 +21,35 @@ from rocking.kernels.rest import (
     time_of,
 )
 from rocking.kernels.short_arc import short_step, undecided
-from rocking.kernels.state import AT_REST, Ending, EventKind, Outcome, Record, Records, RestRule
-from rocking.kernels.trace import has_space, write_event, write_impact, write_node, write_sequence
+from rocking.kernels.state import (
+    AT_REST,
+    Ending,
+    EventKind,
+    Outcome,
+    Record,
+    Records,
+    RestRule,
+    has_space,
+    write_event,
+    write_impact,
+    write_node,
+    write_sequence,
+)
 from rocking.kernels.uplift import next_uplift
 
-#: Depth of a dip below zero rotation that is lost in rounding, over the highest rotation so far.
+#: Distance below zero rotation that is within rounding, over the highest rotation so far.
 _TOUCH = 2.0**-46
 
-#: Distance from zero rotation at which that may be decided by the rounding of what was given.
+#: Distance from zero rotation at which the rounding of the input may decide on an impact.
 _NEAR_TIE = 2.0**-36
 
 
 @kernel
 def march(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
-    """Follow one block through one motion, from its state on; returns how it ended (`Ending`).
+    """Follow one block through one motion, from its state on; returns how it ended (`Ending`), as a plain integer.
 
-    RUNNING: the piece ``state.until`` is reached; a block at rest may have gone on to its next uplift. PAUSED: the
-    budget is spent. FULL: the table has no space left. After each of them, call again with the same state. DONE,
-    OVERTURNED, BALANCED: the march is over. A plain integer is returned: to make an `IntEnum` of it takes numba as long
-    as a short march.
+    RUNNING: the piece ``state.until`` is reached; a block at rest may be at its next uplift. PAUSED: the budget is
+    spent. FULL: the table has no space left. After each of them, call again with the same state.
     """
     while state.piece < state.until:
         if state.budget <= 0:
@@ -73,7 +83,7 @@ def march_step(ground: Ground, block: Record, rules: Record, table: Records, scr
 
 @inlined
 def may_pass(ground: Ground, rules: Record) -> bool:
-    """Whether impacts of a proven sequence can be passed at once: stiffness does not change, and pushes evenly."""
+    """Whether `pass_proven_impacts` applies: linear, without a changing weight, under a motion linear in time."""
     return not rules.nonlinear and is_straight(ground) and not has_vertical(ground)
 
 
@@ -158,9 +168,9 @@ def pass_impact(ground: Ground, block: Record, rules: Record, table: Records, sc
     normalize_offset(ground, state)
     if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
         pushed = abs(restoring(ground, block, state.side, state.piece, state.offset))
-        depth = 0.5 * state.v * state.v / pushed  # of the dip below zero rotation, if there were no ground
+        depth = 0.5 * state.v * state.v / pushed  # distance below zero rotation, if there were no ground
         state.near_ties += depth <= _NEAR_TIE * state.peak
-        if depth <= _TOUCH * state.peak:  # no impact, which would leave the block on the other side
+        if depth <= _TOUCH * state.peak:  # no impact: after one the block would be on the other side
             state.v = 0.0
             return Ending.RUNNING
     time = time_of(ground, state)
@@ -188,12 +198,12 @@ def is_weightless(ground: Ground, block: Record, state: Record, offset: float) -
 
 @shared
 def nearly_touches(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, h: float) -> bool:
-    """Whether the arc from a state turns within h so near to the ground that rounding may hide an impact.
+    """Whether the arc from a state has within h a minimum so near zero that rounding may hide an impact.
 
-    Where weight presses the block down the motion is the same with the impact and without.
+    With a positive weight the motion is the same with the impact and without.
     """
     order, _, _ = expand(ground, block, rules, scratch, state, h)
-    c, d = scratch.rotation, scratch.spare
+    c, d = scratch.rotation, scratch.other
     for k in range(order):
         d[k] = -(k + 1) * c[k + 1]
     lowest_time = first_root(d, 0, order - 1, h)

@@ -4,6 +4,7 @@ import math
 
 from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.ground import move
 
 #: Length of the work array beyond the columns of the motion: 0.25**16 / 16! = 1e-23.
 TERMS = 18
@@ -19,11 +20,11 @@ def peak_displacements(
     work: Floats,
     peaks: Floats,
 ) -> None:
-    """Put the largest ``|u|`` (m) of ``u'' + 2 z w u' + w^2 u = -a(t)`` from rest into `peaks`, for each w (rad/s).
+    """Write the largest |u| (m) of u'' + 2 z w u' + w^2 u = -a(t) from rest into ``peaks``, for each w (rad/s).
 
-    On each step of at most a quarter radian u is the Taylor series of the exact solution. The response is followed
-    past the end of the motion to its first extremum there. Assumes positive frequencies and ``0 <= z < 1``; `work`
-    has twice the motion's columns plus TERMS numbers.
+    On each step of at most a quarter radian u is the Taylor series of the exact solution; past the end of the motion it
+    is followed to the first extremum there. The frequencies must be positive and 0 <= z < 1; ``work`` is scratch space
+    of twice the motion's columns plus TERMS numbers. All numbers must be finite.
     """
     columns = coefficients.shape[1]
     for i in range(len(frequencies)):
@@ -39,6 +40,7 @@ def _peak(
     force: Floats,
     series: Floats,
 ) -> float:
+    """Largest displacement of one oscillator; ``force`` and ``series`` are scratch space."""
     series[:] = 0.0
     peak = 0.0
     for k in range(len(coefficients)):
@@ -60,9 +62,9 @@ def _peak(
 def _advance(series: Floats, force: Floats, h: float, frequency: float, damping: float) -> float:
     """Expand the solution about the start of a step, move ``series[:2]`` to its end and return its peak."""
     for k in range(len(series) - 2):
-        drive = force[k] if k < len(force) else 0.0
-        rate = 2.0 * damping * frequency * (k + 1) * series[k + 1] + frequency * frequency * series[k]
-        series[k + 2] = -(drive + rate) / ((k + 1) * (k + 2))
+        acceleration = force[k] if k < len(force) else 0.0
+        restoring = 2.0 * damping * frequency * (k + 1) * series[k + 1] + frequency * frequency * series[k]
+        series[k + 2] = -(acceleration + restoring) / ((k + 1) * (k + 2))
     start_velocity = series[1]
     end_velocity = _slope(series, h)
     end = _value(series, h)
@@ -75,7 +77,7 @@ def _advance(series: Floats, force: Floats, h: float, frequency: float, damping:
 
 @shared
 def _extremum(series: Floats, h: float) -> float:
-    """Root of the velocity between 0 and h, where it has opposite signs, by bisection.
+    """Root of the velocity between 0 and h, at which it has opposite signs, by bisection.
 
     The displacement is stationary there, so half the digits of the time give all the digits of the peak.
     """
@@ -91,6 +93,7 @@ def _extremum(series: Floats, h: float) -> float:
 
 @inlined
 def _value(series: Floats, x: float) -> float:
+    """Value of a series at x."""
     result = 0.0
     for k in range(len(series) - 1, -1, -1):
         result = result * x + series[k]
@@ -99,6 +102,7 @@ def _value(series: Floats, x: float) -> float:
 
 @inlined
 def _slope(series: Floats, x: float) -> float:
+    """Slope of a series at x."""
     result = 0.0
     for k in range(len(series) - 1, 0, -1):
         result = result * x + k * series[k]
@@ -107,8 +111,5 @@ def _slope(series: Floats, x: float) -> float:
 
 @shared
 def _move(force: Floats, shift: float) -> None:
-    """Re-expand a polynomial about `shift`, in place (repeated synthetic division)."""
-    last = len(force) - 1
-    for i in range(last):
-        for j in range(last - 1, i - 1, -1):
-            force[j] += shift * force[j + 1]
+    """Expand a polynomial about ``shift``, in place; inlined it would slow the loop over the steps down."""
+    move(force, len(force) - 1, shift)

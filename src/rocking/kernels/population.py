@@ -1,4 +1,4 @@
-"""Populations of blocks: what share of each overturns, from blocks that were simulated once; and their density."""
+"""Populations of blocks: the share of each that overturns, from blocks that were simulated once; and their density."""
 
 import math
 from typing import Any, Final
@@ -11,10 +11,8 @@ from rocking.kernels.compiled import inlined, kernel
 Singles = NDArray[np.float32]
 Reals = NDArray[Any]
 
-#: A block that weighs less than exp(-16) of the heaviest one adds less than rounding in single precision.
-_FAINT: Final = np.float32(16.0)
-
-#: A part of a density below exp(-40) of the largest one adds less than rounding.
+#: Exponents by so much less than the largest one add less than rounding: in single precision, and in double.
+_NEGLIGIBLE_SINGLE: Final = np.float32(16.0)
 _NEGLIGIBLE: Final = 40.0
 
 
@@ -27,36 +25,26 @@ def shares(
     found: Singles,
     effective: NDArray[np.float64],
 ) -> None:
-    """Find the share of each population that overturns, and the effective number of blocks behind it.
+    """Write the share of each population that overturns into ``found``, shape (populations, motions).
 
-    Block j weighs the exponential of ``factors[c] @ powers[:, j]`` in population c.
-
-    Parameters
-    ----------
-    factors, powers : ndarray, shapes (c, k) and (k, n)
-        What the exponents are the product of.
-    overturned : ndarray, shape (n, m)
-        1 where a block overturns under a motion, else 0.
-    exponents : ndarray, shape (n,)
-        Room to work in.
-    found : ndarray, shape (c, m)
-        Shares; written.
-    effective : ndarray, shape (c,)
-        Effective numbers of blocks; written.
+    Block j has the weight exp(factors[c] @ powers[:, j]) in population c; ``overturned``, shape (blocks, motions), is 1
+    where it overturns, else 0. ``effective`` becomes the effective number of blocks of each population; ``exponents``,
+    of a number per block, is scratch space. All numbers must be finite.
     """
     for c in range(factors.shape[0]):
         _exponents(factors[c], powers, exponents)
-        highest = _highest(exponents)
+        highest = _largest(exponents)
         total, squares = 0.0, 0.0
         found[c] = np.float32(0.0)
         for j in range(exponents.shape[0]):
             below = highest - exponents[j]
-            if below < _FAINT:
+            if below < _NEGLIGIBLE_SINGLE:
                 weight = np.float32(math.exp(-below))
                 total += float(weight)
                 squares += float(weight) ** 2
                 _add(weight, overturned[j], found[c])
-        _divide(found[c], np.float32(total))
+        for m in range(found.shape[1]):
+            found[c, m] /= np.float32(total)
         effective[c] = total * total / squares
 
 
@@ -67,20 +55,13 @@ def log_density(
     exponents: NDArray[np.float64],
     found: NDArray[np.float64],
 ) -> None:
-    """Find the logarithm of a sum of exponentials, ``sum over j of exp(factors[c] @ powers[:, j])``, for each c.
+    """Write the logarithm of the sum over j of exp(factors[c] @ powers[:, j]) into ``found``, for each c.
 
-    Parameters
-    ----------
-    factors, powers : ndarray, shapes (c, k) and (k, n)
-        What the exponents are the product of.
-    exponents : ndarray, shape (n,)
-        Room to work in.
-    found : ndarray, shape (c,)
-        Logarithms; written.
+    ``exponents``, of a number per j, is scratch space. All numbers must be finite.
     """
     for c in range(factors.shape[0]):
         _exponents(factors[c], powers, exponents)
-        highest = _highest(exponents)
+        highest = _largest(exponents)
         total = 0.0
         for j in range(exponents.shape[0]):
             if highest - exponents[j] < _NEGLIGIBLE:
@@ -90,6 +71,7 @@ def log_density(
 
 @inlined
 def _exponents(factors: Reals, powers: Reals, exponents: Reals) -> None:
+    """Write factors @ powers."""
     for j in range(exponents.shape[0]):
         exponents[j] = factors[0] * powers[0, j]
     for k in range(1, powers.shape[0]):
@@ -97,21 +79,17 @@ def _exponents(factors: Reals, powers: Reals, exponents: Reals) -> None:
 
 
 @inlined
-def _highest(values: Reals) -> Any:
-    highest = values[0]
+def _largest(values: Reals) -> Any:
+    """Largest of some numbers."""
+    largest = values[0]
     for i in range(1, values.shape[0]):
-        if values[i] > highest:
-            highest = values[i]
-    return highest
+        if values[i] > largest:
+            largest = values[i]
+    return largest
 
 
 @inlined
 def _add(weight: Any, row: Reals, total: Reals) -> None:
+    """Add a multiple of a row."""
     for i in range(row.shape[0]):
         total[i] += weight * row[i]
-
-
-@inlined
-def _divide(values: Singles, divisor: np.float32) -> None:
-    for i in range(values.shape[0]):
-        values[i] /= divisor

@@ -10,12 +10,12 @@ In the linear model lam may have any sign: p^2 for a rocking block (whose gain i
 an oscillator with a stop.
 
 Each equation is written three times, for three purposes: to any order into arrays (`arc`); nine terms of one arc in
-registers (`short_arc`); and some ten terms of many lanes at once (`lanes.steps`). One text for all was measured: as
+registers (`short_arc`); and some ten terms of many lanes at once (`lane_steps`). One form for all was measured: as
 loops over tuples it takes twelve times as long in lanes, which then do not vectorise; unrolled, it changes the last bit
 of some results, since each form adds its terms in the order that makes the shortest chain of operations for it. So one
 test compares all forms with one calculation in 40 digits.
 
-No function here fails: a NaN among the arguments makes every later coefficient NaN.
+A NaN among the arguments makes every later coefficient NaN.
 """
 
 import numpy as np
@@ -23,10 +23,10 @@ import numpy as np
 from rocking.kernels.compiled import inlined
 from rocking.kernels.state import ORDER, Record
 
-#: A quantity that changes evenly: its value, and its slope or its change over a step.
+#: A quantity that is linear in time: its value, and its slope or its change over a step.
 Line = tuple[float, float]
 
-#: Coefficients c[0] to c[9] of a rotation; nine terms of a velocity; sizes of seven terms of sin and cos(alpha - u).
+#: Coefficients c[0] to c[9] of a rotation; nine terms of a velocity; seven sums of |terms| of sin and cos(alpha - u).
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 Seven = tuple[float, float, float, float, float, float, float]
@@ -103,7 +103,7 @@ def angle_coefficients(scratch: Record, k: int) -> None:
 
 @inlined
 def variation_coefficients(work: Record, order: int) -> None:
-    """Write the coefficients 2 to ``order`` of x'' = stiffness x + forcing into work.change, whose first two stand."""
+    """Write the coefficients 2 to ``order`` of x'' = stiffness x + forcing into work.change, from its first two."""
     stiffness, forcing, x = work.stiffness, work.forcing, work.change
     for k in range(order - 1):
         value = forcing[k]
@@ -112,7 +112,7 @@ def variation_coefficients(work: Record, order: int) -> None:
         x[k + 2] = value * INTEGRATED_TWICE[k]
 
 
-# ---- Nine terms of one arc, under a motion and a weight that change evenly ----
+# ---- Nine terms of one arc, under a motion and a weight that are linear in time ----
 
 
 @inlined
@@ -142,7 +142,7 @@ def nonlinear_ten(start: Line, angle: Line, lam: float, push: Line, weight: Line
     """Coefficients of u'' = -lam (weight sin(alpha - u) + push cos(alpha - u)), weight and push being lines in time.
 
     ``start`` is u and v, ``angle`` sin and cos(alpha - u) there; a weight of None is 1. The second tuple has the sums
-    of the sizes of the coefficients of sin and cos, from the first power to the seventh.
+    of the absolute values of the coefficients of sin and cos, from the first power to the seventh.
     """
     u, v = start
     s0, c0 = angle

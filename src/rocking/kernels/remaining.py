@@ -1,4 +1,4 @@
-"""The time that is left of complete chattering, estimated to fourth order in the speed.
+"""The remaining time of complete chattering, estimated to fourth order in the speed.
 
 Within one smooth piece of the motion side j's restoring acceleration at a rotation u is
 
@@ -7,10 +7,11 @@ Within one smooth piece of the motion side j's restoring acceleration at a rotat
 with a stiffness of any sign: p^2 for a block, 0 for a ball on a moving table, negative for an oscillator with a stop.
 A body that bounces on one side only has that side for both. The derivation is in the documentation ("Theory").
 
-Counted back from a candidate rest time, with s the time left at an impact that enters side i, half the arc's duration
-is sought as a polynomial Y_i(s), so that s - 2 Y_i(s) is left at the next impact. The speeds at both ends of an arc
-between two given impacts are polynomials of the two times, so Y_i follows by comparison of coefficients. What the
-comparison leaves is a polynomial, too, and bounds the error (`remainder`).
+Counted back from a candidate for the time of rest, with s the remaining time at an impact that enters side i, half the
+arc's duration is sought as a polynomial Y_i(s), so that s - 2 Y_i(s) remains at the next impact. The speeds at both
+ends of an arc between two given impacts are polynomials of the two times, so Y_i follows by comparison of coefficients.
+The terms beyond those compared are a polynomial, too, and bound the error (`remainder`). Below, z is the remaining time
+in units of that at the first impact. A NaN among the arguments makes the results NaN, and a NaN bracket proves nothing.
 """
 
 import math
@@ -18,9 +19,9 @@ from typing import NamedTuple
 
 from rocking.kernels.compiled import inlined, shared
 
-#: Candidates for the rest time, each from the one before, and the relative mismatch of speed that ends the search.
+#: Newton's steps to the time of rest, and the relative error of the speed that ends them.
 _CANDIDATES = 5
-_SETTLED = 2.0**-40
+_AGREEMENT = 2.0**-40
 
 THIRD = 1.0 / 3.0
 FIFTEENTH = 1.0 / 15.0
@@ -32,7 +33,7 @@ Pair = tuple[float, float]
 
 
 class Restoring(NamedTuple):
-    """One side at an impact: restoring acceleration g + rate t + curvature t^2 - stiffness u, to within error."""
+    """One side at an impact: restoring acceleration g + rate t + curvature t^2 - stiffness u, to within ``error``."""
 
     g: float
     rate: float
@@ -43,7 +44,7 @@ class Restoring(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """One side at the candidate rest time: g, and rate, curvature, stiffness in units of the time left."""
+    """One side at the candidate: g, and rate, curvature and stiffness with the remaining time for the unit of time."""
 
     g: float
     rate: float
@@ -52,7 +53,7 @@ class Terms(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """Half the arc's duration, and speed at its start over the time left, as series in the time left."""
+    """Half the arc's duration, and the speed at its start over the remaining time, as series in the remaining time."""
 
     half: Series
     speed: Series
@@ -76,71 +77,72 @@ def remaining_time(v: float, i: Restoring, j: Restoring) -> float:
     own_i = slope_i * (2.0 * e_i * A_j - 4.0 * inverse_i) * THIRD + 2.0 * e_i * inverse_i * drift_j
     own_j = slope_j * (2.0 * e_j * A_i - 4.0 * inverse_j) * THIRD + 2.0 * e_j * inverse_j * drift_i
     B_i = (own_i + e_i * e_i * own_j) / (1.0 - pair * pair)
-    bend_i, bend_j = i.stiffness * inverse_i**3, j.stiffness * inverse_j**3
-    C_i = 2.0 * THIRD * (bend_i + e_i**3 * bend_j) / (1.0 - pair**3)
+    stiff_i, stiff_j = i.stiffness * inverse_i**3, j.stiffness * inverse_j**3
+    C_i = 2.0 * THIRD * (stiff_i + e_i**3 * stiff_j) / (1.0 - pair**3)
     return v * (A_i + v * (B_i + v * C_i))
 
 
 @inlined
-def at_rest(side: Restoring, s: float) -> Terms:
-    """One side as seen from a rest time s later, with s for the unit of time; NaN where nothing presses it down."""
+def terms_at(side: Restoring, s: float) -> Terms:
+    """One side about a candidate s later, with s for the unit of time; g is NaN where it would not be positive."""
     g = side.g + s * (side.rate + s * side.curvature)
     rate = s * (side.rate + 2.0 * s * side.curvature)
     return Terms(g if g > 0.0 else math.nan, rate, side.curvature * s * s, side.stiffness * s * s)
 
 
 @inlined
-def forces(a: Terms, half: Series, sign: float) -> Three:
+def mean_restoring(a: Terms, half: Series, sign: float) -> Three:
     """Coefficients 1, 2, 3 of B: the speeds at an arc's start (sign -1) and end (+1) are Y B.
 
-    With Y half the duration and C = z - Y the time left at its middle, where the acceleration is G = g - rate C
+    With Y half the duration and C = z - Y the remaining time at its middle, where the acceleration is G = g - rate C
     + curvature C^2, B = G (1 - k Y^2/3) + sign ((rate - 2 curvature C) Y/3 - rate k Y^3/45) + curvature Y^2/3 and k
     the stiffness.
     """
     y, y2, y3, _ = half
     c = 1.0 - y
     G = -a.rate * c
-    stiff = THIRD * a.stiffness * y
-    bent = THIRD * a.curvature * y
-    skew = THIRD * sign
-    b = G + skew * a.rate * y
+    stiffness = THIRD * a.stiffness * y
+    curvature = THIRD * a.curvature * y
+    odd = THIRD * sign
+    b = G + odd * a.rate * y
     b2 = (
         a.rate * y2
         + a.curvature * c * c
-        - stiff * a.g * y
-        + skew * (a.rate * y2 - 2.0 * a.curvature * c * y)
-        + bent * y
+        - stiffness * a.g * y
+        + odd * (a.rate * y2 - 2.0 * a.curvature * c * y)
+        + curvature * y
     )
     b3 = (
         a.rate * y3
         - 2.0 * a.curvature * c * y2
-        - stiff * (G * y + 2.0 * a.g * y2)
-        + skew * (a.rate * y3 - 2.0 * a.curvature * y2 * (c - y) - FIFTEENTH * a.rate * a.stiffness * y * y * y)
-        + 2.0 * bent * y2
+        - stiffness * (G * y + 2.0 * a.g * y2)
+        + odd * (a.rate * y3 - 2.0 * a.curvature * y2 * (c - y) - FIFTEENTH * a.rate * a.stiffness * y * y * y)
+        + 2.0 * curvature * y2
     )
     return b, b2, b3
 
 
 @inlined
-def known(half: Series, b: Three) -> Three:
-    """Coefficients 2, 3, 4 of Y B, each without the part g Y."""
+def known_part(a: Terms, half: Series, sign: float) -> Three:
+    """Coefficients 2, 3, 4 of Y B, each without the part g Y, which holds the coefficient that is sought."""
+    b = mean_restoring(a, half, sign)
     y, y2, y3, _ = half
     return y * b[0], y2 * b[0] + y * b[1], y3 * b[0] + y2 * b[1] + y * b[2]
 
 
 @inlined
-def both(first: float, second: float, one: float, other: float) -> Pair:
-    """Solve x = first + one y, y = second + other x."""
-    inverse = 1.0 / (1.0 - one * other)
-    return (first + one * second) * inverse, (second + other * first) * inverse
+def solved(first: float, second: float, p: float, q: float) -> Pair:
+    """Solution of x = first + p y, y = second + q x."""
+    inverse = 1.0 / (1.0 - p * q)
+    return (first + p * second) * inverse, (second + q * first) * inverse
 
 
 @inlined
-def excess(m: Series, ends: Three, starts: Three, speed: Series, e: float) -> Three:
-    """Return what orders 2, 3, 4 of an impact's two speeds differ by while the half durations of that order are zero.
+def speed_difference(m: Series, ends: Three, starts: Three, speed: Series, e: float) -> Three:
+    """Orders 2, 3, 4 of the difference of the speeds at an impact, with zero half durations of that order.
 
-    ``m``: the time left at the next impact; ``ends``, ``starts``: `known` of this arc's end and the next one's start;
-    ``speed``: the next arc's speed at its start.
+    ``m``: the remaining time at the next impact; ``ends``, ``starts``: `known_part` of this arc's end and the next
+    one's start; ``speed``: the next arc's speed at its start.
     """
     square = m[0] * m[0]
     second = square * starts[0] - e * ends[0]
@@ -155,42 +157,43 @@ def excess(m: Series, ends: Three, starts: Three, speed: Series, e: float) -> Th
 
 
 @inlined
-def left(half: Series) -> Series:
-    """Time left at the next impact, z - 2 Y."""
+def remaining_after(half: Series) -> Series:
+    """Remaining time at the next impact, z - 2 Y."""
     return 1.0 - 2.0 * half[0], -2.0 * half[1], -2.0 * half[2], -2.0 * half[3]
 
 
 @inlined
 def rest_curves(a: Terms, b: Terms, e_a: float, e_b: float) -> tuple[Curve, Curve]:
-    """Half durations and speeds of arcs that end in rest at the candidate time, to fourth order in the time left."""
+    """Half durations and speeds of the arcs before rest at the candidate, to fourth order in the remaining time."""
     half = 0.5 * (1.0 - e_a * e_b)
     inverse_a, inverse_b = 1.0 / a.g, 1.0 / b.g
     speed_a, speed_b = half / (inverse_a + e_a * inverse_b), half / (inverse_b + e_b * inverse_a)
     A = Curve((speed_a * inverse_a, 0.0, 0.0, 0.0), (speed_a, 0.0, 0.0, 0.0))
     B = Curve((speed_b * inverse_b, 0.0, 0.0, 0.0), (speed_b, 0.0, 0.0, 0.0))
-    A, B = raised(a, b, e_a, e_b, A, B, 2)
-    A, B = raised(a, b, e_a, e_b, A, B, 3)
-    return raised(a, b, e_a, e_b, A, B, 4)
+    A, B = with_order(a, b, e_a, e_b, A, B, 2)
+    A, B = with_order(a, b, e_a, e_b, A, B, 3)
+    return with_order(a, b, e_a, e_b, A, B, 4)
 
 
 @inlined
-def raised(a: Terms, b: Terms, e_a: float, e_b: float, A: Curve, B: Curve, order: int) -> tuple[Curve, Curve]:
-    """Add the coefficients of one order: 2, 3 or 4."""
-    starts_a, ends_a = known(A.half, forces(a, A.half, -1.0)), known(A.half, forces(a, A.half, 1.0))
-    starts_b, ends_b = known(B.half, forces(b, B.half, -1.0)), known(B.half, forces(b, B.half, 1.0))
-    m_a, m_b = left(A.half), left(B.half)
+def with_order(a: Terms, b: Terms, e_a: float, e_b: float, A: Curve, B: Curve, order: int) -> tuple[Curve, Curve]:
+    """Both curves with the coefficients of one order more: 2, 3 or 4."""
+    starts_a, starts_b = known_part(a, A.half, -1.0), known_part(b, B.half, -1.0)
+    ends_a, ends_b = known_part(a, A.half, 1.0), known_part(b, B.half, 1.0)
+    m_a, m_b = remaining_after(A.half), remaining_after(B.half)
     k = order - 2
-    own_a = excess(m_a, ends_a, starts_b, B.speed, e_a)[k] * (1.0 / B.speed[0])
-    own_b = excess(m_b, ends_b, starts_a, A.speed, e_b)[k] * (1.0 / A.speed[0])
-    y_a, y_b = both(own_a, own_b, power(m_a[0], order), power(m_b[0], order))
+    own_a = speed_difference(m_a, ends_a, starts_b, B.speed, e_a)[k] * (1.0 / B.speed[0])
+    own_b = speed_difference(m_b, ends_b, starts_a, A.speed, e_b)[k] * (1.0 / A.speed[0])
+    y_a, y_b = solved(own_a, own_b, power(m_a[0], order), power(m_b[0], order))
     y_a *= A.half[0]
     y_b *= B.half[0]
-    return extended(A, y_a, starts_a[k] + a.g * y_a, order), extended(B, y_b, starts_b[k] + b.g * y_b, order)
+    A = with_coefficient(A, y_a, starts_a[k] + a.g * y_a, order)
+    return A, with_coefficient(B, y_b, starts_b[k] + b.g * y_b, order)
 
 
 @inlined
 def power(x: float, order: int) -> float:
-    """Return x to the power 2, 3 or 4."""
+    """X to the power 2, 3 or 4."""
     square = x * x
     if order == 2:
         return square
@@ -198,8 +201,8 @@ def power(x: float, order: int) -> float:
 
 
 @inlined
-def extended(A: Curve, y: float, speed: float, order: int) -> Curve:
-    """Set one order's coefficients."""
+def with_coefficient(A: Curve, y: float, speed: float, order: int) -> Curve:
+    """Set the coefficients of one order."""
     h, s = A
     if order == 2:
         return Curve((h[0], y, 0.0, 0.0), (s[0], speed, 0.0, 0.0))
@@ -209,54 +212,54 @@ def extended(A: Curve, y: float, speed: float, order: int) -> Curve:
 
 
 @inlined
-def speed_of(a: Terms, half: Series) -> float:
-    """Speed at the start of the arc at whose start the whole time is left, over that time."""
+def first_speed(a: Terms, half: Series) -> float:
+    """Speed at the start of the first arc (z = 1), over the remaining time."""
     y = half[0] + half[1] + half[2] + half[3]
     c = 1.0 - y
     g = a.g - c * (a.rate - c * a.curvature)
-    stiff = a.stiffness * y
-    rate = a.rate * (1.0 - FIFTEENTH * stiff * y) - 2.0 * a.curvature * c
-    return y * (g - THIRD * y * (rate + stiff * g - a.curvature * y))
+    stiffness = a.stiffness * y
+    rate = a.rate * (1.0 - FIFTEENTH * stiffness * y) - 2.0 * a.curvature * c
+    return y * (g - THIRD * y * (rate + stiffness * g - a.curvature * y))
 
 
 @inlined
 def first_candidate(v: float, i: Restoring, j: Restoring) -> float:
     """Time to rest to second order in v, as the root of a quadratic: exact where restitution is nearly one."""
     constant = 2.0 * v * (1.0 / i.g + i.restitution / j.g) / (1.0 - i.restitution * j.restitution)
-    bent = remaining_time(v, i, j) - constant
-    return 2.0 * constant / (1.0 + math.sqrt(max(0.0, 1.0 - 4.0 * bent / constant)))
+    correction = remaining_time(v, i, j) - constant
+    return 2.0 * constant / (1.0 + math.sqrt(max(0.0, 1.0 - 4.0 * correction / constant)))
 
 
 @inlined
 def rest_candidate(v: float, i: Restoring, j: Restoring, s: float) -> tuple[float, Terms, Terms, Curve, Curve, float]:
     """Time to rest from an impact that enters side i with speed v, to fourth order, by Newton's steps from s.
 
-    Returns it, both sides at that time, their curves, and how far it is from solving speed(time) = v, in speed.
+    Returns it, both sides at that time, their curves, and the residual of speed(time) = v, over the time.
     """
     e_i, e_j = i.restitution, j.restitution
-    a, b = at_rest(i, s), at_rest(j, s)
+    a, b = terms_at(i, s), terms_at(j, s)
     A, B = rest_curves(a, b, e_i, e_j)
-    missing = v / s - speed_of(a, A.half)
+    residual = v / s - first_speed(a, A.half)
     for _ in range(_CANDIDATES):
-        if not abs(missing) > _SETTLED * A.speed[0]:
+        if not abs(residual) > _AGREEMENT * A.speed[0]:
             break
-        # The slope also holds how the first coefficient changes with the candidate; the rest is smaller.
+        # The slope includes how the first coefficient changes with the candidate; what else changes is smaller.
         first = A.speed[0]
-        moved = a.rate / (a.g * a.g) + e_i * b.rate / (b.g * b.g)
-        slope = first + 2.0 * A.speed[1] + 3.0 * A.speed[2] + 2.0 * first * first * moved / (1.0 - e_i * e_j)
-        s += s * missing / slope
+        change = a.rate / (a.g * a.g) + e_i * b.rate / (b.g * b.g)
+        slope = first + 2.0 * A.speed[1] + 3.0 * A.speed[2] + 2.0 * first * first * change / (1.0 - e_i * e_j)
+        s += s * residual / slope
         if not s > 0.0:
             s = math.nan
-        a, b = at_rest(i, s), at_rest(j, s)
+        a, b = terms_at(i, s), terms_at(j, s)
         A, B = rest_curves(a, b, e_i, e_j)
-        missing = v / s - speed_of(a, A.half)
-    return s, a, b, A, B, missing
+        residual = v / s - first_speed(a, A.half)
+    return s, a, b, A, B, residual
 
 
 #: Relative allowance for rounding.
 _ROUNDING = 2.0**-48
 
-#: Relative distance from the candidate rest time within which the proof works, and what it costs the bounds.
+#: Relative distance from the candidate within which the proof holds, and the factor by which it widens the bounds.
 _NEAR = 2.0**-12
 _MARGIN = 1.0 + 2.0**-7
 
@@ -266,33 +269,33 @@ _LARGEST_STIFFNESS = 1.0 / 16.0
 
 @inlined
 def total(series: Series) -> float:
-    """Sum of the sizes of coefficients."""
+    """Sum of the absolute values of coefficients."""
     return abs(series[0]) + abs(series[1]) + abs(series[2]) + abs(series[3])
 
 
 @inlined
-def forces_bound(a: Terms, half: Series) -> Pair:
-    """Bounds on what B (`forces`) holds beyond order 3, over z^4, and on all of it."""
+def mean_restoring_bound(a: Terms, half: Series) -> Pair:
+    """Bounds on the terms of B (`mean_restoring`) beyond order 3, over z^4, and on all of it."""
     y, y2 = half[0], abs(half[1])
     c = abs(1.0 - y)
     Y = total(half)
     C = c + Y - y
-    rate, bend, stiff = abs(a.rate), abs(a.curvature), abs(a.stiffness)
-    G = a.g + C * (rate + C * bend)
+    rate, curvature, stiffness = abs(a.rate), abs(a.curvature), abs(a.stiffness)
+    G = a.g + C * (rate + C * curvature)
     beyond = (
         rate * abs(half[3]) * (1.0 + THIRD)
-        + bend * (C * C - c * (c + 2.0 * y2))
-        + THIRD * stiff * (G * Y * Y - y * (a.g * y + rate * c * y + 2.0 * a.g * y2))
-        + THIRD * bend * (2.0 * (C * Y - c * (y + y2) - y2 * y) + Y * Y - y * (y + 2.0 * y2))
-        + THIRD * FIFTEENTH * rate * stiff * (Y * Y * Y - y * y * y)
+        + curvature * (C * C - c * (c + 2.0 * y2))
+        + THIRD * stiffness * (G * Y * Y - y * (a.g * y + rate * c * y + 2.0 * a.g * y2))
+        + THIRD * curvature * (2.0 * (C * Y - c * (y + y2) - y2 * y) + Y * Y - y * (y + 2.0 * y2))
+        + THIRD * FIFTEENTH * rate * stiffness * (Y * Y * Y - y * y * y)
     )
-    skew = rate * (1.0 + FIFTEENTH * stiff * Y * Y) + bend * (2.0 * C + Y)
-    return beyond, G * (1.0 + THIRD * stiff * Y * Y) + THIRD * Y * skew
+    odd = rate * (1.0 + FIFTEENTH * stiffness * Y * Y) + curvature * (2.0 * C + Y)
+    return beyond, G * (1.0 + THIRD * stiffness * Y * Y) + THIRD * Y * odd
 
 
 @inlined
 def speed_bound(half: Series, b: Three, beyond: float) -> float:
-    """Bound on what Y B holds beyond order 4, over z^5."""
+    """Bound on the terms of Y B beyond order 4, over z^5."""
     y2, y3, y4 = abs(half[1]), abs(half[2]), abs(half[3])
     b1, b2, b3 = abs(b[0]), abs(b[1]), abs(b[2])
     return y2 * b3 + y3 * (b2 + b3) + y4 * (b1 + b2 + b3) + total(half) * beyond
@@ -300,7 +303,7 @@ def speed_bound(half: Series, b: Three, beyond: float) -> float:
 
 @inlined
 def mismatch(m: Series, end: float, start: float, speed: Series, e: float) -> float:
-    """Bound on the mismatch of speeds at an impact, over z^5, of which orders 1 to 4 are made zero.
+    """Bound on the difference of the speeds at an impact, over z^5; its orders 1 to 4 are zero.
 
     ``end``, ``start``: `speed_bound` of this arc's end and of the next one's start.
     """
@@ -309,12 +312,12 @@ def mismatch(m: Series, end: float, start: float, speed: Series, e: float) -> fl
     second = square - m1 * (m1 + 2.0 * m2 + 2.0 * abs(m[2])) - m2 * m2
     third = square * M - m1 * m1 * (m1 + 3.0 * m2)
     fourth = square * square - m1 * m1 * (m1 * m1)
-    chained = abs(speed[1]) * second + abs(speed[2]) * third + abs(speed[3]) * fourth
-    return e * end + chained + start * square * square * M
+    higher = abs(speed[1]) * second + abs(speed[2]) * third + abs(speed[3]) * fourth
+    return e * end + higher + start * square * square * M
 
 
 class Limits(NamedTuple):
-    """Bounds on one side's arcs, in units of the time left."""
+    """Bounds on one side's arcs, in units of the remaining time: see `limits`."""
 
     half: float
     change: float
@@ -328,32 +331,33 @@ class Limits(NamedTuple):
 
 @inlined
 def limits(side: Restoring, a: Terms, half: Series) -> Limits:
-    """Bounds on one side's arcs while s is left; NaN where the hypotheses fail.
+    """Bounds on one side's arcs within the remaining time; NaN where the assumptions of the proof do not hold.
 
     Half duration, error of the speeds, and of their expansions, over z; change of the acceleration; inverse of the
-    least slope of the speed at an arc's start by the rest time; `speed_bound` of both ends; size of all terms of the
-    speeds.
+    least slope of the speed at an arc's start by the time of rest; `speed_bound` of both ends; sum of the absolute
+    values of all terms of the speeds.
     """
-    rate, bend = abs(a.rate), abs(a.curvature)
-    change = rate + 2.0 * bend
+    rate, curvature = abs(a.rate), abs(a.curvature)
+    change = rate + 2.0 * curvature
     Y = total(half)
-    stiff = abs(a.stiffness) * Y * Y * _MARGIN
+    stiffness = abs(a.stiffness) * Y * Y * _MARGIN
     sizes = abs(side.g) + change
-    least = min(side.g, a.g) - 0.25 * bend - 2.0 * _NEAR * change - _ROUNDING * sizes
-    by_half = least * (1.0 - stiff) - (THIRD * bend * Y * Y + 0.1 * rate * stiff * Y) * _MARGIN
+    least = min(side.g, a.g) - 0.25 * curvature - 2.0 * _NEAR * change - _ROUNDING * sizes
+    by_half = least * (1.0 - stiffness) - (THIRD * curvature * Y * Y + 0.1 * rate * stiffness * Y) * _MARGIN
     growth = half[0] - (2.0 * abs(half[1]) + 3.0 * abs(half[2]) + 4.0 * abs(half[3])) * _MARGIN
-    beyond, whole = forces_bound(a, half)
-    end = speed_bound(half, forces(a, half, 1.0), beyond)
-    start = speed_bound(half, forces(a, half, -1.0), beyond)
-    proven = least > 0.0 and by_half > 0.0 and growth > 0.0 and stiff <= _LARGEST_STIFFNESS
+    beyond, whole = mean_restoring_bound(a, half)
+    end = speed_bound(half, mean_restoring(a, half, 1.0), beyond)
+    start = speed_bound(half, mean_restoring(a, half, -1.0), beyond)
+    proven = least > 0.0 and by_half > 0.0 and growth > 0.0 and stiffness <= _LARGEST_STIFFNESS
     inverse = 1.0 / (by_half * growth) if proven else math.nan
-    series = stiff * (stiff * ((a.g + change) / 7.0 + change * Y / 450.0) + bend * Y * (Y / 14.0 + 0.05))
+    fourth = stiffness * ((a.g + change) / 7.0 + change * Y / 450.0)
+    series = stiffness * (fourth + curvature * Y * (Y / 14.0 + 0.05))
     return Limits(Y, change, inverse, 1.03 * Y * side.error, Y * series, end, start, Y * (whole + sizes))
 
 
 @inlined
 def shifts(m: Series, here: Limits, there: Limits, speed: Series, e: float) -> Three:
-    """Bounds on how far one arc and impact shift the rest time: over z^5, over z, over z and the distance so far."""
+    """Bounds on how far one arc and impact shift the time of rest: over z^5, over z, over z and the distance so far."""
     M = total(m)
     fifth = mismatch(m, here.end, there.start, speed, e) * there.inverse
     rounding = 4.0 * _ROUNDING * (e * here.speeds + there.speeds * M)
@@ -364,40 +368,40 @@ def shifts(m: Series, here: Limits, there: Limits, speed: Series, e: float) -> T
 
 
 @inlined
-def distance(missing: float, ratios: Pair, one: Three, other: Three) -> float:
-    """Bound on the distance of the rest time from the candidate: the geometric sum of all shifts."""
+def distance(first: float, ratios: Pair, one: Three, other: Three) -> float:
+    """Bound on the distance of the time of rest from the candidate: the geometric sum of all shifts; NaN: no proof."""
     pair = ratios[0] * ratios[1]
     square = ratios[0] * ratios[0]
     inverse = 1.0 / (1.0 - pair)
     fifths = (one[0] + other[0] * square * square * ratios[0]) / (1.0 - pair * pair * pair * pair * pair)
-    firsts = (one[1] + other[1] * ratios[0]) * inverse
+    linear = (one[1] + other[1] * ratios[0]) * inverse
     drift = (one[2] + other[2] * ratios[0]) * inverse
-    found = (missing + fifths + firsts) / (1.0 - drift)
+    found = (first + fifths + linear) / (1.0 - drift)
     return found if pair < 1.0 and drift < 1.0 and found <= _NEAR else math.nan
 
 
 @inlined
 def ratio(m: Series, shift: Three, following: Three) -> float:
-    """Largest ratio of the times left at two impacts, shifts included; NaN where the next might be out of order."""
-    wandering = shift[0] + shift[1] + shift[2] * _NEAR + following[1]
-    rest = (abs(m[1]) + abs(m[2]) + abs(m[3])) * _MARGIN
-    largest = abs(m[0]) + rest + wandering
-    return largest if m[0] - rest > wandering and largest <= 1.0 else math.nan
+    """Largest ratio of the remaining times at two impacts, shifts included; NaN where their order is not certain."""
+    shifted = shift[0] + shift[1] + shift[2] * _NEAR + following[1]
+    higher = (abs(m[1]) + abs(m[2]) + abs(m[3])) * _MARGIN
+    largest = abs(m[0]) + higher + shifted
+    return largest if m[0] - higher > shifted and largest <= 1.0 else math.nan
 
 
 @shared
 def refined_bracket(v: float, i: Restoring, j: Restoring, window: float) -> Pair:
     """Bracket on the time to rest from an impact that enters side i with speed v; NaN, NaN: no proof.
 
-    ``window``: time over which what i and j say holds, within which complete chattering has been proven.
+    ``window``: time over which i and j hold, and within which complete chattering has been proven.
     """
     if not (0.0 < v < math.inf and i.g > 0.0 and j.g > 0.0 and i.restitution * j.restitution < 1.0):
         return math.nan, math.nan
     first = first_candidate(v, i, j)
     if not 0.5 * first <= window:
         return math.nan, math.nan
-    s, a, b, A, B, missing = rest_candidate(v, i, j, first)
-    half_width = s * remainder(s, i, j, (a, b), (A, B), missing) * (1.0 + _ROUNDING) + _ROUNDING * s
+    s, a, b, A, B, residual = rest_candidate(v, i, j, first)
+    half_width = s * remainder(i, j, (a, b), (A, B), residual) * (1.0 + _ROUNDING) + _ROUNDING * s
     if not (s > 0.0 and s + half_width <= window):
         return math.nan, math.nan
     return s - half_width, s + half_width
@@ -405,27 +409,24 @@ def refined_bracket(v: float, i: Restoring, j: Restoring, window: float) -> Pair
 
 @inlined
 def remainder(
-    s: float, i: Restoring, j: Restoring, terms: tuple[Terms, Terms], curves: tuple[Curve, Curve], missing: float
+    i: Restoring, j: Restoring, terms: tuple[Terms, Terms], curves: tuple[Curve, Curve], residual: float
 ) -> float:
-    """Bound on the rest time's distance from a candidate, over the time left s; NaN: no proof.
-
-    See `rest_candidate` for the rest.
-    """
+    """Bound on the distance of the time of rest from a candidate (see `rest_candidate`), over it; NaN: no proof."""
     A, B = curves
-    one, other = limits(i, terms[0], A.half), limits(j, terms[1], B.half)
-    m_i, m_j = left(A.half), left(B.half)
-    shift_i = shifts(m_i, one, other, B.speed, i.restitution)
-    shift_j = shifts(m_j, other, one, A.speed, j.restitution)
+    limits_i, limits_j = limits(i, terms[0], A.half), limits(j, terms[1], B.half)
+    m_i, m_j = remaining_after(A.half), remaining_after(B.half)
+    shift_i = shifts(m_i, limits_i, limits_j, B.speed, i.restitution)
+    shift_j = shifts(m_j, limits_j, limits_i, A.speed, j.restitution)
     ratios = ratio(m_i, shift_i, shift_j), ratio(m_j, shift_j, shift_i)
-    away = (abs(missing) + 4.0 * _ROUNDING * one.speeds) * one.inverse
-    return distance(away, ratios, shift_i, shift_j)
+    first = (abs(residual) + 4.0 * _ROUNDING * limits_i.speeds) * limits_i.inverse
+    return distance(first, ratios, shift_i, shift_j)
 
 
 @inlined
-def deviation(error: float, drift: float, bend: float, height: float) -> float:
-    """Error of a `Restoring` up to a height where its stiffness drifts and bends: G = g - k u + ..., |d2G/du2| <= bend.
+def deviation(error: float, change: float, curvature: float, height: float) -> float:
+    """Error of a `Restoring` up to a height, where G = g - k u + ... with a stiffness k that is not constant.
 
-    ``error``: of g; ``drift``: of the stiffness k over the window. A nonlinear block with ground accelerations a in
-    units of g has k = p^2 (cos(alpha) - j a sin(alpha)), bend = p^2 hypot(1, |a|max).
+    ``error`` of g; ``change`` of k over the window; ``curvature`` bounds |d2G/du2|. A nonlinear block with ground
+    accelerations a in units of g has k = p^2 (cos(alpha) - j a sin(alpha)) and a curvature of p^2 hypot(1, |a|max).
     """
-    return (error + height * (drift + 0.5 * bend * height)) * (1.0 + _ROUNDING)
+    return (error + height * (change + 0.5 * curvature * height)) * (1.0 + _ROUNDING)

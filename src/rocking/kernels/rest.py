@@ -1,4 +1,4 @@
-"""Whether a block comes to rest after an impact, and when; and the impacts of a sequence that is proven to end."""
+"""Whether a block comes to rest after an impact, and when; the impacts of a sequence after its proof."""
 
 import math
 from typing import NamedTuple
@@ -10,8 +10,7 @@ from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import Ground, coefficient, length_of, start_of
 from rocking.kernels.remaining import THIRD, Pair
-from rocking.kernels.state import Record, Records, RestRule
-from rocking.kernels.trace import PROVEN_PER_ITERATION, write_impact, write_node
+from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRule, write_impact, write_node
 
 ULP = 2.0**-52
 
@@ -27,7 +26,7 @@ _SLOWEST = 0.95
 class Rest(NamedTuple):
     """Time to rest, with proven bounds; NaN bounds: not proven; NaN time: the block does not come to rest yet.
 
-    ``stalled``: for no other reason than that time does not advance any more.
+    ``stalled``: at rest only because time does not advance any more.
     """
 
     lower: float
@@ -44,7 +43,7 @@ def time_of(ground: Ground, state: Record) -> float:
 
 @inlined
 def count_impact(state: Record) -> None:
-    """Count an impact of a proven sequence; before a proof, decide at which speed one is tried."""
+    """Count an impact of a proven sequence; before a proof, set the speed at which the next one is tried."""
     if state.run > 0:
         state.run += 1
     elif state.v > state.proof_speed:
@@ -62,10 +61,10 @@ def record_proof(ground: Ground, rules: Record, state: Record, proof: Proof) -> 
         state.run_start = time_of(ground, state)
     excess = (proof.upper - proof.lower) / rules.tolerance
     wait = time_to_piece(ground, state, proof.time)
-    # The width of a bracket of higher order falls with the fifth power of the speed. It needs a rest within the present
-    # piece; that of lower order does not, and is quadratic.
-    finer = _SOONER * excess**-0.2 if wait == 0.0 else 1.0 - wait / proof.time
-    state.proof_speed = state.v * min(_SLOWEST, max(finer, math.sqrt(1.0 / excess)))
+    # The width of a bracket of fourth order is proportional to the fifth power of the speed, that of the geometric one
+    # to its square. The former needs a rest within the present piece.
+    ratio = _SOONER * excess**-0.2 if wait == 0.0 else 1.0 - wait / proof.time
+    state.proof_speed = state.v * min(_SLOWEST, max(ratio, math.sqrt(1.0 / excess)))
 
 
 @inlined
@@ -85,8 +84,8 @@ def time_to_piece(ground: Ground, state: Record, time: float) -> float:
 def proven_bounds(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record) -> Proof:
     """Proven bounds on the time to rest, widened by the rounding of all times; all NaN: no proof."""
     lower, upper, time, height = prove_rest(ground, block, rules, scratch, state)
-    slack = allowance(time_of(ground, state), upper, state)
-    return Proof(max(0.0, lower - slack), upper + slack, time, height)
+    rounding = allowance(time_of(ground, state), upper, state)
+    return Proof(max(0.0, lower - rounding), upper + rounding, time, height)
 
 
 @inlined
@@ -98,10 +97,10 @@ def allowance(time: float, upper: float, state: Record) -> float:
 
 @shared
 def rest_after_impact(ground: Ground, block: Record, rules: Record, state: Record, proof: Proof) -> Rest:
-    """Decide on rest at an impact, given the bounds that are proven there (NaN: none)."""
+    """Whether the block comes to rest at an impact, given the bounds that are proven there (NaN: none)."""
     time = time_of(ground, state)
     if rules.treatment == RestRule.CERTIFIED:
-        # What is not resolved any more must not be higher than what was.
+        # No rotation that is not resolved may be higher than those that are.
         good = max(rules.tolerance, 4.0 * allowance(time, proof.upper, state))
         if proof.upper - proof.lower <= good and proof.height <= state.peak:
             return Rest(proof.lower, proof.upper, proof.time, False)
@@ -131,7 +130,7 @@ def has_stalled(ground: Ground, block: Record, state: Record) -> bool:
     return bool(time - state.last_impact_time <= least and 2.0 * state.v <= least * pressed)
 
 
-#: Largest |beta| and |gamma| of `proven_arc`: what its sums leave out is below 2^-54 of them.
+#: Largest |beta| and |gamma| of `proven_arc`: the truncation of its sums is below 2^-54 of them.
 LARGEST_BETA = 1.0 / 64.0
 LARGEST_GAMMA = 2.0**-14
 
@@ -142,7 +141,7 @@ def pass_proven_impacts(
 ) -> None:
     """March the linear model through some impacts within ``left``, up to the one at which another proof is tried.
 
-    The ground acceleration changes evenly; the state is one just after an impact.
+    The ground acceleration is linear in time; the state is one just after an impact.
     """
     rate = coefficient(ground, state.piece, 1)
     end = state.offset + left
@@ -151,7 +150,7 @@ def pass_proven_impacts(
         g = restoring(ground, block, side, state.piece, state.offset)
         t, speed = proven_arc(v, g, block.gain[side] * sign_of(side) * rate, block.stiffness[side])
         slower = block.restitution[side] * speed
-        # The arc lies below its first tangent.
+        # The arc is below its first tangent.
         if not (t < end - state.offset and slower > state.proof_speed and v * t <= state.peak):
             return
         state.side = block.entered[side]
@@ -170,36 +169,35 @@ def proven_arc(v: float, g: float, rate: float, stiffness: float) -> Pair:
     """Duration and impact speed of an arc under g + rate t - stiffness u that starts with speed v.
 
     To full precision for |beta| = |rate| v/g^2 and |gamma| = |stiffness| v^2/g^2 up to the limits above, NaN beyond.
-    Half the duration is (v/g) x with x + b x^2 = 1, b = 2 beta/3, and a correction for gamma. The sum for x, with
-    Catalan's numbers, converges for |b| < 1/4; all sums stop where what is left is below rounding.
+    Half the duration is (v/g) x with x + b x^2 = 1, b = 2 beta/3, and a correction for gamma.
     """
     if not g > 0.0:
         return math.nan, math.nan
     inverse = 1.0 / g
-    pace = v * inverse
-    beta, gamma = rate * pace * inverse, stiffness * pace * pace
+    half = v * inverse  # half the duration under constant acceleration
+    beta, gamma = rate * half * inverse, stiffness * half * half
     if not (abs(beta) <= LARGEST_BETA and abs(gamma) <= LARGEST_GAMMA):
         return math.nan, math.nan
     x = half_duration(2.0 * THIRD * beta)
-    tilt = beta * x
+    y = beta * x
     q = gamma * x * x
     # The equation's value, slope and half its second derivative at x.
-    bent = q * (q * (2.0 / 15.0 - q * (17.0 / 315.0)) - THIRD)
-    value = x * ((1.0 + tilt) * bent + tilt * q * (1.0 / 45.0 - q * (2.0 / 945.0)))
-    bending = 2.0 * q * (1.0 + tilt) * (q * (4.0 / 15.0) - THIRD)
-    slope = 1.0 + (4.0 / 3.0) * tilt + (1.0 + 2.0 * tilt) * bent + bending + (4.0 / 45.0) * tilt * q
-    curving = 2.0 * THIRD * beta - gamma * x * (1.0 + (28.0 / 15.0) * tilt)
+    tangent = q * (q * (2.0 / 15.0 - q * (17.0 / 315.0)) - THIRD)
+    value = x * ((1.0 + y) * tangent + y * q * (1.0 / 45.0 - q * (2.0 / 945.0)))
+    change = 2.0 * q * (1.0 + y) * (q * (4.0 / 15.0) - THIRD)
+    slope = 1.0 + (4.0 / 3.0) * y + (1.0 + 2.0 * y) * tangent + change + (4.0 / 45.0) * y * q
+    curvature = 2.0 * THIRD * beta - gamma * x * (1.0 + (28.0 / 15.0) * y)
     step = 1.0 / slope
     newton = value * step
-    x -= newton * (1.0 + curving * step * newton)
+    x -= newton * (1.0 + curvature * step * newton)
     q = gamma * x * x
     gain = 2.0 * beta * x * x * (THIRD - q * (1.0 / 45.0 - q * (2.0 / 945.0)))
-    return 2.0 * pace * x, v + v * gain
+    return 2.0 * half * x, v + v * gain
 
 
 @inlined
 def half_duration(b: float) -> float:
-    """Root of x + b x^2 = 1 near 1 for |b| <= 1/96: a sum with Catalan's numbers, in pairs of terms."""
+    """Root of x + b x^2 = 1 near 1 for |b| <= 1/96, to full precision: the sum with Catalan's numbers."""
     square = b * b
     fourth = square * square
     low = (1.0 - b) + square * (2.0 - 5.0 * b)

@@ -1,14 +1,14 @@
 """Steps so short that nine terms of the series are exact: in registers, with one bound on what may happen on the way.
 
-What the bound does not decide (two impacts close to each other, a rotation near the highest so far, a fall) is left
-UNDECIDED, and goes through `expand` and `advance`. The series are the same, and so are the answers.
+What the bound does not decide (two impacts close to each other, a rotation near the highest so far, a fall) is
+UNDECIDED, and so is a step with a NaN: it is for `expand` and `advance`, whose series are the same.
 """
 
 import math
 
 import numpy as np
 
-from rocking.kernels.arc import is_left_out_nothing, sign_of, strength_of, weight_at
+from rocking.kernels.arc import sign_of, strength_of, truncation_is_negligible, weight_at
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.events import StepEnd
 from rocking.kernels.ground import Ground, acceleration, coefficient, has_vertical, is_straight, vertical_of
@@ -21,15 +21,16 @@ SHORT_LINEAR = 4e-3
 SHORT_WEIGHTED = 2e-3
 SHORT_NONLINEAR = 1.2e-3
 
-#: Largest sum of the last two terms of a linear velocity, over the first two: as lam t^2 is small, what follows is
+#: Largest sum of the last two terms of a linear velocity, over the first two: as lam t^2 is small, the truncation is
 #: smaller by a factor of 20,000 or more.
 _LAST_TERMS = 2.0**-40
 
-#: Largest of what `is_complete_weighted` tests over the first two: what is left out is a sixtieth of it.
-_CARRIED = 2.0**-46
+#: Largest of what `is_complete_weighted` tests over the first two terms: the truncation is a sixtieth of it.
+_NEXT_TERMS = 2.0**-46
 
+#: Newton's steps at most, and the relative size of the one that ends them: the error is of the order of its square.
 _NEWTON_STEPS = 8
-_SETTLED = 1e-8
+_CONVERGED = 1e-8
 
 
 @inlined
@@ -63,7 +64,7 @@ def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: flo
     c, angles = nonlinear_series(ground, block, state, weight)
     end = resolve_step(c, reach_nonlinear(ground, block, state, left, weight), state, block.fallen)
     push = (acceleration(ground, state.piece, state.offset), coefficient(ground, state.piece, 1))
-    complete = is_complete_nonlinear(c, angles, block.stiffness[state.side], (push, weight), end.time)
+    complete = is_complete_nonlinear(c, angles, block.stiffness[state.side], push, weight, end.time)
     return end if complete else undecided()
 
 
@@ -71,27 +72,27 @@ def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: flo
 def is_complete_weighted(c: Ten, lam: float, weight: Line, t: float) -> bool:
     """Whether nine terms of a linear series are enough at t while the weight changes.
 
-    Each coefficient is made of the one two before and, as the weight changes, of the one three before. So the last
-    three make all that follows, a power of lam (|W| + |W'| t) t^2 after the other, which is at most 0.006.
+    Each coefficient follows from the one two before and, as the weight changes, from the one three before. So the last
+    three bound the truncation, by a geometric sum with the ratio lam (|W| + |W'| t) t^2, which is at most 0.006.
     """
     t2, change = t * t, abs(weight[1]) * t
     t6 = t2 * t2 * t2
     eighth, ninth = 8.0 * abs(c[8]) * t2, 9.0 * abs(c[9]) * (t2 * t)
-    made = (abs(weight[0]) + change) * (eighth + ninth) + change * (7.0 * abs(c[7]) * t)
-    return abs(lam) * t2 * (made * t6) <= _CARRIED * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
+    last = (abs(weight[0]) + change) * (eighth + ninth) + change * (7.0 * abs(c[7]) * t)
+    return abs(lam) * t2 * (last * t6) <= _NEXT_TERMS * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
 
 
 @inlined
-def is_complete_nonlinear(c: Ten, z: Seven, lam: float, pulls: tuple[Line, Line | None], t: float) -> bool:
-    """Whether nine terms of a nonlinear series are enough at t; ``pulls`` are push and weight."""
+def is_complete_nonlinear(c: Ten, z: Seven, lam: float, push: Line, weight: Line | None, t: float) -> bool:
+    """Whether nine terms of a nonlinear series are enough at t."""
     t2 = t * t
     t3, t4 = t2 * t, t2 * t2
     t5, t6, t7 = t2 * t3, t3 * t3, t3 * t4
     low = (abs(c[1]) * t, 2.0 * abs(c[2]) * t2, 3.0 * abs(c[3]) * t3, 4.0 * abs(c[4]) * t4, 5.0 * abs(c[5]) * t5)
     sizes = (*low, 6.0 * abs(c[6]) * t6, 7.0 * abs(c[7]) * t7, 8.0 * abs(c[8]) * (t4 * t4), 9.0 * abs(c[9]) * (t4 * t5))
     angles = (z[0] * t, z[1] * t2, z[2] * t3, z[3] * t4, z[4] * t5, z[5] * t6, z[6] * t7)
-    nothing, _ = is_left_out_nothing(sizes, angles, lam * t2, strength_of(pulls[1], pulls[0], t))
-    return nothing
+    negligible, _ = truncation_is_negligible(sizes, angles, lam * t2, strength_of(weight, push, t))
+    return negligible
 
 
 @inlined
@@ -102,7 +103,7 @@ def undecided() -> StepEnd:
 
 @inlined
 def weight_line(ground: Ground, state: Record) -> Line:
-    """Weight at a state, and its slope, where it changes evenly."""
+    """Weight at a state, and its slope, where it is linear in time."""
     return weight_at(ground, state.piece, state.offset), coefficient(vertical_of(ground), state.piece, 1)
 
 
@@ -131,13 +132,13 @@ def reach_nonlinear(ground: Ground, block: Record, state: Record, left: float, w
 
 @inlined
 def greatest(weight: Line | None, left: float) -> float:
-    """Greatest size of the weight over a time; 1 where it does not change."""
+    """Greatest absolute value of the weight over a time; 1 where it does not change."""
     return 1.0 if weight is None else max(abs(weight[0]), abs(weight[0] + weight[1] * left))
 
 
 @inlined
 def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
-    """Series of a linear arc under a ground acceleration that changes evenly."""
+    """Series of a linear arc under a ground acceleration that is linear in time."""
     side = state.side
     gain = block.gain[side]
     push = push_line(ground, state)
@@ -146,7 +147,7 @@ def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
 
 @inlined
 def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) -> Ten:
-    """Series of a linear arc under two ground accelerations that change evenly."""
+    """Series of a linear arc under two ground accelerations that are linear in time."""
     side, gain = state.side, block.gain[state.side]
     push = push_line(ground, state)
     pushes = (gain * push[0], gain * push[1])
@@ -155,7 +156,7 @@ def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) 
 
 @inlined
 def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line | None) -> tuple[Ten, Seven]:
-    """Series of a nonlinear arc under ground accelerations that change evenly; see `nonlinear_ten`."""
+    """Series of a nonlinear arc under ground accelerations that are linear in time; see `nonlinear_ten`."""
     side, u = state.side, state.u
     angle = (block.sine[side], block.cosine[side])
     if u != 0.0:
@@ -166,14 +167,14 @@ def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line 
 
 @inlined
 def push_line(ground: Ground, state: Record) -> Line:
-    """Ground acceleration in the frame of the state's side, and its slope, where it changes evenly."""
+    """Ground acceleration in the frame of the state's side, and its slope, where it is linear in time."""
     sign = sign_of(state.side)
     return sign * acceleration(ground, state.piece, state.offset), sign * coefficient(ground, state.piece, 1)
 
 
 @inlined
 def resolve_step(c: Ten, t: float, state: Record, fallen: float) -> StepEnd:
-    """Where a short arc is after t, or at its first impact before; UNDECIDED where that takes a closer resolve_step."""
+    """End of a step over t, or at the first impact before; UNDECIDED where the bounds do not decide it."""
     if c[1] == 0.0 and c[2] == 0.0:  # balanced, perhaps for ever
         return undecided()
     outcome = Outcome.STEP
@@ -186,7 +187,7 @@ def resolve_step(c: Ten, t: float, state: Record, fallen: float) -> StepEnd:
             t, outcome = impact_from_ground(c, t), Outcome.IMPACT
     else:
         end = rotation(c, t)
-        # No dip below both ends by more than t^2/8 of the curvature.
+        # The rotation is not below both ends by more than t^2/8 of the curvature.
         if not min(c[0], end) > 0.125 * t * t * max(most, 0.0):
             falls = most < 0.0 or c[1] + max(most, 0.0) * t < 0.0
             t, outcome = impact_from_above(c, t) if end < 0.0 and falls else np.nan, Outcome.IMPACT
@@ -207,7 +208,7 @@ def resolve_step(c: Ten, t: float, state: Record, fallen: float) -> StepEnd:
 
 @inlined
 def later_curvature(c: Ten, t: float) -> float:
-    """Size of what the terms from the fourth power on add to u'' within t, at most."""
+    """Bound on the absolute value of what the terms from the fourth power on add to u'' within t."""
     high = 56.0 * abs(c[8]) + 72.0 * abs(c[9]) * t
     middle = 30.0 * abs(c[6]) + 42.0 * abs(c[7]) * t
     low = 12.0 * abs(c[4]) + 20.0 * abs(c[5]) * t
@@ -225,7 +226,7 @@ def is_complete(c: Ten, t: float) -> bool:
 
 @inlined
 def rotation(c: Ten, t: float) -> float:
-    """Value of a series, added up in pairs: a shorter wait than Horner's rule."""
+    """Value of a series, added up in pairs: a shorter chain of operations than Horner's rule."""
     t2 = t * t
     low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
     high = (c[6] + c[7] * t) + (c[8] + c[9] * t) * t2
@@ -262,7 +263,7 @@ def highest_time(c: Ten, left: float) -> float:
         high = (30.0 * c[6] + 42.0 * c[7] * t) + (56.0 * c[8] + 72.0 * c[9] * t) * t2
         step = velocity(c, t) / (low + high * (t2 * t2))
         t -= step
-        if abs(step) <= _SETTLED * t:
+        if abs(step) <= _CONVERGED * t:
             return t if 0.0 < t < left else np.nan
     return np.nan
 
@@ -280,7 +281,7 @@ def impact_from_ground(c: Ten, left: float) -> float:
         f, slope = over_time(c, t)
         step = f / slope
         t -= step
-        if abs(step) <= _SETTLED * t:
+        if abs(step) <= _CONVERGED * t:
             falls = c[2] + 2.0 * max(c[3], 0.0) * t + 0.25 * later_curvature(c, t) < 0.0
             return t if falls and t < left else np.nan
     return np.nan
@@ -296,6 +297,6 @@ def impact_from_above(c: Ten, left: float) -> float:
     for _ in range(_NEWTON_STEPS):
         step = rotation(c, t) / velocity(c, t)
         t -= step
-        if abs(step) <= _SETTLED * t:
+        if abs(step) <= _CONVERGED * t:
             return t if 0.0 < t < left else np.nan
     return np.nan

@@ -1,4 +1,4 @@
-"""What kernels work on, as numpy records, and the integer codes that they return.
+"""What kernels work on, as numpy records; the integer codes that they return; and the rows that a march writes.
 
 Compiled code passes a record by pointer and reads its fields by name. Compiled, an integer code is a plain integer.
 """
@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.kernels.compiled import UNCOMPILED
+from rocking.kernels.compiled import UNCOMPILED, inlined
+from rocking.kernels.ground import Ground, start_of
 
 Records = NDArray[np.void]
 
@@ -36,7 +37,7 @@ class Outcome(IntEnum):
     STOPPED = 3
     #: The block is balanced on a corner and nothing will ever move it.
     BALANCED = 4
-    #: A short step cannot tell; the full series must.
+    #: A short step does not decide it; the full series does.
     UNDECIDED = 5
 
 
@@ -74,6 +75,7 @@ class Ending(IntEnum):
 
 
 def _record(**fields: Any) -> np.dtype[np.void]:
+    """Type of a record with these fields."""
     return np.dtype(
         [(name, *(kind if isinstance(kind, tuple) else (kind,))) for name, kind in fields.items()], align=True
     )
@@ -85,7 +87,7 @@ _SERIES = ("f8", (ORDER + 2,))
 #: A block, side by side: lambda in u'' = lambda u - ...; uplift threshold in g and its gain (the restoring acceleration
 #: at zero rotation is gain (threshold + side a/g)); restitution on leaving the side, and the side entered from it; the
 #: rotation at which the block has overturned; slenderness, its sine and cosine; limit of a treatment other than the
-#: certificate. What most iterations of a march need comes first, here and below: fewer cache lines are read.
+#: certificate. The fields that most iterations of a march read come first, here and below: fewer cache lines are read.
 BLOCK = _record(
     stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, restitution=_SIDES, entered=("i8", (2,)), fallen="f8",
     slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES,
@@ -97,9 +99,9 @@ RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endles
 
 #: The state of a march. ``until`` is the first piece that is not marched through and ``budget`` the number of
 #: iterations left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a
-#: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests that came only because
-#: time hardly advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties``
-#: counts what was decided in the last digits: whether a block without weight touches the ground.
+#: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests only because time hardly
+#: advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties`` counts the
+#: decisions by the last digits whether a block without weight touches the ground.
 STATE = _record(
     piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
     run="i8", proof_speed="f8", last_impact_time="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8",
@@ -117,8 +119,8 @@ SEQUENCE_ROW = _record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8
 #: arrays by value.
 TABLE = _record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
 
-#: Scratch space: the series of one step; of the ground, the weight and sin and cos(alpha - u) about its start; a spare.
-SCRATCH = _record(rotation=_SERIES, ground=_SERIES, weight=_SERIES, sine=_SERIES, cosine=_SERIES, spare=_SERIES)
+#: Scratch space: the series of one step; of the ground, the weight and sin and cos(alpha - u) about its start; another.
+SCRATCH = _record(rotation=_SERIES, ground=_SERIES, weight=_SERIES, sine=_SERIES, cosine=_SERIES, other=_SERIES)
 
 #: Scratch space of a variation: series of the stiffness, of the forcing and of the variation itself.
 VARIATION = _record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
@@ -165,3 +167,75 @@ def new_table(rows: int) -> Records:
 def grown(table: Records) -> Records:
     """Table with the same rows and as many more."""
     return attributed(np.concatenate([table, np.zeros_like(table)]))
+
+
+# ---- Writing rows of a table; nothing is written where the rules say so ----
+
+#: Largest number of impacts of a proven sequence in one iteration of a march, and of rows of one kind that it writes.
+PROVEN_PER_ITERATION = 64
+_ROWS_PER_ITERATION = PROVEN_PER_ITERATION + 3
+
+
+@inlined
+def has_space(rules: Record, table: Records, state: Record) -> bool:
+    """Whether the table has space for what one iteration of the march can write."""
+    most = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
+    return not rules.record or most + _ROWS_PER_ITERATION <= table.shape[0]
+
+
+@inlined
+def signed(side: int) -> int:
+    """Sign of the rotation on a side: +1, -1, and 0 at rest."""
+    return 0 if side == AT_REST else 1 - 2 * side
+
+
+@inlined
+def write_node(ground: Ground, rules: Record, table: Records, state: Record) -> None:
+    """Write the state into the table."""
+    if not rules.record:
+        return
+    row = table[state.nodes].node
+    row.time = start_of(ground, state.piece) + state.offset
+    row.piece = state.piece
+    row.offset = state.offset
+    row.side = state.side
+    row.u = state.u
+    row.v = state.v
+    state.nodes += 1
+
+
+@inlined
+def write_event(rules: Record, table: Records, state: Record, time: float, kind: int) -> None:
+    """Write an uplift, a rest or an overturning."""
+    if rules.record:
+        row = table[state.events].event
+        row.time = time
+        row.kind = kind
+        row.side = signed(state.side)
+    state.events += 1
+
+
+@inlined
+def write_impact(rules: Record, table: Records, state: Record, time: float, speed: float) -> None:
+    """Write the last impact, from the state after it and the speed before."""
+    if not rules.record:
+        return
+    row = table[state.impacts - 1].impact
+    row.time = time
+    row.side = signed(state.side)
+    row.speed_before = speed
+    row.speed_after = state.v
+
+
+@inlined
+def write_sequence(rules: Record, table: Records, state: Record, time: float, rest: tuple[float, float, float]) -> None:
+    """Write a chattering sequence that ends, from its last impact's time and (lower, upper, time) to rest."""
+    lower, upper, to_rest = rest
+    if rules.record:
+        row = table[state.sequences].sequence
+        row.start = state.run_start
+        row.end = time + to_rest
+        row.lower = time + lower
+        row.upper = time + upper
+        row.impacts = state.run
+    state.sequences += 1

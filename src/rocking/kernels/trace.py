@@ -1,94 +1,27 @@
-"""What a response keeps of a march, row by row, and its rotation at any time, from the series of its arcs.
+"""What is computed again from the nodes of a response: its rotation at any time, and how it changes with the input.
 
-Nothing is written where the rules say so.
+For the latter a quantity x is changed to x (1 + epsilon), and d/d epsilon at 0 is carried along: through an arc by the
+linearised equation of motion, through an impact by the saltation that follows from its shift in time.
 """
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats, Integers
-from rocking.kernels.arc import evaluate, expand, sign_of
-from rocking.kernels.compiled import inlined, kernel
-from rocking.kernels.ground import Ground, start_of
+from rocking.kernels.arc import evaluate, expand, restoring, sign_of, weight_at
+from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, start_of, vertical_of
+from rocking.kernels.recurrences import INTEGRATED_TWICE, variation_coefficients
 from rocking.kernels.state import AT_REST, NODE_ROW, Record, Records, records
-
-#: Largest number of impacts of a proven sequence in one iteration of a march, and of rows of one kind that it writes.
-PROVEN_PER_ITERATION = 64
-_ROWS_PER_ITERATION = PROVEN_PER_ITERATION + 3
-
-
-@inlined
-def has_space(rules: Record, table: Records, state: Record) -> bool:
-    """Whether the table has space for what one iteration of the march can write."""
-    most = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
-    return not rules.record or most + _ROWS_PER_ITERATION <= table.shape[0]
-
-
-@inlined
-def signed(side: int) -> int:
-    """Sign of the rotation on a side: +1, -1, and 0 at rest."""
-    return 0 if side == AT_REST else 1 - 2 * side
-
-
-@inlined
-def write_node(ground: Ground, rules: Record, table: Records, state: Record) -> None:
-    """Write the state into the table."""
-    if not rules.record:
-        return
-    row = table[state.nodes].node
-    row.time = start_of(ground, state.piece) + state.offset
-    row.piece = state.piece
-    row.offset = state.offset
-    row.side = state.side
-    row.u = state.u
-    row.v = state.v
-    state.nodes += 1
-
-
-@inlined
-def write_event(rules: Record, table: Records, state: Record, time: float, kind: int) -> None:
-    """Write an uplift, a rest or an overturning."""
-    if rules.record:
-        row = table[state.events].event
-        row.time = time
-        row.kind = kind
-        row.side = signed(state.side)
-    state.events += 1
-
-
-@inlined
-def write_impact(rules: Record, table: Records, state: Record, time: float, speed: float) -> None:
-    """Write the last impact, from the state after it and the speed before."""
-    if not rules.record:
-        return
-    row = table[state.impacts - 1].impact
-    row.time = time
-    row.side = signed(state.side)
-    row.speed_before = speed
-    row.speed_after = state.v
-
-
-@inlined
-def write_sequence(rules: Record, table: Records, state: Record, time: float, rest: tuple[float, float, float]) -> None:
-    """Write a chattering sequence that ends, from its last impact's time and (lower, upper, time) to rest."""
-    lower, upper, to_rest = rest
-    if rules.record:
-        row = table[state.sequences].sequence
-        row.start = state.run_start
-        row.end = time + to_rest
-        row.lower = time + lower
-        row.upper = time + upper
-        row.impacts = state.run
-    state.sequences += 1
-
 
 #: Nodes of a response before its march.
 NO_NODES = records(0, NODE_ROW)
 
 
 class Trail(NamedTuple):
-    """What a response is computed again from: the problem and the nodes of its steps."""
+    """The problem and the nodes of a response, from which it can be computed again."""
 
     ground: Ground
     block: Record
@@ -96,12 +29,16 @@ class Trail(NamedTuple):
     nodes: Records
 
 
+#: Columns of what `trace` writes.
+_ROTATION, _VELOCITY, _ACCELERATION = 0, 1, 2
+
+
 @kernel
 def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Floats) -> None:
     """Write theta, theta', theta'' at times[k], in the step that starts at trail.nodes[rows[k]], into out[k].
 
-    Between the last resolved impact and rest, or the end of the response, the unresolved ones are left out: the block
-    lies still there once its last arc is over.
+    From the end of the last resolved arc to rest, or to the end of the response, they are zero. For a
+    NaN the values mean nothing.
     """
     ground, block, rules, nodes = trail
     expanded = -1
@@ -111,7 +48,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
         node = nodes[row]
         last = row + 1 == nodes.shape[0]
         if node.side == AT_REST:
-            out[k, 0] = out[k, 1] = out[k, 2] = 0.0
+            out[k, _ROTATION] = out[k, _VELOCITY] = out[k, _ACCELERATION] = 0.0
             continue
         if row != expanded:
             left = np.inf if last else nodes[row + 1].time - node.time
@@ -122,6 +59,217 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
         if u < 0.0 and (last or nodes[row + 1].side == AT_REST):
             u = v = w = 0.0
         sign = sign_of(node.side)
-        out[k, 0] = sign * u
-        out[k, 1] = sign * v
-        out[k, 2] = sign * w
+        out[k, _ROTATION] = sign * u
+        out[k, _VELOCITY] = sign * v
+        out[k, _ACCELERATION] = sign * w
+
+
+# ---- How a response changes with what it was computed from ----
+
+
+class Quantity(IntEnum):
+    """What is changed: the motion, the initial rotation or velocity, or p, slenderness or restitution of both sides."""
+
+    MOTION = 0
+    ROTATION = 1
+    VELOCITY = 2
+    FREQUENCY = 3
+    SLENDERNESS = 4
+    RESTITUTION = 5
+
+
+#: An uplift is a jump where the motion is beyond the threshold by more than this fraction of it.
+_JUMP = 1e-9
+
+
+@kernel
+def vary(
+    trail: Trail, scratch: Record, work: Record, quantity: int, peak_time: float, impacts: Floats, events: Floats
+) -> float:
+    """Change of the peak rotation per unit of epsilon; the shifts of all impacts and events are written into arrays.
+
+    The peak must not be an overturning. ``work`` is scratch space (`state.VARIATION`).
+    """
+    nodes = trail.nodes
+    impact_count = event_count = 0
+    du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
+    dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
+    at_peak = du
+    for k in range(nodes.shape[0]):
+        node = nodes[k]
+        if k + 1 == nodes.shape[0]:
+            if node.side != AT_REST and event_count < events.shape[0]:
+                events[event_count] = -du / node.v
+            break
+        following = nodes[k + 1]
+        if node.side == AT_REST:
+            events[event_count] = uplift_shift(trail, following, quantity)
+            event_count += 1
+            du = dv = 0.0
+        elif following.side == AT_REST:
+            shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
+            events[event_count] = rest_shift(trail, node, quantity, dv, shift, following)
+            event_count += 1
+        else:
+            order = expand_variation(trail, scratch, work, node, quantity, (du, dv), following.time - node.time)
+            if node.time < peak_time <= following.time:
+                at_peak, _, _ = evaluate(work.change, order, peak_time - node.time)
+            t = elapsed(trail, node, following)
+            du, dv, _ = evaluate(work.change, order, t)
+            if following.u == 0.0 and (following.side != node.side or following.v > 0.0):  # no touch
+                _, speed, _ = evaluate(scratch.rotation, order, t)
+                shift = du / -speed
+                du, dv = saltation(trail, node, following, quantity, shift, (dv, -speed))
+                impacts[impact_count] = shift
+                impact_count += 1
+    return at_peak
+
+
+@inlined
+def elapsed(trail: Trail, node: Record, following: Record) -> float:
+    """Length of a step, without the rounding of absolute times."""
+    if following.piece == node.piece:
+        return following.offset - node.offset
+    if following.piece == node.piece + 1:
+        return length_of(trail.ground, node.piece) - node.offset + following.offset
+    return following.time - node.time
+
+
+@shared
+def expand_variation(
+    trail: Trail, scratch: Record, work: Record, node: Record, quantity: int, start: tuple[float, float], left: float
+) -> int:
+    """Series of the variation along the arc from a node, into ``work.change``; returns its order."""
+    order, _, degree = expand(trail.ground, trail.block, trail.rules, scratch, node, left)
+    expand_coefficients(trail, scratch, work, node.side, degree, order)
+    if quantity == Quantity.FREQUENCY:
+        for k in range(order - 1):
+            work.forcing[k] = 2.0 * scratch.rotation[k + 2] / INTEGRATED_TWICE[k]
+    elif quantity == Quantity.SLENDERNESS:
+        for k in range(order - 1):
+            work.forcing[k] = -trail.block.slenderness[node.side] * work.stiffness[k]
+    elif quantity != Quantity.MOTION:
+        for k in range(order - 1):
+            work.forcing[k] = 0.0
+    work.change[0], work.change[1] = start
+    variation_coefficients(work, order)
+    return order
+
+
+@inlined
+def expand_coefficients(trail: Trail, scratch: Record, work: Record, side: int, degree: int, order: int) -> None:
+    """Write the series of d u''/d u, and of u'' per unit of change of the motion, into ``work``."""
+    lam, gain, threshold = trail.block.stiffness[side], trail.block.gain[side], trail.block.threshold[side]
+    A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
+    changes = degree if has_vertical(trail.ground) else 0
+    for k in range(order - 1):
+        stiffness, forcing = 0.0, 0.0
+        if trail.rules.nonlinear:
+            forcing = -S[k]
+            for j in range(min(k, changes) + 1):
+                stiffness += W[j] * C[k - j]
+                forcing += W[j] * S[k - j]
+            for j in range(min(k, degree) + 1):
+                stiffness -= A[j] * S[k - j]
+                forcing += A[j] * C[k - j]
+            work.stiffness[k] = lam * stiffness
+            work.forcing[k] = -lam * forcing
+        else:
+            work.stiffness[k] = lam * W[k] if k <= changes else 0.0
+            forcing = gain * (A[k] + threshold * added_weight(W, k, changes)) if k <= degree else 0.0
+            for j in range(min(k, changes) + 1):
+                forcing -= lam * added_weight(W, j, changes) * scratch.rotation[k - j]
+            work.forcing[k] = -forcing
+
+
+@inlined
+def added_weight(W: Floats, k: int, changes: int) -> float:
+    """Coefficient of what the motion adds to the weight."""
+    if k > changes:
+        return 0.0
+    return W[0] - 1.0 if k == 0 else W[k]
+
+
+@inlined
+def saltation(
+    trail: Trail, node: Record, following: Record, quantity: int, shift: float, rates: tuple[float, float]
+) -> tuple[float, float]:
+    """Variation after an impact that shifts; ``rates``: variation of the velocity before it, and speed of impact."""
+    block = trail.block
+    dv, speed = rates
+    left = restoring(trail.ground, block, node.side, following.piece, following.offset)
+    entered = restoring(trail.ground, block, following.side, following.piece, following.offset)
+    e = block.restitution[node.side]
+    faster = -(dv - left * shift) + (speed if quantity == Quantity.RESTITUTION else 0.0)
+    return -e * speed * shift, e * faster + entered * shift
+
+
+@inlined
+def uplift_shift(trail: Trail, node: Record, quantity: int) -> float:
+    """Shift of the uplift with which a node begins."""
+    ground, block, rules, _ = trail
+    threshold = block.threshold[node.side]
+    push = -push_at(ground, block, node.side, node.piece, node.offset)
+    rate = -push_rate(ground, block, node.side, node.piece, node.offset)
+    if abs(push - threshold) > _JUMP * threshold:
+        return 0.0
+    if quantity == Quantity.MOTION:
+        return -push / rate
+    if quantity == Quantity.SLENDERNESS:
+        growth = 1.0 + threshold * threshold if rules.nonlinear else 1.0
+        weight = weight_at(ground, node.piece, node.offset)
+        return block.slenderness[node.side] * growth * weight / rate
+    return 0.0
+
+
+@inlined
+def push_at(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+    """Acceleration towards a side, and what the weight adds to its threshold."""
+    added = weight_at(ground, piece, offset) - 1.0
+    return sign_of(side) * acceleration(ground, piece, offset) + block.threshold[side] * added
+
+
+@inlined
+def push_rate(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
+    """Rate of `push_at`."""
+    vertical = slope(vertical_of(ground), piece, offset) if has_vertical(ground) else 0.0
+    return sign_of(side) * slope(ground, piece, offset) + block.threshold[side] * vertical
+
+
+@inlined
+def rest_shift(trail: Trail, node: Record, quantity: int, dv: float, shift: float, rest: Record) -> float:
+    """Shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
+
+    ``shift`` is that of the impact with which the node begins, ``dv`` the variation of the velocity after it, at the
+    unchanged time. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g at the impact.
+    """
+    if rest.time == node.time:
+        return shift
+    block, i = trail.block, node.side
+    j = block.entered[i]
+    g_i = restoring(trail.ground, block, i, node.piece, node.offset)
+    g_j = restoring(trail.ground, block, j, node.piece, node.offset)
+    dg_i, dg_j = restoring_shift(trail, node, i, quantity, shift), restoring_shift(trail, node, j, quantity, shift)
+    e_i, e_j = block.restitution[i], block.restitution[j]
+    de = 1.0 if quantity == Quantity.RESTITUTION else 0.0
+    per_speed = 2.0 * (1.0 / g_i + e_i / g_j)
+    change = -2.0 * (dg_i / (g_i * g_i) + e_i * dg_j / (g_j * g_j) - de * e_i / g_j)
+    change += per_speed * 2.0 * de * e_i * e_j / (1.0 - e_i * e_j)
+    return shift + (per_speed * (dv - g_i * shift) + change * node.v) / (1.0 - e_i * e_j)
+
+
+@inlined
+def restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: float) -> float:
+    """Change of a side's restoring acceleration at an impact that shifts."""
+    ground, block, rules, _ = trail
+    here = acceleration(ground, node.piece, node.offset)
+    change = block.gain[j] * shift * push_rate(ground, block, j, node.piece, node.offset)
+    if quantity == Quantity.MOTION:
+        change += block.gain[j] * push_at(ground, block, j, node.piece, node.offset)
+    elif quantity == Quantity.FREQUENCY:
+        change += 2.0 * restoring(ground, block, j, node.piece, node.offset)
+    elif quantity == Quantity.SLENDERNESS:
+        weight = weight_at(ground, node.piece, node.offset)
+        slope_of_angle = block.cosine[j] * weight - sign_of(j) * here * block.sine[j] if rules.nonlinear else weight
+        change += block.stiffness[j] * slope_of_angle * block.slenderness[j]
+    return change

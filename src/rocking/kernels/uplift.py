@@ -1,4 +1,4 @@
-"""Uplift: when the ground acceleration first passes the threshold of a side."""
+"""Uplift: when the ground acceleration first passes the threshold of a side. A NaN never passes one."""
 
 from typing import NamedTuple
 
@@ -40,12 +40,12 @@ def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offs
 
     Side AT_REST when it never does before ``stop``; the piece is then the last one looked at.
     """
-    A, d = scratch.ground, scratch.spare
+    A, d = scratch.ground, scratch.other
     plus, minus = block.threshold[0], block.threshold[1]
     while True:
-        quiet = next_beyond(ground, piece, -plus, minus)
-        if quiet > piece:
-            piece, offset = quiet, 0.0
+        following = next_beyond(ground, piece, -plus, minus)
+        if following > piece:
+            piece, offset = following, 0.0
         if piece == last_piece(ground) or not start_of(ground, piece) + offset < stop:
             return Uplift(piece, offset, AT_REST, False)
         length = length_of(ground, piece)
@@ -60,7 +60,7 @@ def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offs
             degree = push_series(ground, piece, offset, minus, 1.0, A, d)
             to_minus, jump_minus = first_excess(A, degree, left, minus, 1.0, d)
             passed = min(to_plus, to_minus)
-            # A passing that rounding puts at the end of the piece is left to the next one, which may turn back.
+            # A passing that rounding puts at the end of the piece is decided in the next one, which may turn back.
             if offset + passed < length:
                 side = 0
                 if block.entered[0] != 0:  # there is another side
@@ -74,8 +74,8 @@ def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offs
 def pushed_side(ground: Ground, piece: int, offset: float, h: float, A: Floats) -> int:
     """Side to which the horizontal motion pushes a block within h from here, + without a push; ``A`` is scratch space.
 
-    Where a threshold is passed that is the side: with weight on the block it is the threshold's, and where nothing
-    weighs the block down both are passed at once, at instants that only rounding tells apart.
+    That is the side of an uplift. With a positive weight it is the side of the threshold that is passed; without one
+    both are passed at instants that differ by rounding only.
     """
     degree = local_series(ground, piece, offset, 1.0, A)
     lead = leading_power(A, degree, h, rounding_of(A, degree, h))
@@ -84,9 +84,9 @@ def pushed_side(ground: Ground, piece: int, offset: float, h: float, A: Floats) 
 
 @inlined
 def push_series(ground: Ground, piece: int, offset: float, threshold: float, sign: float, A: Floats, d: Floats) -> int:
-    """Put into A what, times ``sign``, is to pass a threshold: the motion less what it adds to the weight.
+    """Write the polynomial that, times ``sign``, is compared with a threshold into A, and return its degree.
 
-    Returns the degree; ``d`` is scratch space.
+    It is the motion less what the vertical component adds to the threshold. ``d`` is scratch space.
     """
     degree = local_series(ground, piece, offset, 1.0, A)
     if not has_vertical(ground):
@@ -123,7 +123,7 @@ def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float
 def first_passing(d: Floats, degree: int, h: float) -> float:
     """First time in [0, h) from which a polynomial, not negative before, is negative beyond rounding; inf when never.
 
-    From a root that is but a touch the search goes on with what is left once the root is divided out. Changes ``d``.
+    After a root without a change of sign the search continues from there with the root divided out. Changes ``d``.
     """
     rounding = rounding_of(d, degree, h)
     start = 0.0
@@ -138,7 +138,7 @@ def first_passing(d: Floats, degree: int, h: float) -> float:
             return np.inf
         move(d, degree, time)
         start += time
-        if d[1] < 0.0 and d[1] * d[1] <= 2.0 * d[2] * rounding:  # a dip below zero that is lost in rounding
+        if d[1] < 0.0 and d[1] * d[1] <= 2.0 * d[2] * rounding:  # a minimum below zero by less than rounding
             across = -2.0 * d[1] / d[2]
             move(d, degree, across)
             start += across
@@ -148,7 +148,7 @@ def first_passing(d: Floats, degree: int, h: float) -> float:
 
 @inlined
 def rounding_of(d: Floats, degree: int, h: float) -> float:
-    """Return the rounding of a polynomial within h."""
+    """Bound the rounding of a polynomial within h."""
     rounding = 0.0
     for k in range(degree, -1, -1):
         rounding = rounding * h + _ROUNDING * abs(d[k])
@@ -157,7 +157,7 @@ def rounding_of(d: Floats, degree: int, h: float) -> float:
 
 @inlined
 def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
-    """Lowest power of a polynomial whose term counts within h; above ``degree`` where none does."""
+    """Lowest power of a polynomial whose term is not negligible within h; above ``degree`` where all are."""
     lead = 0
     power = 1.0
     while lead <= degree and abs(d[lead]) * power <= rounding:
@@ -166,13 +166,13 @@ def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
     return lead
 
 
-#: A motion is back within a threshold once it is below it by this fraction: rounding makes no second passing.
+#: A motion is back within a threshold once it is below it by this fraction, so that rounding makes no second passing.
 _BACK = 2.0**-40
 
 
 @kernel
 def note_complete(ground: Ground, blocks: Records, states: Records, scratch: Record, complete: Flags) -> None:
-    """Tell of every block that started at rest whether the chattering after its first uplift was complete."""
+    """Write for each block that started at rest whether the chattering after its first uplift was complete."""
     for k in range(blocks.shape[0]):
         state = states[k]
         complete[k] = state.rests > 0 and not passes_again(ground, blocks[k], scratch, state)
@@ -192,7 +192,7 @@ def passes_again(ground: Ground, block: Record, scratch: Record, state: Record) 
 
 @inlined
 def piece_before(ground: Ground, time: float) -> int:
-    """Return a piece that is over before a time, the one nearest to it; the first where there is none."""
+    """Last piece that is over before a time; the first one where there is none."""
     low, high = 0, last_piece(ground)
     while high - low > 1:
         middle = (low + high) // 2
@@ -207,7 +207,7 @@ def piece_before(ground: Ground, time: float) -> int:
 def back_within(ground: Ground, block: Record, scratch: Record, lifted: Uplift) -> tuple[int, float]:
     """Piece and offset at which the motion is beyond neither threshold any more.
 
-    It may jump from one to the other and, where nothing weighs the block down, be beyond both.
+    It may jump from one to the other and, without a positive weight, be beyond both.
     """
     piece, offset, side = lifted.piece, lifted.offset, lifted.side
     while piece < last_piece(ground):
@@ -228,7 +228,7 @@ def back_within(ground: Ground, block: Record, scratch: Record, lifted: Uplift) 
 def time_beyond(ground: Ground, block: Record, scratch: Record, piece: int, offset: float, side: int) -> float:
     """Time from here for which the motion stays beyond a side's threshold within a piece; inf when to its end."""
     sign, threshold = 1.0 if side == 1 else -1.0, block.threshold[side]
-    A, d = scratch.ground, scratch.spare
+    A, d = scratch.ground, scratch.other
     degree = push_series(ground, piece, offset, threshold, sign, A, d)
     d[0] = sign * A[0] - (1.0 - _BACK) * threshold
     for k in range(1, degree + 1):

@@ -59,9 +59,8 @@ class Description:
         Kind of motion: "record", "samples", "sine", "symmetric Ricker", ... After a delay or processing it says so
         ("delayed sine", "processed record"), since the formula of `text` then no longer starts at time zero.
     parameters : mapping of str to float
-        Numbers of the formula in SI units and radians, for instance amplitude, frequency, phase and cycles of
-        a sine. Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it
-        negative).
+        Numbers of the formula in SI units and radians, for instance amplitude, frequency, phase and cycles of a sine.
+        Scaling a motion scales every parameter whose name starts with "amplitude" (and may make it negative).
     text : str
         The formula, or the record's source and terms, in words.
     origin : Origin, optional
@@ -105,39 +104,66 @@ class Description:
         return ", ".join(f"{name} {value:.5g}" for name, value in self.parameters.items())
 
     def scaled(self, factor: float) -> Description:
-        """Return the description of the motion times `factor`."""
+        """Return the description of the motion times a factor.
+
+        Parameters
+        ----------
+        factor : float
+            What the motion is multiplied with.
+
+        Returns
+        -------
+        Description
+            With amplitudes times the factor.
+
+        Examples
+        --------
+        >>> Description("sine", {"amplitude": 2.0, "frequency": 3.0}).scaled(-0.5)
+        <Description: sine, amplitude -1, frequency 3>
+        """
         parameters = {k: v * factor if k.startswith("amplitude") else v for k, v in self.parameters.items()}
         return replace(self, parameters=parameters)
 
     def changed(self, how: str) -> Description:
-        """Return the description of a motion that was `how` ("delayed", "processed") off its formula."""
+        """Return the description of a motion that no longer is what its formula says.
+
+        Parameters
+        ----------
+        how : str
+            What was done to it: "delayed", "processed".
+
+        Returns
+        -------
+        Description
+            Its family says so, once.
+
+        Examples
+        --------
+        >>> Description("sine").changed("delayed").changed("delayed")
+        <Description: delayed sine>
+        """
         family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
         return replace(self, family=family)
 
 
 def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
-    """Return the name of a motion with what was done to it, in a few words: without what it was scaled to.
-
-    A vertical component is named, too.
+    """Return the name of a motion, and of its vertical one, with what was done to it but not what it was scaled to.
 
     Examples
     --------
-    >>> labelled("pulse", ["scaled by 2 to a peak ground acceleration of 2 m/s^2 (0.2039 g)", "trimmed to 2-20 s"])
-    'pulse, scaled by 2, trimmed to 2-20 s'
-    >>> labelled("tower-090", ["scaled by 2"], "tower-up")
+    >>> labelled("tower-090", ["scaled by 2 to a peak ground acceleration of 2 m/s^2 (0.2039 g)"], "tower-up")
     'tower-090 with vertical tower-up, scaled by 2'
     """
     both = f"{name} with vertical {vertical}" if vertical else name
     return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))
 
 
-def checked_description(given: Description) -> Description:
-    """Return the description, which must be one."""
+def check_description(given: Description) -> None:
+    """Refuse what is no description."""
     if not isinstance(given, Description):
         raise InvalidMotion(
             f"the description of a motion must be a Description(family, parameters, text), not a {type(given).__name__}"
         )
-    return given
 
 
 def checked_history(given: Iterable[str]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -14,7 +14,7 @@ from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import measures, piecewise, processing
-from rocking.motion.description import Description, checked_description, checked_history, labelled
+from rocking.motion.description import Description, check_description, checked_history, labelled
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 
 if TYPE_CHECKING:
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 #: Times at which a motion is looked at between its breakpoints, for a picture.
 _DRAWN = 33
+
+_OF_SAMPLES = Description("samples", text="linear between even samples")
+_OF_POINTS = Description("points", text="linear between uneven points")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,34 +86,20 @@ class Motion:
 
     def __post_init__(self) -> None:
         breakpoints, coefficients = piecewise.checked_pieces(self.breakpoints, self.coefficients)
-        held = {
-            "breakpoints": breakpoints,
-            "coefficients": coefficients,
-            "name": checks.text(self.name, "name of a motion", InvalidMotion),
-            "description": checked_description(self.description),
-            "history": checked_history(self.history),
-            "error": checks.within(
-                self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.STRONGEST
-            ),
-        }
+        checks.text(self.name, "name of a motion", InvalidMotion)
+        check_description(self.description)
+        history = checked_history(self.history)
+        error = checks.within(self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.STRONGEST)
         if self.vertical is not None:
             _check_vertical(self.vertical)
+        held = {"breakpoints": breakpoints, "coefficients": coefficients, "history": history, "error": error}
         for name, value in held.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "step", piecewise.even_step(self))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Through the constructor, which makes the arrays read-only again.
-        fields = (
-            self.breakpoints,
-            self.coefficients,
-            self.name,
-            self.description,
-            self.history,
-            self.error,
-            self.vertical,
-        )
-        return Motion, fields
+        return Motion, tuple(getattr(self, each.name) for each in fields(self) if each.init)
 
     @classmethod
     def from_samples(
@@ -137,6 +126,7 @@ class Motion:
         Returns
         -------
         Motion
+            Of n - 1 pieces.
 
         Raises
         ------
@@ -151,14 +141,7 @@ class Motion:
         """
         samples, step = piecewise.checked_samples(acceleration), piecewise.checked_step(dt)
         times = piecewise.even_times(len(samples), step)
-        return cls(
-            times,
-            piecewise.linear(times, samples),
-            name=name,
-            description=Description("samples", text="linear between even samples")
-            if description is None
-            else description,
-        )
+        return cls(times, piecewise.linear(times, samples), name=name, description=description or _OF_SAMPLES)
 
     @classmethod
     def from_points(
@@ -185,12 +168,12 @@ class Motion:
         Returns
         -------
         Motion
+            Of n - 1 pieces.
 
         Raises
         ------
         InvalidMotion
-            If the two lengths differ, there are fewer than two points, a number is not finite, or the times
-            do not increase strictly.
+            If the lengths differ or are below two, a number is not finite, or the times do not increase strictly.
 
         Examples
         --------
@@ -202,12 +185,7 @@ class Motion:
         with np.errstate(over="ignore"):
             breakpoints = instants - instants[0]
         return cls(
-            breakpoints,
-            piecewise.linear(breakpoints, samples),
-            name=name,
-            description=Description("points", text="linear between uneven points")
-            if description is None
-            else description,
+            breakpoints, piecewise.linear(breakpoints, samples), name=name, description=description or _OF_POINTS
         )
 
     @property
@@ -225,7 +203,7 @@ class Motion:
         >>> horizontal.with_vertical(vertical).duration, horizontal.with_vertical(vertical).end
         (1.0, 3.0)
         """
-        return max(self.duration, 0.0 if self.vertical is None else self.vertical.duration)
+        return self.duration if self.vertical is None else max(self.duration, self.vertical.duration)
 
     @property
     def label(self) -> str:
@@ -281,7 +259,7 @@ class Motion:
     @overload
     def acceleration(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
     def acceleration(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground acceleration, m/s^2, at the times `time` (s) and shaped like it; zero outside the motion.
+        """Ground acceleration; zero outside the motion.
 
         Parameters
         ----------
@@ -308,7 +286,7 @@ class Motion:
     @overload
     def velocity(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
     def velocity(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground velocity at the times `time` (s), m/s, from rest; constant after the end of the motion.
+        """Ground velocity, from rest; constant after the end of the motion.
 
         Parameters
         ----------
@@ -334,7 +312,7 @@ class Motion:
     @overload
     def displacement(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
     def displacement(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground displacement at the times `time` (s), m, from rest; after the end at the last velocity.
+        """Ground displacement, from rest; after the end of the motion at its last velocity.
 
         Parameters
         ----------
@@ -367,11 +345,17 @@ class Motion:
         return measures.cumulative_absolute_velocity(self)
 
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
-        """Time between the fractions `start` and `end` of the Arias intensity, s; NaN if that is zero.
+        """Time between two fractions of the Arias intensity, s.
+
+        Parameters
+        ----------
+        start, end : float
+            The fractions.
 
         Returns
         -------
         float
+            NaN if the intensity is zero.
 
         Raises
         ------
@@ -426,14 +410,23 @@ class Motion:
         return measures.spectral_acceleration(self, period, damping)
 
     def measures(self, periods: Sequence[float] = ()) -> dict[str, float]:
-        """Intensity measures by name; each name ends in its unit, as in ``"pga_m_s2"``.
+        """Intensity measures by name; each name ends in its unit.
 
-        Spectral accelerations (5 % damping) at `periods` (s) are added under names as
-        ``"spectral_acceleration_0.5s_m_s2"``.
+        Parameters
+        ----------
+        periods : sequence of float
+            Periods, s, of which the spectral acceleration (5 % damping) is added.
 
         Returns
         -------
         dict of str to float
+            SI units.
+
+        Examples
+        --------
+        >>> measures = Motion([0.0, 2.0], [[1.0]]).measures(periods=[0.5])
+        >>> measures["pga_m_s2"], round(measures["spectral_acceleration_0.5s_m_s2"], 6)
+        (1.0, 1.854468)
         """
         return measures.table(self, periods)
 
@@ -448,6 +441,7 @@ class Motion:
         Returns
         -------
         Motion
+            Both components; the vertical one by the size of the factor.
 
         Raises
         ------
@@ -477,6 +471,7 @@ class Motion:
         Returns
         -------
         Motion
+            Both components, by one factor.
 
         Raises
         ------
@@ -512,6 +507,7 @@ class Motion:
         Returns
         -------
         Motion
+            Of the same name.
 
         Raises
         ------
@@ -530,11 +526,17 @@ class Motion:
         return self if vertical is self.vertical else replace(self, vertical=vertical)
 
     def delayed(self, delay: float) -> Motion:
-        """Return the motion after `delay` seconds of no acceleration.
+        """Return the motion after a time of no acceleration.
+
+        Parameters
+        ----------
+        delay : float
+            That time, s.
 
         Returns
         -------
         Motion
+            With a piece more, both components.
 
         Raises
         ------
@@ -586,6 +588,7 @@ class Motion:
         Returns
         -------
         Motion
+            Of the same name, both components processed alike.
 
         Raises
         ------
@@ -672,10 +675,9 @@ class Motion:
         >>> figure.axes[0].get_xlabel(), figure.get_suptitle()
         ('time (s)', 'sine')
         """
-        from rocking.plot import motion_figure
+        from rocking.plot.response import motion_figure
 
-        end = self.duration if self.vertical is None else max(self.duration, self.vertical.duration)
-        times = self.drawing_times(0.0, end)
+        times = self.drawing_times(0.0, self.end)
         return motion_figure(
             time=times,
             acceleration_g=self.acceleration(times) / STANDARD_GRAVITY,
@@ -686,14 +688,22 @@ class Motion:
         )
 
     def drawing_times(self, start: float, end: float) -> Floats:
-        """Return the ends of a stretch of time, breakpoints in it, and times between them where pieces are curved.
+        """Return times at which to draw a stretch: ends, breakpoints, and between them where pieces are curved.
 
-        The breakpoints are those of both components.
+        Parameters
+        ----------
+        start, end : float
+            Ends of the stretch, s.
 
         Returns
         -------
         ndarray
-            s.
+            s, increasing; breakpoints are those of both components.
+
+        Examples
+        --------
+        >>> Motion.from_samples([0.0, 1.0, -2.0, 0.0], 0.5).drawing_times(0.25, 1.25)
+        array([0.25, 0.5 , 1.  , 1.25])
         """
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:
@@ -748,6 +758,10 @@ class Motion:
         return ", ".join(part for part in (self.name, *described, *self.history) if part)
 
     def _times(self, factor: float, done: str) -> Motion:
+        """Return both components times a factor, the vertical one by its size."""
+        vertical = self.vertical
+        if vertical is not None and abs(factor) != 1.0:
+            vertical = vertical._times(abs(factor), done)
         with np.errstate(over="ignore"):
             coefficients = self.coefficients * factor
         return replace(
@@ -756,11 +770,8 @@ class Motion:
             description=self.description.scaled(factor),
             history=(*self.history, done),
             error=self.error * abs(factor),
-            vertical=self._vertical_times(abs(factor), done),
+            vertical=vertical,
         )
-
-    def _vertical_times(self, factor: float, done: str) -> Motion | None:
-        return self.vertical if self.vertical is None or factor == 1.0 else self.vertical._times(factor, done)
 
 
 def _peak(motion: Motion) -> str:

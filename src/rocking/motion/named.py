@@ -1,4 +1,4 @@
-"""Motions by name, of record files, of shipped records, of whole folders; and tables of what records there are."""
+"""Motions as they are given: as arguments, by name, of record files, of whole folders; and tables of what there is."""
 
 from __future__ import annotations
 
@@ -6,17 +6,86 @@ import fnmatch
 import glob
 import os
 import sys
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import UnreadableRecord
+from rocking.errors import InvalidMotion, InvalidOption, UnreadableRecord
 from rocking.motion import formats, records
 from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
 from rocking.tables import decimal, named, text_table
+
+#: One motion, several, or several by names that replace their own.
+Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
+
+
+def one_motion(motion: Motion | None) -> Motion | None:
+    """Return the motion (None is free rocking).
+
+    Examples
+    --------
+    >>> one_motion("RSN6.AT2")
+    Traceback (most recent call last):
+        ...
+    rocking.errors.InvalidMotion: a Motion is needed, not 'RSN6.AT2': load it with rocking.read("RSN6.AT2")
+    """
+    if motion is not None and not isinstance(motion, Motion):
+        raise InvalidMotion(_refusal(motion))
+    return motion
+
+
+def several_motions(motions: Motions) -> list[Motion]:
+    """Return one motion or several as a list; those of a mapping under its names."""
+    if isinstance(motions, Motion):
+        return [motions]
+    if isinstance(motions, (str, Path, np.ndarray)) or not isinstance(motions, Iterable):
+        raise InvalidMotion(_refusal(motions))
+    gathered = list(motions.values() if isinstance(motions, Mapping) else motions)
+    if not gathered:
+        raise InvalidOption("{} must hold at least one motion", "motions")
+    for motion in gathered:
+        if not isinstance(motion, Motion):
+            whole = isinstance(motion, (int, float, np.number)) and not isinstance(motion, bool)
+            raise InvalidMotion(_refusal(motions if whole else motion))
+    if isinstance(motions, Mapping):
+        return [replace(motion, name=name) for name, motion in motions.items()]
+    return gathered
+
+
+def motions_by_name(motions: Motions) -> dict[str, Motion]:
+    """Return one motion or several by the names of a mapping, or else by their own."""
+    several = several_motions(motions)
+    if isinstance(motions, Mapping):
+        return dict(motions)
+    return dict(zip(names_of(several), several, strict=True))
+
+
+def names_of(motions: Sequence[Motion]) -> list[str]:
+    """Names of motions, numbered where several share one: a row of a table must say which it is."""
+    shared = {name for name, count in Counter(motion.name for motion in motions).items() if count > 1}
+    seen: Counter[str] = Counter()
+    names = []
+    for motion in motions:
+        seen[motion.name] += 1
+        names.append(f"{motion.name} #{seen[motion.name]}" if motion.name in shared else motion.name)
+    return names
+
+
+def _refusal(given: Any) -> str:
+    if isinstance(given, (str, Path)):
+        how = "rocking.records.load" if str(given) in records.names() else "rocking.read"
+        return f'a Motion is needed, not {str(given)!r}: load it with {how}("{given}")'
+    made = "make one with Motion.from_samples(array, dt), in m/s^2 and s"
+    if given is None:
+        return f"a Motion is needed, not None: {made}"
+    return f"a Motion is needed, not a {type(given).__name__}: {made}"
+
 
 #: The name of a record that is read from standard input.
 STANDARD_INPUT = "-"
@@ -31,19 +100,10 @@ def named_motion(
     scale: float = 1.0,
     several: bool = False,
 ) -> Motion:
-    """Motion of a record file, or of a shipped record of that name, times a factor.
+    """Motion, times a factor, of a record file ("-" is standard input), or of a shipped record where there is no file.
 
-    Parameters
-    ----------
-    name : str
-        Path of a file, "-" for standard input, or name of a shipped record; where a file has that name too, the file.
-    channel, dt, units
-        As for `rocking.read`.
-    scale : float
-        Factor on the motion.
-    several : bool
-        Whether `dt`, `units` and `channel` are for several files, of which those that say their step and units keep
-        them, and those that hold one channel are taken whatever its name.
+    Channel, step and units are as for `rocking.read`. Where they are for several files, those that say their step and
+    units keep them, and those that hold one channel are taken whatever its name.
     """
     if is_shipped(name):
         if not several:
@@ -60,18 +120,8 @@ def named_vertical(
 ) -> Motion:
     """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal one's file.
 
-    There are two motions then, so `dt` and `units` are for the one that does not say its own.
-
-    Parameters
-    ----------
-    name : str
-        Path of a file, name of a shipped record, or a channel by number or name.
-    record : str
-        Path of the file with the horizontal motion.
-    channel
-        The channel that is the horizontal motion, where that file has several.
-    dt, units
-        As for `rocking.read`.
+    That file is `record`, and `channel` the horizontal motion in it. There are two motions then, so `dt` and `units`
+    are for the one that does not say its own.
     """
     if Path(name).is_file() or name in records.names():
         return named_motion(name, dt=dt, units=units, several=True)
@@ -112,11 +162,6 @@ def expanded(names: Iterable[str]) -> list[str]:
 
     A folder stands for the files in it, by name, hidden ones left out; a pattern for the files that match it, or where
     none does for the shipped records of such names.
-
-    Examples
-    --------
-    >>> expanded(["el-centro-meloland-270", "record.AT2", "record.AT2"])
-    ['el-centro-meloland-270', 'record.AT2']
     """
     found: dict[str, None] = {}
     for name in names:
@@ -187,6 +232,16 @@ class Contents:
 def shipped(name: str | None = None) -> Contents:
     """List the records that ship, or one of them.
 
+    Parameters
+    ----------
+    name : str, optional
+        Name of the one.
+
+    Returns
+    -------
+    Contents
+        With step, duration and peaks.
+
     Raises
     ------
     UnreadableRecord
@@ -214,8 +269,13 @@ def contents(
     ----------
     file, channel, dt, units
         As for `rocking.read`; without `channel`, all of them.
-    several
-        As for `named_motion`.
+    several : bool
+        Whether the arguments are for several files: those that say their step and units keep them.
+
+    Returns
+    -------
+    Contents
+        With units, step, duration and peaks of each channel.
 
     Raises
     ------
@@ -223,7 +283,7 @@ def contents(
         As for `rocking.read`.
     """
     request = Request.checked(dt, units, several=several)
-    identification, channels = formats.content_as(file, channel, request, optional=several)
+    identification, channels = formats.content(file, channel, request, optional=several)
     motions = tuple(each.motion() for each in channels)
     name = "standard input" if hasattr(file, "read") else os.fsdecode(file)
     facts = {"file": name, "format": identification.format, "reason": identification.reason}

@@ -258,11 +258,14 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
     )
     if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
         raise InvalidMotion(
-            f"a motion of n pieces needs n + 1 breakpoints and coefficients of shape (n, degree + 1), "
-            f"not {ends.shape} and {rows.shape}"
+            "a motion of n pieces needs n + 1 {} and {} of shape (n, degree + 1), not "
+            f"{ends.shape} and {rows.shape}",
+            "breakpoints",
+            "coefficients",
         )
-    if ends[0] != 0.0 or not np.all(np.diff(ends) > 0.0):
-        raise InvalidMotion("the breakpoints of a motion must start at 0 and increase strictly")
+    widths = np.diff(ends)
+    if ends[0] != 0.0 or not np.all(widths > 0.0):
+        raise InvalidMotion("the {} of a motion must start at 0 and increase strictly", "breakpoints")
     if rows.shape[1] > HIGHEST_DEGREE + 1:
         raise InvalidMotion(
             f"the pieces of a motion must be of degree {HIGHEST_DEGREE} or less, not {rows.shape[1] - 1}: "
@@ -272,9 +275,9 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
         raise InvalidMotion(
             f"a motion must last from {SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
         )
-    if not _stays_below(STRONGEST, rows, np.diff(ends)):
+    if not _stays_below(STRONGEST, rows, widths):
         raise InvalidMotion(f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale")
-    if not _stays_below(STRONGEST, rows, np.maximum(np.diff(ends), SHORTEST)):
+    if not _stays_below(STRONGEST, rows, np.maximum(widths, SHORTEST)):
         raise InvalidMotion(
             f"a piece of a motion is too steep: shorter than {SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "
             "within that time: check units and times"
@@ -312,21 +315,22 @@ def checked_times(times: ArrayLike, count: int) -> Floats:
     """Return the times of so many samples, s."""
     values = _floats(times, "times", 1)
     if len(values) != count:
-        raise InvalidMotion(f"there are {len(values)} times but {count} accelerations: give one for each")
+        raise InvalidMotion(f"there are {len(values)} {{}} but {count} accelerations: give one for each", "times")
     if not np.all(np.isfinite(values)) or not np.all(np.diff(values) > 0.0):
-        raise InvalidMotion("the times of a motion must be finite and increase strictly")
+        raise InvalidMotion("the {} of a motion must be finite and increase strictly", "times")
     return values
 
 
 def _floats(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Floats:
     array = np.array(checks.numbers(values, f"{what} of a motion", InvalidMotion), order="C")
     if array.ndim != dimensions:
-        raise InvalidMotion(f"the {what} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}")
+        sentence = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
+        raise InvalidMotion(sentence, what)
     return array
 
 
 def _finite(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Floats:
     array = _floats(values, what, dimensions, hint)
     if not np.all(np.isfinite(array)):
-        raise InvalidMotion(f"the {what} of a motion must be finite numbers")
+        raise InvalidMotion("the {} of a motion must be finite numbers", what)
     return array

@@ -30,11 +30,11 @@ class Processed(NamedTuple):
 
 
 def pair(values: tuple[T, T], what: str) -> tuple[T, T]:
-    """Return the two values, or raise InvalidMotion if they are not two."""
+    """Return the two values of the argument `what`."""
     try:
         first, second = values
     except (TypeError, ValueError) as error:
-        raise InvalidMotion(f"{what} takes two numbers, not {values!r}") from error
+        raise InvalidMotion(f"{{}} takes two numbers, not {values!r}", what, value=values) from error
     return first, second
 
 
@@ -45,13 +45,15 @@ def ends(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
     duration = float(motion.breakpoints[-1])
     if not 0.0 <= first < last <= duration * (1.0 + 1e-12):
         raise InvalidMotion(
-            f"trim needs 0 <= start < end <= {duration:.6g} s, the motion's duration, not {first:.6g} and {last:.6g}"
+            f"{{}} needs 0 <= start < end <= {duration:.6g} s, the motion's duration, not {first:.6g} and {last:.6g}",
+            "trim",
+            value=(start, end),
         )
     step = piecewise.even_step(motion)
     if step is None:
         return first, min(last, duration)
     if round(last / step) <= round(first / step):
-        raise InvalidMotion(f"trim must keep at least two samples, {step:.6g} s apart")
+        raise InvalidMotion(f"{{}} must keep at least two samples, {step:.6g} s apart", "trim", value=(start, end))
     return round(first / step) * step, round(last / step) * step
 
 
@@ -118,12 +120,13 @@ def _corners(motion: Piecewise, step: float, low: float | None, high: float | No
     ]
     nyquist, duration = 0.5 / step, float(motion.breakpoints[-1])
     if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
-        raise InvalidMotion(
-            f"band_pass needs (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; "
-            "one of them may be None"
+        sentence = (
+            f"{{}} needs (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one of them may be"
         )
+        raise InvalidMotion(f"{sentence} None", "band_pass", value=(low, high))
     if corners[0] * duration < 0.1:
-        raise InvalidMotion(f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s")
+        sentence = f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s"
+        raise InvalidMotion(sentence, value=(low, high))
     return corners
 
 
@@ -133,10 +136,8 @@ def resample(motion: Piecewise, step: float) -> Processed:
     duration = float(motion.breakpoints[-1])
     count = math.floor(duration / new * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MOST_SAMPLES:
-        raise InvalidMotion(
-            f"a step of {new:.6g} s gives {count} samples of a motion of {duration:.6g} s: "
-            f"it needs from 2 to {_MOST_SAMPLES}"
-        )
+        sentence = f"a step of {new:.6g} s gives {count} samples of a motion of {duration:.6g} s: it needs from 2 to"
+        raise InvalidMotion(f"{sentence} {_MOST_SAMPLES}", value=step)
     times = np.minimum(new * np.arange(count), duration)
     samples = piecewise.at(motion.breakpoints, motion.coefficients, times)
     return _joined(samples, new, f"resampled to a step of {new:.6g} s")
@@ -145,10 +146,10 @@ def resample(motion: Piecewise, step: float) -> Processed:
 def _step(motion: Piecewise, what: str) -> float:
     step = piecewise.even_step(motion)
     if step is None:
-        raise InvalidMotion(f"{what} needs even samples: call processed(resample=...) on the motion first")
+        raise InvalidMotion("{} needs even samples: call processed(resample=...) on the motion first", what)
     if piecewise.jumps(motion):
         raise InvalidMotion(
-            f"{what} needs samples joined by lines, but the motion jumps: call processed(resample=...) on it first"
+            "{} needs samples joined by lines, but the motion jumps: call processed(resample=...) on it first", what
         )
     return step
 

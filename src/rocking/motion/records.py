@@ -7,7 +7,6 @@ channel has a near-fault pulse. The values are exactly those published.
 
 from __future__ import annotations
 
-import difflib
 import json
 from dataclasses import dataclass
 from importlib import resources
@@ -19,8 +18,10 @@ import numpy as np
 from rocking import checks
 from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description, Origin
-from rocking.motion.formats.units import choose_unit
+from rocking.motion.formats.source import choose_unit
 from rocking.motion.motion import Motion
+
+__all__ = ["Record", "info", "load", "names"]
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ def names() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
+        Those that `load` takes.
 
     Examples
     --------
@@ -81,9 +83,15 @@ def names() -> tuple[str, ...]:
 def info(name: str) -> Record:
     """Return what is known of a shipped record: event, station, direction, step, source and terms.
 
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+
     Returns
     -------
     Record
+        Without its samples.
 
     Raises
     ------
@@ -105,21 +113,15 @@ def info(name: str) -> Record:
 
 
 def meant(name: str) -> tuple[str, ...]:
-    """Return the shipped records that may be meant: one that is like `name`, or a station's horizontal ones.
-
-    Examples
-    --------
-    >>> meant("ridgecrest-cls-090"), meant("el-centro")
-    (('ridgecrest-clc-090',), ('el-centro-meloland-360', 'el-centro-meloland-270'))
-    """
+    """Return the shipped records that may be meant: one that is like `name`, or a station's horizontal ones."""
     catalogue = _catalogue()
     horizontal = [each for each in catalogue if catalogue[each]["direction"] != "up"]
     begun = tuple(each for each in horizontal if each.startswith(str(name)))
     stations = {each.rpartition("-")[0]: () for each in horizontal}
     alike = {station: tuple(each for each in horizontal if each.startswith(station)) for station in stations}
     alike |= {each: (each,) for each in catalogue}
-    close = difflib.get_close_matches(str(name), alike, n=1)
-    return begun or (alike[close[0]] if close else ())
+    close = checks.nearest(str(name), alike)
+    return begun or (alike[close] if close else ())
 
 
 def load(name: str) -> Motion:
@@ -139,6 +141,7 @@ def load(name: str) -> Motion:
     Returns
     -------
     Motion
+        Its `description` has source and terms.
 
     Raises
     ------

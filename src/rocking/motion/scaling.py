@@ -88,7 +88,19 @@ class Measure:
 
     @classmethod
     def of(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
-        """Return a measure that is given by name or as it is, one of those that make sense.
+        """Return a measure that is given by name or as it is.
+
+        Parameters
+        ----------
+        measure : str or Measure
+            What is given.
+        among : sequence of str
+            Names of the measures that make sense.
+
+        Returns
+        -------
+        Measure
+            One of them.
 
         Raises
         ------
@@ -137,7 +149,17 @@ class Measure:
         return {"m/s^2": "g", "m/s": "m/s", "1": ""}[self.units]
 
     def shown(self, value: float) -> str:
-        """Return a value, in SI units, with its unit; an acceleration in g, too.
+        """Return a value with its unit; an acceleration in g, too.
+
+        Parameters
+        ----------
+        value : float
+            In SI units.
+
+        Returns
+        -------
+        str
+            To six digits.
 
         Examples
         --------
@@ -161,7 +183,17 @@ class Measure:
         return self if self.of_motion == self.name else Measure(self.of_motion, self.period, self.damping)
 
     def value(self, motion: Piecewise) -> float:
-        """Return what the motion alone measures, in SI units; 1 where levels are factors.
+        """Return what the motion alone measures.
+
+        Parameters
+        ----------
+        motion : Motion
+            The motion.
+
+        Returns
+        -------
+        float
+            In SI units; 1 where levels are factors.
 
         Examples
         --------
@@ -178,10 +210,28 @@ class Measure:
     def positive(self, motion: Piecewise, name: str) -> float:
         """Return what the motion alone measures, as `value`, of a motion that can be scaled.
 
+        Parameters
+        ----------
+        motion : Motion
+            The motion.
+        name : str
+            What an error calls it.
+
+        Returns
+        -------
+        float
+            In SI units.
+
         Raises
         ------
         InvalidMotion
-            If the motion, called `name`, is zero throughout.
+            If the motion is zero throughout.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> Measure("pgv").positive(rocking.Motion([0.0, 2.0], [[3.0]]), "a step")
+        6.0
         """
         value = self.value(motion)
         if not value > 0.0:
@@ -207,15 +257,49 @@ class Measure:
         -------
         ndarray, shape (n,)
             Accelerations (m/s^2) for "pga_ratio", velocities (m/s) for "pgv_ratio".
+
+        Examples
+        --------
+        >>> Measure("pgv_ratio").unit(np.array([2.0]), np.array([4.0]))
+        array([0.5])
         """
         return lifting if self.name == "pga_ratio" else lifting / p
 
     def options(self) -> dict[str, float]:
-        """Return period (s) and damping, where the measure has them."""
+        """Return period (s) and damping, where the measure has them.
+
+        Returns
+        -------
+        dict of str to float
+            Empty for all measures but "sa".
+
+        Examples
+        --------
+        >>> Measure("sa", period=0.5).options()
+        {'period': 0.5, 'damping': 0.05}
+        """
         return {} if self.period is None else {"period": self.period, "damping": self.damping}
 
     def scaling(self, level: float, factor: float) -> str:
-        """Return the sentence for the history of a motion that a factor brought to a level."""
+        """Return the sentence for the history of a motion that a factor brought to a level.
+
+        Parameters
+        ----------
+        level : float
+            In SI units.
+        factor : float
+            What the motion was multiplied by.
+
+        Returns
+        -------
+        str
+            In words.
+
+        Examples
+        --------
+        >>> Measure("pgv").scaling(0.5, 2.0)
+        'scaled by 2 to a peak ground velocity of 0.5 m/s'
+        """
         if self.name == "factor":
             return f"scaled by {factor:.6g}"
         oscillator = "" if self.period is None else f" at {self.period:.6g} s, damping {self.damping:.6g}"

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_title, figure_for
-from rocking.plot.style import ABOVE, GROUND, INK, REST
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, figure_for, write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,23 +38,17 @@ def duration_figure(*, amplitude: Floats, durations: Mapping[str, Floats], criti
     All are over amplitudes (n,), of the ground acceleration over g alpha: by the exact method first, NaN where
     incomplete.
     """
-    with figure_for(None, (5.2, 5.0)) as figure:
+    with figure_for(None, (5.2, 5.0), title=title) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         for (name, values), style in zip(durations.items(), _CURVES, strict=False):
             upper.plot(amplitude, values, label=name, **style)
         upper.axhline(1.0, color=INK, linewidth=0.5)
         for at, text in ((1.0, "$a = 1$"), (critical, rf"$a_{{cr}}$ = {critical:.6f}")):
             upper.axvline(at, color=INK, linewidth=0.6, linestyle=(0, (1, 2)))
-            upper.annotate(
-                text,
-                (at, 1.045),
-                ha="left" if at == 1.0 else "right",
-                xytext=(3 if at == 1.0 else -3, 0),
-                textcoords="offset points",
-            )
+            side, off = ("left", 3) if at == 1.0 else ("right", -3)
+            write(upper, text, (at, 1.045), (off, 0), ha=side)
         upper.set_ylim(0.0, 1.14)
         upper.set_ylabel(r"chattering time, $\tau_{ch}\,/\,(T/2)$")
-        add_title(figure, None, title)
         upper.legend(loc="lower right", bbox_to_anchor=(0.84, 0.02))
         exact, *others = durations.values()
         moves = exact > 0.0
@@ -118,18 +111,8 @@ def surface_figure(*, omega: Floats, eta: Floats, exact: Floats, fitted: Floats)
         x, y = np.meshgrid(omega, eta, indexing="ij")
         # Facets of four corners each: Matplotlib fills facets of unequal length from memory that nobody has written.
         mesh = _spread(omega.size, 25, eta.size, 20)
-        axes.plot_surface(
-            x[mesh],
-            y[mesh],
-            exact[mesh],
-            rstride=1,
-            cstride=1,
-            cmap="Greys",
-            vmin=0.9,
-            vmax=1.35,
-            edgecolor=INK,
-            linewidth=0.35,
-        )
+        facets: dict[str, Any] = {"rstride": 1, "cstride": 1, "cmap": "Greys", "vmin": 0.9, "vmax": 1.35}
+        axes.plot_surface(x[mesh], y[mesh], exact[mesh], edgecolor=INK, linewidth=0.35, **facets)
         some = _spread(omega.size, 17, eta.size, 11)
         above = fitted[some] >= exact[some]
         for shown, face in ((above, ABOVE), (~above, "white")):
@@ -158,7 +141,7 @@ def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: st
 
     All are over frequencies (n,), by the exact method first.
     """
-    with figure_for(None, (5.2, 3.3)) as figure:
+    with figure_for(None, (5.2, 3.3), title=title) as figure:
         axes = figure.add_subplot()
         exact = next(iter(critical.values()))
         low, high = float(exact.min()), float(exact.max())
@@ -174,7 +157,6 @@ def frequency_figure(*, omega: Floats, critical: Mapping[str, Floats], title: st
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.set_xlabel(r"frequency, $\omega = \omega_g / p$")
         axes.set_ylabel(r"critical amplitude, $a_{cr}$")
-        add_title(figure, None, title)
         axes.legend(loc="lower right")
     return figure
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from rocking.arrays import Flags, Floats
-from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled
-from rocking.plot.style import ABOVE, CURVES, GROUND, INK
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for, labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,38 +43,17 @@ def outcomes_figure(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw what happened in every test against its fitted probability, and the blocks behind that.
+    """Draw what happened in every test against its fitted probability, and the blocks behind that by their parameters.
 
-    Parameters
-    ----------
-    probabilities : ndarray, shape (m,)
-        Fitted probability of overturning in each test.
-    overturned : ndarray of bool, shape (m,)
-        Whether the specimen overturned.
-    parameters : sequence of Parameter
-        One panel each.
-    weights : ndarray, shape (blocks,)
-        Weights of the blocks.
-    title, ax, figsize
-        As for `figure_for` and `add_title`. In `ax`, the tests are drawn without the blocks.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> figure = outcomes_figure(
-    ...     probabilities=np.array([0.1, 0.9]), overturned=np.array([False, True]), weights=np.array([0.5, 0.5]),
-    ...     parameters=[Parameter("p (rad/s)", np.array([[2.0], [3.0]]), np.array([[2.4, 2.0, 3.0]]), (1.0, 9.0))])
-    >>> [axes.get_xlabel() for axes in figure.axes]
-    ['test, by its probability', 'p (rad/s)']
+    Probabilities and outcomes have shape (tests,), weights (blocks,). In `ax`, the tests are drawn without the blocks.
     """
-    with figure_for(ax, (7.0, 4.6), figsize) as figure:
+    with figure_for(ax, (7.0, 4.6), figsize, title) as figure:
         tests, panels = _panels(figure, len(parameters)) if ax is None else (ax, [])
         _draw_tests(tests, probabilities, overturned)
         for panel, parameter in zip(panels, parameters, strict=False):
             _draw_parameter(panel, parameter, weights)
         if panels:
             add_labels(panels[0], parameters[0].label, "share of blocks")
-        add_title(figure, ax, title)
         add_legend(figure, ax, labelled(tests, *panels))
     return figure
 
@@ -91,26 +69,11 @@ def measured_figure(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw a measured rotation history, that of the fitted block, and what is left between them.
+    """Draw a measured rotation history (rad, over s), that of the fitted block, and what is left between them.
 
-    Parameters
-    ----------
-    time, measured, residual : ndarray, shape (n,)
-        Times (s), measured rotation and measured less fitted rotation (rad).
-    fitted_time, fitted : ndarray, shape (k,)
-        Times (s) and rotation (rad) of the fitted block.
-    title, ax, figsize
-        As for `figure_for` and `add_title`. In `ax`, the histories are drawn without the residuals.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> t = np.linspace(0.0, 1.0, 5)
-    >>> figure = measured_figure(time=t, measured=t, residual=0.0 * t, fitted_time=t, fitted=t)
-    >>> [text.get_text() for text in figure.legends[0].get_texts()]
-    ['measured', 'fitted']
+    In `ax`, the histories are drawn without the residuals.
     """
-    with figure_for(ax, (7.0, 4.0), figsize) as figure:
+    with figure_for(ax, (7.0, 4.0), figsize, title) as figure:
         panels = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0)).tolist() if ax is None else [ax]
         main, *others = panels
         main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")
@@ -122,7 +85,6 @@ def measured_figure(
             add_labels(panel, "time (s)", "residual (rad)")
         for panel in panels:
             panel.axhline(0.0, color=INK, linewidth=0.4)
-        add_title(figure, ax, title)
         add_legend(figure, ax, labelled(main))
     return figure
 

@@ -1,4 +1,4 @@
-"""The one way to make a figure: where it is drawn and who knows of it, its title and its legend."""
+"""What all figures share: colours, where a figure is drawn and who knows of it, its title, labels and legend."""
 
 from __future__ import annotations
 
@@ -17,13 +17,49 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
-from rocking.plot.style import STYLE
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
+
+# Luminances differ, so that the figures read in grey as well.
+INK: Final = "#10243e"
+GROUND: Final = "#94a0ad"
+REST: Final = "#e3e6ea"
+ABOVE: Final = "#b0390c"
+
+#: Curves of one figure: luminances differ, and so do the dashes.
+CURVES: Final[tuple[dict[str, Any], ...]] = (
+    {"color": INK, "linestyle": "-"},
+    {"color": ABOVE, "linestyle": (0, (5, 1.5))},
+    {"color": "#4d7ea8", "linestyle": (0, (1, 1))},
+    {"color": "#b8860b", "linestyle": (0, (6, 1.5, 1, 1.5))},
+)
+
+STYLE: Final[dict[Any, Any]] = {
+    "font.size": 8.5,
+    "axes.titlesize": 8.5,
+    "axes.labelsize": 8.5,
+    "figure.titlesize": 9.0,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "grid.color": REST,
+    "grid.linewidth": 0.6,
+    "hatch.linewidth": 0.4,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 1.5,
+    "legend.handletextpad": 0.5,
+    "legend.columnspacing": 1.0,
+    "legend.frameon": False,
+}
 
 #: A number with more decimals than anybody reads.
 _LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
@@ -51,24 +87,12 @@ _TITLE_AT: Final = 0.02
 
 @contextmanager
 def figure_for(
-    ax: Axes | None, default: tuple[float, float], figsize: tuple[float, float] | None = None
+    ax: Axes | None, default: tuple[float, float], figsize: tuple[float, float] | None = None, title: str = ""
 ) -> Iterator[Figure]:
     """Yield the figure to draw in: that of `ax` where there is one, in its own style, else a new one in this package's.
 
-    Parameters
-    ----------
-    ax : matplotlib.axes.Axes or None
-        Where the caller is asked to draw.
-    default, figsize : (float, float)
-        Width and height of a new figure, inches: those that suit what is drawn, and the caller's own choice.
+    Its size (inches) is `figsize`, or else the default, which suits what is drawn.
 
-    Raises
-    ------
-    InvalidOption
-        If the size is not two positive numbers.
-
-    Notes
-    -----
     A new figure is made through pyplot, so that `pyplot.show()` and `figure.show()` show it, if pyplot is loaded, in a
     notebook, or where there is a display and nobody chose a backend without windows. Elsewhere no global state knows of
     it, and it is forgotten with its last reference. A notebook shows each figure once, as a cell's value or at its end.
@@ -78,6 +102,7 @@ def figure_for(
             raise InvalidOption(f"{{}} must be axes of Matplotlib's to draw in, not {ax!r}", "ax", value=ax)
         figure = ax.get_figure(root=True)
         assert figure is not None
+        _add_title(figure, ax, title)
         yield figure
         _show_once(figure)
         return
@@ -86,11 +111,12 @@ def figure_for(
 
     with mpl.rc_context(STYLE):
         figure = _new_figure(_size(default if figsize is None else figsize))
+        _add_title(figure, None, title)
         yield figure
         _make_ticks(figure)
 
 
-def add_title(figure: Figure, ax: Axes | None, title: str) -> None:
+def _add_title(figure: Figure, ax: Axes | None, title: str) -> None:
     """Put a title above a figure of its own, broken into lines where the figure ends, or above the caller's axes."""
     short = _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title)
     if ax is not None:
@@ -120,6 +146,17 @@ def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
     for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
         letter = _LETTER * axes.figure.dpi * float(axis.label.get_fontsize()) / 72.0
         axis.set_label_text(_in_lines(label, max(_FEWEST_LETTERS, int(length / letter))))
+
+
+def write(axes: Axes, text: str, at: tuple[Any, Any], off: tuple[float, float], **look: Any) -> None:
+    """Write a text so many points off a place."""
+    axes.annotate(text, at, xytext=off, textcoords="offset points", **look)
+
+
+def add_ticks(axes: Axes, places: Floats, height: float, marker: str = "|", **look: Any) -> None:
+    """Mark places along an axis, all at one height over that of the axes; short ticks unless another look is given."""
+    shown: dict[str, Any] = {"color": INK, "markersize": 6, "markeredgewidth": 0.5} | look
+    axes.plot(places, np.full(places.size, height), marker, transform=axes.get_xaxis_transform(), **shown)
 
 
 def scale_by_ratio(axes: Axes, x: Floats) -> None:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled
-from rocking.plot.style import CURVES, GROUND, INK
+from rocking.plot.canvas import CURVES, GROUND, INK, add_labels, add_legend, figure_for, labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+_DOT: Final[dict[str, Any]] = {"markersize": 4.0, "markerfacecolor": "none"}
 
 
 class FragilityLine(NamedTuple):
@@ -45,51 +46,24 @@ def fragility_figure(
 ) -> Figure:
     """Draw fitted fragility curves with their confidence bands, and the shares that were seen.
 
-    Parameters
-    ----------
-    lines : sequence of FragilityLine
-        One for every limit state.
-    intensity_label, band_label, probability_label : str
-        Texts; `band_label` says what the bands are, or why there is none, `probability_label` what is probable.
-    title, ax, figsize
-        As for `figure_for` and `add_title`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> x = np.array([1.0, 2.0, 3.0])
-    >>> line = FragilityLine(
-    ...     "overturning", x, x / 4, x / 5, x / 3, np.array([2.0]), np.array([0.5]), np.array([12.0]))
-    >>> figure = fragility_figure(
-    ...     lines=[line], intensity_label="PGA", band_label="band: 90 % confidence", title="Fragile")
-    >>> [text.get_text() for text in figure.legends[0].get_texts()]
-    ['overturning', 'band: 90 % confidence', 'dot: share of 12 outcomes at about its intensity']
+    `band_label` says what the bands are, or why there is none.
     """
-    with figure_for(ax, (5.6, 4.2), figsize) as figure:
+    with figure_for(ax, (5.6, 4.2), figsize, title) as figure:
         axes = ax or figure.add_subplot()
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
             axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
             axes.plot(line.intensity, line.probability, linewidth=1.5, label=line.label, **style)
             # Every limit state has a mark of its own.
-            axes.plot(
-                line.seen_at,
-                line.seen,
-                "os^D"[k % 4],
-                color=style["color"],
-                markersize=4.0,
-                markerfacecolor="none",
-                clip_on=False,
-            )
+            axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_DOT)
         if any(np.any(line.lower < line.upper) for line in lines):
             axes.fill_between([], [], [], color=GROUND, alpha=0.4, linewidth=0.0, label=band_label)
         else:
             axes.plot([], [], linestyle="none", label=band_label)
-        axes.plot([], [], "o", color=GROUND, markersize=4.0, markerfacecolor="none", label=_dots(lines))
+        axes.plot([], [], "o", color=GROUND, label=_dots(lines), **_DOT)
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid()
         add_labels(axes, intensity_label, probability_label)
-        add_title(figure, ax, title)
         add_legend(figure, ax, labelled(axes))
     return figure
 
@@ -104,18 +78,8 @@ def dispersions_figure(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw a dispersion with its interval for each measure, one below the other.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Measures.
-    dispersion, low, high : ndarray, shape (n,)
-        Standard deviation of the logarithm of the intensity at overturning, and the ends of its interval.
-    title, ax, figsize
-        As for `figure_for` and `add_title`.
-    """
-    with figure_for(ax, (5.6, 0.8 + 0.32 * len(names)), figsize) as figure:
+    """Draw the dispersion of the intensity at overturning, with its interval, for each measure by name."""
+    with figure_for(ax, (5.6, 0.8 + 0.32 * len(names)), figsize, title) as figure:
         axes = ax or figure.add_subplot()
         row = np.arange(len(names))
         axes.hlines(row, low, high, color=INK, linewidth=1.0)
@@ -125,7 +89,6 @@ def dispersions_figure(
         axes.set_xlim(left=0.0)
         axes.grid(axis="x", linewidth=0.4, color="0.85")
         add_labels(axes, "dispersion of the intensity at overturning (90 % interval)", "")
-        add_title(figure, ax, title)
     return figure
 
 

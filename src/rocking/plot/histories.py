@@ -1,4 +1,4 @@
-"""Histories of one block under a sine: a chattering sequence with its intervals, and responses by several schemes."""
+"""One block under a sine: a chattering sequence with its intervals and their ratios, responses by several schemes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,20 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
-from rocking.plot.canvas import add_legend, add_title, figure_for, labelled, magnified
-from rocking.plot.style import ABOVE, GROUND, INK, REST
+from rocking.arrays import Floats, Integers
+from rocking.plot.canvas import (
+    ABOVE,
+    GROUND,
+    INK,
+    REST,
+    add_labels,
+    add_legend,
+    add_ticks,
+    figure_for,
+    labelled,
+    magnified,
+    write,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +36,6 @@ _SCHEMES: Final[tuple[dict[str, Any], ...]] = (
     {"color": "#3c6aa0", "linewidth": 1.8, "linestyle": (0, (1, 1))},
 )
 
-
 #: Cycles that the details show: the first, and those after the impact with this number.
 _FIRST_CYCLES: Final = 5
 _LAST_CYCLES: Final = 5
@@ -36,6 +46,14 @@ _NARROW: Final = 0.1
 #: The line at which a block comes to rest, or to which ratios tend.
 _LIMIT: Final[dict[str, Any]] = {"color": ABOVE, "linestyle": (0, (4, 2))}
 
+_ARROW: Final = {
+    "arrowstyle": "<->",
+    "linewidth": 0.6,
+    "color": INK,
+    "shrinkA": 0.0,
+    "shrinkB": 0.0,
+    "mutation_scale": 6,
+}
 _MARK: Final[dict[str, Any]] = {"color": ABOVE, "markersize": 4.5, "markeredgewidth": 0.0, "zorder": 4}
 
 
@@ -61,7 +79,7 @@ def excitation_figure(
     Times are over the period, accelerations over g alpha; `marks` are the first one or two initiations. The chattering
     time is NaN where chattering is incomplete.
     """
-    with figure_for(None, (7.0, 2.9)) as figure:
+    with figure_for(None, (7.0, 2.9), title=title) as figure:
         axes = figure.add_subplot()
         _draw_excitation(axes, time, acceleration)
         _mark_initiations(axes, marks, float(acceleration.max()))
@@ -71,14 +89,11 @@ def excitation_figure(
             if math.isnan(end):
                 continue
             axes.annotate("", (end, height), (first, height), arrowprops={"arrowstyle": "<->", "linewidth": 0.8})
-            axes.annotate(
-                text, (0.5 * (first + end), height), xytext=(0, 2), textcoords="offset points", ha="center", va="bottom"
-            )
+            write(axes, text, (0.5 * (first + end), height), (0, 2), ha="center", va="bottom")
         if not math.isnan(rest):
             axes.plot([rest, rest], [-0.75, 0.1], linewidth=0.9, **_LIMIT)
-            axes.annotate("at rest", (rest, -0.75), xytext=(-3, 0), textcoords="offset points", ha="right", color=ABOVE)
+            write(axes, "at rest", (rest, -0.75), (-3, 0), ha="right", color=ABOVE)
         axes.set_xlim(time[0], time[-1])
-        add_title(figure, None, title)
         axes.set_xlabel("time over period, $t/T$")
         axes.legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.04))
     return figure
@@ -98,7 +113,7 @@ def history_figure(
     Times are over the period, rotations over the slenderness, the reference first, accelerations over g alpha. The time
     of the detail is shaded in the first panel.
     """
-    with figure_for(None, (7.0, 5.6)) as figure:
+    with figure_for(None, (7.0, 5.6), title=title) as figure:
         response, excitation, close = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 1.2))
         response.axvspan(*detail.time, color=REST, label="the time of (c)")
         low = min(float(rotation.min()) for rotation in rotations.values())
@@ -117,7 +132,6 @@ def history_figure(
         close.set_xlabel("time over period, $t/T$")
         for letter, axes in zip("abc", (response, excitation, close), strict=True):
             axes.set_title(f"({letter})", loc="left", pad=3.0)
-        add_title(figure, None, title)
         add_legend(figure, None, labelled(response, excitation))
     return figure
 
@@ -150,9 +164,7 @@ def _mark_initiations(axes: Axes, marks: tuple[Mark, ...], peak: float) -> None:
     axes.set_yticks([-1.0, 0.0, 1.0])
     for mark in marks:
         axes.plot(mark.time, height, "v", **_MARK)
-        axes.annotate(
-            mark.text, (mark.time, height), xytext=(-4, 4), textcoords="offset points", color=ABOVE, fontsize=7.5
-        )
+        write(axes, mark.text, (mark.time, height), (-4, 4), color=ABOVE, fontsize=7.5)
 
 
 class Ratios(NamedTuple):
@@ -171,10 +183,9 @@ def chattering_figure(
     Times are p t since uplift, dense also between the late impacts; rotations are over the slenderness. The second
     detail starts at the impact with the index `late_impact`.
     """
-    with figure_for(None, (7.0, 5.0)) as figure:
+    with figure_for(None, (7.0, 5.0), title=title) as figure:
         grid = figure.add_gridspec(2, 2)
         whole, first, last = (figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1]))
-        add_title(figure, None, title)
         _draw_whole(whole, time, rotation, impact_times, rest)
         early = np.append(0.0, impact_times[:_FIRST_CYCLES])
         _draw_cycles(first, time, rotation, early, 0)
@@ -192,25 +203,10 @@ def _draw_whole(axes: Axes, time: Floats, rotation: Floats, impact_times: Floats
     scale, power = magnified(float(np.max(np.abs(rotation))))
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, scale * rotation, color=INK, linewidth=0.9)
-    axes.plot(
-        impact_times,
-        np.full(impact_times.size, 0.06),
-        "|",
-        color=INK,
-        markersize=6,
-        markeredgewidth=0.5,
-        transform=axes.get_xaxis_transform(),
-    )
+    add_ticks(axes, impact_times, 0.06)
     axes.axvline(rest, linewidth=1.0, **_LIMIT)
-    axes.annotate(
-        rf"at rest, $\tau_{{ch}}$ = {rest:.6f}",
-        (rest, 0.3),
-        xycoords=axes.get_xaxis_transform(),
-        xytext=(-6, 0),
-        textcoords="offset points",
-        ha="right",
-        color=ABOVE,
-    )
+    text, across = rf"at rest, $\tau_{{ch}}$ = {rest:.6f}", axes.get_xaxis_transform()
+    write(axes, text, (rest, 0.3), (-6, 0), xycoords=across, ha="right", color=ABOVE)
     axes.set_xlim(0.0, 1.06 * rest)
     low, high = axes.get_ylim()
     axes.set_ylim(low - 0.18 * (high - low), high)
@@ -245,57 +241,90 @@ def _draw_intervals(axes: Axes, impacts: Floats, number: int, height: float) -> 
     for k, (start, end) in enumerate(itertools.pairwise(impacts)):
         if end - start < _NARROW * (impacts[-1] - impacts[0]):
             continue
-        arrow = {
-            "arrowstyle": "<->",
-            "linewidth": 0.6,
-            "color": INK,
-            "shrinkA": 0.0,
-            "shrinkB": 0.0,
-            "mutation_scale": 6,
-        }
-        axes.annotate("", (end, height), (start, height), arrowprops=arrow)
-        axes.annotate(
-            rf"$\Delta\tau_{{{number + k}}}$",
-            (0.5 * (start + end), height),
-            xytext=(0, -2),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-        )
+        axes.annotate("", (end, height), (start, height), arrowprops=_ARROW)
+        write(axes, rf"$\Delta\tau_{{{number + k}}}$", (0.5 * (start + end), height), (0, -2), ha="center", va="top")
 
 
 def ratio_figure(panels: Sequence[Ratios]) -> Figure:
-    """Draw the ratios of the intervals between every second impact, each panel with the limit.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> figure = ratio_figure([Ratios(np.array([0.2, 1.0, 0.6, 0.9]), 0.8464, "a sequence")])
-    >>> figure.axes[0].get_title(loc="left")
-    '(a) a sequence'
-    """
+    """Draw the ratios of the intervals between every second impact, each panel with the limit."""
     with figure_for(None, (7.0, 2.9)) as figure:
         for k, (panel, axes) in enumerate(zip(panels, figure.subplots(1, len(panels), squeeze=False)[0], strict=True)):
             n = np.arange(panel.values.size)
             for start, face, label in ((0, INK, "even $n$"), (1, "white", "odd $n$")):
                 chosen = slice(start, None, 2)
-                axes.plot(
-                    n[chosen], panel.values[chosen], "o", color=INK, markersize=3.0, markerfacecolor=face, label=label
-                )
+                look = {"color": INK, "markersize": 3.0, "markerfacecolor": face, "label": label}
+                axes.plot(n[chosen], panel.values[chosen], "o", **look)
             axes.axhline(panel.limit, linewidth=0.9, **_LIMIT, zorder=0)
-            axes.annotate(
-                rf"$\eta^2$ = {panel.limit:.4f}",
-                (0.98, panel.limit),
-                xycoords=axes.get_yaxis_transform(),
-                xytext=(0, -5),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                color=ABOVE,
-            )
+            text, at, up = rf"$\eta^2$ = {panel.limit:.4f}", (0.98, panel.limit), axes.get_yaxis_transform()
+            write(axes, text, at, (0, -5), xycoords=up, ha="right", va="top", color=ABOVE)
             axes.set_title(f"({'abcdef'[k]}) {panel.title}", loc="left")
             axes.set_xlabel("impact $n$")
             axes.grid(color=GROUND, linewidth=0.3, alpha=0.6)
             axes.legend(loc="center right")
         figure.axes[0].set_ylabel(r"$\Delta\tau_{n+2}\,/\,\Delta\tau_n$")
     return figure
+
+
+_DOTS: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "markersize": 3.2, "markeredgewidth": 0.6}
+
+#: Up to so many intervals are joined by a line, which shows how they take turns.
+_JOINED: Final = 100
+
+#: Room beside the first and the last impact, over their number.
+_MARGIN: Final = 0.03
+
+
+def intervals_figure(
+    *,
+    intervals: Floats,
+    eta: float,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw the dimensionless intervals between the impacts of a chattering sequence, and the ratios of every second.
+
+    The first interval is that from the uplift; there may be none. The ratios of a complete sequence tend to eta^2. In
+    `ax`, the intervals are drawn without the ratios.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    with figure_for(ax, (7.0, 3.2), figsize, title) as figure:
+        panels = _panels(figure) if ax is None else [ax]
+        number = np.arange(1, intervals.size + 1)
+        margin = max(0.5, _MARGIN * intervals.size)
+        _draw(panels[0], number, intervals)
+        add_labels(panels[0], "impact", "interval before the impact, p t")
+        if intervals.size:
+            panels[0].set_yscale("log")
+        for panel in panels[1:]:
+            _draw(panel, number[2:], intervals[2:] / intervals[:-2])
+            panel.axhline(eta**2, color=ABOVE, linewidth=1.2, linestyle=(0, (5, 1.5)), label=f"η² = {eta**2:.5g}")
+            add_labels(panel, "impact", "interval over that two impacts before")
+        for panel in panels:
+            panel.grid()
+            if intervals.size:
+                panel.set_xlim(1.0 - margin, intervals.size + margin)
+                panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+        add_legend(figure, ax, labelled(*panels))
+    return figure
+
+
+def _panels(figure: Figure) -> list[Axes]:
+    """Make panels beside each other where the figure is wider than high, else below each other."""
+    wide = figure.get_figwidth() > figure.get_figheight()
+    panels: list[Axes] = figure.subplots(*((1, 2) if wide else (2, 1))).tolist()
+    return panels
+
+
+def _draw(axes: Axes, number: Integers, values: Floats) -> None:
+    """Draw values by the number of the impact; those of the first side filled, those of the second open."""
+    if values.size <= _JOINED:
+        axes.plot(number, values, color=INK, linewidth=0.4, alpha=0.6, label="_in turn")
+    for first, face, label in ((1, INK, "impacts 1, 3, ..."), (0, "white", "impacts 2, 4, ...")):
+        chosen = number % 2 == first
+        if chosen.any():
+            axes.plot(number[chosen], values[chosen], markerfacecolor=face, label=label, **_DOTS)
+    if not values.size:
+        axes.annotate("no such impacts", (0.5, 0.7), xycoords="axes fraction", ha="center", color=INK)
+        axes.set_xticks([])

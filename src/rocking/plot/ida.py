@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for
-from rocking.plot.style import ABOVE, CURVES, GROUND, INK
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for, write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,6 +44,7 @@ _NAME_LINE: Final = 18
 
 #: Marker that looks like a kinked curve.
 _KINK: Final = [(-4, -4), (2, -1), (0, 1), (4, 4)]
+_KINKED: Final = "kink: from there on, another swing is the largest"
 
 
 class ScaledMotion(NamedTuple):
@@ -66,29 +66,12 @@ def ida_figure(
 ) -> Figure:
     """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
 
-    Parameters
-    ----------
-    motions : sequence of ScaledMotion
-        One curve each; peaks are infinite where the block overturns. Up to four have a style of their own. More
-        are drawn alike, with the fractiles (16, 50, 84 %) of the lowest level at which each reaches a peak rotation.
-    level_label : str
-        Measure of intensity and its units.
-    title, ax, figsize
-        As for `figure_for` and `add_title`. In `ax`, the curves are drawn without the levels that overturn.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> motion = ScaledMotion("a", np.array([1.0, 2.0]), np.array([0.1, np.inf]), np.array([[1.5, 2.0]]))
-    >>> figure = ida_figure(motions=[motion], level_label="PGA (m/s^2)", title="Scaled up")
-    >>> [axes.get_xlabel() for axes in figure.axes]
-    ['peak rotation / slenderness', 'overturns']
-    >>> [text.get_text() for text in figure.legends[0].get_texts()][-2:]
-    ['kink: from there on, another swing is the largest', 'strip: levels that overturn (arrow: and above)']
+    Up to four motions have a style of their own. More are drawn alike, with the fractiles (16, 50, 84 %) of the lowest
+    level at which each reaches a peak rotation. In `ax`, the curves are drawn without the levels that overturn.
     """
     few = len(motions) <= _FEW
     styles = [*CURVES[: len(motions)]] if few else [{"color": GROUND, "linestyle": "-"}] * len(motions)
-    with figure_for(ax, (7.0, 4.2), figsize) as figure:
+    with figure_for(ax, (7.0, 4.2), figsize, title) as figure:
         curves, *strips = figure.subplots(1, 2, sharey=True, width_ratios=(2.0, 1.0)).tolist() if ax is None else [ax]
         for motion, style in zip(motions, styles, strict=True):
             _draw_motion(curves, motion, style | (_OWN if few else _ALIKE))
@@ -104,7 +87,6 @@ def ida_figure(
             _draw_strips(panel, motions, styles if few else [{"color": INK}] * len(motions))
             _name_strips(panel, motions, few=few)
         named = motions if few else []
-        add_title(figure, ax, title)
         add_legend(figure, ax, _handles(named, with_strips=ax is None, with_arrows=_go_on(motions)))
     return figure
 
@@ -129,14 +111,8 @@ def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
 
 
 def _draw_motion(axes: Axes, motion: ScaledMotion, style: dict[str, Any]) -> None:
-    axes.plot(
-        np.where(np.isfinite(motion.peak), motion.peak, np.nan),
-        motion.levels,
-        marker=".",
-        markeredgewidth=0.0,
-        label=motion.label,
-        **style,
-    )
+    peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
+    axes.plot(peak, motion.levels, marker=".", markeredgewidth=0.0, label=motion.label, **style)
 
 
 def _draw_ways(axes: Axes, motion: ScaledMotion, color: str) -> None:
@@ -160,28 +136,15 @@ def _draw_fractiles(axes: Axes, motions: Sequence[ScaledMotion]) -> None:
         # The lowest level that is enough for this share of the motions.
         level = reached[int(np.ceil(share * len(motions))) - 1]
         shown = np.isfinite(level)
-        axes.plot(
-            peaks[shown],
-            level[shown],
-            color=ABOVE,
-            linewidth=1.8 if share == 0.5 else 1.1,
-            linestyle="-" if share == 0.5 else (0, (5, 1.5)),
-            label=f"{100 * share:g} %",
-        )
+        name = f"{100 * share:g} %"
+        width, dashes, text = (1.8, "-", "median") if share == 0.5 else (1.1, (0, (5, 1.5)), name)
+        axes.plot(peaks[shown], level[shown], color=ABOVE, linewidth=width, linestyle=dashes, label=name)
         if shown.any():
             # Where the curves lie close, each label still has a place of its own.
             place, above = (0.6, True) if share == 0.5 else (1.0, share > 0.5)
-            at = int(place * (np.count_nonzero(shown) - 1))
-            axes.annotate(
-                "median" if share == 0.5 else f"{100 * share:g} %",
-                (peaks[shown][at], level[shown][at]),
-                xytext=(0, 2 if above else -2),
-                textcoords="offset points",
-                ha="right",
-                va="bottom" if above else "top",
-                color=ABOVE,
-                fontsize="small",
-            )
+            k = int(place * (np.count_nonzero(shown) - 1))
+            at, off, side = (peaks[shown][k], level[shown][k]), (0, 2 if above else -2), "bottom" if above else "top"
+            write(axes, text, at, off, ha="right", va=side, color=ABOVE, fontsize="small")
 
 
 def _highest_shown(motions: Sequence[ScaledMotion]) -> float:
@@ -238,15 +201,7 @@ def _handles(named: Sequence[ScaledMotion], *, with_strips: bool, with_arrows: b
     handles += [
         Line2D([], [], marker=".", markersize=5.0, label="dot: a level at which it stands", **alone),
         Line2D([], [], color=GROUND, label="dotted: off to overturning, and back", **_AWAY | {"linewidth": 1.0}),
-        Line2D(
-            [],
-            [],
-            marker=_KINK,
-            markersize=8.0,
-            markerfacecolor="none",
-            label="kink: from there on, another swing is the largest",
-            **alone,
-        ),
+        Line2D([], [], marker=_KINK, markersize=8.0, markerfacecolor="none", label=_KINKED, **alone),
     ]
     if with_strips:
         arrow = " (arrow: and above)" if with_arrows else ""

@@ -1,18 +1,19 @@
-"""Maps over two parameters: the outcome of each point, or regions between boundaries."""
+"""Maps over two parameters: outcomes of points, regions between boundaries, a number for each of many blocks."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Floats
+from rocking.errors import InvalidOption
 from rocking.plot.boundaries import Stack, runs
-from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for
-from rocking.plot.style import INK
+from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, figure_for, labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,44 +56,18 @@ def outcome_figure(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw which of up to six outcomes each point of a grid has.
+    """Draw which of up to six outcomes each point of a grid has: numbers of shape (len(y), len(x)).
 
-    Parameters
-    ----------
-    x, y : ndarray
-        Values of the two parameters, increasing.
-    outcome : ndarray of int, shape (len(y), len(x))
-        Number of the outcome at each point.
-    meanings : sequence of str
-        What the outcomes 0, 1, ... mean, from the lightest colour to the darkest; the last stands out.
-    x_label, y_label, title, ax, figsize
-        Texts, where to draw, and the size of a new figure, inches.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> figure = outcome_figure(
-    ...     x=np.array([1.0, 2.0]), y=np.array([0.0, 1.0]), outcome=np.array([[0, 0], [1, 0]]),
-    ...     meanings=["stays", "rocks"], x_label="omega", y_label="a", title="A map")
-    >>> [text.get_text() for text in figure.legends[0].get_texts()]
-    ['stays', 'rocks']
+    The meanings are named from the lightest colour to the darkest; the last one stands out.
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     count = len(meanings)
-    with figure_for(ax, (5.4, 4.2), figsize) as figure:
+    with figure_for(ax, (5.4, 4.2), figsize, title) as figure:
         axes = ax or figure.add_subplot()
-        axes.pcolormesh(
-            x,
-            y,
-            outcome,
-            cmap=ListedColormap(_COLOURS[:count]),
-            norm=BoundaryNorm(np.arange(count + 1) - 0.5, count),
-            shading="nearest",
-            rasterized=True,
-        )
+        colours, norm = ListedColormap(_COLOURS[:count]), BoundaryNorm(np.arange(count + 1) - 0.5, count)
+        axes.pcolormesh(x, y, outcome, cmap=colours, norm=norm, shading="nearest", rasterized=True)
         add_labels(axes, x_label, y_label)
-        add_title(figure, ax, title)
         present = sorted(set(np.unique(outcome).tolist()))
         add_legend(figure, ax, [_patch((_COLOURS[k], ""), meanings[k]) for k in present])
     return figure
@@ -111,45 +86,19 @@ def regions_figure(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw regions between boundaries that are known at some abscissae.
+    """Draw regions between boundaries that are known at increasing abscissae x, shape (n,).
 
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-        Increasing abscissae.
-    y_range : (float, float)
-        Lowest and highest ordinate.
-    edges : sequence of ndarray
-        At each abscissa the ordinates of the boundaries, increasing.
-    regions : sequence of sequence of int
-        At each abscissa the regions below, between and above the boundaries; negative ones, from -3 on: the block
-        stays; the others: it overturns after so many impacts.
-    names : mapping of int to str
-        What the regions mean; those that can be seen are in the legend.
-    x_label, y_label, title, ax, figsize
-        Texts, where to draw, and the size of a new figure, inches.
-
-    Notes
-    -----
-    A region that one abscissa has and the next one lacks ends in a tip half way between them: see
-    `rocking.plot.boundaries`. A strip has no lines around it, which would hide it, and a region too low to be seen
-    none that would make it seen.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> figure = regions_figure(
-    ...     x=np.array([1.0, 2.0]), y_range=(0.0, 3.0), edges=[np.array([1.0]), np.array([2.0])],
-    ...     regions=[[-3, 0], [-3, 0]], names={-3: "stays", 0: "overturns"}, x_label="x", y_label="y", title="A map")
-    >>> [text.get_text() for text in figure.legends[0].get_texts()]
-    ['stays', 'overturns']
+    At each abscissa, `edges` are the ordinates of the boundaries, increasing, and `regions` those below, between and
+    above them: negative ones, from -3 on, where the block stays, the others where it overturns after so many impacts.
+    Those that can be seen are in the legend by their names. How the regions of neighbours meet says
+    `rocking.plot.boundaries`. A strip has no lines around it, which would hide it, and a region too low to be seen none
+    that would make it seen.
     """
     from matplotlib.collections import LineCollection, PolyCollection
 
     low, high = y_range
     stacks = [Stack(np.array([low, *edge, high]), tuple(at)) for edge, at in zip(edges, regions, strict=True)]
-    polygons: dict[int, list[Floats]] = {}
-    specks: dict[int, list[Floats]] = {}
+    polygons, specks = dict[int, list[Floats]](), dict[int, list[Floats]]()
     tallest: dict[int, float] = {}
     lines: list[Floats] = []
     for abscissae, levels, inside in runs(x, stacks):
@@ -161,7 +110,7 @@ def regions_figure(
             tallest[region] = max(height, tallest.get(region, 0.0))
         seen = np.flatnonzero(heights > _SPECK)
         lines += [curves[j + 1] for j, k in pairwise(seen) if min(heights[j], heights[k]) > _STRIP]
-    with figure_for(ax, (5.6, 4.6), figsize) as figure:
+    with figure_for(ax, (5.6, 4.6), figsize, title) as figure:
         axes = ax or figure.add_subplot()
         for region, corners in specks.items():
             axes.add_collection(PolyCollection(corners, facecolors=_look(region)[0], linewidths=0.0))
@@ -175,7 +124,6 @@ def regions_figure(
         axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.5, capstyle="round", snap=False))
         axes.set(xlim=(x[0], x[-1]), ylim=y_range)
         add_labels(axes, x_label, y_label)
-        add_title(figure, ax, title)
         strips = {region: f"{name} (a strip)" for region, name in names.items() if tallest.get(region, 1.0) < _STRIP}
         add_legend(figure, ax, _patches(polygons, {**names, **strips}, (x[-1] - x[0]) * (high - low)))
     return figure
@@ -209,3 +157,55 @@ def _patch(look: tuple[str, str], label: str) -> Patch:
 def _area(corners: Floats) -> float:
     x, y = corners.T
     return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
+
+
+#: Width and height of one panel, inches, and how many stand side by side.
+_PANEL: Final = (3.5, 2.9)
+_BESIDE: Final = 2
+
+#: Area of a mark, points squared, shared by all of them, between bounds.
+_AREA: Final = 9000.0
+_MARK: Final = (6.0, 60.0)
+
+
+def blocks_figure(
+    p: Floats,
+    alpha: Floats,
+    *,
+    panels: Mapping[str, Floats],
+    value_label: str,
+    missing_label: str,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw a number for each block as the colour of a mark, in one panel or several with the same colours.
+
+    Blocks are given by p (rad/s) and alpha (rad), `panels` by their names: arrays of shape (n,). Where a value is not
+    finite, the block has a cross, and `missing_label` says why. In `ax` there is room for one panel.
+    """
+    if ax is not None and len(panels) > 1:
+        raise InvalidOption(f"{len(panels)} panels need a figure of their own: leave ax out, or select one of them")
+    columns = min(len(panels), _BESIDE)
+    rows = math.ceil(len(panels) / columns)
+    finite = np.concatenate([values[np.isfinite(values)] for values in panels.values()])
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    area = float(np.clip(_AREA / len(p), *_MARK))
+    with figure_for(ax, (columns * _PANEL[0] + 0.6, rows * _PANEL[1] + 0.4), figsize, title) as figure:
+        axes = [ax] if ax is not None else list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
+        for each, (name, values) in zip(axes, panels.items(), strict=False):
+            there = np.isfinite(values)
+            x, y = p[there], np.degrees(alpha[there])
+            shades: dict[str, Any] = {"cmap": "cividis_r", "vmin": low, "vmax": high}
+            marks = each.scatter(x, y, c=values[there], s=area, marker="s", linewidth=0.0, **shades)
+            if not there.all():
+                x, y = p[~there], np.degrees(alpha[~there])
+                each.scatter(x, y, s=area, marker="x", color=ABOVE, linewidth=0.7, label=missing_label)
+            add_labels(each, "p (rad/s)", "slenderness (degrees)")
+            if len(panels) > 1:
+                each.set_title(name, color=INK)
+        for spare in axes[len(panels) :]:
+            spare.remove()
+        figure.colorbar(marks, ax=axes[: len(panels)], label=value_label, shrink=0.9)
+        add_legend(figure, ax, labelled(*axes[: len(panels)]))
+    return figure

@@ -1,4 +1,4 @@
-"""Rotation above the ground motion that caused it, with impacts, rests and one chattering sequence."""
+"""Histories of a ground motion, and of a rotation above it with impacts, rests and one chattering sequence."""
 
 from __future__ import annotations
 
@@ -8,8 +8,18 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled
-from rocking.plot.style import ABOVE, GROUND, INK, REST
+from rocking.plot.canvas import (
+    ABOVE,
+    GROUND,
+    INK,
+    REST,
+    add_labels,
+    add_legend,
+    add_ticks,
+    figure_for,
+    labelled,
+    write,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,68 +79,25 @@ def response_figure(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    r"""Draw a response above the ground motion that caused it.
+    """Draw a response above the ground motion that caused it.
 
-    Parameters
-    ----------
-    time, rotation : ndarray, shape (n,)
-        Times (s) and signed rotation (rad), of the stretch to draw; beyond twice the slenderness the curve leaves the
-        frame.
-    slenderness : (float, float)
-        Angle at which the block stands on its edge, of side + and side -, rad.
-    impact_times, uplift_times : ndarray
-        Times of the impacts and of the uplifts, s; those in the stretch are drawn.
-    rest_intervals : ndarray, shape (k, 2)
-        Start and end of each stretch at rest, s.
-    overturn_time : float or None
-        Time at which the block has fallen, s.
-    motion_time, motion_acceleration_g : ndarray, shape (m,)
-        Times (s) and ground acceleration (g) of the stretch; both empty for free rocking, which has no panel of it.
-    thresholds_g : (float, float), or a pair of ndarray, shape (m,)
-        Acceleration (g, a magnitude) that uplifts the block to side + and to side -; an acceleration
-        of the opposite sign is needed, so the first is drawn below zero and the second above. Under a vertical motion
-        they change with the weight: one for each of the motion's times.
-    vertical_acceleration_g : ndarray, shape (m,), optional
-        Vertical ground acceleration (g), which has a panel of its own.
-    duration : float, optional
-        How long the whole response is, s; where the stretch is only a part of it, the figure says so.
-    chattering : DrawnSequence, optional
-        A sequence to show in a panel of its own: the interval to the next impact against the time to rest, both
-        logarithmic. There is none where the time of rest is not bracketed (NaN) or the sequence has a single impact.
-    units : {"slenderness", "rad", "deg"}
-        What rotations are drawn in: over the slenderness of their side, or as they are. Beside the first two stands an
-        axis in degrees. Where the sides differ they are named, with what 1 is on each.
-    label : str
-        Name and unit of a coordinate that is no rotation: it is drawn as it is.
-    title : str
-        Title of the figure.
-    ax : matplotlib.axes.Axes, optional
-        Draw the rotation here, without the other panels.
-    figsize : (float, float), optional
-        Width and height of a new figure, inches; by default 7 by 4.4, or 5.4 with a vertical motion.
+    Times are s and the rotation is in rad, on the stretch that is drawn; it leaves the frame beyond twice the
+    slenderness (side +, side -). `rest_intervals` have shape (k, 2). Ground accelerations are in g; without
+    `motion_time` there is no panel of them. A threshold is a magnitude, or one for each of the motion's times where the
+    weight changes: the first lifts to side + and is drawn below zero, the second above. Where the stretch is only a
+    part of the whole `duration`, the figure says so.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rocking.plot import response_figure
-    >>> t = np.linspace(0.0, 2.0, 201)
-    >>> figure = response_figure(
-    ...     time=t, rotation=0.1 * np.sin(t), slenderness=(0.2, 0.2), impact_times=np.array([]),
-    ...     rest_intervals=np.empty((0, 2)), uplift_times=np.array([0.0]), overturn_time=None,
-    ...     motion_time=t, motion_acceleration_g=-0.4 * np.cos(t), thresholds_g=(0.2, 0.2), title="A block")
-    >>> [axes.get_ylabel() for axes in figure.axes]
-    ['rotation / slenderness', 'ground\nacceleration (g)']
+    A sequence `chattering` has a panel of its own, the interval to the next impact against the time to rest, both
+    logarithmic, unless the time of rest is not bracketed (NaN) or there is a single impact. Rotations are drawn in
+    `units`; a coordinate that is no rotation as it is, under its `label`. In `ax`, the rotation is drawn without the
+    other panels.
     """
     shown = float(time[0]), float(time[-1])
     scale = _scale("rad" if label else units, slenderness)
     drawn = scale.of(rotation)
     zoom = chattering if ax is None and chattering and _can_be_zoomed(chattering) else None
     histories = 1 if not motion_time.size else 2 if vertical_acceleration_g is None else 3
-    with figure_for(ax, (7.0, 4.4 if histories < 3 else 5.4), figsize) as figure:
+    with figure_for(ax, (7.0, 4.4 if histories < 3 else 5.4), figsize, title) as figure:
         (main, *grounds), sequence = _panels(figure, ax, histories, zoomed=zoom is not None)
         _shade_rest(main, np.clip(rest_intervals, *shown))
         _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])))
@@ -146,7 +113,7 @@ def response_figure(
         if grounds:
             _draw_motion(grounds[0], motion_time, motion_acceleration_g, thresholds_g)
         if vertical_acceleration_g is not None and len(grounds) > 1:
-            _draw_vertical(grounds[1], motion_time, vertical_acceleration_g)
+            _draw_ground(grounds[1], motion_time, vertical_acceleration_g, 0.6)
         histories_shown = main, *grounds
         labels = label or _Y_LABELS[units], "ground acceleration (g)", "vertical (g)"
         for axes, name in zip(histories_shown, labels, strict=False):
@@ -156,7 +123,6 @@ def response_figure(
         if zoom and sequence is not None:
             _mark_sequence(main, zoom)
             _draw_sequence(sequence, zoom)
-        add_title(figure, ax, title)
         add_legend(figure, ax, labelled(main, *grounds))
     return figure
 
@@ -225,67 +191,31 @@ def _tell_sides(
     if motion is not None:
         places += [(motion, minus, "lifts to side −", "top"), (motion, -plus, "lifts to side +", "bottom")]
     for axes, level, words, place in places:
-        axes.annotate(
-            words,
-            (0.0, level),
-            xycoords=axes.get_yaxis_transform(),
-            xytext=(3, 2 if place == "bottom" else -2),
-            textcoords="offset points",
-            va=place,
-            color=INK,
-            fontsize="small",
-            zorder=5,
+        look = {"va": place, "color": INK, "fontsize": "small", "zorder": 5}
+        write(
+            axes, words, (0.0, level), (3, 2 if place == "bottom" else -2), xycoords=axes.get_yaxis_transform(), **look
         )
 
 
 def _mark_impacts(axes: Axes, impact_times: Floats, uplift_times: Floats) -> None:
-    rug = axes.get_xaxis_transform()
     if impact_times.size:
-        axes.plot(
-            impact_times,
-            np.full(impact_times.size, 0.055),
-            "|",
-            color=INK,
-            markersize=6,
-            markeredgewidth=0.5,
-            transform=rug,
-            label=f"impacts ({impact_times.size})",
-        )
+        add_ticks(axes, impact_times, 0.055, label=f"impacts ({impact_times.size})")
     if uplift_times.size:
-        axes.plot(
-            uplift_times,
-            np.full(uplift_times.size, 0.13),
-            "^",
-            color=ABOVE,
-            markersize=4.5,
-            markeredgewidth=0.0,
-            transform=rug,
-            label="uplift",
-        )
+        add_ticks(axes, uplift_times, 0.13, "^", color=ABOVE, markersize=4.5, markeredgewidth=0.0, label="uplift")
 
 
 def _mark_overturning(axes: Axes, drawn: Floats, overturn_time: float) -> None:
     """Put a cross at the time of the fall: where the curve ends, or at the edge of the frame that it has left."""
-    axes.plot(
-        overturn_time,
-        float(np.clip(drawn[-1], *axes.get_ylim())),
-        "X",
-        color=ABOVE,
-        markersize=7,
-        markeredgecolor="white",
-        markeredgewidth=0.5,
-        clip_on=False,
-        zorder=4,
-        label=f"overturned at {overturn_time:.3f} s",
-    )
+    look: dict[str, Any] = {"color": ABOVE, "markersize": 7, "markeredgecolor": "white", "markeredgewidth": 0.5}
+    height, label = float(np.clip(drawn[-1], *axes.get_ylim())), f"overturned at {overturn_time:.3f} s"
+    axes.plot(overturn_time, height, "X", clip_on=False, zorder=4, label=label, **look)
 
 
 def _draw_motion(
     axes: Axes, time: Floats, acceleration: Floats, thresholds: tuple[Floats | float, Floats | float]
 ) -> None:
     plus, minus = (np.broadcast_to(threshold, time.shape) for threshold in thresholds)
-    axes.axhline(0.0, color=INK, linewidth=0.4)
-    axes.plot(time, acceleration, color=GROUND, linewidth=0.6, label="_ground acceleration")
+    _draw_ground(axes, time, acceleration, 0.6)
     above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
     label = "beyond a threshold"
     for threshold, beyond in ((minus, acceleration > minus), (-plus, acceleration < -plus)):
@@ -304,9 +234,9 @@ def _draw_motion(
         label = ""
 
 
-def _draw_vertical(axes: Axes, time: Floats, acceleration: Floats) -> None:
+def _draw_ground(axes: Axes, time: Floats, acceleration: Floats, linewidth: float) -> None:
     axes.axhline(0.0, color=INK, linewidth=0.4)
-    axes.plot(time, acceleration, color=GROUND, linewidth=0.6, label="_vertical acceleration")
+    axes.plot(time, acceleration, color=GROUND, linewidth=linewidth, label="_ground acceleration")
 
 
 def _time_label(shown: tuple[float, float], duration: float | None) -> str:
@@ -320,17 +250,8 @@ def _time_label(shown: tuple[float, float], duration: float | None) -> str:
 def _mark_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     start, end = float(sequence.impact_times[0]), sequence.rest_upper
     axes.plot([start, end], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=axes.get_xaxis_transform())
-    axes.annotate(
-        "A",
-        (0.5 * (start + end), 0.955),
-        xycoords=axes.get_xaxis_transform(),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha="center",
-        va="bottom",
-        color=ABOVE,
-        fontweight="bold",
-    )
+    at, look = (0.5 * (start + end), 0.955), {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold"}
+    write(axes, "A", at, (0, 2), xycoords=axes.get_xaxis_transform(), **look)
 
 
 def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
@@ -339,17 +260,32 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     interval = np.diff(sequence.impact_times)
     # Where impacts lie closer than the spacing of floating point times, neither axis has a logarithm.
     shown = (interval > 0.0) & (rest > start)
-    axes.loglog(
-        rest - start[shown],
-        interval[shown],
-        "o",
-        color=INK,
-        markersize=2.6,
-        markerfacecolor="white",
-        markeredgewidth=0.6,
-    )
+    look: dict[str, Any] = {"color": INK, "markersize": 2.6, "markerfacecolor": "white", "markeredgewidth": 0.6}
+    axes.loglog(rest - start[shown], interval[shown], "o", **look)
     axes.invert_xaxis()
     add_labels(axes, "time to rest (s)", "interval to next impact (s)")
     axes.grid()
     width = sequence.rest_upper - sequence.rest_lower
     axes.set_title(f"A: at rest at {rest:.6f} s, bracket {width:.0e} s wide", color=ABOVE, loc="left", wrap=True)
+
+
+def motion_figure(
+    *,
+    time: Floats,
+    acceleration_g: Floats,
+    vertical_g: Floats | None = None,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw a ground acceleration (g) over time (s), and a vertical one below it; in `ax`, the horizontal one alone."""
+    traces = {"ground acceleration (g)": acceleration_g}
+    if vertical_g is not None and ax is None:
+        traces["vertical acceleration (g)"] = vertical_g
+    with figure_for(ax, (7.0, 0.6 + 1.8 * len(traces)), figsize, title) as figure:
+        panels = [ax] if ax else figure.subplots(len(traces), 1, sharex=True, squeeze=False)[:, 0].tolist()
+        for axes, (label, trace) in zip(panels, traces.items(), strict=True):
+            _draw_ground(axes, time, trace, 0.8)
+            axes.set_xlim(time[0], time[-1])
+            add_labels(axes, "time (s)" if axes is panels[-1] else "", label)
+    return figure

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, labelled, scale_by_ratio
-from rocking.plot.style import ABOVE, CURVES, GROUND
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, add_labels, add_legend, figure_for, labelled, scale_by_ratio
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,29 +47,9 @@ def risk_figure(
 ) -> Figure:
     """Draw a hazard curve, dotted where it is extended, and below it where each limit state's rate comes from.
 
-    Parameters
-    ----------
-    intensity : ndarray, shape (n,)
-        Intensities of all lines.
-    hazard : HazardLine
-        Annual rates at these intensities.
-    lines : sequence of RiskLine
-        One for every limit state.
-    intensity_label, title : str
-        Texts.
-    ax, figsize
-        As for `figure_for`. In `ax`, the shares of the rates are drawn without the hazard curve.
-
-    Examples
-    --------
-    >>> x = np.array([1.0, 2.0, 4.0])
-    >>> figure = risk_figure(
-    ...     intensity=x, hazard=HazardLine(1e-2 / x, (1.0, 2.0)), lines=[RiskLine("overturning", x / 7.0)],
-    ...     intensity_label="PGA (g)")
-    >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
-    ['exceeded, times a year', 'share of the rate (per unit of ln)']
+    In `ax`, the shares of the rates are drawn without the hazard curve.
     """
-    with figure_for(ax, (5.6, 5.2), figsize) as figure:
+    with figure_for(ax, (5.6, 5.2), figsize, title) as figure:
         panels = figure.subplots(2, 1, sharex=True).tolist() if ax is None else [ax]
         *curves, shares = panels
         for axes in curves:
@@ -89,7 +68,6 @@ def risk_figure(
         shares.set_ylim(bottom=0.0)
         shares.grid()
         add_labels(shares, intensity_label, "share of the rate (per unit of ln)")
-        add_title(figure, ax, title)
         add_legend(figure, ax, labelled(*panels))
     return figure
 
@@ -105,30 +83,8 @@ def survival_figure(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw the largest annual rates of motions that fit with a block that still stands, and a hazard curve beside it.
-
-    Parameters
-    ----------
-    intensity, largest : ndarray, shape (n,)
-        Intensities, and the largest rate of motions of that intensity or more.
-    largest_label : str
-        What the rates say.
-    hazard : HazardLine or None
-        Annual rates of a hazard curve at these intensities.
-    intensity_label, title : str
-        Texts.
-    ax, figsize
-        As for `figure_for`.
-
-    Examples
-    --------
-    >>> x = np.array([1.0, 2.0, 4.0])
-    >>> figure = survival_figure(
-    ...     intensity=x, largest=1e-2 / x, largest_label="at most", hazard=None, intensity_label="PGA (g)")
-    >>> [text.get_text() for text in figure.legends[0].get_texts()]
-    ['at most']
-    """
-    with figure_for(ax, (5.6, 3.6), figsize) as figure:
+    """Draw the largest annual rates of motions that fit with a block that still stands, and a hazard curve."""
+    with figure_for(ax, (5.6, 3.6), figsize, title) as figure:
         axes = ax or figure.add_subplot()
         scale_by_ratio(axes, intensity)
         if hazard is not None:
@@ -146,7 +102,6 @@ def survival_figure(
         axes.set(xlim=(float(intensity[0]), float(intensity[-1])), ylim=(0.5 * lowest, min(_MARGIN * highest, 10.0)))
         axes.grid()
         add_labels(axes, intensity_label, "exceeded, times a year")
-        add_title(figure, ax, title)
         add_legend(figure, ax, labelled(axes))
     return figure
 

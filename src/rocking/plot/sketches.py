@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import add_title, figure_for
-from rocking.plot.style import ABOVE, GROUND, INK, REST
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, figure_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,11 +35,10 @@ def block_figure(*, upright: Floats, rocking: Floats, title: str) -> Figure:
     """
     from matplotlib.patches import Polygon
 
-    with figure_for(None, (3.4, 4.2)) as figure:
+    with figure_for(None, (3.4, 4.2), title=title) as figure:
         axes = figure.add_subplot()
         axes.set_aspect("equal")
         axes.set_axis_off()
-        add_title(figure, None, title)
         axes.add_patch(Polygon(rocking[:4], facecolor=REST, edgecolor=INK, linewidth=1.3))
         axes.add_patch(Polygon(upright[:4], fill=False, edgecolor=GROUND, linewidth=0.9, linestyle=(0, (4, 2))))
         _draw_ground(axes, rocking, upright)
@@ -93,7 +91,7 @@ def _draw_sizes(axes: Axes, corners: Floats) -> None:
 def _draw_angles(axes: Axes, upright: Floats, rocking: Floats) -> None:
     """Draw the slenderness, between the block's edge and R, and the rotation, between the edge upright and rocking."""
     pivot = rocking[0]
-    edge, before, diagonal = (_direction(end - pivot) for end in (rocking[1], upright[1], rocking[4]))
+    edge, before, diagonal = (math.atan2(*(end - pivot)[::-1]) for end in (rocking[1], upright[1], rocking[4]))
     height = float(np.hypot(*(upright[1] - pivot)))
     arcs = ((_ALPHA_RADIUS, diagonal, r"$\alpha$"), (_THETA_RADIUS * height, before, r"$\theta$"))
     start = edge
@@ -105,10 +103,6 @@ def _draw_angles(axes: Axes, upright: Floats, rocking: Floats) -> None:
         middle = 0.5 * (start + end)
         at = pivot + (radius + 0.09) * np.array([math.cos(middle), math.sin(middle)])
         axes.annotate(name, at, ha="center", va="center")
-
-
-def _direction(vector: Floats) -> float:
-    return math.atan2(vector[1], vector[0])
 
 
 def _draw_arrow(axes: Axes, start: Any, end: Any, style: str, color: str, **look: float) -> None:

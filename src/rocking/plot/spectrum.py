@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from rocking.arrays import Flags, Floats
-from rocking.plot.canvas import add_labels, add_legend, add_title, figure_for, scale_by_ratio
-from rocking.plot.style import CURVES, GROUND, INK
+from rocking.plot.canvas import CURVES, GROUND, INK, add_labels, add_legend, figure_for, scale_by_ratio
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,43 +56,17 @@ def spectrum_figure(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    r"""Draw peak rotations against the size of the block, and below them the share of motions that overturn it.
+    """Draw peak rotations over the abscissa, and below them the share of motions that overturn the block.
 
-    Parameters
-    ----------
-    x : ndarray, shape (points,)
-        Abscissa, drawn on a logarithmic axis.
-    curves : sequence of SpectrumCurves
-        At most four; one alone needs no label.
-    fractiles : sequence of float
-        What the fractiles are, in (0, 1). None of two motions or fewer is drawn, and only the middle one of three
-        curves or four.
-    motions : sequence of str
-        Names of the motions; two are named, more are counted.
-    x_label, title, ax, figsize
-        Texts; where to draw the peak rotations, without the shares; the size of a new figure, inches.
-
-    Notes
-    -----
-    A line of a named motion, and a fractile, ends in a cross where the block of the next point overturns; of a fractile
-    that means that so many motions overturn it that there is none.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> peaks = np.array([[0.1, 0.4], [0.2, 0.5], [0.4, np.inf]])
-    >>> curves = [SpectrumCurves("tall", peaks, np.array([[0.2, 0.5]]), np.array([0.0, 1.0 / 3.0]))]
-    >>> figure = spectrum_figure(
-    ...     x=np.array([1.0, 2.0]), curves=curves, fractiles=[0.5], motions=["a", "b", "c"], x_label="p")
-    >>> [axes.get_ylabel() for axes in figure.axes]
-    ['peak rotation / slenderness', 'share\noverturned']
-    >>> [text.get_text() for text in figure.legends[0].get_texts()]
-    ['tall', 'each of 3 motions', 'median']
+    There are at most four curves; one alone needs no label. Two motions are named, more are counted. Of two motions or
+    fewer no fractile is drawn, and of three curves or four only the middle one. A line of a named motion, and a
+    fractile, ends in a cross where the block of the next point overturns; of a fractile that means that so many motions
+    overturn it that there is none. In `ax`, the peak rotations are drawn without the shares.
     """
     few = len(motions) <= _FEW
     middle = _middle(fractiles)
     chosen = {share: k for k, share in enumerate(fractiles) if share == middle or len(curves) <= _WITH_ALL_FRACTILES}
-    with figure_for(ax, (5.6, 4.8), figsize) as figure:
+    with figure_for(ax, (5.6, 4.8), figsize, title) as figure:
         panels = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0)).tolist() if ax is None else [ax]
         peaks, *shares = panels
         for style, curve in zip(CURVES, curves, strict=False):
@@ -111,7 +84,6 @@ def spectrum_figure(
         for panel in shares:
             panel.set_ylim(-0.03, 1.03)
             add_labels(panel, x_label, "share overturned")
-        add_title(figure, ax, title)
         add_legend(figure, ax, [*_handles(curves, motions, chosen), *_ends_handle(peaks)])
     return figure
 

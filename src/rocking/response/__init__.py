@@ -1,5 +1,6 @@
 """What one simulation found, and what a practitioner asks of it."""
 
+from rocking.response.answers import trail_of
 from rocking.response.export import active_span, drawing_times
 from rocking.response.history import AMBIGUITY, QUANTITIES, Sensitivity
 from rocking.response.response import Response
@@ -15,4 +16,5 @@ __all__ = [
     "in_brief",
     "in_words",
     "ratio_text",
+    "trail_of",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,21 +13,22 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.arrays import Floats, as_asked
 from rocking.block import Block
 from rocking.body import Body
+from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.trace import Trail
-from rocking.model import Model
 from rocking.motion.motion import Motion
-from rocking.response.forces import Contact, friction_coefficient, friction_demand, with_all_impacts
-from rocking.response.history import History, Sensitivity
+from rocking.response.history import (
+    Contact,
+    History,
+    Sensitivity,
+    ambiguities,
+    friction_coefficient,
+    friction_demand,
+    sensitivity_along,
+    with_all_impacts,
+)
 from rocking.treatment import Treatment
-
-EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
-IMPACT = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
-CHATTERING = np.dtype([("start", "f8"), ("end", "f8"), ("lower", "f8"), ("upper", "f8"), ("impacts", "i8")])
-
-#: Kinds of events by their codes, see `rocking.kernels.state`.
-_KINDS = np.array(["uplift", "rest", "overturn"])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,40 +50,7 @@ class Answers:
     chattering: NDArray[np.void]
     stalled: int
     near_ties: int
-    trail: Trail
-
-    @classmethod
-    def from_march(
-        cls,
-        body: Body,
-        motion: Motion | None,
-        model: Model,
-        treatment: Treatment,
-        trail: Trail,
-        table: state.Records,
-        end: state.Record,
-    ) -> Self:
-        """Response from the table and the last state of a march."""
-        events = table["event"][: end["events"]]
-        overturned = bool(len(events)) and int(events["kind"][-1]) == state.EventKind.OVERTURN
-        return cls(
-            body=body,
-            motion=motion,
-            model=model,
-            treatment=treatment,
-            overturned=bool(overturned),
-            unfinished=int(end["ending"]) == state.Ending.UNFINISHED,
-            overturn_time=float(events["time"][-1]) if overturned else math.nan,
-            peak_rotation=float(end["peak"]),
-            peak_time=float(end["peak_time"]),
-            duration=float(end["end"]),
-            events=_events(events),
-            impacts=_public(table["impact"][: end["impacts"]], IMPACT),
-            chattering=_public(table["sequence"][: end["sequences"]], CHATTERING),
-            stalled=int(end["stalled"]),
-            near_ties=int(end["near_ties"]),
-            trail=trail._replace(nodes=state.attributed(np.array(table["node"][: end["nodes"]]))),
-        )
+    _trail: Trail
 
     @property
     def block(self) -> Block:
@@ -99,7 +67,7 @@ class Answers:
 
     @cached_property
     def _history(self) -> History:
-        return History(self.trail, self.duration)
+        return History(self._trail, self.duration)
 
     @cached_property
     def peak_over_slenderness(self) -> float:
@@ -114,7 +82,7 @@ class Answers:
     @property
     def moves_at_end(self) -> bool:
         """Whether the block is not at rest at the end of the response."""
-        return bool(self.trail.nodes["side"][-1] != state.AT_REST)
+        return bool(self._trail.nodes["side"][-1] != state.AT_REST)
 
     @property
     def stopped(self) -> bool:
@@ -137,8 +105,8 @@ class Answers:
     @cached_property
     def sensitivity(self) -> Sensitivity:
         """How the peak and the times of events and impacts change with the motion, the initial state and the block."""
-        return Sensitivity.along(
-            self.trail, self.peak_time, len(self.impacts), len(self.events), overturned=self.overturned
+        return sensitivity_along(
+            self._trail, self.peak_time, len(self.impacts), len(self.events), overturned=self.overturned
         )
 
     @property
@@ -155,7 +123,7 @@ class Answers:
         An ambiguous response is one of those that are possible. Scale the motion, or the initial state, by 1 plus some
         millionths, simulate each, and take the spread of the results for the answer.
         """
-        return self.sensitivity.ambiguities(self.peak_rotation, self.near_ties)
+        return ambiguities(self.sensitivity, self.peak_rotation, self.near_ties)
 
     @property
     def time_at_rest(self) -> float:
@@ -190,23 +158,7 @@ class Answers:
         return self._history.states(time)
 
     def rotation(self, time: ArrayLike) -> Floats:
-        """Rotation theta, rad, at any time, from the series of the arc in which it lies.
-
-        Parameters
-        ----------
-        time : array_like
-            Times, s, of any shape.
-
-        Returns
-        -------
-        ndarray
-            Same shape, a number for a number; NaN outside [0, duration].
-
-        Raises
-        ------
-        InvalidOption
-            If a time is not a number.
-        """
+        """Rotation theta, rad, at times of any shape, as `states`: from the series of the arc in which each lies."""
         return as_asked(self.states(time)[..., 0])
 
     def angular_velocity(self, time: ArrayLike) -> Floats:
@@ -289,22 +241,14 @@ class Answers:
         if law is None:
             raise InvalidOption(f"the forces of the ground on a {type(self.body).__name__} are not known")
         until = self.duration if math.isnan(self.tipping_time) else self.tipping_time
-        return Contact(History(with_all_impacts(self.trail, cut=cut), self.duration), law, until)
+        return Contact(History(with_all_impacts(self._trail, cut=cut), self.duration), law, until)
+
+
+def trail_of(response: Answers) -> Trail:
+    """Return the steps of the march that a response was made from."""
+    return response._trail
 
 
 def _pull(_: Floats, vertical: Floats) -> Floats:
     """Return how much the ground would have to pull: the normal force's opposite."""
     return -vertical
-
-
-def _public(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    public = np.empty(len(rows), dtype=dtype)
-    for name in dtype.names or ():
-        public[name] = rows[name]
-    return public
-
-
-def _events(rows: state.Records) -> NDArray[np.void]:
-    events = np.empty(len(rows), dtype=EVENT)
-    events["time"], events["side"], events["kind"] = rows["time"], rows["side"], _KINDS[rows["kind"]]
-    return events

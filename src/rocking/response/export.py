@@ -10,8 +10,8 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
-from rocking.plot import RotationUnits
-from rocking.response.answers import Answers
+from rocking.plot.response import RotationUnits
+from rocking.response.answers import Answers, trail_of
 from rocking.response.history import even_times
 from rocking.tables import named, rows_of
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: What a response can be written as.
-Table = Literal["histories", "events", "impacts", "chattering"]
+ResponseTable = Literal["histories", "events", "impacts", "chattering"]
 
 _DIMENSIONS: Final = {"events": "event", "impacts": "impact", "chattering": "sequence"}
 
@@ -49,11 +49,11 @@ def dataset(response: Answers, dt: float | None) -> xr.Dataset:
     return xr.Dataset(variables, {"time": ("time", times, {"units": "s"})}, _attributes(response))
 
 
-def frame(response: Answers, table: Table, dt: float | None) -> pd.DataFrame:
+def frame(response: Answers, table: ResponseTable, dt: float | None) -> pd.DataFrame:
     """One table as a data frame; histories are indexed by time."""
     import pandas as pd
 
-    checks.one_of(table, "table", InvalidOption, get_args(Table))
+    checks.one_of(table, "table", InvalidOption, get_args(ResponseTable))
     if table != "histories":
         if dt is not None:
             raise InvalidOption(f"{{}} is the step of the histories; the {table} have none", "dt")
@@ -133,10 +133,10 @@ def figure(
     ax: Axes | None,
     figsize: tuple[float, float] | None,
     *,
-    chattering: bool,
+    longest_sequence: bool,
 ) -> Figure:
     """Draw the rotation over the ground motion, from the window's start to its end."""
-    from rocking.plot import DrawnSequence, response_figure
+    from rocking.plot.response import DrawnSequence, response_figure
 
     checks.one_of(units, "units", InvalidOption, get_args(RotationUnits))
     start, end = active_span(response) if window is None else _checked(window, response.duration)
@@ -147,7 +147,7 @@ def figure(
     lift = None if motion is None or motion.vertical is None else motion.vertical.acceleration(corners) / gravity
     weight = 1.0 if lift is None else 1.0 + lift
     plus, minus = (weight * threshold / gravity for threshold in body.uplift_thresholds(response.model))
-    sequence = _longest_sequence(response, start, end) if chattering else None
+    sequence = _longest_sequence(response, start, end) if longest_sequence else None
     return response_figure(
         time=times,
         rotation=response.states(times)[:, 0],
@@ -183,7 +183,7 @@ def active_span(response: Answers) -> tuple[float, float]:
 def drawing_times(response: Answers, start: float, end: float) -> Floats:
     """Return times dense enough for a smooth line: even ones, and those of steps that are long enough to see."""
     even = np.linspace(start, end, _EVEN_TIMES)
-    steps = _within(response.trail.nodes["time"], start, end)
+    steps = _within(trail_of(response).nodes["time"], start, end)
     visible = np.diff(np.floor(steps / max(even[1] - even[0], 1e-12)), prepend=-1.0) > 0.0
     return np.union1d(even, steps[visible])
 

@@ -1,4 +1,4 @@
-"""What the steps of a march tell: where the body is at any time, when it tips, and how both change with the input."""
+"""What the steps of a march tell: rotations and forces at any time, when a body tips, how that changes with input."""
 
 from __future__ import annotations
 
@@ -12,9 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
+from rocking.bisection import bisected
+from rocking.body import ContactLaw
 from rocking.errors import InvalidOption
-from rocking.kernels import state, variation
-from rocking.kernels.trace import Trail, trace
+from rocking.kernels import state
+from rocking.kernels.ground import components
+from rocking.kernels.march import march
+from rocking.kernels.trace import Trail, trace, vary
+from rocking.motion import piecewise
 from rocking.tables import counted
 
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
@@ -31,6 +36,22 @@ QUANTITIES: Final = ("motion", "initial_rotation", "initial_velocity", "p", "alp
 DRIVING: Final = QUANTITIES[:3]
 
 _ULP: Final = 2.0**-52
+
+#: Samples per step, rounds, and steps that are looked at again, when the forces' extremes are searched.
+_SAMPLES: Final = 9
+_REFINEMENTS: Final = 10
+_MOST_REFINED: Final = 64
+
+#: Impacts beyond the last resolved one are followed down to this speed, over p and in rad: what the motion changes and
+#: what their speed adds are then nothing. And so many of a sequence at most: all, up to a restitution of 0.998.
+_SLOWEST: Final = 1e-10
+_MOST_IMPACTS: Final = 10_000
+
+#: Coefficients of friction beyond those of any two materials.
+_ROUGHEST: Final = 3.0
+
+#: What is asked of the horizontal and the vertical force over the weight.
+Measure = Callable[[Floats, Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,16 +112,7 @@ class History:
         within = np.flatnonzero(np.abs(self.states(times)[:, 0]) < balance)
         if not len(within):
             return float(ends[0])  # beyond it from the start
-        return bisected(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)
-
-
-def bisected(low: float, high: float, holds: Callable[[float], bool]) -> float:
-    """Time from which on something holds, between one at which it does not and one at which it does."""
-    while True:
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            return high
-        low, high = (low, middle) if holds(middle) else (middle, high)
+        return bisected(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)[1]
 
 
 def even_times(end: float, dt: float) -> Floats:
@@ -127,18 +139,6 @@ class Sensitivity:
     impacts: NDArray[np.void]
     events: NDArray[np.void]
 
-    @classmethod
-    def along(cls, trail: Trail, peak_time: float, impacts: int, events: int, *, overturned: bool) -> Sensitivity:
-        """Sensitivity of a response with that many impacts and events: one pass along its steps for each quantity."""
-        count = len(QUANTITIES)
-        peak, impact_times, event_times = np.zeros(count), np.zeros((count, impacts)), np.zeros((count, events))
-        scratch, work = state.new_scratch(), state.record(state.VARIATION)
-        for k in range(count):
-            peak[k] = variation.vary(trail, scratch, work, k, peak_time, impact_times[k], event_times[k])
-        if overturned:
-            peak[:] = 0.0
-        return cls(*(_by_quantity(values) for values in (peak[:, None], impact_times, event_times)))
-
     def __repr__(self) -> str:
         event = np.max(np.abs(self.events["motion"]), initial=0.0)
         return (
@@ -147,19 +147,33 @@ class Sensitivity:
             f"{counted(len(self.impacts), 'impact')}>"
         )
 
-    def ambiguities(self, peak_rotation: float, near_ties: int) -> tuple[str, ...]:
-        """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly."""
-        peak, *times = (_ULP * _total(values, QUANTITIES) for values in (self.peak, self.events, self.impacts))
-        known = {
-            "peak": bool(np.all(peak <= AMBIGUITY * max(peak_rotation, 1e-300))),
-            "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
-            "touch": near_ties == 0,
-        }
-        return tuple(name for name, is_known in known.items() if not is_known)
 
-    def driving(self) -> tuple[float, Floats]:
-        """Sizes of the changes of the peak and of the events with all that drives the block, per relative change."""
-        return float(_total(self.peak, DRIVING)[0]), _total(self.events, DRIVING)
+def sensitivity_along(trail: Trail, peak_time: float, impacts: int, events: int, *, overturned: bool) -> Sensitivity:
+    """Sensitivity of a response with that many impacts and events: one pass along its steps for each quantity."""
+    count = len(QUANTITIES)
+    peak, impact_times, event_times = np.zeros(count), np.zeros((count, impacts)), np.zeros((count, events))
+    scratch, work = state.new_scratch(), state.record(state.VARIATION)
+    for k in range(count):
+        peak[k] = vary(trail, scratch, work, k, peak_time, impact_times[k], event_times[k])
+    if overturned:
+        peak[:] = 0.0
+    return Sensitivity(*(_by_quantity(values) for values in (peak[:, None], impact_times, event_times)))
+
+
+def ambiguities(found: Sensitivity, peak_rotation: float, near_ties: int) -> tuple[str, ...]:
+    """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly."""
+    peak, *times = (_ULP * _total(values, QUANTITIES) for values in (found.peak, found.events, found.impacts))
+    known = {
+        "peak": bool(np.all(peak <= AMBIGUITY * max(peak_rotation, 1e-300))),
+        "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
+        "touch": near_ties == 0,
+    }
+    return tuple(name for name, is_known in known.items() if not is_known)
+
+
+def driving(found: Sensitivity) -> tuple[float, Floats]:
+    """Sizes of the changes of the peak and of the events with all that drives the block, per relative change."""
+    return float(_total(found.peak, DRIVING)[0]), _total(found.events, DRIVING)
 
 
 def _total(values: NDArray[np.void], quantities: tuple[str, ...]) -> Floats:
@@ -172,3 +186,169 @@ def _by_quantity(values: Floats) -> NDArray[np.void]:
     for name, row in zip(QUANTITIES, values, strict=True):
         table[name] = row
     return table
+
+
+def friction_coefficient(value: object) -> float:
+    """Return a coefficient of friction.
+
+    Raises
+    ------
+    InvalidOption
+        If it is not positive, or larger than that of any two materials.
+    """
+    coefficient = checks.positive(value, "friction", InvalidOption)
+    if coefficient > _ROUGHEST:
+        raise InvalidOption(
+            "{} must be a coefficient (friction over normal force, about 0.6 of stone on stone) of at most "
+            f"{_ROUGHEST:g}, not {coefficient:g}; of an angle of friction take the tangent",
+            "friction",
+            value=value,
+        )
+    return coefficient
+
+
+def friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
+    """Friction coefficient that sticking needs: |H|/N, infinite where the block would leave the ground, NaN of NaN."""
+    demand = np.where(np.isnan(vertical), np.nan, np.inf)
+    np.divide(np.abs(horizontal), vertical, out=demand, where=vertical > 0.0)
+    return demand
+
+
+def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
+    """Return the trail with the impacts between the last resolved one of each chattering sequence and its rest.
+
+    ``cut``: whether the response ends within a sequence that is closed already. A sequence is closed where its end is
+    proven, while its impacts still push and pull. They are followed here as far as that counts.
+    """
+    nodes = trail.nodes
+    # A duration that ends within a sequence that is closed leaves no rest behind its last impact.
+    rests = np.append(nodes["side"][1:] == state.AT_REST, cut)
+    closing = np.flatnonzero(rests & (nodes["side"] != state.AT_REST) & (nodes["u"] == 0.0))
+    slowest = _SLOWEST * np.sqrt(np.abs(trail.block["stiffness"]))
+    closing = closing[nodes["v"][closing] > slowest[nodes["side"][closing]]]
+    if not len(closing):
+        return trail
+    body, rules, scratch = trail.block.copy(), trail.rules.copy(), state.new_scratch()
+    body["limit"] = slowest
+    rules["treatment"], rules["endless"], rules["record"] = state.RestRule.VELOCITY, False, True
+    table = state.new_table(1024)
+    parts, done = [], 0
+    for row in closing:
+        start = state.new_states(1, _MOST_IMPACTS)[0]
+        for name in ("piece", "offset", "side", "u", "v"):
+            start[name] = nodes[name][row]
+        start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
+        rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
+        while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
+            table = state.grown(table)
+        found = table["node"][1 : start["nodes"]]
+        parts += [nodes[done : row + 1], found[(found["side"] != state.AT_REST) & (found["time"] < rules["stop"])]]
+        done = row + 1
+    return trail._replace(nodes=state.attributed(np.concatenate([*parts, nodes[done:]])))
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Horizontal and vertical force of the ground over the weight, up to the time `until` (s).
+
+    Within a step the forces are smooth; both limits at every impact and at every jump of the motion are looked at. The
+    impulses at impacts are not part of it.
+    """
+
+    history: History
+    law: ContactLaw
+    until: float
+
+    def forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
+        """Both forces at times of any shape; NaN outside the response."""
+        times = checks.numbers(time, "time", InvalidOption)
+        flat = times.ravel()
+        outside = self.history.outside(flat)
+        within = np.where(outside, 0.0, flat)
+        horizontal, vertical = self._forces_in(within, self.history.rows(within))
+        horizontal[outside] = vertical[outside] = np.nan
+        return horizontal.reshape(times.shape), vertical.reshape(times.shape)
+
+    def largest(self, measure: Measure) -> float:
+        """Largest value of a measure: steps whose samples come near it are sampled again, around their best."""
+        times, rows = self._samples()
+        values = self._measured(measure, times, rows)
+        kept = np.argsort(values.max(axis=1))[-_MOST_REFINED:]
+        return float(max(values.max(), self._peaks(measure, times[kept], rows[kept])[1].max()))
+
+    def first(self, measure: Measure, is_beyond: Callable[[Floats], Flags]) -> float:
+        """First time, s, at which a measure is beyond a level, as then all greater values are; NaN if it never is."""
+        times, rows = self._samples()
+        values = self._measured(measure, times, rows)
+        highest = values.max(axis=1)
+        with np.errstate(invalid="ignore"):
+            # Between its samples, a smooth step rises above them by less than they span.
+            reach = np.where(np.isfinite(highest), 2.0 * highest - values.min(axis=1), highest)
+        near = np.flatnonzero(is_beyond(reach))
+        if not len(near):
+            return math.nan
+        at, peaks = self._peaks(measure, times[near], rows[near])
+        passing = np.flatnonzero(is_beyond(peaks))
+        if not len(passing):
+            return math.nan
+        step = near[passing[0]]
+        looks = np.append(times[step], at[passing[0]])
+        beyond = is_beyond(np.append(values[step], peaks[passing[0]]))
+        high = float(looks[beyond].min())
+        before = looks[~beyond & (looks < high)]
+        if not len(before):
+            return high  # at once: a jump
+
+        def passes(time: float) -> bool:
+            return bool(is_beyond(self._measured(measure, np.array([time]), rows[step, :1]))[0])
+
+        return bisected(float(before.max()), high, passes)[1]
+
+    def _peaks(self, measure: Measure, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
+        """Where each of some steps has its largest value, and that value."""
+        at, best = times[:, 0], np.full(len(times), -np.inf)
+        for _ in range(_REFINEMENTS):
+            values = self._measured(measure, times, rows)
+            place = values.argmax(axis=1)[:, None]
+            value, where = (np.take_along_axis(array, place, axis=1)[:, 0] for array in (values, times))
+            at, best = np.where(value > best, where, at), np.maximum(value, best)
+            low = np.take_along_axis(times, np.maximum(place - 1, 0), axis=1)
+            high = np.take_along_axis(times, np.minimum(place + 1, times.shape[1] - 1), axis=1)
+            times = low + (high - low) * np.linspace(0.0, 1.0, times.shape[1])
+        return at, best
+
+    def _measured(self, measure: Measure, times: Floats, rows: Integers) -> Floats:
+        return measure(*self._forces_in(times.ravel(), rows.ravel())).reshape(times.shape)
+
+    def _forces_in(self, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
+        """Compute the forces in the steps that start at these rows: on the side and under the piece of each."""
+        theta, rate, acceleration = self.history.states_in(times, rows).T
+        side = self.history.trail.nodes["side"][rows]
+        ground = self._ground_in(times, rows, side == state.AT_REST)
+        return self.law((theta, rate, acceleration), ground, side)
+
+    def _ground_in(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
+        """Both ground accelerations in g: in the piece where a step starts; at rest, which may span many, anywhere."""
+        ground = self.history.trail.ground
+        anywhere = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
+        piece = np.where(at_rest, anywhere, self.history.trail.nodes["piece"][rows])
+        elapsed = np.maximum(times - ground.pieces[piece, 0], 0.0)
+        push, *lift = (piecewise.value(coefficients, elapsed) for coefficients in components(ground, piece))
+        return push, lift[0] if lift else np.zeros_like(push)
+
+    def _samples(self) -> tuple[Floats, Integers]:
+        """Sample every step, and at rest every piece of the motion, ends included and in order; with their steps."""
+        nodes = self.history.trail.nodes
+        corners = self.history.trail.ground.pieces[:, 0]
+        corners = corners[nodes["side"][self.history.rows(corners)] == state.AT_REST]
+        starts = np.unique(np.concatenate([nodes["time"], corners]))
+        starts = starts[(starts < self.until) | (starts == starts[0])]
+        if nodes["side"][self.history.rows(np.array([self.until]))[0]] == state.AT_REST:
+            starts = np.union1d(starts, [self.until])  # what the motion is after a jump at the end
+        ends = np.append(starts[1:], max(self.until, starts[-1]))
+        rows = self.history.rows(starts)
+        fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES))
+        times = starts[:, None] + fractions * (ends - starts)[:, None]
+        resting = nodes["side"][rows] == state.AT_REST  # what the motion is before a jump
+        times[resting, -1] = np.maximum(np.nextafter(times[resting, -1], 0.0), times[resting, 0])
+        return times, np.repeat(rows[:, None], _SAMPLES, axis=1)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rocking import svg
-from rocking.plot import RotationUnits
+from rocking.plot.response import RotationUnits
 from rocking.response import export, summary
 from rocking.response.answers import Answers
-from rocking.result import Findings, Row, dictionary_of, text_of
+from rocking.result import DrawnResult, Row, dictionary_of, text_of
 from rocking.tables import write_csv, write_netcdf
 
 if TYPE_CHECKING:
@@ -22,12 +22,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: Letters of the column of names in a summary.
+_WIDTH = 20
+
 #: Rotations beyond this multiple of the slenderness are cut in a notebook's picture: past it a block only falls.
 _HIGHEST_PICTURED = 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Answers, Findings):
+class Response(Answers, DrawnResult):
     """Response of one body to one motion, made by `rocking.simulate`.
 
     Attributes
@@ -80,6 +83,11 @@ class Response(Answers, Findings):
         friction : float, optional
             Coefficient of friction: says whether the block would slide, and when first.
 
+        Returns
+        -------
+        sequence of Row
+            One for each line.
+
         Examples
         --------
         >>> import rocking
@@ -90,7 +98,25 @@ class Response(Answers, Findings):
         return summary.summary_rows(self, friction)
 
     def facts(self, friction: float | None = None) -> Sequence[Row]:
-        """Return what happened for machines, as rows of name, value and unit: the entries of `to_dict`."""
+        """Return what happened for machines, as rows of name, value and unit: the entries of `to_dict`.
+
+        Parameters
+        ----------
+        friction : float, optional
+            As for `summary_rows`.
+
+        Returns
+        -------
+        sequence of Row
+            One for each entry.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response.facts()[4]
+        Row(name='overturned', value=True, unit='1', note='')
+        """
         return summary.facts(self, friction)
 
     def summary(self, friction: float | None = None) -> str:
@@ -125,7 +151,7 @@ class Response(Answers, Findings):
         least normal force  0.8919 of the weight, until it tips at 0.9319 s
         verdict             overturns at 1.532021 s
         """
-        return text_of(self.summary_rows(friction), self.WIDTH)
+        return text_of(self.summary_rows(friction), _WIDTH)
 
     def to_dict(self, friction: float | None = None) -> dict[str, Any]:
         """Return the result in plain values for machines, as ``rocking simulate --json`` prints it.
@@ -167,10 +193,17 @@ class Response(Answers, Findings):
         ------
         InvalidOption
             If `dt` is not positive.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> dict(response.to_xarray(dt=0.1).sizes)
+        {'time': 16, 'event': 2, 'impact': 1, 'sequence': 0}
         """
         return export.dataset(self, dt)
 
-    def to_dataframe(self, table: export.Table = "histories", *, dt: float | None = None) -> pd.DataFrame:
+    def to_dataframe(self, table: export.ResponseTable = "histories", *, dt: float | None = None) -> pd.DataFrame:
         """Return one of the response's tables as a data frame; columns are named with their units.
 
         Parameters
@@ -180,6 +213,11 @@ class Response(Answers, Findings):
             `events`, `impacts` or `chattering`.
         dt : float, optional
             Step of the histories, s; by default the motion's own, or a two-thousandth of the duration.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each time, event, impact or sequence.
 
         Raises
         ------
@@ -200,15 +238,38 @@ class Response(Answers, Findings):
     def to_netcdf(self, path: str | Path, dt: float | None = None) -> None:
         """Write `to_xarray` to a NetCDF file.
 
+        Parameters
+        ----------
+        path : path
+            File to write.
+        dt : float, optional
+            As for `to_xarray`.
+
         Raises
         ------
         OutputError
             If the file cannot be written.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response.to_netcdf(pathlib.Path(tempfile.mkdtemp()) / "response.nc", dt=0.1)
         """
         write_netcdf(path, export.dataset(self, dt))
 
-    def to_csv(self, path: str | Path, table: export.Table = "histories", *, dt: float | None = None) -> None:
+    def to_csv(self, path: str | Path, table: export.ResponseTable = "histories", *, dt: float | None = None) -> None:
         """Write one of the tables of `to_dataframe` as text columns with a header.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            File to write, whole or not at all.
+        table : {"histories", "impacts", "events", "chattering"}
+            The table, as `to_dataframe` takes it.
+        dt : float, optional
+            Step of the histories, s.
 
         Raises
         ------
@@ -216,6 +277,16 @@ class Response(Answers, Findings):
             As `to_dataframe`.
         OutputError
             If the file cannot be written.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> file = pathlib.Path(tempfile.mkdtemp()) / "impacts.csv"
+        >>> response.to_csv(file, "impacts")
+        >>> file.read_text().splitlines()[0]
+        'time_s,side,speed_before_rad_s,speed_after_rad_s'
         """
         write_csv(path, export.frame(self, table, dt), index=table == "histories")
 
@@ -225,7 +296,7 @@ class Response(Answers, Findings):
         *,
         units: RotationUnits = "slenderness",
         window: tuple[float, float] | None = None,
-        chattering: bool = False,
+        longest_sequence: bool = False,
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
@@ -239,7 +310,7 @@ class Response(Answers, Findings):
             What rotations are drawn in: over the slenderness of their side, or as they are.
         window : (start, end), optional
             Stretch of time to draw, s; by default from a little before the first event to a little after the last.
-        chattering : bool
+        longest_sequence : bool
             Whether to show the longest chattering sequence, impact by impact, in a panel of its own.
         title : str
             Title; by default what was simulated.
@@ -251,4 +322,4 @@ class Response(Answers, Findings):
         InvalidOption
             If there is no such unit, the window is not a stretch of the response, or the size is not one.
         """
-        return export.figure(self, units, window, title, ax, figsize, chattering=chattering)
+        return export.figure(self, units, window, title, ax, figsize, longest_sequence=longest_sequence)

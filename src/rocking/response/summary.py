@@ -9,6 +9,7 @@ import numpy as np
 
 from rocking.response.answers import Answers
 from rocking.response.export import records
+from rocking.response.history import driving
 from rocking.result import Row
 from rocking.tables import counted, named
 
@@ -198,7 +199,7 @@ def peak_time_text(response: Answers) -> str:
     """Time of the peak: that of a swing which is uncertain by a share of itself, by this share of its duration."""
     if response.overturned:
         return _short_text(response.peak_time, KNOWN * _change_of_fall(response))
-    change = response.sensitivity.driving()[0]
+    change = driving(response.sensitivity)[0]
     bend = response.peak_rotation * abs(float(response.states(response.peak_time)[2]))
     return _short_text(response.peak_time, KNOWN * change / math.sqrt(bend) if bend > 0.0 else 0.0)
 
@@ -236,7 +237,7 @@ def _thresholds_text(response: Answers) -> str:
 
 def _event_rows(response: Answers) -> list[Row]:
     sequences = {float(row["end"]): row for row in response.chattering}
-    changes = response.sensitivity.driving()[1]
+    changes = driving(response.sensitivity)[1]
     rows = []
     for event, change in zip(response.events[:_LISTED], changes, strict=False):
         time, kind = float(event["time"]), str(event["kind"])
@@ -322,11 +323,11 @@ def _has_moved(response: Answers) -> bool:
 
 def _change_of_fall(response: Answers) -> float:
     """Change of the time at which the block overturns per relative change of what drives it, s."""
-    return float(response.sensitivity.driving()[1][-1])
+    return float(driving(response.sensitivity)[1][-1])
 
 
 def _peak_digits(response: Answers) -> int:
-    return digits_of(response.peak_rotation, response.sensitivity.driving()[0])
+    return digits_of(response.peak_rotation, driving(response.sensitivity)[0])
 
 
 def _decimals(unknown: float) -> int:

@@ -1,7 +1,7 @@
 from .file import TEMPLATE, StudyFile, read_study
 from .fragility import BlockFragilities
 from .refine import Refinement
-from .report import FragilityPlan, ReportPlan, SpectrumPlan
+from .results import FragilityPlan, ReportPlan, SpectrumPlan
 from .run import RunReport
 from .spectrum import StudySpectrum
 from .state import Running, Status

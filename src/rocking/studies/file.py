@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 import itertools
 import re
 import tomllib
@@ -18,6 +17,7 @@ import numpy as np
 from rocking import checks, quantities
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
+from rocking.ensemble import Product, Scales
 from rocking.errors import InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
 from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
@@ -25,11 +25,10 @@ from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.named_pulses import pulse_family
 from rocking.plausibility import vertical_notes
-from rocking.product import Product, Scales
 from rocking.progress import note
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
 from rocking.studies.refine import Tolerances, tolerances_of
-from rocking.studies.report import PLANS, ReportPlan
+from rocking.studies.results import PLANS, ReportPlan, check_part
 from rocking.tables import csv_rows
 from rocking.treatment import treatment
 
@@ -140,6 +139,7 @@ def read_study(path: str | Path) -> StudyFile:
     Returns
     -------
     StudyFile
+        Its product, and what is to be kept and made of the results.
 
     Raises
     ------
@@ -201,7 +201,7 @@ class _Reader:
         for table in self.tables:
             if table not in _SCHEMA:
                 hint = _nearest(table, (name for name in _SCHEMA if "." not in name))
-                raise self._wrong(f"there is no table [{{}}]; {hint}", table, table=table)
+                raise self._wrong(table, None, f"there is no table [{{}}]; {hint}", table)
             self._check_keys(table)
         for needed in ("blocks", "motions"):
             if needed not in self.tables:
@@ -210,15 +210,13 @@ class _Reader:
     def _check_keys(self, table: str) -> None:
         content = self._table(table)
         if not isinstance(content, dict):
-            raise self._wrong(f"{{}} must be a table, [{table}]", table.rpartition(".")[2], table="", key=table)
+            raise self._wrong("", table, f"{{}} must be a table, [{table}]", table.rpartition(".")[2])
         for key, value in content.items():
             if key not in _SCHEMA[table]:
-                hint = _nearest(key, _SCHEMA[table])
-                raise self._wrong(f"[{table}] has no {{}}; {hint}", key, table=table, key=key)
+                raise self._wrong(table, key, f"[{table}] has no {{}}; {_nearest(key, _SCHEMA[table])}", key)
             kind = _SCHEMA[table][key]
             if not kind.holds(value):
-                sentence = f"{{}} must be {kind.words}, not {checks.shown(value)}"
-                raise self._wrong(sentence, key, table=table, key=key, value=value)
+                raise self._wrong(table, key, f"{{}} must be {kind.words}, not {checks.shown(value)}", key, value=value)
             if f"{table}.{key}" in _SCHEMA:
                 self._check_keys(f"{table}.{key}")
 
@@ -234,12 +232,13 @@ class _Reader:
         measures = [name for name in _MEASURES if name in given]
         if len(measures) > 1:
             listed = " and ".join(["{}"] * len(measures))
-            sentence = f"motions can be scaled to one measure only, not to {listed}"
-            raise self._wrong(sentence, *measures, table="scales", key=measures[0])
+            raise self._wrong(
+                "scales", measures[0], f"motions can be scaled to one measure only, not to {listed}", *measures
+            )
         if "period" in given and "sa" not in given:
-            raise self._wrong("{} goes with {}, and only with it", "period", "sa", table="scales", key="period")
+            raise self._wrong("scales", "period", "{} goes with {}, and only with it", "period", "sa")
         if "sa" in given and "period" not in given:
-            raise self._wrong("{} needs {}, in s", "sa", "period", table="scales", key="sa")
+            raise self._wrong("scales", "sa", "{} needs {}, in s", "sa", "period")
         levels = {name: self._numbers("scales", name, given[name]) for name in measures}
         with self._located("scales"):
             if not levels:
@@ -254,19 +253,19 @@ class _Reader:
         for name, given in self._table("report").items():
             with self._located(f"report.{name}"):
                 plans[name] = PLANS[name](**given)
-                plans[name].check(kept)
+                check_part(plans[name], kept)
         return ReportPlan(**plans) if "report" in self.tables else None
 
     def _blocks(self) -> Blocks:
         given = self._table("blocks")
         if "csv" in given:
             if len(given) > 1:
-                raise self._wrong("{} goes without other keys", "csv", table="blocks", key="csv")
+                raise self._wrong("blocks", "csv", "{} goes without other keys", "csv")
             return self._blocks_of_csv(self.file.parent / given["csv"])
         if not any({*needed} <= given.keys() <= {*needed, *more} for needed, more in _BODIES.items()):
             choices = ", or ".join(map(_listed, _BODIES))
             having = f"; it has {_listed([*given])}" if given else ""
-            raise self._wrong(f"[blocks] needs {choices}, or csv{having}", table="blocks")
+            raise self._wrong("blocks", None, f"[blocks] needs {choices}, or csv{having}")
         axes: dict[str, Any] = {
             name: self._pivots(value) if name == "pivots" else self._numbers("blocks", name, value)
             for name, value in given.items()
@@ -289,13 +288,12 @@ class _Reader:
             return found
 
     def _blocks_of_csv(self, table: Path) -> Blocks:
-        about: dict[str, Any] = {"table": "blocks", "key": "csv"}
         try:
             rows = csv_rows(table.read_text("utf-8-sig"))
         except OSError as error:
-            raise self._wrong(f"{table} cannot be read: {error.strerror}", **about) from None
+            raise self._wrong("blocks", "csv", f"{table} cannot be read: {error.strerror}") from None
         except UnicodeDecodeError:
-            raise self._wrong(f"{table} is no text table in UTF-8; save it as CSV", **about) from None
+            raise self._wrong("blocks", "csv", f"{table} is no text table in UTF-8; save it as CSV") from None
         columns: dict[str, Any] = {}
         headings, rows = (rows[0][1], rows[1:]) if len(rows) > 1 else (list[str](), [])
         for name in _PARAMETERS:
@@ -309,16 +307,18 @@ class _Reader:
                 columns[name] = np.squeeze(cells, axis=1) if len(ends) == 1 else np.array(cells)
         if not any({*needed} <= columns.keys() for needed in _BODIES):
             raise self._wrong(
+                "blocks",
+                "csv",
                 f"{table} needs columns p (rad/s) and alpha (rad, or 12deg), or width and height (m), or pivots_plus, "
                 "pivots_minus, height_of_mass and gyration (m), and rows",
-                **about,
             )
         if {"p", "alpha"} <= columns.keys():
             try:
                 return Blocks(**{name: columns[name] for name in ("p", "alpha", "restitution") if name in columns})
             except RockingError as error:
-                where = f"{table}, whose block 0 is in line {rows[0][0]}"
-                raise self._wrong(f"{where}: {error}", **about) from None
+                where = f"{table}, whose block 0 is in line {rows[0][0]}: "
+                line = _line(self.text, "blocks", "csv", 0)
+                raise _moved(error, StudyError, self.file, line, where) from None
         bodies = []
         for (line, _), values in zip(rows, zip(*columns.values(), strict=True), strict=True):
             with _in_table(table, line):
@@ -352,8 +352,7 @@ class _Reader:
         for k in range(len(given.get("pulses", []))):
             motions += self._pulses(k)
         if not motions:
-            sentence = "[motions] holds no motion that can be read: name records or pulses"
-            raise self._wrong(sentence, table="motions")
+            raise self._wrong("motions", None, "[motions] holds no motion that can be read: name records or pulses")
         return motions, names + [""] * (len(motions) - len(names)), skipped
 
     def _record(self, path: str, *, several: bool) -> Motion:
@@ -417,19 +416,16 @@ class _Reader:
             line = next((k for k, text in enumerate(lines, start=first) if name in text), first)
             raise _moved(error, type(error), self.file, line) from None
 
-    def _wrong(
-        self, message: str, *arguments: str, table: str, key: str | None = None, value: object = None
-    ) -> StudyError:
+    def _wrong(self, table: str, key: str | None, message: str, *names: str, value: object = None) -> StudyError:
+        """Return the error that says what is wrong with a key of a table, or with the table."""
         line = _line(self.text, table, key, 0)
-        return StudyError(message, *arguments, path=str(self.file), line=line, value=value)
+        return StudyError(message, *names, path=str(self.file), line=line, value=value)
 
 
-def _moved(error: RockingError, kind: type[_Kept], file: Path, line: int) -> _Kept:
-    """Return an error as one of this line; what it says of a file of its own stays in the sentence."""
-    message, arguments = error.message.template, error.message.arguments
-    if error.path is not None:
-        message, arguments = error.text(), ()
-    return kind(message, *arguments, path=str(file), line=line, value=error.value)
+def _moved(error: RockingError, kind: type[_Kept], file: Path, line: int, where: str = "") -> _Kept:
+    """Return an error as one of this line, with all its data; what it says of a file of its own comes before."""
+    where += error.text().removesuffix(error.message.text())
+    return kind(where + error.message.template, *error.message.arguments, path=str(file), line=line, value=error.value)
 
 
 @contextlib.contextmanager
@@ -444,8 +440,7 @@ def _in_table(table: Path, line: int) -> Iterator[None]:
 def _nearest(name: str, known: Iterable[str]) -> str:
     """Say which known name is meant, or which there are."""
     names = [*known]
-    close = difflib.get_close_matches(name, names, n=1)
-    return f"did you mean {close[0]}?" if close else f"there are {', '.join(names)}"
+    return checks.meant(name, names, f"there are {', '.join(names)}")
 
 
 def _number(key: str, text: str) -> float:

@@ -16,9 +16,9 @@ from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.levels import mean_one, only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
+from rocking.ensemble import Product, body_coordinates
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
-from rocking.product import Product, body_coordinates
 from rocking.progress import Progress
 from rocking.result import table_of_some
 from rocking.studies.spectrum import BlocksResult, peak_ratios, require_limits
@@ -163,7 +163,6 @@ class BlockFragilities(BlocksResult):
         )
 
     def summary(self) -> str:
-        """Medians and dispersions of some blocks, and how many have no curve."""
         data, scale = self.data, self.measure.scale
         parameters = self.block_parameters
         header = ["limit state", "block", *parameters, "exceeded", "median", "between", "dispersion"]
@@ -191,7 +190,6 @@ class BlockFragilities(BlocksResult):
         return f"{text}\n\n{table_of_some(header, rows)}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Curves by name; intensities in SI units."""
         data = self.data
         return {
             **data.attrs,
@@ -209,7 +207,7 @@ class BlockFragilities(BlocksResult):
         InvalidOption
             If there are several limit states for the one `ax`.
         """
-        from rocking.plot import blocks_figure
+        from rocking.plot.maps import blocks_figure
 
         names = [str(name) for name in self.data.limit_state.values]
         medians = self.measure.scale * self.data["median"].values

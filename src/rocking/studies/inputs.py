@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import KINDS, Bodies
+from rocking.ensemble import VARIABLES, Product, Scales
 from rocking.errors import InvalidOption, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.product import VARIABLES, Product, Scales
 from rocking.treatment import treatment
 
 #: A fixed time in archives, so that the same inputs make the same bytes.

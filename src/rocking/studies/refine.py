@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from rocking import bisection, checks
 from rocking.arrays import Flags, Floats, Integers
+from rocking.ensemble import Product, body_coordinates, dataset_of, measured, setup_of
 from rocking.errors import InvalidOption, StudyError
-from rocking.product import Product, body_coordinates
 from rocking.studies import inputs
 from rocking.studies.inputs import require
-from rocking.studies.store import Store, UnitArray, sealed, unsealed
+from rocking.studies.store import Store, UnitArray, kept, sealed, unsealed
 from rocking.studies.units import Key, PointsWork, UnitGrid
 from rocking.tables import counted
 
@@ -40,13 +40,13 @@ _PLAN: Final = "refine.json"
 _UNITS: Final = 32
 _LEAST: Final = 64
 
-Verdict = Literal["overturning", "complete_chattering"]
+StudyVerdict = Literal["overturning", "complete_chattering"]
 
 #: What a study may be refined for; brackets name verdicts by their number here.
-VERDICTS: Final[tuple[Verdict, ...]] = get_args(Verdict)
+VERDICTS: Final[tuple[StudyVerdict, ...]] = get_args(StudyVerdict)
 
 #: How a dataset names a verdict on the higher scale, and what it says.
-_ABOVE: Final[Mapping[Verdict, tuple[str, str]]] = {
+_ABOVE: Final[Mapping[StudyVerdict, tuple[str, str]]] = {
     "overturning": ("overturns", "whether the scale above overturns the block, and the one below does not"),
     "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not at the one below"),
 }
@@ -113,7 +113,7 @@ class Brackets:
         excess = (self.high - self.low)[wide] / (self._enough(tolerances)[wide] * self.low[wide])
         return int(np.ceil(np.log2(excess.max(initial=1.0))))
 
-    def of(self, verdict: Verdict) -> Brackets:
+    def of(self, verdict: StudyVerdict) -> Brackets:
         """Those of one verdict."""
         chosen = self.verdict == VERDICTS.index(verdict)
         return Brackets(**{name: values[chosen] for name, values in vars(self).items()})
@@ -164,7 +164,7 @@ class Round(UnitArray):
         count = len(self.chosen)
         width = min(math.prod(store.grid.unit), max(_LEAST, math.ceil(count / _UNITS)))
         super().__init__(store.place, f"round.{number}", UnitGrid((count,), (width,), store.grid.outcomes))
-        self._measured = functools.cache(lambda motion: store.product.scales.now(store.product.motions[motion]))
+        self._measured = functools.cache(lambda motion: measured(store.product.scales, store.product.motions[motion]))
 
     def create(self) -> None:
         """Write the round without its units; what describes it last."""
@@ -191,12 +191,12 @@ class Round(UnitArray):
         chosen = self.chosen[some]
         motions, which = np.unique(self.brackets.motion[chosen], return_inverse=True)
         signs = np.array(product.signs)[self.brackets.polarity[chosen]]
-        measured = np.array([self._measured(int(motion)) for motion in motions])
+        values = np.array([self._measured(int(motion)) for motion in motions])
         return PointsWork(
-            setup=dataclasses.replace(product.setup(), bodies=product.bodies.select(self.brackets.block[chosen])),
+            setup=dataclasses.replace(setup_of(product), bodies=product.bodies.select(self.brackets.block[chosen])),
             motions=tuple(product.motions[motion] for motion in motions),
             which=which,
-            factors=signs * (self.brackets.middle[chosen] / measured[which]),  # to the last bit as of `Scales.factors`
+            factors=signs * (self.brackets.middle[chosen] / values[which]),  # to the last bit as of `Scales.factors`
             unit=self.grid.unit,
             outcomes=self.grid.outcomes,
         )
@@ -257,7 +257,7 @@ def refinement(store: Store) -> Refinement | None:
     return Refinement(tolerances, len(begun), done, last.grid.total, last.is_last)
 
 
-def tolerances_of(product: Product, refine: float | Mapping[str, float], kept: Sequence[str]) -> Tolerances:
+def tolerances_of(product: Product, refine: float | Mapping[str, float], outcomes: Sequence[str]) -> Tolerances:
     """Return tolerances by verdict, checked, also against what the study keeps; a number alone is for overturning."""
     given = refine if isinstance(refine, Mapping) else {"overturning": refine}
     others = [name for name in given if name not in VERDICTS]
@@ -267,7 +267,7 @@ def tolerances_of(product: Product, refine: float | Mapping[str, float], kept: S
     _require_order(product)
     names = [verdict for verdict in VERDICTS if verdict in given]
     for verdict in names:
-        require(kept, _NEEDED[verdict], f"a refinement of {_name(verdict)}")
+        require(outcomes, _NEEDED[verdict], f"a refinement of {_name(verdict)}")
     return {verdict: checks.within(given[verdict], "refine", InvalidOption, 1e-12, 0.5) for verdict in names}
 
 
@@ -285,15 +285,8 @@ def keep_plan(store: Store, tolerances: Tolerances) -> None:
 
 def kept_plan(store: Store) -> Tolerances | None:
     """Tolerances to which a study is refined; None where it is not, a StudyError if what says so is damaged."""
-    data = store.place.get(_PLAN)
-    if data is None:
-        return None
-    plan = unsealed(data)
-    if plan is None:
-        raise StudyError(
-            f"{_PLAN} is damaged: remove it, and create the study again from its inputs", path=str(store.place)
-        )
-    return {verdict: plan[verdict] for verdict in VERDICTS if verdict in plan}
+    plan = kept(store.place, _PLAN, "remove it, and create the study again from its inputs")
+    return None if plan is None else {verdict: plan[verdict] for verdict in VERDICTS if verdict in plan}
 
 
 def rounds(store: Store, tolerances: Tolerances) -> Iterator[Round]:
@@ -328,7 +321,7 @@ def _require_order(product: Product) -> None:
         raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
 
 
-def _found_brackets(store: Store, verdict: Verdict) -> Brackets:
+def _found_brackets(store: Store, verdict: StudyVerdict) -> Brackets:
     """Return the changes of a verdict in a study whose units are done; refined, where it is to be refined."""
     store.require_complete()
     tolerances = kept_plan(store)
@@ -361,7 +354,7 @@ def grid_brackets(store: Store, of: Collection[str]) -> Brackets:
     return Brackets(which, motion, polarity, block, levels[scale], levels[scale + 1], holds, known)
 
 
-def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
+def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
     """Label the changes of a verdict in a study whose units are done, as `Study.critical_scales`."""
     import xarray as xr
 
@@ -370,7 +363,7 @@ def critical_scales(store: Store, verdict: Verdict) -> xr.Dataset:
     brackets = _found_brackets(store, verdict)
     above, meaning = _ABOVE[verdict]
     product = store.product
-    whole = product.dataset({})
+    whole = dataset_of(product, {})
     about = {"units": product.scales.about["units"]}
     named: dict[str, Any] = {
         name: ("change", np.asarray(values)[brackets.block], attributes)

@@ -1,4 +1,4 @@
-"""Results of a study: arrays that are read from its store when they are needed, and files with a row a simulation."""
+"""What comes out of a study: arrays read from its store when they are needed, files, and the report that is wanted."""
 
 from __future__ import annotations
 
@@ -7,24 +7,43 @@ import itertools
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking import checks
+from rocking.analysis.fragility.fit import OVERTURNING
+from rocking.analysis.fragility.result import Fragility
 from rocking.engine import OUTCOME
 from rocking.errors import InvalidOption, StudyError
+from rocking.motion.scaling import IntensityName, Measure
 from rocking.progress import Progress
-from rocking.studies.refine import Verdict
-from rocking.studies.store import Store
+from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
+from rocking.studies.refine import StudyVerdict
+from rocking.studies.spectrum import (
+    FRACTILES,
+    StudySpectrum,
+    checked_fractiles,
+    require_limits,
+    require_ratios,
+    study_spectrum,
+)
+from rocking.studies.store import Store, keep
 from rocking.studies.units import name_of
 from rocking.tables import data_frame, plain, whole_file, write_netcdf
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+#: What a report may hold: each with a summary, a figure and a table.
+ReportPart = Fragility | BlockFragilities | StudySpectrum
+
+_REPORT: Final = "report.json"
 
 #: Methods of a study that write it, by the end of the file's name: `to_csv` and so on.
 FORMATS: Final[Mapping[str, str]] = {
@@ -46,29 +65,14 @@ class WrittenToFiles(ABC):
     """What writes its results to one file, a part of them at a time."""
 
     @abstractmethod
-    def _results(self, critical: Verdict | None) -> tuple[xr.Dataset, str, int]:
+    def _results(self, critical: StudyVerdict | None) -> tuple[xr.Dataset, str, int]:
         """Return results, their first dimension, and how much of it is held in memory at a time."""
 
-    def to_netcdf(self, path: str | Path, *, critical: Verdict | None = None) -> None:
-        """Write the results as `results` has them to a NetCDF file.
-
-        Parameters
-        ----------
-        path : path
-            File to write.
-        critical : {"overturning", "complete_chattering"}, optional
-            Write the `critical_scales` of this verdict instead.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        StudyError
-            If a unit is damaged, or critical scales are not known yet.
-        """
+    def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
+        """Write the results as `results` has them to a NetCDF file; parameters and errors as of `to_csv`."""
         write_netcdf(path, self._results(critical)[0])
 
-    def to_csv(self, path: str | Path, *, critical: Verdict | None = None, progress: bool | None = None) -> None:
+    def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
         """Write a row for each simulation as text, in columns named with their units.
 
         Parameters
@@ -89,14 +93,16 @@ class WrittenToFiles(ABC):
         """
         self._write(path, critical, progress, _write_csv)
 
-    def to_json(self, path: str | Path, *, critical: Verdict | None = None, progress: bool | None = None) -> None:
+    def to_json(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
         """Write an object for each simulation as JSON; parameters and errors as of `to_csv`.
 
         The keys are those of its columns, and NaN is null; attributes of the study stand under "study".
         """
         self._write(path, critical, progress, _write_json)
 
-    def to_parquet(self, path: str | Path, *, critical: Verdict | None = None, progress: bool | None = None) -> None:
+    def to_parquet(
+        self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None
+    ) -> None:
         """Write the table of `to_csv` as Parquet; parameters and errors as there.
 
         Raises
@@ -106,7 +112,7 @@ class WrittenToFiles(ABC):
         """
         self._write(path, critical, progress, _write_parquet)
 
-    def to_excel(self, path: str | Path, *, critical: Verdict | None = None, progress: bool | None = None) -> None:
+    def to_excel(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
         """Write the table of `to_csv` as a workbook (.xlsx); parameters and errors as there.
 
         Raises
@@ -116,7 +122,7 @@ class WrittenToFiles(ABC):
         """
         self._write(path, critical, progress, _write_excel)
 
-    def _write(self, path: str | Path, critical: Verdict | None, progress: bool | None, writer: _Writer) -> None:
+    def _write(self, path: str | Path, critical: StudyVerdict | None, progress: bool | None, writer: _Writer) -> None:
         dataset, along, step = self._results(critical)
         table, count = _with_named_scales(dataset), max(1, dataset.sizes[along])
         with Progress("writing", count, show=progress) as bar:
@@ -235,3 +241,136 @@ def _selected(store: Store, name: str, complete: bool, key: tuple[Any, ...]) -> 
             raise StudyError(f"unit {name_of(unit)} is gone since these results were opened: run the study again")
     values = found.squeeze(axis=tuple(position for position, axis in enumerate(axes) if axis.ndim == 0))
     return values.astype(OUTCOME[name]) if complete else values
+
+
+@dataclass(frozen=True)
+class FragilityPlan:
+    """Fragility curves that are wanted.
+
+    Attributes
+    ----------
+    measure : str
+        Intensity, as for `rocking.fragility`.
+    period : float or None
+        Period of a spectral acceleration, s.
+    damping : float
+        Its fraction of critical damping.
+    limits : mapping of str to float
+        Limit states: peak rotation over slenderness that is exceeded, or infinity for overturning.
+    blocks : {"each", "together"}
+        A curve for each block, or one for all.
+    confidence : float
+        Probability of the intervals.
+
+    Raises
+    ------
+    InvalidOption
+        If one of them is out of its range.
+    """
+
+    measure: IntensityName = "pga"
+    period: float | None = None
+    damping: float = 0.05
+    limits: Mapping[str, float] = field(default_factory=lambda: dict(OVERTURNING))
+    blocks: Literal["each", "together"] = "each"
+    confidence: float = 0.9
+
+    def __post_init__(self) -> None:
+        Measure(self.measure, self.period, self.damping)
+        checks.share(self.confidence, "confidence", InvalidOption)
+        checks.one_of(self.blocks, "blocks", InvalidOption, ["each", "together"])
+        for name, limit in checks.mapping(self.limits, "limits", InvalidOption, '{"overturning": inf}').items():
+            if not (isinstance(limit, (int, float)) and limit >= 0.0):
+                raise InvalidOption(
+                    f"{{}}.{name} must be a rotation over slenderness or inf, not {checks.shown(limit)}",
+                    "limits",
+                    value=limit,
+                )
+
+
+@dataclass(frozen=True)
+class SpectrumPlan:
+    """Fractiles that are wanted.
+
+    Attributes
+    ----------
+    fractiles : sequence of float
+        Shares of the motions, in (0, 1), that stay below.
+
+    Raises
+    ------
+    InvalidOption
+        If one is out of its range.
+    """
+
+    fractiles: Sequence[float] = FRACTILES
+
+    def __post_init__(self) -> None:
+        checked_fractiles(self.fractiles)
+
+
+#: Plans by the names of the parts of a report.
+PLANS: Final[Mapping[str, type[FragilityPlan | SpectrumPlan]]] = {"fragility": FragilityPlan, "spectrum": SpectrumPlan}
+
+
+@dataclass(frozen=True)
+class ReportPlan:
+    """All that is wanted.
+
+    Attributes
+    ----------
+    fragility : FragilityPlan or None
+        Fragility curves.
+    spectrum : SpectrumPlan or None
+        Fractiles of the peak rotation.
+    """
+
+    fragility: FragilityPlan | None = None
+    spectrum: SpectrumPlan | None = None
+
+
+def check_part(plan: FragilityPlan | SpectrumPlan, kept: Sequence[str]) -> None:
+    """Raise an InvalidOption unless these outcomes, which a study keeps, are enough for a part of a report."""
+    if isinstance(plan, FragilityPlan):
+        require_limits(kept, plan.limits)
+    else:
+        require_ratios(kept, "a spectrum")
+
+
+def made_report(store: Store, progress: bool | None) -> dict[str, ReportPart]:
+    """Make all that is wanted of a complete study, by name."""
+    plan = kept_report(store)
+    if plan is None:
+        raise StudyError(
+            "the study says nothing of a report: add [report.fragility] to its file and create it again",
+            path=str(store.place),
+        )
+    found: dict[str, ReportPart] = {}
+    if (curves := plan.fragility) is not None:
+        measure = Measure(curves.measure, curves.period, curves.damping)
+        found["fragility"] = (
+            pooled_fragility(store, measure, curves.limits, curves.confidence)
+            if curves.blocks == "together"
+            else block_fragilities(store, measure, curves.limits, curves.confidence, progress)
+        )
+    if plan.spectrum is not None:
+        found["spectrum"] = study_spectrum(store, plan.spectrum.fractiles, progress)
+    return found
+
+
+def keep_report(store: Store, plan: ReportPlan) -> None:
+    """Store what is wanted beside the study, in place of what was."""
+    keep(store.place, _REPORT, json.dumps(asdict(plan), indent=2).encode())
+
+
+def kept_report(store: Store) -> ReportPlan | None:
+    """Read what is wanted; None if nothing is, a StudyError if it is damaged."""
+    data = store.place.get(_REPORT)
+    if data is None:
+        return None
+    try:
+        given = {name: words for name, words in json.loads(data).items() if words is not None}
+        plans: dict[str, Any] = {name: PLANS[name](**words) for name, words in given.items()}
+        return ReportPlan(**plans)
+    except (ValueError, TypeError, KeyError, AttributeError, InvalidOption) as error:
+        raise StudyError(f"{_REPORT} is damaged ({error}): create the study again from its file") from None

@@ -1,8 +1,13 @@
-"""Running a study: units to workers, results into the store, until all are done or somebody stops it."""
+"""Running a study: units to workers, results into the store, until all are done or somebody stops it.
+
+Workers are threads of this process, any executor, or those of dask.distributed: of a scheduler, or of this machine.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import logging
 import signal
 import threading
 import time
@@ -23,8 +28,8 @@ from typing import Any, Final
 
 from rocking.compiling import SIMULATIONS, announce
 from rocking.engine import cores
-from rocking.errors import RockingError, StudyError
-from rocking.progress import Progress
+from rocking.errors import InvalidOption, RockingError, StudyError
+from rocking.progress import Progress, note
 from rocking.studies.store import UnitArray
 from rocking.studies.units import Key, Work, compute
 from rocking.tables import counted
@@ -43,6 +48,12 @@ _RETRIES: Final = 3
 
 #: How often the workers are asked whether they still live, s.
 _POLL: Final = 0.5
+
+
+_HERE: Final = "127.0.0.1"
+
+#: How long a scheduler may take to answer, s.
+_ANSWER: Final = 5.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +81,6 @@ class RunReport:
     stopped: bool
 
     def __add__(self, other: RunReport) -> RunReport:
-        """Return what both did, one after the other."""
         return RunReport(
             self.units + other.units,
             self.simulations + other.simulations,
@@ -263,3 +273,65 @@ def _reason(error: BaseException) -> str:
 
 def _gone(why: object) -> StudyError:
     return StudyError(f"the workers are gone: {why}; what was computed is kept, run the study again")
+
+
+@contextlib.contextmanager
+def scheduler_executor(address: str) -> Iterator[Executor]:
+    """Give the workers of a scheduler, as ``tcp://127.0.0.1:8786``, as an executor; a StudyError if nobody answers.
+
+    Certificates for ``tls://`` are taken from Dask's configuration.
+    """
+    distributed = _distributed()
+    try:
+        # A client that cannot connect would leave threads behind, and wait for them at the end.
+        asyncio.run(_try_connection(distributed, address))
+    except Exception as error:  # whatever the address, the certificates and the sockets raise
+        raise StudyError(f"there is no scheduler at {address}: {' '.join(str(error).split())}") from error
+    with distributed.Client(address, timeout=_ANSWER, set_as_default=False) as client:
+        if not client.nthreads():
+            note(f"no worker has come to {address} yet; the run goes on as they come")
+        yield client.get_executor(pure=False)
+
+
+@contextlib.contextmanager
+def local_executor(workers: int) -> Iterator[Executor]:
+    """Give so many processes of this machine, of one thread each, as an executor; nobody else can reach them."""
+    distributed = _distributed()
+    here: dict[str, Any] = {
+        "host": _HERE,
+        "dashboard_address": f"{_HERE}:0",
+        "worker_dashboard_address": f"{_HERE}:0",
+    }
+    with (
+        distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, preload=[__name__], silence_logs=logging.CRITICAL, **here
+        ) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        yield client.get_executor(pure=False)
+
+
+def dask_setup(worker: object) -> None:
+    """Leave signals to the process that runs the study: what a terminal sends reaches the workers, too.
+
+    dask.distributed calls this in every worker of `local_executor` when it starts.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+
+
+async def _try_connection(distributed: Any, address: str) -> None:
+    """Connect, as a client does, and go."""
+    credentials = distributed.Security().get_connection_args("client")
+    connection = await distributed.comm.connect(address, timeout=_ANSWER, **credentials)
+    await connection.close()
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise InvalidOption("a cluster needs dask.distributed: install rocking[cluster]") from None
+    # What is worth saying of workers that come and go is said in sentences of our own.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    return distributed

@@ -16,10 +16,10 @@ from rocking.analysis.spectrum import fractiles_of
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import require_finished
+from rocking.ensemble import body_coordinates
 from rocking.errors import InvalidOption, StudyError
-from rocking.product import body_coordinates
 from rocking.progress import Progress
-from rocking.result import Result, table_of_some
+from rocking.result import DatasetResult, table_of_some
 from rocking.studies.inputs import require
 from rocking.studies.store import Store
 from rocking.tables import counted
@@ -106,7 +106,7 @@ def _read(store: Store, shape: tuple[int, int, int], unit: int, blocks: slice) -
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BlocksResult(Result):
+class BlocksResult(DatasetResult):
     """Result of a study that has a dimension ``block``, whose parameters are coordinates."""
 
     @property
@@ -182,7 +182,6 @@ class StudySpectrum(BlocksResult):
     TABLES = MappingProxyType({"fractiles": ("fractile_over_alpha", "overturned_share")})
 
     def summary(self) -> str:
-        """Medians (or the fractile next to it) of some blocks at up to four scales."""
         data, one = self.data, self._fractile(0.5)
         parameters, chosen = self.block_parameters, self._some_scales()
         header = ["block", *parameters, *(self._scale_name(i) for i in chosen)]
@@ -198,7 +197,6 @@ class StudySpectrum(BlocksResult):
         return f"{what}; {self._about()}\n\n{table_of_some(header, rows)}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Axes, fractiles and shares by name."""
         data = self.data
         return {
             **data.attrs,
@@ -236,7 +234,7 @@ class StudySpectrum(BlocksResult):
         InvalidOption
             If there are several scales for the one `ax`.
         """
-        from rocking.plot import blocks_figure
+        from rocking.plot.maps import blocks_figure
 
         one = self._fractile(fractile)
         return blocks_figure(

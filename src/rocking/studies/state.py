@@ -18,7 +18,7 @@ from rocking.errors import StudyError
 from rocking.progress import Progress
 from rocking.studies.place import Place, this_process
 from rocking.studies.refine import Refinement, kept_plan, refinement, rounds
-from rocking.studies.report import kept_report
+from rocking.studies.results import kept_report
 from rocking.studies.store import Store, UnitArray
 from rocking.studies.units import Key, compute
 from rocking.tables import counted

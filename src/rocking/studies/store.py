@@ -6,16 +6,16 @@ import functools
 import hashlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from rocking.arrays import Floats
 from rocking.constants import VERSION
+from rocking.ensemble import Product, setup_of
 from rocking.errors import DamagedStudy, StudyError
 from rocking.kernels.compiled import fingerprint
-from rocking.product import Product
 from rocking.studies import inputs
 from rocking.studies.inputs import OUTCOMES, outcomes_text
 from rocking.studies.place import Place
@@ -134,7 +134,7 @@ class Store(UnitArray):
         self.product = product
         # Neighbouring units share their motions or their blocks.
         self._factors = functools.lru_cache(1)(self._factors_of)
-        self._setup = functools.lru_cache(1)(lambda unit: product.setup(grid.ranges((0, 0, 0, unit))[-1]))
+        self._setup = functools.lru_cache(1)(lambda unit: setup_of(product, grid.ranges((0, 0, 0, unit))[-1]))
 
     @classmethod
     def create(cls, place: Place, product: Product, unit: tuple[int, ...], outcomes: tuple[str, ...]) -> Store:
@@ -201,21 +201,13 @@ class Store(UnitArray):
 
     def name_records(self, records: Sequence[str]) -> None:
         """Keep the name of the record of each motion, in place of those that were; no number depends on them."""
-        data = sealed({"records": list(records)})
-        if self.place.get(_RECORDS) != data:
-            self.place.put(_RECORDS, data)
+        keep(self.place, _RECORDS, sealed({"records": list(records)}))
 
     def records(self) -> tuple[str, ...]:
         """Name of the record of each motion, empty of a pulse; none at all where they are not known."""
-        data = self.place.get(_RECORDS)
-        if data is None:
-            return ()
-        about = unsealed(data)
-        if about is None or len(about["records"]) != len(self.product.motions):
-            raise StudyError(
-                f"{_RECORDS} is damaged: create the study again from its file, in its place", path=str(self.place)
-            )
-        return tuple(about["records"])
+        correction, count = "create the study again from its file, in its place", len(self.product.motions)
+        about = kept(self.place, _RECORDS, correction, lambda about: len(about["records"]) == count)
+        return () if about is None else tuple(about["records"])
 
     def label(self, key: Key) -> str:
         """Name a unit; those of the grid need no name of their array."""
@@ -246,12 +238,9 @@ def exists(place: Place) -> bool:
 
 def _described(place: Place) -> dict[str, Any]:
     """Read what `study.json` says; a StudyError if there is none, it is damaged, or its format is another."""
-    data = place.get("study.json")
-    if data is None:
-        raise StudyError("there is no study here: create it first", path=str(place))
-    about = unsealed(data)
+    about = kept(place, "study.json", "restore it, or create the study again elsewhere")
     if about is None:
-        raise StudyError("study.json is damaged: restore it, or create the study again elsewhere", path=str(place))
+        raise StudyError("there is no study here: create it first", path=str(place))
     if about["format"] not in (_FORMAT, _CHOSEN):
         raise StudyError(
             f"the study is of format {about['format']}, this program knows {_FORMAT} and {_CHOSEN}: use its version",
@@ -266,6 +255,25 @@ def _require_free(place: Place) -> None:
     if others:
         listed = ", ".join(sorted(others)[:_LISTED]) + (" and more" if len(others) > _LISTED else "")
         raise StudyError(f"this holds no study, but {listed}: name a new folder, or an empty one", path=str(place))
+
+
+def keep(place: Place, name: str, data: bytes) -> None:
+    """Put an object in place of another one; not if it is there already."""
+    if place.get(name) != data:
+        place.put(name, data)
+
+
+def kept(
+    place: Place, name: str, correction: str, holds: Callable[[dict[str, Any]], bool] = lambda about: True
+) -> dict[str, Any] | None:
+    """Return what a sealed object says; None where there is none, a StudyError with a correction if it is damaged."""
+    data = place.get(name)
+    if data is None:
+        return None
+    about = unsealed(data)
+    if about is None or not holds(about):
+        raise StudyError(f"{name} is damaged: {correction}", path=str(place))
+    return about
 
 
 def unsealed(data: bytes) -> dict[str, Any] | None:

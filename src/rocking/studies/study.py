@@ -15,25 +15,23 @@ from rocking import checks
 from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.fragility.result import Fragility
 from rocking.block import Block, Blocks
-from rocking.errors import InvalidOption, StudyError
-from rocking.model import Model
-from rocking.motion.arguments import Motions, names_of, several_motions
+from rocking.constants import Model
+from rocking.ensemble import Polarity, Product, dataset_of, product_of
+from rocking.errors import InvalidOption
+from rocking.motion.named import Motions, names_of
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
-from rocking.problem import bodies_of
-from rocking.product import Polarity, Product, Scales
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
 from rocking.studies.place import Place, place_of
-from rocking.studies.refine import Verdict, critical_scales, keep_plan, kept_plan, next_round, tolerances_of
-from rocking.studies.report import ReportPart, ReportPlan, keep_report, kept_report
-from rocking.studies.results import WrittenToFiles, lazy_outcome
+from rocking.studies.refine import StudyVerdict, critical_scales, keep_plan, kept_plan, next_round, tolerances_of
+from rocking.studies.results import ReportPart, ReportPlan, WrittenToFiles, keep_report, lazy_outcome, made_report
 from rocking.studies.run import RunReport, Stop, run
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.state import Log, Status, simulations_done, status_of, verified
 from rocking.studies.store import Store, exists
 from rocking.studies.units import fitting_unit, width_of
 from rocking.tables import counted
-from rocking.treatment import Treatment, treatment
+from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,19 +46,37 @@ class Study(WrittenToFiles):
 
     Attributes
     ----------
-    place : Place
-        Where it is kept.
-    store : Store
-        Its units.
+    place : str
+        Folder or URL where it is kept.
+    product : Product
+        What is simulated.
+    outcomes : tuple of str
+        What is kept of each simulation.
+    status : Status
+        How far it has come; may be asked while another process runs it.
     """
 
-    place: Place
-    store: Store
+    _store: Store
+
+    @property
+    def place(self) -> str:
+        """Folder or URL where it is kept."""
+        return str(self._store.place)
 
     @property
     def product(self) -> Product:
         """What is simulated."""
-        return self.store.product
+        return self._store.product
+
+    @property
+    def outcomes(self) -> tuple[str, ...]:
+        """What is kept of each simulation."""
+        return self._store.grid.outcomes
+
+    @property
+    def status(self) -> Status:
+        """How far it has come; may be asked while another process runs it."""
+        return status_of(self._store)
 
     def run(
         self, threads: int | None = None, executor: Executor | None = None, *, progress: bool | None = None
@@ -89,23 +105,33 @@ class Study(WrittenToFiles):
             If the study is being run elsewhere, was made by another version, or the workers are gone.
         OutputError
             If a unit cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> study.run().simulations
+        8
         """
         if threads is not None:
             threads = checks.whole(threads, "threads", InvalidOption, least=1)
-        log, stop = Log(self.place), Stop()
-        self.store.check_program()
-        with stop.listening(), self.place.locked() as note:
-            log.add({"event": "start", "note": note, "done": simulations_done(self.store)})
+        store, log, stop = self._store, Log(self._store.place), Stop()
+        store.check_program()
+        with stop.listening(), store.place.locked() as note:
+            log.add({"event": "start", "note": note, "done": simulations_done(store)})
 
             def failing(unit: str, why: str) -> None:
                 log.add({"event": "failed", "unit": unit, "why": why})
 
             options: dict[str, Any] = {"threads": threads, "executor": executor, "progress": progress}
             try:
-                report = run(self.store, stop=stop, failing=failing, **options)
-                tolerances = kept_plan(self.store)
+                report = run(store, stop=stop, failing=failing, **options)
+                tolerances = kept_plan(store)
                 while tolerances is not None and not (report.failed or report.stopped):
-                    now = next_round(self.store, tolerances)
+                    now = next_round(store, tolerances)
                     if now.is_last:
                         break
                     report += run(now, stop=stop, failing=failing, **options)
@@ -113,13 +139,8 @@ class Study(WrittenToFiles):
                 log.add({"event": "end", "error": str(error) or type(error).__name__})
                 raise
             about = {"units": report.units, "seconds": report.seconds, "stopped": report.stopped}
-            log.add({"event": "end", **about, "done": simulations_done(self.store)})
+            log.add({"event": "end", **about, "done": simulations_done(store)})
         return report
-
-    @property
-    def status(self) -> Status:
-        """How far it has come; may be asked while another process runs it."""
-        return status_of(self.store)
 
     def results(self) -> xr.Dataset:
         """Outcomes so far, read from the store when they are needed.
@@ -135,19 +156,30 @@ class Study(WrittenToFiles):
         ------
         StudyError
             When a damaged unit is read; the message names it.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> study.results().impacts.values.tolist()
+        [[[1, 0, 1, 0], [0, 1, 0, 0]]]
         """
-        done, grid = self.store.done(), self.store.grid
+        done, grid = self._store.done(), self._store.grid
         complete = len(done) == len(grid)
-        outcomes: dict[str, Any] = {name: lazy_outcome(self.store, name, complete) for name in grid.outcomes}
+        outcomes: dict[str, Any] = {name: lazy_outcome(self._store, name, complete) for name in grid.outcomes}
         if not complete:
             outcomes["done"] = np.zeros(grid.shape, dtype=bool)
             for key in done:
                 outcomes["done"][grid.ranges(key)] = True
-        return self._with_records(self.product.dataset(outcomes))
+        return self._with_records(dataset_of(self.product, outcomes))
 
     def _with_records(self, found: xr.Dataset) -> xr.Dataset:
         """Name each motion by its record, too, where the study knows that."""
-        records = dict(zip(names_of(self.product.motions), self.store.records(), strict=False))
+        records = dict(zip(names_of(self.product.motions), self._store.records(), strict=False))
         if not records:
             return found
         return found.assign_coords(record=(found.motion.dims, [records[name] for name in found.motion.values.tolist()]))
@@ -184,10 +216,21 @@ class Study(WrittenToFiles):
         The log of the runs, ``runs.jsonl``, is not needed for any result. That it is cut is seen within a line, where
         it has no run of units that are done, and after the end of a run; a log that ends within a run looks as after a
         kill. What is lost of it stays lost: a repair keeps the lines that can be read, and says so in it.
-        """
-        return verified(self.store, recompute, repair, seed, progress)
 
-    def critical_scales(self, verdict: Verdict = "overturning") -> xr.Dataset:
+        Examples
+        --------
+        >>> import tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> study.verify(recompute=1)
+        []
+        """
+        return verified(self._store, recompute, repair, seed, progress)
+
+    def critical_scales(self, verdict: StudyVerdict = "overturning") -> xr.Dataset:
         """Scales between which the verdict on a block changes.
 
         Parameters
@@ -212,8 +255,20 @@ class Study(WrittenToFiles):
             If units are missing or damaged, or the refinement is not done.
         InvalidOption
             If there is no such verdict, the study does not keep its outcomes, or has no two scales in increasing order.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> found = study.critical_scales()
+        >>> found.block.values.tolist(), found.low.values.tolist(), found.high.values.tolist()
+        ([1, 3], [0.4, 0.4], [1.0, 1.0])
         """
-        return self._with_records(critical_scales(self.store, verdict))
+        return self._with_records(critical_scales(self._store, verdict))
 
     def fragility(
         self,
@@ -227,8 +282,19 @@ class Study(WrittenToFiles):
 
         Parameters
         ----------
-        measure, limits, confidence, weights
+        measure : {"pga", "pgv", "sa", "pga_ratio", "pgv_ratio"} or Measure
             As for `rocking.fragility`. What a motion measures at a scale is its intensity.
+        limits : mapping of str to float
+            As for `rocking.fragility`.
+        confidence : float
+            As for `rocking.fragility`.
+        weights : array_like, optional
+            As for `rocking.fragility`.
+
+        Returns
+        -------
+        Fragility
+            A curve for each limit.
 
         Raises
         ------
@@ -236,8 +302,19 @@ class Study(WrittenToFiles):
             If units are missing or damaged.
         InvalidOption
             If an argument is out of its range, the study does not keep what a limit needs, or no lognormal fits.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 0.6, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> f"{study.fragility().curves[0].median:.3f} m/s^2"
+        '1.662 m/s^2'
         """
-        return pooled_fragility(self.store, Measure.of(measure), limits, confidence, weights)
+        return pooled_fragility(self._store, Measure.of(measure), limits, confidence, weights)
 
     def block_fragilities(
         self,
@@ -251,11 +328,20 @@ class Study(WrittenToFiles):
 
         Parameters
         ----------
-        measure, limits, confidence
+        measure : {"pga", "pgv", "sa", "pga_ratio", "pgv_ratio"} or Measure
             As for `rocking.fragility`. A curve takes some hundredths of a second where motions were scaled to the
             measure (stripes), and seconds where thousands of outcomes have an intensity each (a cloud).
+        limits : mapping of str to float
+            As for `rocking.fragility`.
+        confidence : float
+            As for `rocking.fragility`.
         progress : bool, optional
             Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+
+        Returns
+        -------
+        BlockFragilities
+            A curve for each block and limit, or why there is none.
 
         Raises
         ------
@@ -264,8 +350,19 @@ class Study(WrittenToFiles):
         InvalidOption
             If an argument is out of its range, or the study does not keep what a limit needs. A block that no lognormal
             fits has a sentence in place of a curve.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> study.block_fragilities().data.exceeded.values.tolist()
+        [[2.0, 1.0, 2.0, 1.0]]
         """
-        return block_fragilities(self.store, Measure.of(measure), limits, confidence, progress)
+        return block_fragilities(self._store, Measure.of(measure), limits, confidence, progress)
 
     def spectrum(self, fractiles: Sequence[float] = FRACTILES, *, progress: bool | None = None) -> StudySpectrum:
         """Fractiles over the motions of the peak rotation over slenderness, for each scale and block.
@@ -288,8 +385,19 @@ class Study(WrittenToFiles):
             If units are missing or damaged.
         InvalidOption
             If a fractile is out of its range, or the study does not keep overturned and peak_rotation.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> study.spectrum([0.5]).data.overturned_share.values.tolist()
+        [[1.0, 0.0, 1.0, 0.0], [1.0, 1.0, 1.0, 1.0]]
         """
-        return study_spectrum(self.store, fractiles, progress)
+        return study_spectrum(self._store, fractiles, progress)
 
     def report(self, *, progress: bool | None = None) -> dict[str, ReportPart]:
         """Make what the study's file asks for under [report].
@@ -308,22 +416,28 @@ class Study(WrittenToFiles):
         ------
         StudyError
             If nothing is asked for, or units are missing or damaged.
-        """
-        plan = kept_report(self.store)
-        if plan is None:
-            raise StudyError(
-                "the study says nothing of a report: add [report.fragility] to its file and create it again",
-                path=str(self.place),
-            )
-        return plan.make(self.store, progress)
 
-    def _results(self, critical: Verdict | None) -> tuple[xr.Dataset, str, int]:
+        Examples
+        --------
+        >>> import tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> study.report()
+        Traceback (most recent call last):
+        ...
+        rocking.errors.StudyError: ...the study says nothing of a report: add [report.fragility] to its file ...
+        """
+        return made_report(self._store, progress)
+
+    def _results(self, critical: StudyVerdict | None) -> tuple[xr.Dataset, str, int]:
         if critical:
             return self.critical_scales(critical), "change", _CHANGES
-        return self.results(), "motion", self.store.grid.unit[0]
+        return self.results(), "motion", self._store.grid.unit[0]
 
     def __repr__(self) -> str:
-        m, s, k, n = self.store.grid.shape
+        m, s, k, n = self._store.grid.shape
         sizes = counted(m, "motion"), counted(s, "scale"), counted(k, "polarity"), counted(n, "block")
         return f"<Study: {' x '.join(sizes)}; {self.status}>"
 
@@ -350,10 +464,22 @@ def study(
     folder : path
         Where the study is kept: a folder, or the URL of an object store as ``"s3://bucket/prefix"``, which
         needs obstore.
-    blocks, motions
-        As for `simulate_many`; without both, the study must be there, and needs no script nor any other argument
-        (but `refine`).
-    model, chattering, levels, measure, polarity, duration
+    blocks : Blocks, Block or sequence of Block, optional
+        As for `simulate_many`; without blocks and motions, the study must be there, and needs no script nor any other
+        argument (but `refine`).
+    motions : Motion, sequence of Motion, or mapping of str to Motion, optional
+        As for `simulate_many`.
+    model : {"nonlinear", "linear"}
+        As for `simulate_many`.
+    chattering : str or Treatment
+        As for `simulate_many`.
+    levels : array_like, optional
+        As for `simulate_many`.
+    measure : {"factor", "pga", "pgv"} or Measure
+        As for `simulate_many`.
+    polarity : {"+", "-", "both"}
+        As for `simulate_many`.
+    duration : float, optional
         As for `simulate_many`.
     refine : float or mapping, optional
         Once the scales (two or more, increasing) are computed, halve the gap between neighbours of which one overturns
@@ -396,19 +522,11 @@ def study(
         if blocks is not None or motions is not None:
             raise InvalidOption("a new study needs {} and {}; one that is there needs neither", "blocks", "motions")
         _refuse_inputs({"levels": levels, "duration": duration, "outcomes": outcomes, "unit_blocks": unit_blocks})
-        found = Study(place, Store.open(place))
+        store = Store.open(place)
         if refine is not None:
-            keep_plan(found.store, tolerances_of(found.product, refine, found.store.grid.outcomes))
-        return found
-    product = Product(
-        bodies_of(blocks),
-        tuple(several_motions(motions)),
-        Scales.of(levels, measure),
-        polarity,
-        model,
-        treatment(chattering),
-        duration,
-    )
+            keep_plan(store, tolerances_of(store.product, refine, store.grid.outcomes))
+        return Study(store)
+    product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
     return study_of(place, product, unit_blocks, refine=refine, outcomes=chosen_outcomes(outcomes))
 
 
@@ -453,4 +571,4 @@ def study_of(
         keep_report(found, plan)
     if tolerances is not None:
         keep_plan(found, tolerances)
-    return Study(place, found)
+    return Study(found)

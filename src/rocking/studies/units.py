@@ -25,10 +25,10 @@ from rocking.arrays import Floats, Integers
 from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import VERSION
 from rocking.engine import Setup, Task, simulate_task
+from rocking.ensemble import Product
 from rocking.errors import InvalidOption, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
-from rocking.product import Product, Scales
 from rocking.studies.inputs import OUTCOMES
 
 #: Units are multiples of so many blocks, which the engine takes through a motion together.
@@ -162,7 +162,7 @@ def fitting_unit(product: Product) -> tuple[int, int, int, int]:
     motion = max(product.motions, key=lambda one: len(one.coefficients))
     factors = np.array([[[product.scales.factors(motion).max()]]])
     announce(SIMULATIONS)
-    setup = Product(some, (motion,), Scales(), "+", product.model, product.treatment, product.duration).setup()
+    setup = Setup(some, product.model, product.treatment, product.duration)
     work = GridWork(setup=setup, motions=(motion,), factors=factors, unit=(1, 1, 1, len(some)), outcomes=OUTCOMES)
     compute(work)  # compiles
     start = time.perf_counter()

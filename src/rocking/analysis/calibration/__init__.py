@@ -1,5 +1,1 @@
 """Calibration: the block behind observed outcomes, or behind a measured rotation history."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,14 +1,14 @@
 """How good a calibration is: scores of its predictions, and what it does not know.
 
-It does not know enough where candidates are few, where runs disagree, and where a posterior leans on a bound.
+It does not know enough where candidates are few, where runs disagree, and where a posterior reaches a bound.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, astuple, dataclass
-from typing import Any, Final
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,10 +20,10 @@ from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.tables import counted
 
-#: A posterior leans on a bound if more than this share of it, what lies beyond one end of an estimate's interval, is
+#: A bound is reached if more than this share of the posterior, what lies beyond one end of an estimate's interval, is
 #: within the outermost part of the range, in the logarithm: then the interval ends where the bound is.
 _OUTERMOST: Final = 0.05
-_LEANING: Final = 0.05
+_TAIL: Final = 0.05
 
 #: Fewer effective candidates than these do not show what a population does.
 _FEW: Final = 20.0
@@ -48,7 +48,6 @@ class Scores:
     brier: float
 
     def __str__(self) -> str:
-        """Write the three in one line."""
         return f"accuracy {100 * self.accuracy:.1f} %, log loss {self.log_loss:.3f}, Brier score {self.brier:.3f}"
 
     def __repr__(self) -> str:
@@ -56,7 +55,19 @@ class Scores:
 
     @classmethod
     def of(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
-        """Measure probabilities against outcomes of the same number.
+        """Measure probabilities against outcomes.
+
+        Parameters
+        ----------
+        probabilities : array_like, shape (m,)
+            Predicted probabilities.
+        observed : array_like of bool, shape (m,)
+            What happened.
+
+        Returns
+        -------
+        Scores
+            The three measures.
 
         Raises
         ------
@@ -81,16 +92,10 @@ class Scores:
             brier=float(np.mean((given - seen) ** 2)),
         )
 
-    @classmethod
-    def mean(cls, scores: Sequence[Scores]) -> Scores:
-        """Mean of each measure."""
-        table = np.array([astuple(one) for one in scores])
-        return cls(*(float(value) for value in table.mean(axis=0)))
-
 
 @dataclass(frozen=True)
-class Leaning:
-    """A parameter whose posterior leans on a bound.
+class BoundReached:
+    """An estimate whose interval ends where a bound is.
 
     Attributes
     ----------
@@ -113,11 +118,10 @@ class Leaning:
     share: float
 
     def __str__(self) -> str:
-        """Say so, and how to correct it."""
         unit = unit_of(self.name)
         bound = f"{self.bound:g}" + ("" if unit == "1" else f" {unit}")
         return (
-            f"{self.name} leans on its {self.end} bound of {bound}: {100 * self.share:.0f} % of the posterior lies in "
+            f"{self.name} reaches its {self.end} bound of {bound}: {100 * self.share:.0f} % of the posterior lies in "
             f"the outermost {100 * _OUTERMOST:.0f} % of the range, so that the bound sets the {self.end} end of the "
             "interval; unless you know that bound, "
             f"set that of {self.name.partition('_')[0]} to {self.wider:g}"
@@ -136,30 +140,19 @@ class Diagnostics:
         How many of them, effectively, tell what a typical population of the posterior does.
     agreement : mapping of str to float
         R-hat of each estimate between independent runs: 1 where they agree, above 1.1 where they do not.
-    leaning : tuple of Leaning
-        Estimates that lean on a bound.
+    bounds_reached : tuple of BoundReached
+        Estimates whose interval ends where a bound is.
     """
 
     candidates: int
     effective: float
     agreement: Mapping[str, float]
-    leaning: tuple[Leaning, ...]
-
-    @classmethod
-    def of(cls, found: Search, posterior: Floats) -> Diagnostics:
-        """Look at a search, and at the draws of its posterior."""
-        space = found.evidence.candidates.space
-        return cls(
-            len(found.evidence.candidates.points),
-            float(np.median(found.evidence.effective(posterior))),
-            found.agreement,
-            leaning(space, unpacked(posterior)[0]),
-        )
+    bounds_reached: tuple[BoundReached, ...]
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What is to be known before the estimates are believed, a sentence each; none where all is well."""
-        notes = [f"{one}" for one in self.leaning]
+        notes = [f"{one}" for one in self.bounds_reached]
         apart = [f"{name} ({value:.2f})" for name, value in self.agreement.items() if value > AGREEMENT]
         if apart:
             held = "the estimates weigh what both found; double the candidates, or narrow the bounds to what you know"
@@ -170,25 +163,25 @@ class Diagnostics:
         return tuple(notes)
 
     def __str__(self) -> str:
-        """Say how the search went, then the notes."""
         search = (
             f"{counted(self.candidates, 'candidate')}, {self.effective:.0f} effective for a typical population; {RUNS} "
             f"independent runs, R-hat at most {max(self.agreement.values()):.2f}"
         )
         return "\n".join([search, *(f"note: {sentence}" for sentence in self.notes)])
 
-    def to_dict(self) -> dict[str, Any]:
-        """Numbers and notes by name."""
-        return {
-            "candidates": self.candidates,
-            "effective": self.effective,
-            "agreement": dict(self.agreement),
-            "leaning": [asdict(one) for one in self.leaning],
-            "notes": list(self.notes),
-        }
+
+def diagnosed(found: Search, posterior: Floats) -> Diagnostics:
+    """Look at a search, and at the draws of its posterior."""
+    space = found.evidence.candidates.space
+    return Diagnostics(
+        len(found.evidence.candidates.points),
+        float(np.median(found.evidence.effective(posterior))),
+        found.agreement,
+        bounds_reached(space, unpacked(posterior)[0]),
+    )
 
 
-def leaning(space: Space, centres: Floats) -> tuple[Leaning, ...]:
+def bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
     """Estimates whose interval ends where a bound is, from draws of the population's centre."""
     found = []
     for name, values in space.named(centres).items():
@@ -206,6 +199,6 @@ def leaning(space: Space, centres: Floats) -> tuple[Leaning, ...]:
         for end, bound, further, near in ends:
             share = float(near.mean())
             # Nothing lies beyond a bound that no block can exceed.
-            if share > _LEANING and bound < math.log(HIGHEST[parameter]) - 1e-9:
-                found.append(Leaning(name, end, math.exp(bound), further, share))
+            if share > _TAIL and bound < math.log(HIGHEST[parameter]) - 1e-9:
+                found.append(BoundReached(name, end, math.exp(bound), further, share))
     return tuple(found)

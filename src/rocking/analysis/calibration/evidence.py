@@ -80,20 +80,10 @@ def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Blocks that were tried.
+    """Blocks that were tried: coordinates (n, k) in a space, and 1 where one overturned under a motion, else 0, (n, m).
 
-    Attributes
-    ----------
-    space : Space
-        Where they are from.
-    points : ndarray, shape (n, k)
-        Their coordinates.
-    overturned : ndarray, shape (n, m)
-        1 where a block overturned under a motion, else 0.
-    evenly : int
-        How many of them fill the space evenly.
-    guides : tuple of (int, ndarray)
-        How many were drawn from which populations, those outside the space included.
+    `evenly` of them fill the space; the `guides` say how many were drawn from which populations, those outside
+    included.
     """
 
     space: Space
@@ -141,18 +131,9 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What was observed, against what candidates do.
+    """What was observed under m motions (m,), against what n candidates do under them.
 
-    Attributes
-    ----------
-    candidates : Candidates
-        n blocks, simulated under the m motions.
-    observed : ndarray of bool, shape (m,)
-        Whether the specimen overturned.
-    lapse : float
-        Chance that an outcome is not that of a rocking block at all.
-    threads : int or None
-        Number of threads; by default one for every core.
+    The lapse is the chance that an outcome is not that of a rocking block at all.
     """
 
     candidates: Candidates

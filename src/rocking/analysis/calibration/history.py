@@ -20,14 +20,14 @@ from rocking.analysis.calibration.space import (
     unit_of,
     value_range,
 )
-from rocking.analysis.report import Report
 from rocking.arrays import Floats
 from rocking.block import Block
+from rocking.constants import Model
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response, drawing_times
+from rocking.result import DrawnResult
 from rocking.simulation import simulate
 from rocking.tables import counted, text_table
 
@@ -82,7 +82,7 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HistoryCalibration(Report):
+class HistoryCalibration(DrawnResult):
     """The block that explains a rotation history best.
 
     Made by `calibrate_history`. Its figure has the measured rotation, that of the fitted block, and the residuals.
@@ -115,7 +115,6 @@ class HistoryCalibration(Report):
         return math.sqrt(float(np.mean(self.residuals**2)))
 
     def summary(self) -> str:
-        """Return the estimates as a table for people."""
         rows = [
             [name, one.value, float(f"{one.deviation:.2g}"), unit_of(name), "at its bound" if one.at_bound else ""]
             for name, one in self.estimates.items()
@@ -124,7 +123,6 @@ class HistoryCalibration(Report):
         return f"{table}\n\n{self._misfit_text()}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Estimates and misfit by name."""
         return {
             "model": self.response.model,
             "samples": len(self.residuals),
@@ -133,8 +131,8 @@ class HistoryCalibration(Report):
             "misfit_rad": self.misfit,
         }
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import measured_figure
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.calibration import measured_figure
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
         end = min(float(self.times[-1]), self.response.duration)
@@ -154,8 +152,8 @@ class HistoryCalibration(Report):
         texts = (f"{name.replace('_', ' ')} = {one.value:.4g} {unit_of(name)}" for name, one in self.estimates.items())
         return ", ".join(text.removesuffix(" 1") for text in texts)
 
-    def __repr__(self) -> str:
-        return f"<HistoryCalibration: {self._estimates_text()}; {self._misfit_text()}>"
+    def _headline(self) -> str:
+        return f"{self._estimates_text()}; {self._misfit_text()}"
 
     def _misfit_text(self) -> str:
         return f"misfit {self.misfit:.3g} rad (root mean square) over {counted(len(self.residuals), 'sample')}"
@@ -229,52 +227,40 @@ def calibrate_history(
     >>> [f"{found.estimates[name].value:.2f}" for name in ("p", "alpha", "restitution")]
     ['2.50', '0.20', '0.90']
     """
-    history = _History.of(times, rotation, motion, model)
+    at, measured = _checked(times, rotation)
     settled, unknowns = _split({"p": p, "alpha": alpha, "restitution": restitution}, two_sided)
     if initial_rotation is not None:
         settled["initial_rotation"] = checks.finite(initial_rotation, "initial_rotation", InvalidOption)
     elif motion is not None:
         settled["initial_rotation"] = 0.0
     else:
-        unknowns.append(_released_from(history))
+        unknowns.append(_released_from(measured))
     if not unknowns:
         raise InvalidOption(EVERYTHING_IS_KNOWN)
-    if len(history.times) < 2 * len(unknowns):
+    if len(at) < 2 * len(unknowns):
         raise InvalidOption(
-            f"{counted(len(history.times), 'sample')} cannot determine {counted(len(unknowns), 'parameter')}: give more"
+            f"{counted(len(at), 'sample')} cannot determine {counted(len(unknowns), 'parameter')}: give more"
         )
-    problem = _HistoryProblem(history, settled, tuple(unknowns))
+    problem = _Problem(at, measured, motion, model, settled, tuple(unknowns))
     rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
     return _result(problem, _best(problem, rng, progress))
 
 
-@dataclass(frozen=True, eq=False)
-class _History:
-    times: Floats
-    rotation: Floats
-    motion: Motion | None
-    model: Model
-
-    @classmethod
-    def of(cls, times: ArrayLike, rotation: ArrayLike, motion: Motion | None, model: Model) -> _History:
-        at, measured = (
-            np.array(checks.numbers(values, name, InvalidOption))
-            for values, name in ((times, "times"), (rotation, "rotation"))
-        )
-        if at.ndim != 1 or at.shape != measured.shape:
-            raise InvalidOption(f"there must be one rotation for each time, not {at.shape} and {measured.shape}")
-        if not (np.all(np.isfinite(at)) and np.all(np.isfinite(measured))):
-            raise InvalidOption("{} and {} must be finite: leave out samples that are missing", "times", "rotation")
-        if not len(at) or at[0] < 0.0 or not np.all(np.diff(at) > 0.0):
-            raise InvalidOption("{} must start at 0 or later and increase from sample to sample", "times")
-        if not np.any(measured) or np.abs(measured).max() >= 0.5 * math.pi:
-            raise InvalidOption("{} must be in rad, below pi/2 in size, and not zero throughout", "rotation")
-        return cls(at, measured, motion, model)
-
-    def first(self, share: float) -> int:
-        """Count the samples until this share of all rocking is over, measured by the integral of |rotation|."""
-        past = np.cumsum(np.abs(self.rotation) * np.gradient(self.times))
-        return int(np.searchsorted(past, share * past[-1])) + 1
+def _checked(times: ArrayLike, rotation: ArrayLike) -> tuple[Floats, Floats]:
+    """Return times and rotations of a history, as arrays of their own."""
+    at, measured = (
+        np.array(checks.numbers(values, name, InvalidOption))
+        for values, name in ((times, "times"), (rotation, "rotation"))
+    )
+    if at.ndim != 1 or at.shape != measured.shape:
+        raise InvalidOption(f"there must be one rotation for each time, not {at.shape} and {measured.shape}")
+    if not (np.all(np.isfinite(at)) and np.all(np.isfinite(measured))):
+        raise InvalidOption("{} and {} must be finite: leave out samples that are missing", "times", "rotation")
+    if not len(at) or at[0] < 0.0 or not np.all(np.diff(at) > 0.0):
+        raise InvalidOption("{} must start at 0 or later and increase from sample to sample", "times")
+    if not np.any(measured) or np.abs(measured).max() >= 0.5 * math.pi:
+        raise InvalidOption("{} must be in rad, below pi/2 in size, and not zero throughout", "rotation")
+    return at, measured
 
 
 @dataclass(frozen=True)
@@ -288,10 +274,20 @@ class _Unknown:
 
 
 @dataclass(frozen=True, eq=False)
-class _HistoryProblem:
-    history: _History
+class _Problem:
+    """A history, what is settled of the block by name, and what is to be found."""
+
+    times: Floats
+    rotation: Floats
+    motion: Motion | None
+    model: Model
     settled: Mapping[str, float]
     unknowns: tuple[_Unknown, ...]
+
+    def first(self, share: float) -> int:
+        """Count the samples until this share of all rocking is over, measured by the integral of |rotation|."""
+        past = np.cumsum(np.abs(self.rotation) * np.gradient(self.times))
+        return int(np.searchsorted(past, share * past[-1])) + 1
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:
@@ -314,15 +310,13 @@ class _HistoryProblem:
 
     def response(self, logs: Floats, end: float) -> Response:
         start = self.values(logs)["initial_rotation"]
-        history = self.history
-        return simulate(self.block(logs), history.motion, model=history.model, duration=end, initial_rotation=start)
+        return simulate(self.block(logs), self.motion, model=self.model, duration=end, initial_rotation=start)
 
     def residuals(self, logs: Floats, count: int) -> Floats:
         """Measured less simulated rotation of the first samples; an overturned block stays at pi/2."""
-        times = self.history.times[:count]
+        times = self.times[:count]
         response = self.response(logs, float(times[-1]))
-        rotation = response.rotation(np.minimum(times, response.duration))
-        return self.history.rotation[:count] - rotation
+        return self.rotation[:count] - response.rotation(np.minimum(times, response.duration))
 
     def error(self, logs: Floats, count: int) -> float:
         """Sum of the squared residuals of the first samples."""
@@ -342,25 +336,25 @@ def _split(given: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[st
     return settled, unknowns
 
 
-def _released_from(history: _History) -> _Unknown:
+def _released_from(rotation: Floats) -> _Unknown:
     """Rotation at the release, near that of the first sample."""
-    first = float(history.rotation[0])
-    if abs(first) < _RELEASED * np.abs(history.rotation).max():
+    first = float(rotation[0])
+    if abs(first) < _RELEASED * np.abs(rotation).max():
         text = "a release test must start at the rotation it is released from; give {}"
         raise InvalidOption(text, "initial_rotation")
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
 
 
-def _best(problem: _HistoryProblem, rng: np.random.Generator, progress: bool | None) -> Floats:
+def _best(problem: _Problem, rng: np.random.Generator, progress: bool | None) -> Floats:
     """Logarithms of the unknowns at the least sum of squares over the whole history."""
     from scipy.stats import qmc
 
     low, high = problem.bounds
     survivors = qmc.scale(qmc.Halton(len(low), rng=rng).random(_CANDIDATES), low, high)
-    whole = len(problem.history.times)
+    whole = len(problem.times)
     with Progress("fitting", sum(kept for _, kept in _STAGES) + len(_WIDTHS), show=progress) as bar:
         for share, kept in _STAGES:
-            count = min(max(problem.history.first(share), 2 * len(low)), whole)
+            count = min(max(problem.first(share), 2 * len(low)), whole)
             errors = [problem.error(one, count) for one in survivors]
             descended = []
             for one in survivors[np.argsort(errors, kind="stable")[:kept]]:
@@ -374,7 +368,7 @@ def _best(problem: _HistoryProblem, rng: np.random.Generator, progress: bool | N
     return np.asarray(found, dtype=np.float64)
 
 
-def _descended(problem: _HistoryProblem, start: Floats, count: int) -> Floats:
+def _descended(problem: _Problem, start: Floats, count: int) -> Floats:
     from scipy.optimize import least_squares
 
     low, high = problem.bounds
@@ -383,9 +377,9 @@ def _descended(problem: _HistoryProblem, start: Floats, count: int) -> Floats:
     return np.asarray(fit.x, dtype=np.float64)
 
 
-def _shaken(problem: _HistoryProblem, found: Floats, width: float, rng: np.random.Generator) -> Floats:
+def _shaken(problem: _Problem, found: Floats, width: float, rng: np.random.Generator) -> Floats:
     """Look around an optimum, so many standard errors wide: a forced response can be rugged on that scale."""
-    whole = len(problem.history.times)
+    whole = len(problem.times)
     covariance = _covariance(problem, found, problem.residuals(found, whole))
     around = found + width * rng.multivariate_normal(np.zeros(len(found)), covariance, _AROUND, method="cholesky")
     around = np.clip(around, *problem.bounds)
@@ -393,8 +387,8 @@ def _shaken(problem: _HistoryProblem, found: Floats, width: float, rng: np.rando
     return min(found, _descended(problem, best, whole), key=lambda one: problem.error(one, whole))
 
 
-def _result(problem: _HistoryProblem, logs: Floats) -> HistoryCalibration:
-    count = len(problem.history.times)
+def _result(problem: _Problem, logs: Floats) -> HistoryCalibration:
+    count = len(problem.times)
     residuals = problem.residuals(logs, count)
     covariance = _covariance(problem, logs, residuals)
     low, high = problem.bounds
@@ -402,24 +396,12 @@ def _result(problem: _HistoryProblem, logs: Floats) -> HistoryCalibration:
     for one, log, variance, bottom, top in zip(problem.unknowns, logs, np.diag(covariance), low, high, strict=True):
         at_bound = bool(min(log - bottom, top - log) < _AT_BOUND)
         estimates[one.name] = Measured(one.sign * math.exp(log), math.exp(log) * math.sqrt(variance), at_bound)
-    return HistoryCalibration(
-        block=problem.block(logs),
-        estimates=estimates,
-        covariance=covariance,
-        times=problem.history.times,
-        residuals=residuals,
-        response=problem.response(logs, float(problem.history.times[-1])),
-    )
+    response = problem.response(logs, float(problem.times[-1]))
+    return HistoryCalibration(problem.block(logs), estimates, covariance, problem.times, residuals, response)
 
 
-def _covariance(problem: _HistoryProblem, logs: Floats, residuals: Floats) -> Floats:
-    """Covariance of the logarithms: inverse curvature times the residuals' variance, allowing for their correlation.
-
-    Raises
-    ------
-    InvalidOption
-        If the history says nothing of an unknown, or not enough to tell them all apart.
-    """
+def _covariance(problem: _Problem, logs: Floats, residuals: Floats) -> Floats:
+    """Covariance of the logarithms: inverse curvature times the residuals' variance, allowing for their correlation."""
     variance = float((residuals**2).sum()) / (len(residuals) - len(logs)) * _integrated_autocorrelation(residuals)
     slopes = _slopes(problem, logs, math.sqrt(variance))
     sizes = np.linalg.norm(slopes, axis=0)
@@ -433,13 +415,13 @@ def _covariance(problem: _HistoryProblem, logs: Floats, residuals: Floats) -> Fl
     return np.asarray(variance * (right.T / values**2) @ right / np.outer(sizes, sizes))
 
 
-def _slopes(problem: _HistoryProblem, logs: Floats, deviation: float) -> Floats:
+def _slopes(problem: _Problem, logs: Floats, deviation: float) -> Floats:
     """Differentiate the residuals, shape (n, k), by differences over about one standard error.
 
     A forced response may jump where a block just lifts off or just does not, and a small step across such a jump would
     make a slope of it. Over a standard error jumps count for what they change.
     """
-    count, low, high = len(problem.history.times), *problem.bounds
+    count, low, high = len(problem.times), *problem.bounds
     columns = []
     for k in range(len(logs)):
         step = _STEP

@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, astuple, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.analysis.calibration.diagnostics import Diagnostics, Scores
-from rocking.analysis.calibration.evidence import Evidence, blurred, expected_share, unpacked
+from rocking.analysis.calibration.diagnostics import Diagnostics, Scores, diagnosed
+from rocking.analysis.calibration.evidence import Evidence as _Evidence
+from rocking.analysis.calibration.evidence import blurred, expected_share, unpacked
 from rocking.analysis.calibration.search import Problem, posterior, search, systematic
 from rocking.analysis.calibration.space import SIDED, Knowledge, Space, unit_of
-from rocking.analysis.fragility.fit import OVERTURNING, fragility
+from rocking.analysis.fragility.fit import fragility
 from rocking.analysis.fragility.result import Fragility
-from rocking.analysis.report import Tabled
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
+from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
 from rocking.motion.motion import Motion
-from rocking.motion.scaling import IntensityName, Measure
+from rocking.motion.named import Motions, several_motions
+from rocking.result import DrawnResult, TableResult
 from rocking.tables import counted, named, text_table
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rocking.plot import Parameter
+    from rocking.plot.calibration import Parameter
 
 #: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
 _LAPSE: Final = 0.005
@@ -89,11 +89,11 @@ class Validation:
     @property
     def scores(self) -> Scores:
         """Mean scores of the repeats."""
-        return Scores.mean(self.repeats)
+        return Scores(*np.mean([astuple(one) for one in self.repeats], axis=0).tolist())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Tabled):
+class Calibration(DrawnResult, TableResult):
     """Blocks that explain which motions overturned a specimen, and what they predict.
 
     Made by `calibrate`. Its table "ensemble" has a row for each block: parameters of both sides, weight, and the
@@ -123,10 +123,11 @@ class Calibration(Tabled):
         What the search started from.
     diagnostics : Diagnostics
         How far this can be trusted: effective candidates, agreement of runs, bounds that the posterior
-        leans on. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
+        reaches. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
     """
 
     TABLES = ("ensemble",)
+    _FORMAT = "%.10g"
 
     blocks: Blocks
     weights: Floats
@@ -138,7 +139,7 @@ class Calibration(Tabled):
     lapse: float
     seed: int
     diagnostics: Diagnostics
-    _evidence: Evidence = field(repr=False)
+    _evidence: _Evidence = field(repr=False)
 
     @property
     def scores(self) -> Scores:
@@ -157,7 +158,9 @@ class Calibration(Tabled):
         ----------
         motions : Motion or sequence of Motion
             m motions.
-        threads, progress
+        threads : int, optional
+            As for `simulate_many`.
+        progress : bool, optional
             As for `simulate_many`.
 
         Returns
@@ -169,6 +172,14 @@ class Calibration(Tabled):
         ------
         InvalidMotion
             If one is no motion.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+        >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
+        True
         """
         if not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
@@ -198,8 +209,10 @@ class Calibration(Tabled):
             Number of parts, and of random divisions into parts.
         seed : int
             Seeds the divisions.
-        threads, progress
-            As for `simulate_many`; the number of threads changes no result.
+        threads : int, optional
+            As for `simulate_many`; it changes no result.
+        progress : bool, optional
+            As for `simulate_many`.
 
         Returns
         -------
@@ -213,7 +226,15 @@ class Calibration(Tabled):
 
         See Also
         --------
-        rocking.analysis.calibration.Scores : accuracy, log loss and Brier score.
+        rocking.analysis.Scores : accuracy, log loss and Brier score.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+        >>> found.cross_validate(folds=2).probabilities.shape
+        (1, 4)
         """
         labels = _labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
@@ -229,26 +250,17 @@ class Calibration(Tabled):
                 row[left_out] = wanted.probabilities(drawn).mean(axis=0)
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
-    def fragility(
-        self,
-        motions: Motions,
-        *,
-        measure: IntensityName | Measure = "pga",
-        levels: ArrayLike | None = None,
-        limits: Mapping[str, float] = OVERTURNING,
-        model: Model | None = None,
-        **options: Any,
-    ) -> Fragility:
+    def fragility(self, motions: Motions, *, model: Model | None = None, **options: Any) -> Fragility:
         """Fit the specimen's fragility: the ensemble with its weights, in the equation of motion of the calibration.
 
         Parameters
         ----------
-        motions, measure, levels, limits
-            As for `rocking.fragility`.
+        motions : Motion, sequence of Motion, or mapping of str to Motion
+            m motions.
         model : {"linear", "nonlinear"}, optional
             Equation of motion, if not that of the calibration.
-        **options
-            Further arguments of `rocking.fragility`: polarity, band, ...
+        **options : object
+            Further arguments of `rocking.fragility`: measure, levels, limits, polarity, band, ...
 
         Returns
         -------
@@ -261,45 +273,48 @@ class Calibration(Tabled):
         ------
         InvalidOption, InvalidMotion
             As `rocking.fragility`.
-        """
-        return fragility(
-            self.blocks,
-            motions,
-            weights=self.weights,
-            model=self.model if model is None else model,
-            measure=measure,
-            levels=levels,
-            limits=limits,
-            **options,
-        )
 
-    def spectrum(
-        self,
-        motions: Motions,
-        *,
-        model: Model | None = None,
-        **options: Any,
-    ) -> RockingSpectrum:
+        Examples
+        --------
+        >>> import rocking
+        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+        >>> found.fragility(pulses, levels=[2.0, 3.0, 4.0, 6.0]).model
+        'nonlinear'
+        """
+        chosen = self.model if model is None else model
+        return fragility(self.blocks, motions, weights=self.weights, model=chosen, **options)
+
+    def spectrum(self, motions: Motions, *, model: Model | None = None, **options: Any) -> RockingSpectrum:
         """Peak rotation of the specimen, and of larger and smaller ones of its shape, with the ensemble's weights.
 
         Parameters
         ----------
-        motions : Motion or sequence of Motion
+        motions : Motion, sequence of Motion, or mapping of str to Motion
             m motions.
         model : {"linear", "nonlinear"}, optional
             Equation of motion, if not that of the calibration.
-        **options
+        **options : object
             Further arguments of `rocking.rocking_spectrum`: p (rad/s, to which the ensemble's median is moved; by
             default half to twice its own) or size, fractiles, ...
 
         Returns
         -------
         RockingSpectrum
+            Fractiles of the motions and of the ensemble's weight together.
 
         Raises
         ------
         InvalidOption, InvalidMotion
             As `rocking.rocking_spectrum`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+        >>> found.spectrum(pulses, p=[1.0, 2.0]).sizes["p"]
+        2
         """
         chosen = self.model if model is None else model
         return rocking_spectrum(self.blocks, motions, weights=self.weights, model=chosen, **options)
@@ -309,32 +324,25 @@ class Calibration(Tabled):
         return f"{counted(len(self.observed), 'motion')}, {overturned} overturned the specimen; {self.model} model"
 
     def summary(self) -> str:
-        """Return the estimates and scores as a table for people."""
         rows = [
             [name, one.median, one.lower, one.upper, f"{100 * one.dispersion:.0f} %", unit_of(name)]
             for name, one in self.estimates.items()
         ]
         alike = 1.0 / float((self.weights**2).sum())
-        lines = [
-            self._headline(),
-            "",
-            text_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows),
-            "",
-            f"ensemble of {counted(len(self.blocks), 'block')}, equivalent to {alike:.0f} of equal weight",
-            f"fitted motions: {self.scores}",
-            str(self.diagnostics),
-        ]
-        return "\n".join(lines)
+        table = text_table(["parameter", "median", "5 %", "95 %", "dispersion", "unit"], rows)
+        ensemble = f"ensemble of {counted(len(self.blocks), 'block')}, equivalent to {alike:.0f} of equal weight"
+        return f"{self._headline()}\n\n{table}\n\n{ensemble}\nfitted motions: {self.scores}\n{self.diagnostics}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Estimates, scores and probabilities by name."""
+        known = self.diagnostics
+        lists = {"bounds_reached": [asdict(one) for one in known.bounds_reached], "notes": [*known.notes]}
         return {
             "model": self.model,
             "motions": len(self.observed),
             "overturned": int(self.observed.sum()),
             "estimates": {name: asdict(one) for name, one in self.estimates.items()},
             "fitted": asdict(self.scores),
-            "diagnostics": self.diagnostics.to_dict(),
+            "diagnostics": asdict(known) | lists,
             "probabilities": self.probabilities,
         }
 
@@ -348,8 +356,8 @@ class Calibration(Tabled):
         }
         return pd.DataFrame({**columns, "weight": self.weights, "model": self.model})
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import outcomes_figure
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.calibration import outcomes_figure
 
         return outcomes_figure(
             probabilities=self.probabilities,
@@ -363,7 +371,7 @@ class Calibration(Tabled):
 
     def _parameter(self, name: str) -> Parameter:
         """One parameter for a figure: of both sides where they may differ."""
-        from rocking.plot import Parameter
+        from rocking.plot.calibration import Parameter
 
         estimates = [one for key, one in self.estimates.items() if key.partition("_")[0] == name]
         values = getattr(self.blocks, name)[:, : len(estimates)]
@@ -421,7 +429,9 @@ def calibrate(
         Most blocks that are kept for predictions.
     seed : int
         The same seed gives the same result.
-    threads, progress
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
         As for `simulate_many`.
 
     Returns
@@ -440,16 +450,13 @@ def calibrate(
     A specimen differs a little from test to test, and no rigid plane block is a real rock. So each test is taken to
     have its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratio of the
     sides' slendernesses. The probability of an outcome is the share of the population that behaves so (and a small
-    lapse); a common dispersion of both slendernesses is, in the linear model, the same as one of the motion's
-    amplitude. The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006),
-    with the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %). The
-    likelihood is derived in the documentation's page on calibration.
+    lapse). The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with
+    the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %).
 
-    The search is global. Two independent runs each fill the bounds evenly, then try blocks where their own fits say:
-    first where they are fair, in the end where they are best. A candidate weighs what the density of candidates lacks,
-    so that the prior stays what it was (deterministic mixture; Owen and Zhou 2000). While the runs disagree, or few
-    candidates tell what a typical population does, they go on; the result is drawn from the candidates of both. What is
-    left of a disagreement, few effective candidates, or a posterior that leans on a bound, is said in the summary.
+    The search is global. Two independent runs each fill the bounds evenly, then try blocks where their own fits say. A
+    candidate weighs what the density of candidates lacks, so that the prior stays what it was (deterministic mixture;
+    Owen and Zhou 2000). What is left of a disagreement between the runs, few effective candidates, or a posterior that
+    reaches a bound, is said in the summary.
 
     Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
     predictions are not.
@@ -503,7 +510,7 @@ def calibrate(
         model=model,
         lapse=lapse,
         seed=seed,
-        diagnostics=Diagnostics.of(found, final),
+        diagnostics=diagnosed(found, final),
         _evidence=evidence,
     )
 
@@ -519,48 +526,33 @@ def _outcomes(
 
 def _distinct(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
     """Motions that differ, and which of them each one is: the same command is often given several times."""
-    places: dict[tuple[bytes, ...], int] = {}
-    distinct: list[Motion] = []
+    places: dict[tuple[bytes, ...], tuple[int, Motion]] = {}
     which = []
     for motion in motions:
         parts = [part for part in (motion, motion.vertical) if part is not None]
         key = tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients))
-        if key not in places:
-            places[key] = len(distinct)
-            distinct.append(motion)
-        which.append(places[key])
-    return distinct, which
+        which.append(places.setdefault(key, (len(places), motion))[0])
+    return [motion for _, motion in places.values()], which
 
 
 def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
-    dispersion = _side_dispersions(space, populations).mean(axis=0)
-    tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
-    estimates = {}
-    for name, values in space.named(unpacked(populations)[0]).items():
-        median, lower, upper = (float(value) for value in np.quantile(values, tails))
-        estimates[name] = Estimate(median, lower, upper, float(dispersion[space.unknown.index(name.partition("_")[0])]))
-    return estimates
-
-
-def _side_dispersions(space: Space, populations: Floats) -> Floats:
-    """Return standard deviations of the logarithm of each unknown parameter on either side, shape (c, f)."""
-    dispersion = unpacked(populations)[1]
-    sides = dispersion[:, : len(space.unknown)].copy()
+    centres, dispersions = unpacked(populations)
+    sides = dispersions[:, : len(space.unknown)].copy()
     if space.two_sided:
         # The side's logarithm is that of the mean plus or minus half that of the ratio.
         sided = space.unknown.index(SIDED)
-        sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersion[:, -1])
-    return sides
+        sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersions[:, -1])
+    dispersion = dict(zip(space.unknown, sides.mean(axis=0).tolist(), strict=True))
+    tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
+    estimates = {}
+    for name, values in space.named(centres).items():
+        median, lower, upper = np.quantile(values, tails).tolist()
+        estimates[name] = Estimate(median, lower, upper, dispersion[name.partition("_")[0]])
+    return estimates
 
 
 def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
-    """Outcomes as an array of their own that nobody can change.
-
-    Raises
-    ------
-    InvalidOption
-        If they are not yes or no, not one for each motion, or all the same.
-    """
+    """Outcomes as an array that nobody can change: yes or no, one for each motion, and not all the same."""
     values = np.asarray(overturned)
     if values.shape != (count,):
         raise InvalidOption(

@@ -96,17 +96,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What the runs found.
-
-    Attributes
-    ----------
-    evidence : Evidence
-        All candidates of all runs.
-    runs : tuple of Candidates
-        Those of each run.
-    posteriors : tuple of ndarray
-        Populations, drawn from the candidates of each run alone.
-    """
+    """What the runs found: all their candidates, those of each, and populations drawn from those of each run alone."""
 
     evidence: Evidence
     runs: tuple[Candidates, ...]

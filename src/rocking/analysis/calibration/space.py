@@ -57,18 +57,9 @@ Knowledge = float | Range | Literal["housner"]
 class Space:
     """Blocks in logarithmic coordinates: what is not known of p, slenderness (mean of both sides) and restitution.
 
-    The last coordinate of a two-sided block is the ratio of the slenderness of side + to that of side -.
-
-    Attributes
-    ----------
-    unknown : tuple of str, length f
-        Parameters that have coordinates.
-    known : mapping of str to float
-        Parameters that have a value; a restitution in neither follows from the slenderness.
-    lower, upper : ndarray, shape (f,)
-        Logarithms of the bounds that each side's unknown parameters keep to.
-    ratio : float
-        Logarithm of the largest ratio between the slendernesses of the sides; 0 for symmetric blocks.
+    The f unknown parameters keep to bounds on each side, whose logarithms are `lower` and `upper`; a restitution that
+    is neither unknown nor known follows from the slenderness. The last coordinate of a two-sided block is the logarithm
+    of the ratio of the slenderness of side + to that of side -, at most `ratio`, which is 0 for symmetric blocks.
     """
 
     unknown: tuple[str, ...]
@@ -79,13 +70,7 @@ class Space:
 
     @classmethod
     def of(cls, p: Knowledge, alpha: Knowledge, restitution: Knowledge, *, two_sided: bool) -> Space:
-        """Space between bounds, of what is not known.
-
-        Raises
-        ------
-        InvalidOption
-            If a value or a pair is not in the range that blocks allow, or everything is known.
-        """
+        """Space between bounds, of what is not known."""
         bounds, known = {}, {}
         for name, given in zip(PARAMETERS, (p, alpha, restitution), strict=True):
             if isinstance(given, str):
@@ -198,13 +183,7 @@ def is_known(given: Any) -> bool:
 
 
 def known_value(value: object, name: str) -> float:
-    """Return the value of a known parameter.
-
-    Raises
-    ------
-    InvalidOption
-        If it is no number in the range that blocks allow.
-    """
+    """Return the value of a known parameter, in the range that blocks allow."""
     known = checks.positive(value, name, InvalidOption, unit_of(name))
     if known > HIGHEST[name]:
         raise InvalidOption(f"{{}} must be at most {HIGHEST[name]:g}, not {known:g}", name, value=known)
@@ -218,13 +197,7 @@ def _check_housner(name: str, given: str) -> None:
 
 
 def value_range(pair: Any, name: str, highest: float) -> Range:
-    """Return the two ends of a range.
-
-    Raises
-    ------
-    InvalidOption
-        If they are not two increasing numbers between 0 and `highest`.
-    """
+    """Return the two ends of a range, increasing numbers between 0 and `highest`."""
     try:
         low, high = (checks.number(value, f"each of {name}", InvalidOption) for value in pair)
     except (TypeError, ValueError):

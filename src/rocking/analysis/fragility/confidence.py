@@ -52,11 +52,6 @@ class LikelyRegion:
     stretched to the covariance that the clusters show (Chandler and Bate 2007), each left out in turn, and Student's
     distribution takes the place of the normal one. Fewer than three clusters tell nothing of it: then the region is
     the whole plane.
-
-    Attributes
-    ----------
-    boundary : Probit
-        Intercepts and slopes all around.
     """
 
     boundary: Probit
@@ -98,14 +93,8 @@ class LikelyRegion:
 class Resamples:
     """Fits to data drawn anew from the clusters of outcomes, with replacement; intervals are BCa (Efron 1987).
 
-    Attributes
-    ----------
-    fits : Probit
-        A step where the drawn outcomes are separated; level where they do not rise.
-    degenerate : float
-        Share of such.
-    influence : ndarray, shape (clusters, 2)
-        How far each cluster pulls intercept and slope: its score over the observed information.
+    A fit is a step where the drawn outcomes are separated, level where they do not rise; `degenerate` is the share of
+    such. The influence (clusters, 2) of a cluster is its score over the observed information: how far it pulls the fit.
     """
 
     fits: Probit
@@ -134,16 +123,8 @@ class Resamples:
     def interval(self, quantity: Quantity, estimate: Floats, gradient: Floats, confidence: float) -> Ends:
         """Percentiles of a quantity, corrected for its bias and its skewness.
 
-        Parameters
-        ----------
-        quantity : callable
-            Values (fits, n) of n quantities from fits.
-        estimate : ndarray, shape (n,)
-            Their estimates.
-        gradient : ndarray, shape (2, n)
-            Their derivatives with respect to intercept and slope.
-        confidence : float
-            Probability that an interval shall hold the true value.
+        Of n quantities there are values (fits, n), estimates (n,) and derivatives (2, n) with respect to the
+        parameters.
         """
         from scipy.special import ndtr, ndtri
 

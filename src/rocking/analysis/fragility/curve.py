@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.fragility import lognormal
-from rocking.analysis.fragility.confidence import Confidence, LikelyRegion, Resamples
-from rocking.analysis.fragility.lognormal import Outcomes, Probit
+from rocking.analysis.fragility.confidence import Confidence, Ends, LikelyRegion, Quantity, Resamples
+from rocking.analysis.fragility.lognormal import Outcomes, Probit, normal_scores, probabilities
 from rocking.arrays import Floats, Integers, as_asked
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure, intensities
@@ -85,8 +85,6 @@ class FragilityCurve:
         Intercept and slope of P = Phi(intercept + slope ln x).
     covariance : ndarray, shape (2, 2)
         Inverse of Fisher's expected information of intercept and slope.
-    uncertainty : LikelyRegion or Resamples
-        Where intervals and bands come from: the likelihood, or the bootstrap.
     confidence : float
         Probability of the intervals and bands.
     likelihood : Likelihood
@@ -104,12 +102,12 @@ class FragilityCurve:
     trials: Floats
     fitted: Probit
     covariance: Floats
-    uncertainty: Confidence
     confidence: float
     clusters: int
     independent: bool
     likelihood: lognormal.Likelihood
     goodness: lognormal.Goodness
+    _uncertainty: Confidence
 
     def __repr__(self) -> str:
         median, dispersion = (interval_text(each, 4) for each in (self.median_interval, self.dispersion_interval))
@@ -143,19 +141,19 @@ class FragilityCurve:
 
         Separated outcomes make a step, the others a level curve; NaN without a bootstrap.
         """
-        return self.uncertainty.degenerate if isinstance(self.uncertainty, Resamples) else math.nan
+        return self._uncertainty.degenerate if isinstance(self._uncertainty, Resamples) else math.nan
 
     @property
     def bounded(self) -> bool:
         """Whether intervals and bands bound anything: fewer than three clusters of several outcomes do not."""
-        return isinstance(self.uncertainty, Resamples) or self.uncertainty.bounded
+        return isinstance(self._uncertainty, Resamples) or self._uncertainty.bounded
 
     @property
     def median_interval(self) -> tuple[float, float]:
         """Confidence interval of the median; 0 or infinite where the data allow a curve that does not rise."""
         logarithm = math.log(self.median)
         gradient = np.array([[-1.0 / self._slope], [-logarithm / self._slope]])
-        low, high = self.uncertainty.interval(_log_medians, np.array([logarithm]), gradient, self.confidence)
+        low, high = interval_of(self, _log_medians, np.array([logarithm]), gradient)
         with np.errstate(over="ignore"):
             return float(np.exp(low[0])), float(np.exp(high[0]))
 
@@ -163,7 +161,7 @@ class FragilityCurve:
     def dispersion_interval(self) -> tuple[float, float]:
         """Confidence interval of the dispersion; infinite where the data allow a curve that does not rise."""
         gradient = np.array([[0.0], [1.0]])
-        flattest, steepest = self.uncertainty.interval(_slopes, self.fitted.slope, gradient, self.confidence)
+        flattest, steepest = interval_of(self, _slopes, self.fitted.slope, gradient)
         return _dispersion(float(steepest[0])), _dispersion(float(flattest[0]))
 
     def probability(self, intensity: ArrayLike) -> Floats:
@@ -192,7 +190,7 @@ class FragilityCurve:
         [0.5, 0.0]
         """
         at = intensities(intensity)
-        return as_asked(self.fitted.probability(_logarithm(at).ravel())[0].reshape(at.shape))
+        return as_asked(probabilities(self.fitted, _logarithm(at).ravel())[0].reshape(at.shape))
 
     def intensity_of(self, probability: float) -> float:
         """Intensity at which the fitted probability is as given.
@@ -214,6 +212,13 @@ class FragilityCurve:
         ------
         InvalidOption
             If the probability is not between 0 and 1.
+
+        Examples
+        --------
+        >>> from rocking import fit_fragility
+        >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
+        >>> round(curve.intensity_of(0.5) / curve.median, 9)
+        1.0
         """
         from scipy.special import ndtri
 
@@ -247,6 +252,13 @@ class FragilityCurve:
         ------
         InvalidOption
             If an argument is out of range.
+
+        Examples
+        --------
+        >>> from rocking import fit_fragility
+        >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
+        >>> f"{curve.largest_rate(curve.median, years=1000.0):.5f}"
+        '0.00599'
         """
         time = checks.positive(years, "years", InvalidOption)
         share = checks.share(confidence, "confidence", InvalidOption)
@@ -270,23 +282,39 @@ class FragilityCurve:
         ------
         InvalidOption
             If an intensity is no number, or negative.
+
+        Examples
+        --------
+        >>> from rocking import fit_fragility
+        >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
+        >>> low, high = curve.band(curve.median)
+        >>> bool(low < 0.5 < high)
+        True
         """
         from scipy.special import ndtr
 
         at = intensities(intensity)
         z = _logarithm(at).ravel()
         finite = np.where(np.isfinite(z), z, 0.0)
-        ends = self.uncertainty.interval(
-            lambda fits: fits.score(z),
-            self.fitted.score(z)[0],
-            np.stack([np.ones_like(finite), finite]),
-            self.confidence,
-        )
+        gradient = np.stack([np.ones_like(finite), finite])
+        ends = interval_of(self, lambda fits: normal_scores(fits, z), normal_scores(self.fitted, z)[0], gradient)
         low, high = (as_asked(np.asarray(ndtr(end)).reshape(at.shape)) for end in ends)
         return low, high
 
     def to_dict(self) -> dict[str, Any]:
-        """Parameters, intervals and tests by name."""
+        """Return parameters, intervals and tests by name.
+
+        Returns
+        -------
+        dict of str to object
+            Intensities are in SI units, or a block's own.
+
+        Examples
+        --------
+        >>> from rocking import fit_fragility
+        >>> fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0].to_dict()["exceeded"]
+        7
+        """
         return {
             "limit_state": self.limit_state,
             "median": self.median,
@@ -319,11 +347,6 @@ def fitted_curve(
 
     Outcomes may count in parts, as those of blocks with weights do. Without clusters every trial is on its own, also
     where several are at one intensity.
-
-    Raises
-    ------
-    InvalidOption
-        If no rising lognormal fits best, or its median is far beyond the intensities.
     """
     intensity, exceeded, trials = data
     z = np.log(intensity)
@@ -355,13 +378,18 @@ def fitted_curve(
         trials=trials,
         fitted=fitted,
         covariance=lognormal.covariance(outcomes, fitted),
-        uncertainty=uncertainty,
         confidence=band.confidence,
         clusters=count,
         independent=independent,
         likelihood=lognormal.gain(outcomes, fitted, independent=independent),
         goodness=lognormal.goodness(outcomes, fitted, independent=independent),
+        _uncertainty=uncertainty,
     )
+
+
+def interval_of(curve: FragilityCurve, quantity: Quantity, estimate: Floats, gradient: Floats) -> Ends:
+    """Return the confidence interval of a quantity of fits, from its estimate and its gradient at the fit."""
+    return curve._uncertainty.interval(quantity, estimate, gradient, curve.confidence)
 
 
 def passed(ratio: Floats, limit: float, name: str) -> Floats:

@@ -15,13 +15,12 @@ from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.levels import mean_one, only_block, pooled, simulate_levels, units_of, values_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Block, Blocks
+from rocking.constants import Model
 from rocking.engine import require_finished
-from rocking.ensemble import simulate_many
+from rocking.ensemble import Polarity, simulate_many
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, several_motions
+from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.product import Polarity
 from rocking.tables import counted
 from rocking.treatment import Treatment
 
@@ -72,13 +71,21 @@ def fragility(
     limits : mapping of str to float
         Limit states: peak rotation over slenderness (the smaller one of two sides) that is exceeded; ``math.inf``
         stands for overturning, the default.
-    model, chattering, polarity, threads, progress
-        As for `simulate_many`. With both polarities each motion counts twice, unless all blocks are symmetric: they do
-        the same under a motion and its mirror image, which is no second outcome.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    chattering : str or Treatment
+        As for `simulate`.
+    polarity : {"+", "-", "both"}
+        Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric:
+        they do the same under a motion and its mirror image, which is no second outcome.
     weights : array_like, optional
         How much the outcomes of each block count, one number for each; by default all alike.
     band : Band
         How intervals and bands are made; the clusters are the motions, each with all its outcomes.
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
+        As for `simulate_many`.
 
     Returns
     -------
@@ -202,7 +209,7 @@ def fit_fragility(
     clusters : array_like of int, shape (n,), optional
         Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own. Fewer
         than three clusters of several outcomes bound nothing: then intervals go from 0 to infinity.
-    measure
+    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
         What the intensity is, as for `fragility`.
     band : Band
         How intervals and bands are made.

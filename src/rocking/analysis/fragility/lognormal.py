@@ -32,15 +32,7 @@ _GROUPS: Final = 10
 
 
 class Outcomes(NamedTuple):
-    """Outcomes of one data set, or of several at the same intensities.
-
-    Attributes
-    ----------
-    z : ndarray, shape (n,)
-        Logarithms of the intensity.
-    exceeded, trials : ndarray, shape (n,) or (sets, n)
-        Outcomes that exceeded, of how many, at each.
-    """
+    """Outcomes that exceeded, of how many trials, at n logarithms of the intensity, of one data set or of several."""
 
     z: Floats
     exceeded: Floats
@@ -56,7 +48,13 @@ class Outcomes(NamedTuple):
 
 
 class Probit(NamedTuple):
-    """Parameters of one or many fits, along the first axis: intercept and slope, in the logarithm of the intensity."""
+    """Parameters of one or many fits: probabilities are Phi(intercept + slope ln x) at intensities x.
+
+    Attributes
+    ----------
+    intercept, slope : ndarray, shape (fits,)
+        Those of a single fit have one entry.
+    """
 
     intercept: Floats
     slope: Floats
@@ -66,18 +64,20 @@ class Probit(NamedTuple):
             return f"<Probit: {len(self.slope)} fits>"
         return f"<Probit: intercept {float(self.intercept[0]):.5g}, slope {float(self.slope[0]):.5g}>"
 
-    def probability(self, z: Floats) -> Floats:
-        """Probability at logarithms of the intensity, shape (fits, len(z))."""
-        from scipy.special import ndtr
 
-        result: Floats = ndtr(self.score(z))
-        return result
+def normal_scores(fits: Probit, z: Floats) -> Floats:
+    """Return normal scores of the probability at logarithms of the intensity, shape (fits, len(z)); -inf at 0."""
+    finite = np.isfinite(z)
+    at = fits.intercept[:, None] + fits.slope[:, None] * np.where(finite, z, 0.0)
+    return np.where(finite, at, z)
 
-    def score(self, z: Floats) -> Floats:
-        """Return normal scores of the probability, shape (fits, len(z)); at intensity 0 nothing is exceeded."""
-        finite = np.isfinite(z)
-        at = self.intercept[:, None] + self.slope[:, None] * np.where(finite, z, 0.0)
-        return np.where(finite, at, z)
+
+def probabilities(fits: Probit, z: Floats) -> Floats:
+    """Return probabilities at logarithms of the intensity, shape (fits, len(z))."""
+    from scipy.special import ndtr
+
+    result: Floats = ndtr(normal_scores(fits, z))
+    return result
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,7 @@ def goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
     from scipy.special import gammaincc
 
     group = groups(data.z, data.trials)
-    chance = fitted.probability(data.z)[0]
+    chance = probabilities(fitted, data.z)[0]
     expected, variance = (np.bincount(group, data.trials * terms) for terms in (chance, chance * (1.0 - chance)))
     seen = np.bincount(group, data.exceeded)
     freedom = len(seen) - 2

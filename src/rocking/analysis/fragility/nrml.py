@@ -21,9 +21,8 @@ from rocking.analysis.fragility.curve import FragilityCurve
 from rocking.analysis.levels import units_of
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption
-from rocking.model import Model
 from rocking.motion.scaling import Measure
 from rocking.tables import write_text
 
@@ -47,15 +46,7 @@ class Scale(NamedTuple):
 
 
 def write(path: str | Path, function: ET.Element, limit_states: Sequence[str], description: str, **model: str) -> None:
-    """Write a model with one fragility function; `model` holds its id, assetCategory and lossCategory.
-
-    Raises
-    ------
-    InvalidOption
-        If a name has a character that NRML does not allow, or the loss category is none of OpenQuake's.
-    OutputError
-        If the file cannot be written.
-    """
+    """Write a model with one fragility function; `model` holds its id, assetCategory and lossCategory."""
     checks.one_of(model["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
     root = ET.Element("nrml", {"xmlns": NAMESPACE})
     element = ET.SubElement(root, "fragilityModel", model | {"id": _name(model["id"], "model_id")})
@@ -75,13 +66,7 @@ def fragility_function(
     taxonomy: str,
     kind: Format,
 ) -> ET.Element:
-    """Fragility function; `valid` is the range (SI) of the data, below `no_damage` (OpenQuake's unit) nothing happens.
-
-    Raises
-    ------
-    InvalidOption
-        If the format is neither, the identifier not allowed, or a dispersion too wide for a mean and a deviation.
-    """
+    """Fragility function; `valid` is the range (SI) of the data, up to `no_damage` (OpenQuake's unit) nothing moves."""
     checks.one_of(kind, "format", InvalidOption, get_args(Format))
     low, high = (scale.factor * end for end in valid)
     low = max(low, no_damage or 0.0)
@@ -112,13 +97,7 @@ def fragility_function(
 
 
 def scale_of(measure: Measure, block: Block | None, model: Model) -> Scale:
-    """OpenQuake's type for a measure, and the factor from SI units or the block's own: PGA and SA in g, PGV in cm/s.
-
-    Raises
-    ------
-    InvalidOption
-        If the measure counts in a block's own unit, and there is no block.
-    """
+    """OpenQuake's type for a measure, and the factor from SI units or the block's own: PGA and SA in g, PGV in cm/s."""
     if block is not None:
         own = float(units_of(Blocks.of([block]), measure, model)[0])
     elif not measure.in_block_units:

@@ -12,20 +12,18 @@ import numpy as np
 
 from rocking import checks
 from rocking.analysis.fragility import nrml
-from rocking.analysis.fragility.confidence import Resamples
 from rocking.analysis.fragility.curve import FragilityCurve, in_units, interval_text
 from rocking.analysis.fragility.lognormal import groups
 from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.report import Tabled
-from rocking.analysis.risk import Risk
+from rocking.analysis.risk import Risk, risk_of
 from rocking.analysis.survival import Survival
 from rocking.arrays import Floats
 from rocking.block import Block
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption, Message
-from rocking.model import Model
 from rocking.motion.scaling import Measure
 from rocking.progress import spelled
+from rocking.result import DrawnResult, TableResult
 from rocking.tables import counted, text_table
 
 if TYPE_CHECKING:
@@ -38,7 +36,7 @@ _POINTS: Final = 201
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fragility(Tabled):
+class Fragility(DrawnResult, TableResult):
     """Fragility curves of one or several limit states against one intensity measure; from `fragility`.
 
     Its tables are "curves" (limit state, intensity in SI units, probability, lower and upper end of the band) and,
@@ -67,7 +65,8 @@ class Fragility(Tabled):
         What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
     """
 
-    TABLES = "curves", "outcomes"
+    TABLES = ("curves", "outcomes")
+    _FORMAT = "%.10g"
 
     curves: tuple[FragilityCurve, ...]
     measure: Measure
@@ -79,7 +78,6 @@ class Fragility(Tabled):
     source: str = "motion"
 
     def summary(self) -> str:
-        """Median and dispersion of each limit state with their intervals, in a table."""
         scale = self.measure.scale
         rows = [
             [
@@ -133,7 +131,6 @@ class Fragility(Tabled):
         return f"{count} cannot tell how far {self.source}s differ; give 3 or more"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return curves and outcomes by name; intensities in SI units."""
         return {
             "block": None if self.block is None else self.block.description,
             "description": self.description,
@@ -148,14 +145,14 @@ class Fragility(Tabled):
     @property
     def band_kind(self) -> str:
         """Where intervals and bands come from: "likelihood" or "bootstrap"."""
-        return "bootstrap" if isinstance(self.curves[0].uncertainty, Resamples) else "likelihood"
+        return "likelihood" if math.isnan(self.curves[0].degenerate) else "bootstrap"
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         curves = ", ".join(
             f"{one.limit_state}: median {in_units(one.median, self.measure)}, dispersion {one.dispersion:.3g}"
             for one in self.curves
         )
-        return f"<Fragility: {self.description}; {self.measure.label}; {curves}>"
+        return f"{self.description}; {self.measure.label}; {curves}"
 
     def curve(self, limit_state: str) -> FragilityCurve:
         """Curve of a limit state.
@@ -168,11 +165,18 @@ class Fragility(Tabled):
         Returns
         -------
         FragilityCurve
+            Its curve.
 
         Raises
         ------
         InvalidOption
             If there is none of that name.
+
+        Examples
+        --------
+        >>> from rocking import fit_fragility
+        >>> fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curve("overturning").clusters
+        4
         """
         curves = {curve.limit_state: curve for curve in self.curves}
         return curves[checks.one_of(limit_state, "limit_state", InvalidOption, list(curves))]
@@ -209,7 +213,7 @@ class Fragility(Tabled):
         >>> f"{one.annual_rate:.6f} {one.probability(50.0):.4f}"
         '0.000434 0.0215'
         """
-        return Risk.of(self.curves, hazard, self.measure, self.description)
+        return risk_of(self.curves, hazard, self.measure, self.description)
 
     def survival(
         self,
@@ -317,6 +321,13 @@ class Fragility(Tabled):
         Units become OpenQuake's: PGA and SA in g, PGV in cm/s. A measure in a block's own unit becomes PGA or PGV of
         that block. The range of validity is that of the data. A block cannot move below its uplift acceleration, which
         is written as the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from rocking import fit_fragility
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).to_nrml(f"{folder}/model.xml")
         """
         chosen = self.block if block is None else block
         scale = nrml.scale_of(self.measure, chosen, self.model)
@@ -329,8 +340,8 @@ class Fragility(Tabled):
         about = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
         nrml.write(path, function, states, self.description, **about)
 
-    def _draw(self, ax: Axes | None, title: str, figsize: tuple[float, float] | None) -> Figure:
-        from rocking.plot import FragilityLine, fragility_figure
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.fragility import FragilityLine, fragility_figure
 
         first = self.curves[0]
         band_text = f"band: {100 * first.confidence:g} % confidence ({self.band_kind})"

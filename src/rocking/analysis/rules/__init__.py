@@ -1,5 +1,6 @@
 """Rules of thumb for the rocking and overturning of blocks, and a check of them against the exact answer."""
 
-import lazy_loader
+from rocking.analysis.rules.check import Check, check
+from rocking.analysis.rules.criteria import RULES, Rating, asce_43_05, housner, ishiyama, priestley, rate, west
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__all__ = ["RULES", "Check", "Rating", "asce_43_05", "check", "housner", "ishiyama", "priestley", "rate", "west"]

@@ -11,11 +11,10 @@ from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.rules.criteria import TITLES, rate
 from rocking.analysis.survey import BlockUnderRecords, motion_of
 from rocking.block import Block
-from rocking.constants import STANDARD_GRAVITY
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption
-from rocking.model import Model
-from rocking.motion.arguments import Motions, motions_by_name
 from rocking.motion.motion import Motion
+from rocking.motion.named import Motions, motions_by_name
 from rocking.progress import Progress
 from rocking.response import Response, in_brief
 from rocking.simulation import simulate
@@ -28,7 +27,7 @@ _TOLERANCE: Final = 1e-4
 _NEAR: Final = 0.985
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Check(BlockUnderRecords):
     """Rules of thumb beside the exact answer, for a block under several motions; from `check`.
 
@@ -56,7 +55,6 @@ class Check(BlockUnderRecords):
         return tuple(margin > 1.0 and not (one.overturned or one.unfinished) for one, margin in each)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return demand, ratios and the exact answer for each record; units are in the names."""
         return [
             {
                 **label,
@@ -76,7 +74,6 @@ class Check(BlockUnderRecords):
         ]
 
     def summary(self) -> str:
-        """Return the table for people."""
         rules = [*self.ratios[0]]
         shown = {
             "record": "record",
@@ -100,8 +97,8 @@ class Check(BlockUnderRecords):
             ]
         )
 
-    def __repr__(self) -> str:
-        return f"<Check: {self._count()}; by {', '.join(self.ratios[0]) or 'no rule'}>"
+    def _headline(self) -> str:
+        return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
 
     def _disagreements(self, rules: list[str]) -> list[str]:
         """Say of each rule how often it is wrong, and how; where no number can be right, none is counted."""
@@ -146,12 +143,15 @@ def check(
         Names in `RULES`; by default all.
     model : {"nonlinear", "linear"}
         Equation of motion of the exact answer.
-    threads, progress
-        As for `simulate_many`.
+    threads : int, optional
+        Number of threads; by default one for every core.
+    progress : bool, optional
+        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
     Returns
     -------
     Check
+        Demand over capacity by each rule, and the exact margin.
 
     Raises
     ------

@@ -18,8 +18,8 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
 from rocking.errors import InvalidBlock, InvalidOption
-from rocking.motion.arguments import several_motions
 from rocking.motion.motion import Motion
+from rocking.motion.named import several_motions
 from rocking.tables import range_text
 
 #: Share of the velocity that would overturn a block at one blow, from which on Ishiyama sees blocks overturn.
@@ -348,16 +348,8 @@ def rate(
 class _Oscillator:
     """Oscillators that stand for one side of a block at some rotations.
 
-    Attributes
-    ----------
-    periods : ndarray
-        Their periods, s.
-    damping : float
-        Fraction of critical.
-    capacities : ndarray
-        What the side has there.
-    per_acceleration : ndarray
-        Demand for a spectral acceleration of 1 m/s^2.
+    They have periods (s), a fraction of critical damping, capacities, and demands for a spectral acceleration of 1
+    m/s^2.
     """
 
     periods: Floats

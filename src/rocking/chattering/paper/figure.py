@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,15 +27,17 @@ from rocking.errors import InvalidOption
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.response import Response
+from rocking.result import TableResult
 from rocking.simulation import simulate
-from rocking.tables import whole_file, write_figure
+from rocking.tables import write_figure
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 #: Columns of equal length by name; a name ends in its unit where there is one.
-Table = Mapping[str, NDArray[np.generic]]
+Columns = Mapping[str, NDArray[np.generic]]
 
 _DOTS_PER_INCH: Final = 200
 
@@ -141,7 +142,7 @@ def dense_times(impacts: Floats, end: float, *, shortest: float = 0.0) -> Floats
 
 @dataclass(frozen=True)
 class Statement:
-    """What the paper states, and what is computed here.
+    """What the paper states, and what is computed here; ``print`` it for a line.
 
     Attributes
     ----------
@@ -170,14 +171,14 @@ class Statement:
             return self.here - self.paper
         return None
 
-    def shown(self) -> str:
-        """One line: paper, here, difference; ours alone where the paper says nothing."""
-        _, here, difference = self.cells()
+    def __str__(self) -> str:
+        _, here, difference = self.cells
         if self.paper is None:
             return here
         source = f"by {self.formula}" if self.formula else "in the paper"
         return f"{self._written(self.paper)} {source}, {here} here{difference and f', {difference}'}"
 
+    @property
     def cells(self) -> tuple[str, str, str]:
         """Paper, here and difference as texts; the first is empty where the paper says nothing."""
         paper = "" if self.paper is None else self._written(self.paper)
@@ -188,9 +189,9 @@ class Statement:
         return value if isinstance(value, str) else f"{value:.{self.digits}g}"
 
 
-@dataclass(frozen=True, eq=False)
-class PaperFigure:
-    """One figure of the paper, computed.
+@dataclass(frozen=True, eq=False, repr=False)
+class PaperFigure(TableResult):
+    """One figure of the paper, computed; from `paper_figure`.
 
     Attributes
     ----------
@@ -200,18 +201,21 @@ class PaperFigure:
         What it shows.
     conditions : str
         The parameters that it is drawn for, with their values; empty where it depends on none.
-    tables : mapping of str to table
-        All that is drawn; each is written as a CSV file of its own.
+    tables : mapping of str to mapping of str to ndarray
+        All that is drawn: tables by name, and their columns; a name ends in its unit where there is one.
     statements : tuple of Statement
         What the paper states about it in numbers, beside ours.
     drawings : mapping of str to callable
         What draws it, by name; the first is what `draw` draws by default.
     """
 
+    _FORMAT = "%.12g"
+    _NAN = "nan"
+
     number: int
     title: str
     conditions: str
-    tables: Mapping[str, Table]
+    tables: Mapping[str, Columns]
     statements: tuple[Statement, ...]
     drawings: Mapping[str, Callable[[], Figure]]
 
@@ -219,6 +223,25 @@ class PaperFigure:
         conditions = f" ({self.conditions})" if self.conditions else ""
         contents = f"tables: {', '.join(self.tables) or 'none'}; {len(self.statements)} statements"
         return f"<PaperFigure {self.number}: {self.title}{conditions}; {contents}>"
+
+    def _names(self) -> list[str]:
+        return [*self.tables]
+
+    def summary(self) -> str:
+        return "\n".join([self.caption, *(f"  {statement.claim}: {statement}" for statement in self.statements)])
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "number": self.number,
+            "title": self.title,
+            "conditions": self.conditions,
+            "statements": [asdict(statement) for statement in self.statements],
+        }
+
+    def _frame(self, table: str) -> pd.DataFrame:
+        import pandas as pd
+
+        return pd.DataFrame(dict(self.tables[table]))
 
     @property
     def caption(self) -> str:
@@ -236,11 +259,18 @@ class PaperFigure:
         Returns
         -------
         matplotlib.figure.Figure
+            A new figure.
 
         Raises
         ------
         InvalidOption
             If there is none of that name.
+
+        Examples
+        --------
+        >>> from rocking.chattering import paper_figure
+        >>> len(paper_figure(6).draw("surface").axes)
+        1
         """
         chosen = next(iter(self.drawings)) if drawing is None else drawing
         if chosen not in self.drawings:
@@ -250,40 +280,42 @@ class PaperFigure:
         return self.drawings[chosen]()
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write all drawings as PDF and PNG and the data as CSV into a folder that exists; the files' paths.
+        """Write all drawings as PDF and PNG, and the tables as CSV.
+
+        Parameters
+        ----------
+        folder : str or pathlib.Path
+            Folder that exists.
+
+        Returns
+        -------
+        tuple of pathlib.Path
+            The files.
 
         Raises
         ------
         OutputError
             If a file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from rocking.chattering import paper_figure
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in paper_figure(1).write(folder)]
+        ['figure-1.pdf', 'figure-1.png', 'figure-1-points.csv']
         """
         target = Path(folder)
-        tables = {target / f"{self._stem}-{name}.csv": table for name, table in self.tables.items()}
         paths: list[Path] = []
         for k, name in enumerate(self.drawings):
-            paths += self._write_drawing(target, f"{self._stem}-{name}" if k else self._stem, self.draw(name))
-        for path, table in tables.items():
-            _write_table(path, table)
-        return (*paths, *tables)
-
-    @property
-    def _stem(self) -> str:
-        return f"figure-{self.number}"
-
-    def _write_drawing(self, folder: Path, stem: str, drawing: Figure) -> tuple[Path, Path]:
-        pdf, png = folder / f"{stem}.pdf", folder / f"{stem}.png"
-        # Without a date the files of two runs are the same.
-        write_figure(pdf, drawing, metadata={"CreationDate": None})
-        write_figure(png, drawing, dpi=_DOTS_PER_INCH)
-        return pdf, png
-
-
-def _write_table(path: Path, table: Table) -> None:
-    with whole_file(path) as beside, beside.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(table)
-        writer.writerows(zip(*([_cell(value) for value in column] for column in table.values()), strict=True))
-
-
-def _cell(value: np.generic) -> str:
-    return f"{value:.12g}" if isinstance(value, np.floating) else str(value)
+            stem = f"figure-{self.number}-{name}" if k else f"figure-{self.number}"
+            pdf, png = target / f"{stem}.pdf", target / f"{stem}.png"
+            drawn = self.draw(name)
+            # Without a date the files of two runs are the same.
+            write_figure(pdf, drawn, metadata={"CreationDate": None})
+            write_figure(png, drawn, dpi=_DOTS_PER_INCH)
+            paths += [pdf, png]
+        for name in self.tables:
+            paths.append(target / f"figure-{self.number}-{name}.csv")
+            self.to_csv(paths[-1], name)
+        return tuple(paths)

@@ -18,10 +18,10 @@ from rocking.chattering.paper.figure import (
     OMEGA,
     A,
     BlockUnderSine,
+    Columns,
     P,
     PaperFigure,
     Statement,
-    Table,
     dense_times,
     yes_or_no,
 )
@@ -240,7 +240,7 @@ def _detail(case: BlockUnderSine, shares: tuple[float, float], time: Floats, rot
     return Detail((start, end), (-reach, reach))
 
 
-def _events(case: BlockUnderSine, responses: dict[str, Response]) -> Table:
+def _events(case: BlockUnderSine, responses: dict[str, Response]) -> Columns:
     """Uplifts and rests of all schemes in one table."""
     names = [name for name, response in responses.items() for _ in response.events]
     events = np.concatenate([response.events for response in responses.values()])

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from rocking.arrays import Floats
+from rocking.bisection import bisected
 from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.duration import chattering_time, interval_ratios, resolved_by_default, sequence
 from rocking.chattering.expansions import first_impact_speed, first_interval
@@ -220,10 +221,7 @@ def _crossing(case: BlockUnderSine) -> float | str:
         return "nowhere"
     if exceeds(high):
         return "a_cr"
-    while high - low > 1e-9:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if exceeds(middle) else (low, middle)
-    return low
+    return bisected(low, high, lambda a: not exceeds(a), width=1e-9)[0]
 
 
 def _exponent(values: Floats) -> float:

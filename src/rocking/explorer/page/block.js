@@ -173,12 +173,12 @@ export class View {
     const floor = height - 40;
     const drawn = theta * Number(/** @type {HTMLSelectElement} */ (one("magnify")).value);
     // The ground moves across a still background; where it would leave the picture, the background moves instead.
-    const room = width / 2 - scale * reach * 0.75 - 20;
-    const shift = Math.max(-room, Math.min(room, scale * moved));
+    const widthBeside = width / 2 - scale * reach * 0.75 - 20; // pixels that are free on each side of the block
+    const shift = Math.max(-widthBeside, Math.min(widthBeside, scale * moved));
     const behind = scale * moved - shift;
     const middle = width / 2 + shift;
     this.background(pen, width, floor, scale, behind);
-    this.earth(pen, width, height, floor, middle);
+    this.ground(pen, width, height, floor, middle);
     pen.save();
     const pivot = drawn >= 0 ? right : -left;
     pen.translate(middle + scale * pivot, floor);
@@ -232,7 +232,7 @@ export class View {
   }
 
   /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {number} floor @param {number} middle */
-  earth(pen, width, height, floor, middle) {
+  ground(pen, width, height, floor, middle) {
     pen.fillStyle = colour("rest");
     pen.fillRect(0, floor, width, height - floor);
     pen.strokeStyle = colour("earth");

@@ -12,7 +12,7 @@ export class ChatteringPanel {
     this.made = false;
     /** @type {any[]} */
     this.sequences = [];
-    one("deeper").addEventListener("click", () => this.deeper());
+    one("deeper").addEventListener("click", () => this.zoomToRest());
   }
 
   /** @param {import("./api.js").Payload} shown @param {Record<string, string>} texts */
@@ -53,19 +53,19 @@ export class ChatteringPanel {
     }
     fill(table, ["", "Uplift, s", "Complete from, s", "At rest, s", "Known to", "Impacts"], this.sequences.map((each, k) => {
       const proven = Number.isFinite(each.upper);
-      const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; this.list(); this.plot(); this.near(each); }}}, [`Show ${k + 1}`]);
+      const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; this.list(); this.plot(); this.showSequence(each); }}}, [`Show ${k + 1}`]);
       return [button, each.uplift.toFixed(3), proven ? each.start.toFixed(4) : "not proven", each.end.toFixed(9), proven ? `± ${span(0.5 * (each.upper - each.lower))}` : "–", String(this.count(each))];
     }));
   }
 
   /** @param {any} sequence */
-  near(sequence) {
+  showSequence(sequence) {
     const margin = 0.06 * (sequence.end - sequence.uplift);
     this.go([Math.max(0, sequence.uplift - margin), sequence.end + margin]);
   }
 
   /** Ten times closer to the accumulation point. */
-  deeper() {
+  zoomToRest() {
     const sequence = this.sequences[this.chosen];
     if (!sequence || !this.shown) return;
     const {from, to} = this.shown.header.window;

@@ -1,10 +1,9 @@
-// Two responses over each other: another end of chattering, another block, another motion.
+// Two responses over each other: another treatment of chattering, another block, another motion.
 
 import {Latest, json, payload} from "./api.js";
-import {ends} from "./address.js";
 import {BlockForm, MotionForm, TreatmentForm} from "./forms.js";
 import {Histories} from "./histories.js";
-import {namesOf, parameter, specification} from "./parameters.js";
+import {ends, namesOf, parameter, specification} from "./parameters.js";
 import {counted, fill, legend, make, one, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */

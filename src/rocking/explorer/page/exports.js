@@ -1,6 +1,6 @@
 // What can be saved or copied: figures, data, and the case as code.
 
-import {ends} from "./address.js";
+import {ends} from "./parameters.js";
 import {address} from "./api.js";
 import {make, one, say} from "./words.js";
 
@@ -9,7 +9,7 @@ const FORMS = /** @type {[string, string, boolean][]} */ ([
   ["impacts.csv", "Impacts, CSV", false], ["nc", "All, NetCDF", false],
 ]);
 
-/** Files of a case, which the server makes; figures show its window. @param {import("./address.js").State} state */
+/** Files of a case, which the server makes; figures show its window. @param {import("./parameters.js").State} state */
 export function showFiles(state) {
   one("exports").replaceChildren(...FORMS.map(([form, label, windowed]) => make("a", {
     href: address("/api/export", {...state.texts, form, ...(windowed ? ends(state) : {})}), download: `rocking-response.${form}`,

@@ -19,11 +19,13 @@ class NumberControl {
   constructor(spec, form, prefix = "") {
     this.spec = spec;
     this.form = form;
+    /** Whether somebody types in the field: what arrives meanwhile leaves it as it is. */
+    this.typing = false;
     const id = `${prefix}${spec.name}`;
     this.slider = /** @type {HTMLInputElement} */ (make("input", {
       type: "range", id: `${id}-slider`, min: "0", max: String(STEPS), step: "1", "aria-label": `${spec.label}, slider`, on: {input: () => this.slid()},
     }));
-    this.field = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, inputMode: "decimal", size: 6, "data-argument": spec.name, on: {change: () => this.typed()}}));
+    this.field = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, inputMode: "decimal", size: 6, "data-argument": spec.name, on: {input: () => { this.typing = true; }, change: () => this.typed(), blur: () => { this.typing = false; }}}));
     const [button, words] = spec.explanation ? explained(spec.explanation, spec.label) : [];
     this.element = make("div", {className: "number"}, [
       make("div", {className: "number-head"}, [make("label", {for: id}, [spec.label]), ...(button ? [button] : [])]),
@@ -51,8 +53,9 @@ class NumberControl {
     const {low, high, logarithmic} = this.spec;
     const part = logarithmic ? Math.log(Math.max(value, 1e-300) / low) / Math.log(high / low) : (value - low) / (high - low);
     this.slider.value = String(Math.round(STEPS * Math.min(1, Math.max(0, part))));
-    this.field.value = sent(value);
-    this.slider.setAttribute("aria-valuetext", `${this.field.value} ${this.spec.unit}`.trim());
+    const written = sent(value);
+    if (!this.typing) this.field.value = written;
+    this.slider.setAttribute("aria-valuetext", `${written} ${this.spec.unit}`.trim());
   }
 
   slid() {
@@ -66,6 +69,7 @@ class NumberControl {
   }
 
   typed() {
+    this.typing = false;
     const given = this.field.value.trim().replace("−", "-").replace(",", ".");
     this.show(given !== "" && !Number.isNaN(Number(given)) ? given + this.spec.suffix : given);
     this.form.tell();
@@ -102,8 +106,8 @@ export class BlockForm {
     /** @type {any[] | undefined} sides as they are, for what the texts leave out */
     this.known = undefined;
     this.shape = choice(prefix, "shape", "Given by", specification.shapes.map((/** @type {any} */ each) => [each.name, each.label]), () => this.reshape());
-    this.two = check(`${prefix}two`, "Two different sides", () => this.part());
-    this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => { this.reveal(); this.tell(); });
+    this.two = check(`${prefix}two`, "Two different sides", () => this.separate());
+    this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => { this.showFields(); this.tell(); });
     this.specs = BLOCK.map(parameter);
     /** Controls by name: one for both sides, and one for each. @type {Record<string, {both: NumberControl, pair: NumberControl[]}>} */
     this.controls = Object.fromEntries(this.specs.map((spec) => [spec.name, {
@@ -131,7 +135,7 @@ export class BlockForm {
       if (text) this.put(name, text.split(","));
       else if (name === "restitution" && this.known) this.put(name, this.known.map((side) => sent(side.restitution)));
     }
-    this.reveal();
+    this.showFields();
   }
 
   /** @param {string} name @param {string[]} texts one, or one for each side */
@@ -155,7 +159,7 @@ export class BlockForm {
   }
 
   /** Show the controls that describe the block as it is chosen, and hide the others. */
-  reveal() {
+  showFields() {
     const names = this.names();
     for (const spec of this.specs) {
       const {both, pair} = this.controls[spec.name];
@@ -185,18 +189,18 @@ export class BlockForm {
         if (this.two.box.checked) this.housner.box.checked = false;
       }
     }
-    this.reveal();
+    this.showFields();
     this.tell();
   }
 
   /** Between one set of parameters and a pair of each. */
-  part() {
+  separate() {
     for (const {both, pair} of Object.values(this.controls)) {
       if (this.two.box.checked) for (const side of pair) side.show(both.text);
       else if (pair.length) both.show(pair[0].text);
     }
     if (this.two.box.checked) this.housner.box.checked = false;
-    this.reveal();
+    this.showFields();
     this.tell();
   }
 
@@ -226,23 +230,23 @@ export class MotionForm {
     this.files = [];
     this.given = "";
     this.upwards = "";
-    const tell = () => this.tell(), revealed = () => { this.reveal(); this.tell(); };
-    const another = () => { this.upwards = ""; revealed(); };
+    const tell = () => this.tell(), chosen = () => { this.showFields(); this.tell(); };
+    const another = () => { this.upwards = ""; chosen(); };
     /** @param {string} name */
     const field = (name) => parameter(name).label;
     this.kind = choice(prefix, "kind", "Shaken by", KINDS, another);
     this.record = choice(prefix, "record", field("motion"), specification.records.map((/** @type {any} */ each) => [each.name, each.name]), another);
     this.about = make("p", {className: "derived"});
-    this.pulse = choice(prefix, "pulse", "Pulse", Object.entries(specification.pulses).map(([name, each]) => [name, each.label]), (name) => { this.furnish(name); revealed(); });
+    this.pulse = choice(prefix, "pulse", "Pulse", Object.entries(specification.pulses).map(([name, each]) => [name, each.label]), (name) => { this.showPulse(name); chosen(); });
     this.numbers = make("div");
-    this.channel = choice(prefix, "channel", field("channel"), [], revealed);
-    this.vertical = choice(prefix, "vertical", field("vertical"), [["", "none"]], (value) => { this.upwards = value; revealed(); });
+    this.channel = choice(prefix, "channel", field("channel"), [], chosen);
+    this.vertical = choice(prefix, "vertical", field("vertical"), [["", "none"]], (value) => { this.upwards = value; chosen(); });
     this.units = choice(prefix, "units", field("units"), specification.units.map((/** @type {string} */ each) => [each, each]), tell);
     const {label, unit, default: step} = parameter("dt");
     const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, value: step, "data-argument": "dt", on: {change: tell}}));
     this.dt = {field: dt, element: make("div", {className: "choice"}, [make("label", {className: "field", for: dt.id}, [`${label}, ${unit}`]), dt])};
     this.start = new NumberControl(parameter("initial_rotation"), this, prefix);
-    this.scale = choice(prefix, "scaled", "Scaled", specification.scalings, revealed);
+    this.scale = choice(prefix, "scaled", "Scaled", specification.scalings, chosen);
     /** @type {NumberControl[]} */
     this.scales = specification.scalings.slice(1).map((/** @type {string[]} */ [name]) => new NumberControl(parameter(name), this, prefix));
     this.period = new NumberControl(specification.period, this, prefix);
@@ -250,11 +254,11 @@ export class MotionForm {
       this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.channel.element, this.vertical.element, this.units.element,
       this.dt.element, this.start.element, this.scale.element, ...this.scales.map((each) => each.element), this.period.element,
     );
-    this.furnish("sine");
+    this.showPulse("sine");
   }
 
   /** Numbers and choices of a pulse. @param {string} name */
-  furnish(name) {
+  showPulse(name) {
     const {parameters, choices} = specification.pulses[name];
     this.family = name;
     /** @type {NumberControl[]} */
@@ -275,7 +279,7 @@ export class MotionForm {
     if (kind === "given") this.given = motion;
     if (kind === "pulse") {
       this.pulse.select.value = family;
-      if (this.family !== family) this.furnish(family);
+      if (this.family !== family) this.showPulse(family);
       const parts = Object.fromEntries(motion.slice(family.length + 1).split(",").map((part) => part.split("=")));
       for (const each of this.controls ?? []) if (parts[each.spec.name]) each.show(parts[each.spec.name]);
       for (const each of this.choices ?? []) each.select.value = parts[each.name] ?? each.select.value;
@@ -286,12 +290,12 @@ export class MotionForm {
     this.upwards = texts.vertical ?? "";
     if (texts.units) this.units.select.value = texts.units;
     if (texts.dt) this.dt.field.value = texts.dt;
-    this.reveal();
-    void this.recall(texts);
+    this.showFields();
+    void this.fetchFiles(texts);
   }
 
   /** Learn what the files of a link are, which the server has kept. @param {Texts} texts */
-  async recall(texts) {
+  async fetchFiles(texts) {
     const [moving, upwards] = [texts.motion, texts.vertical].map((name) => /^file:([^#]*)/.exec(name ?? "")?.[1]);
     for (const key of new Set([moving, upwards])) {
       if (!key || this.files.some((file) => file.key === key)) continue;
@@ -300,7 +304,7 @@ export class MotionForm {
     const known = this.files.find((file) => file.key === moving);
     if (known && known !== this.file) this.use(known);
     if (known && texts.channel) this.channel.select.value = texts.channel;
-    if (moving || upwards) this.reveal();
+    if (moving || upwards) this.showFields();
   }
 
   /** Let a file shake the block. @param {any} file */
@@ -319,7 +323,7 @@ export class MotionForm {
       this.kind.select.value = "file";
       this.scale.select.value = "";
     }
-    this.reveal();
+    this.showFields();
     this.tell();
   }
 
@@ -348,7 +352,7 @@ export class MotionForm {
   }
 
   /** Show the fields that belong to the motion as it is chosen, and hide the others. */
-  reveal() {
+  showFields() {
     const kind = this.kind.select.value, scaled = this.scale.select.value, scalable = kind !== "none" && kind !== "pulse";
     for (const option of this.kind.select.options) option.hidden = (option.value === "given" && !this.given) || (option.value === "file" && !this.file && kind !== "file");
     this.record.element.hidden = kind !== "record";
@@ -407,14 +411,14 @@ export class TreatmentForm {
   constructor(element, changed, {prefix = "", label = parameter("chattering").label} = {}) {
     this.changed = changed;
     const {treatments} = specification;
-    this.kind = choice(prefix, "treatment", label, treatments.map((/** @type {any} */ each) => [each.name, each.label]), () => { this.reveal(); this.tell(); });
+    this.kind = choice(prefix, "treatment", label, treatments.map((/** @type {any} */ each) => [each.name, each.label]), () => { this.showFields(); this.tell(); });
     this.kind.select.dataset.argument = "chattering";
     this.about = make("p", {className: "derived"});
     /** @type {Record<string, NumberControl>} */
     this.limits = {};
     for (const {name, limit} of treatments) if (limit) this.limits[name] = new NumberControl(limit, this, `${prefix}${name}-`);
     element.append(this.kind.element, this.about, ...Object.values(this.limits).map((each) => each.element));
-    this.reveal();
+    this.showFields();
   }
 
   /** @param {Texts} texts */
@@ -422,10 +426,10 @@ export class TreatmentForm {
     const [name, value] = (texts.chattering ?? "certified").split("=");
     this.kind.select.value = name;
     if (value) this.limits[name]?.show(value);
-    this.reveal();
+    this.showFields();
   }
 
-  reveal() {
+  showFields() {
     const name = this.kind.select.value;
     this.about.textContent = specification.treatments.find((/** @type {any} */ each) => each.name === name)?.explanation ?? "";
     for (const [each, control] of Object.entries(this.limits)) control.element.hidden = each !== name;

@@ -61,7 +61,7 @@ export class Histories {
     /** @type {any[]} */
     this.cursors = [];
     this.made = false;
-    this.quiet = false;
+    this.drawing = false;
     element.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -73,7 +73,7 @@ export class Histories {
     this.rotation.left[0].axis_label = "rotation / slenderness";
     this.ground.left[0].axis_label = "ground (g)";
     this.rotation.below[0].visible = false;
-    for (const each of [this.rotation, this.ground]) this.furnish(each);
+    for (const each of [this.rotation, this.ground]) this.addTools(each);
     this.glyphs();
     this.cursors = [this.rotation, this.ground].map((plot) => this.vertical(plot));
     const grid = B.Plotting.gridplot([[this.rotation], [this.ground]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false});
@@ -92,7 +92,7 @@ export class Histories {
   }
 
   /** @param {any} plot */
-  furnish(plot) {
+  addTools(plot) {
     const B = bokeh();
     if (!coarse()) {
       const zoom = new B.BoxZoomTool({dimensions: "width"});
@@ -178,13 +178,23 @@ export class Histories {
     this.drawn = [first, second];
     this.thresholds = first.block.thresholds_g;
     this.scale = new Scale(from, to);
-    Object.assign(this.element.dataset, {origin: String(this.scale.origin), unit: String(this.scale.unit)});
-    this.quiet = true;
+    const {dataset} = this.element, origin = String(this.scale.origin), unit = String(this.scale.unit);
+    if (dataset.origin !== origin || dataset.unit !== unit) Object.assign(dataset, {origin, unit});
+    this.drawing = true;
     for (const plot of [this.rotation, this.ground]) plot.hold_render = true;
     this.x.setv({start: this.scale.plotted(from), end: this.scale.plotted(to)});
     this.ground.below[0].axis_label = this.scale.label;
-    const heights = this.drawn.map((drawn, k) => (drawn ? this.line(NAMES[k], drawn) : this.blank(NAMES[k])));
-    const [low, high] = [Math.min(...heights.map((each) => each[0])), Math.max(...heights.map((each) => each[1]))];
+    let low = 0, high = 0;
+    for (const [k, drawn] of this.drawn.entries()) {
+      const name = NAMES[k];
+      if (!drawn) { this.clear(name); continue; }
+      const {lines, block: {sides}} = drawn;
+      const y = lines.rotation.map((each) => each / sides[each >= 0 ? 0 : 1].alpha);
+      for (const each of y) { if (each < low) low = each; if (each > high) high = each; }
+      this.sources[name].data = {x: this.scale.all(lines.time, from), y};
+      this.sources[`${name}-ground`].data = {x: this.scale.all(lines.ground_time, from), y: lines.ground_g};
+    }
+    this.drawThresholds(first.lines);
     this.frame(low, high);
     const rests = first.rest;
     const ends = Array.from({length: rests.length / 2}, (_, k) => [rests[2 * k], rests[2 * k + 1]]);
@@ -194,72 +204,37 @@ export class Histories {
       to: Float64Array.from(seen, ([, end]) => this.scale.plotted(Math.min(end, to))),
     };
     for (const plot of [this.rotation, this.ground]) plot.hold_render = false;
-    this.quiet = false;
+    this.drawing = false;
   }
 
-  /** @param {string} name @param {Drawn} drawn @returns {[number, number]} */
-  line(name, drawn) {
-    const {lines, block: {sides}} = drawn;
-    const from = this.window[0];
-    const y = lines.rotation.map((each) => each / sides[each >= 0 ? 0 : 1].alpha);
-    this.sources[name].data = {x: this.scale.all(lines.time, from), y};
-    this.sources[`${name}-ground`].data = {x: this.scale.all(lines.ground_time, from), y: lines.ground_g};
-    if (name === NAMES[0]) {
-      this.weigh(lines.weight);
-      for (const sign of SIGNS) this.beyond(sign, lines.weight);
-    }
-    let low = 0, high = 0;
-    for (const each of y) { if (each < low) low = each; if (each > high) high = each; }
-    return [low, high];
-  }
-
-  /** Vertical acceleration, and the thresholds that move with it. @param {Float64Array} [weight] */
-  weigh(weight) {
-    const none = new Float64Array(0);
+  /** What of the ground motion is beyond the threshold of a side; under a vertical component, that and the thresholds, which it moves.
+   * @param {Lines} lines */
+  drawThresholds({ground_g: y, weight}) {
     const {x} = this.sources[`${NAMES[0]}-ground`].data;
     const [plus, minus] = this.thresholds;
     for (const level of this.levels.threshold) level.visible = !weight;
     if (weight) this.sources.vertical.data = {x, y: weight.map((each) => each - 1), plus: weight.map((each) => minus * each), minus: weight.map((each) => -plus * each)};
-    else if (this.sources.vertical.data.x.length) this.sources.vertical.data = {x: none, y: none, plus: none, minus: none};
-  }
-
-  /** What of the ground motion is beyond the threshold of a side, and one point before and after it.
-   * @param {number} sign @param {Float64Array} [weight] */
-  beyond(sign, weight) {
-    const {x, y} = this.sources[`${NAMES[0]}-ground`].data;
-    const [plus, minus] = this.thresholds;
-    const still = sign > 0 ? minus : plus;
-    /** @type {number[]} */
-    const seen = [], cut = [], line = [], levels = [];
-    let before = false, over = x.length > 0 && sign * y[0] > still * (weight?.[0] ?? 1);
-    for (let k = 0; k < x.length; k += 1) {
-      const after = k + 1 < x.length && sign * y[k + 1] > still * (weight?.[k + 1] ?? 1);
-      if (before || over || after) {
-        const level = sign * still * (weight?.[k] ?? 1);
-        // Between two stretches the area is of no height, and the line has a gap.
-        if (seen.length && !over && !before) { seen.push(x[k]); cut.push(level); levels.push(level); line.push(NaN); }
-        seen.push(x[k]);
-        cut.push(over ? y[k] : level);
-        levels.push(level);
-        line.push(cut[cut.length - 1]);
-      }
-      [before, over] = [over, after];
+    else this.empty("vertical");
+    for (const sign of SIGNS) {
+      const still = sign > 0 ? minus : plus;
+      const found = weight ? beyond(x, y, sign, still, weight) : beyond(x, y, sign, still);
+      if (found.x.length) this.sources[`beyond${sign}`].data = found;
+      else this.empty(`beyond${sign}`);
     }
-    const [xs, ys, lines, bases] = [seen, cut, line, levels].map((each) => Float64Array.from(each));
-    this.sources[`beyond${sign}`].data = {x: xs, y: ys, line: lines, level: bases};
   }
 
-  /** @param {string} name @returns {[number, number]} */
-  blank(name) {
-    const none = new Float64Array(0);
-    if (!this.sources[name].data.x.length) return [0, 0];
-    this.sources[name].data = {x: none, y: none};
-    this.sources[`${name}-ground`].data = {x: none, y: none};
-    this.sources[`${name}-impact`].data = {x: none, y: none};
-    return [0, 0];
+  /** Remove the line of a response, its ground motion and its impacts. @param {string} name */
+  clear(name) {
+    for (const each of [name, `${name}-ground`, `${name}-impact`]) this.empty(each);
   }
 
-  /** Heights of both plots, and the marks that stand at their feet. @param {number} low @param {number} high */
+  /** Remove what a source holds; one that is empty would be painted again for nothing. @param {string} name */
+  empty(name) {
+    const source = this.sources[name], {data} = source;
+    if (Object.values(data)[0].length) source.data = Object.fromEntries(Object.keys(data).map((column) => [column, new Float64Array(0)]));
+  }
+
+  /** Heights of both plots, and the marks at their bottom. @param {number} low @param {number} high */
   frame(low, high) {
     const [bottom, top] = [Math.max(low, -1.6), Math.min(high, 1.6)];
     const span = top - bottom || (this.drawn[0]?.lines.rotation.length ? 1e-3 : 1);
@@ -278,8 +253,8 @@ export class Histories {
     for (const [k, drawn] of this.drawn.entries()) {
       if (!drawn) continue;
       const x = this.scale.all(drawn.lines.impact, from);
-      const foot = start + (0.045 + 0.075 * k) * (end - start);
-      this.sources[`${NAMES[k]}-impact`].data = {x, y: new Float64Array(x.length).fill(foot)};
+      const height = start + (0.045 + 0.075 * k) * (end - start);
+      this.sources[`${NAMES[k]}-impact`].data = {x, y: new Float64Array(x.length).fill(height)};
     }
     const uplifts = (this.drawn[0]?.uplift ?? new Float64Array(0)).filter((each) => each >= this.window[0] && each <= this.window[1]);
     this.sources.uplift.data = {
@@ -290,7 +265,7 @@ export class Histories {
 
   /** The range was changed by a tool. */
   ranged() {
-    if (this.quiet) return;
+    if (this.drawing) return;
     window.clearTimeout(this.waiting);
     this.waiting = window.setTimeout(() => {
       this.go([this.scale.time(this.x.start), this.scale.time(this.x.end)]);
@@ -349,6 +324,34 @@ export class Histories {
     const width = this.window[1] - this.window[0];
     this.tell.cursor(`${time.toFixed(decimals(width))} s: θ = ${short(theta / alpha)} α = ${short((theta * 180) / Math.PI)}°, ground ${short(ground)} g`);
   }
+}
+
+/** Points of a ground motion beyond a threshold, one before and one after each stretch, and the area between.
+ * @param {Float64Array} x @param {Float64Array} y @param {number} sign @param {number} still threshold without vertical motion @param {Float64Array} [weight] */
+function beyond(x, y, sign, still, weight) {
+  /** @type {number[]} */
+  const seen = [];
+  let before = false, over = x.length > 0 && sign * y[0] > (weight ? still * weight[0] : still);
+  for (let k = 0; k < x.length; k += 1) {
+    const after = k + 1 < x.length && sign * y[k + 1] > (weight ? still * weight[k + 1] : still);
+    // Between two stretches the area is of no height, and the line has a gap.
+    if (seen.length && !over && !before && after) seen.push(-k - 1);
+    if (before || over || after) seen.push(k);
+    before = over;
+    over = after;
+  }
+  const count = seen.length;
+  const found = {x: new Float64Array(count), y: new Float64Array(count), level: new Float64Array(count), line: new Float64Array(count)};
+  seen.forEach((place, n) => {
+    const k = place < 0 ? -place - 1 : place;
+    const level = sign * still * (weight ? weight[k] : 1);
+    const height = sign * y[k] > sign * level ? y[k] : level;
+    found.x[n] = x[k];
+    found.y[n] = height;
+    found.level[n] = level;
+    found.line[n] = place < 0 ? NaN : height;
+  });
+  return found;
 }
 
 /** Value of a line at a time. @param {Float64Array} times @param {Float64Array} values @param {number} time */

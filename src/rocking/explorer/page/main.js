@@ -1,23 +1,22 @@
 // The page: one state, in its address; forms that change it, and four views that show it.
 
-import * as address from "./address.js";
+import {ends, readAddress, specification, writeAddress} from "./parameters.js";
 import {Latest, Problem, json, payload} from "./api.js";
 import {ChatteringPanel} from "./chattering.js";
 import {makeCopying, showCode, showFiles} from "./exports.js";
 import {BlockForm, ModelForm, MotionForm} from "./forms.js";
 import {Histories} from "./histories.js";
-import {specification} from "./parameters.js";
 import {coarse} from "./theme.js";
 import {acceptFiles} from "./upload.js";
 import {counted, legend, make, one, say, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
-const state = address.read();
+const state = readAddress();
 
 /** What the views share.
- * @type {{state: address.State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, remember: () => void}} */
-const page = {state, shown: null, go, problem, restate, remember: () => address.write(state)};
+ * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, remember: () => void}} */
+const page = {state, shown: null, go, problem, restate, remember: () => writeAddress(state)};
 /** @type {Record<string, any>} */
 const views = {};
 
@@ -35,6 +34,7 @@ const problems = {};
 /** Say what is wrong, or that nothing is, and mark the field that is wrong. @param {unknown} error @param {string} [place] id of what holds the field */
 function problem(error, place = "settings") {
   if (error instanceof DOMException && error.name === "AbortError") return;
+  if (!error && !problems[place]) return;
   if (error && !(error instanceof Problem)) console.error(error);
   problems[place] = error instanceof Problem ? error.message : error ? `The page has a fault: ${error}` : null;
   for (const each of one(place).querySelectorAll("[aria-invalid]")) each.removeAttribute("aria-invalid");
@@ -59,14 +59,14 @@ let pause = 0;
 /** The whole case, where a form has changed it. */
 const load = new Latest(async () => {
   window.clearTimeout(pause);
-  page.shown = await payload("/api/case", {...state.texts, ...address.ends(state)});
+  page.shown = await payload("/api/case", {...state.texts, ...ends(state)});
   draw();
   counted("drawn");
-  pause = window.setTimeout(() => rest.ask(), PAUSE);
+  pause = window.setTimeout(() => afterPause.ask(), PAUSE);
 }, problem);
 
 /** What nobody reads while a slider moves. */
-const rest = new Latest(async () => {
+const afterPause = new Latest(async () => {
   pause = 0;
   if (!page.shown) return;
   const {header} = page.shown, {texts} = state;
@@ -87,7 +87,7 @@ const rest = new Latest(async () => {
 const look = new Latest(async () => {
   if (!page.shown) return;
   if (!state.window) { await load.work(); return; }
-  const {header, arrays} = await payload("/api/window", {...state.texts, ...address.ends(state)});
+  const {header, arrays} = await payload("/api/window", {...state.texts, ...ends(state)});
   page.shown.header.window = header.window;
   Object.assign(page.shown.arrays, arrays);
   draw();
@@ -99,7 +99,7 @@ const look = new Latest(async () => {
 /** @param {[number, number] | null} chosen */
 function showWindow(chosen) {
   state.window = chosen;
-  address.write(state);
+  writeAddress(state);
   void look.ask();
 }
 
@@ -108,7 +108,7 @@ function changed(texts, replaced) {
   if (replaced.includes("motion") && state.texts.motion !== texts.motion) state.window = null;
   const kept = Object.entries(state.texts).filter(([name]) => !replaced.includes(name));
   state.texts = {...Object.fromEntries(kept), ...texts};
-  address.write(state);
+  writeAddress(state);
   if (state.view === "map" || state.view === "compare") views[state.view].update();
   void load.ask();
 }
@@ -135,7 +135,7 @@ async function go(name) {
   one("figures").hidden = name === "block";
   if (name === "block") histories.size(190, 140);
   else if (name === "response") histories.size(290, 190);
-  address.write(state);
+  writeAddress(state);
   for (const [each, view] of Object.entries(views)) if (each !== name) { view.leave?.(); problem(null, `view-${each}`); }
   if (name !== "response" && !views[name]) {
     const module = await import(`./${name}.js`);
@@ -155,7 +155,7 @@ function draw() {
   const [plus, minus] = header.block.thresholds_g;
   const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
     `p = ${short(side.p)} rad/s, α = ${short((side.alpha * 180) / Math.PI)}°, η = ${short(side.restitution)}; lifts above ${short([plus, minus][k])} g`);
-  one("derived").textContent = right === left ? `${right}.` : `To the right ${right}. To the left ${left}.`;
+  put(one("derived"), right === left ? `${right}.` : `To the right ${right}. To the left ${left}.`);
   if (state.view === "response" || state.view === "block") {
     const lines = /** @type {any} */ (arrays);
     histories.draw(header, {lines, rest: arrays.rest, uplift: arrays.uplift, block: header.block});
@@ -186,8 +186,9 @@ function showFigures(header) {
   ];
   const list = one("figures");
   if (!list.childNodes.length) list.append(...rows.map(([name]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, ["", make("small")])])));
+  const values = list.getElementsByTagName("dd");
   rows.forEach(([, value, more], k) => {
-    const [number, small] = list.querySelectorAll("dd")[k].childNodes;
+    const [number, small] = values[k].childNodes;
     put(number, value);
     put(small, more);
   });

@@ -147,7 +147,7 @@ export class View {
       const wide = map.quantity === "peak" || map.quantity === "mode";
       for (const [k, end] of ["from", "to"].entries()) {
         const field = /** @type {HTMLInputElement} */ (one(`map-${which}-${end}`));
-        field.value = map[`${which}_${end}`] ?? String((wide ? axis.wide : axis.close)[k]);
+        if (document.activeElement !== field) field.value = map[`${which}_${end}`] ?? String((wide ? axis.wide : axis.close)[k]);
       }
     }
   }
@@ -182,7 +182,7 @@ export class View {
       done += this.take(frame);
       const [rows, columns] = this.about.shape;
       /** @type {HTMLProgressElement} */ (one("map-progress")).value = done / (rows * columns);
-      this.soon(started);
+      this.recolourSoon(started);
       if (!body.first || body.firstOf !== String(started)) { body.first = String(performance.now() - started); body.firstOf = String(started); }
     }
     this.complete = true;
@@ -215,7 +215,7 @@ export class View {
 
   /** Recolour soon, once: at first at every change, later after a part of the time that the map has taken so far, so that
    * painting takes little from computing, which is done on the same cores. @param {number} started */
-  soon(started) {
+  recolourSoon(started) {
     if (this.waiting) return;
     const wait = Math.max(90, 0.1 * (performance.now() - started));
     this.waiting = window.setTimeout(() => { this.waiting = 0; if (!this.complete) this.recolour(); }, wait);

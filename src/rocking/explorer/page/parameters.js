@@ -1,7 +1,10 @@
-// What the server says about the parameters of a case: the address and the forms are built from it.
+// What the server says about the parameters of a case, from which the forms are built; and the state of the page, as the
+// address has it: whoever opens the link sees the same.
 
 import {json} from "./api.js";
 
+/** @typedef {import("./api.js").Texts} Texts */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts}} State */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
 
 /** @type {any} */
@@ -13,3 +16,60 @@ export const parameter = (name) => specification.parameters.find((/** @type {Par
 /** Names of the texts of a case, of some groups or of all. @param {string[]} groups @returns {string[]} */
 export const namesOf = (...groups) =>
   specification.parameters.filter((/** @type {Parameter} */ each) => !groups.length || groups.includes(each.group)).map((/** @type {Parameter} */ each) => each.name);
+
+const VIEWS = ["response", "block", "map", "compare"];
+
+/** @returns {State} */
+export function readAddress() {
+  const given = new URLSearchParams(location.search);
+  /** @param {string[]} names @param {string} [prefix] @returns {Texts} */
+  const those = (names, prefix = "") =>
+    Object.fromEntries(names.map((name) => [name, given.get(prefix + name) ?? ""]).filter(([, text]) => text));
+  const texts = those(namesOf());
+  const {view: first, ...opening} = specification.opening;
+  const view = given.get("view") ?? first ?? "response";
+  const from = Number(given.get("from") ?? NaN), to = Number(given.get("to") ?? NaN);
+  return {
+    view: VIEWS.includes(view) ? view : "response",
+    texts: complete(Object.keys(texts).length ? texts : opening),
+    other: those(namesOf(), "other."),
+    compare: given.get("compare") ?? "treatment",
+    window: from < to ? [from, to] : null,
+    map: those(specification.map),
+  };
+}
+
+/** Texts with a block, where they have none. @param {Texts} texts @returns {Texts} */
+function complete(texts) {
+  const {width, height} = specification.default;
+  if (!Object.keys(texts).length) return {...specification.default};
+  return ["width", "p", "pivots"].some((name) => name in texts) ? texts : {width, height, ...texts};
+}
+
+/** @param {State} state */
+function query(state) {
+  const given = new URLSearchParams();
+  /** @param {Texts} texts @param {string[]} names @param {string} [prefix] */
+  const put = (texts, names, prefix = "") => { for (const name of names) if (texts[name]) given.set(prefix + name, texts[name]); };
+  if (state.view !== "response") given.set("view", state.view);
+  put(state.texts, namesOf());
+  if (state.view === "compare") {
+    given.set("compare", state.compare);
+    put(state.other, namesOf(), "other.");
+  }
+  if (state.view === "map") put(state.map, specification.map);
+  put(ends(state), ["from", "to"]);
+  return given.toString();
+}
+
+/** The window as texts. @param {State} state @returns {Texts} */
+export const ends = ({window: chosen}) => (chosen ? {from: String(chosen[0]), to: String(chosen[1])} : {});
+
+let waiting = 0;
+
+/** Write the state into the address, at most a few times a second.
+ * @param {State} state */
+export function writeAddress(state) {
+  window.clearTimeout(waiting);
+  waiting = window.setTimeout(() => history.replaceState(null, "", `?${query(state)}`), 150);
+}

@@ -18,17 +18,17 @@ Every positive root of U/t with x + t < pi is the first one. From the first impa
 uplift, both restoring accelerations are positive, so once an arc has come down to zero, U'' = delta U - g < 0 keeps
 it below. Hence no search for an earlier root; and an arc that is still up at x = pi proves incomplete chattering.
 
-Under slow forcing an arc grows like exp(t/omega), beyond the range of a double. All that is asked of a long arc is
-its sign and its root, which a positive factor leaves as they are: there the basis is taken times exp(-t/omega).
+Under slow forcing an arc grows like exp(t/omega), beyond the range of a double. Of a long arc only the sign and the
+root are needed, which a positive factor does not change: there the basis is multiplied by exp(-t/omega).
 
-What becomes of an arc or of a sequence is a `Verdict`, never a number that is NaN or infinite.
+The result for an arc or a sequence is a `Verdict`, never a number that is NaN or infinite.
 """
 
 from enum import IntEnum
 
 
 class Verdict(IntEnum):
-    """What becomes of an arc or of a sequence."""
+    """The result for an arc or a sequence."""
 
     #: The impact, or the phase of rest, is found (the latter with a proof).
     FOUND = 0

@@ -1,10 +1,11 @@
 """One arc: the functions of time that it is a sum of, its duration and impact, and the first arc beyond half a period.
 
-Beyond half a period the ground pulls the block down and pushes it up in turn: the first side's restoring acceleration
-P = 1 - cos x - kappa sin x is negative in the first part of each period, up to 2 arctan(kappa), and positive in the
-second. Where it is positive, an arc that has come down to zero goes on falling (U'' = delta U - P), so that its sign at
-the end shows whether it has ended. Where it is negative, the height is convex as long as it is positive, so that its
-lowest point shows it.
+Beyond half a period the first side's restoring acceleration P = 1 - cos x - kappa sin x is negative in the first part
+of each period, up to 2 arctan(kappa), and positive in the second. Where it is positive, an arc that has come down to
+zero goes on falling (U'' = delta U - P), so that its sign at the end shows whether there is an impact. Where it is
+negative, the height is convex as long as it is positive, so that its minimum shows it.
+
+No number may be NaN; a search that finds nothing is UNRESOLVED.
 """
 
 import math
@@ -29,7 +30,7 @@ _INVERSE_FACTORIAL: Final = tuple(1.0 / math.factorial(k) for k in range(2 * LON
 
 
 class Basis(NamedTuple):
-    """Values at a time t; E and W, which grow, are scaled by the positive factor ``decay``.
+    """Values at a time t; E and W, which grow exponentially, are multiplied by ``decay`` > 0.
 
     With S = sinh(sqrt(delta) t)/sqrt(delta) and C = (cosh(sqrt(delta) t) - 1)/delta,
     t^3 E = (S - sin t)/(1 + delta) and t^4 W = (C - 1 + cos t)/(1 + delta).
@@ -44,7 +45,7 @@ class Basis(NamedTuple):
 
 @inlined
 def summed_basis(q: float, delta: float, order: int) -> Basis:
-    """Add up powers of q = t^2; decay is one."""
+    """Compute the basis as a sum of powers of q = t^2; decay is one."""
     sine = 1.0
     versine = _INVERSE_FACTORIAL[2]
     E = _INVERSE_FACTORIAL[3]
@@ -66,7 +67,7 @@ def summed_basis(q: float, delta: float, order: int) -> Basis:
 
 @inlined
 def closed_basis(t: float, delta: float) -> Basis:
-    """Follow the definitions, for long arcs; decay is exp(-sqrt(delta) t), so that nothing overflows."""
+    """Compute the basis by its definition, for long arcs; decay is exp(-sqrt(delta) t), so that nothing overflows."""
     q = t * t
     growth = math.sqrt(delta) * t
     decay = math.exp(-growth)
@@ -80,7 +81,7 @@ def closed_basis(t: float, delta: float) -> Basis:
 
 @shared
 def basis(t: float, delta: float) -> Basis:
-    """Return the basis at any t > 0: by the shortest sum of full precision, in closed form where there is none."""
+    """Basis at any t > 0: by the shortest sum of full precision, by definition where there is none."""
     q = t * t
     reach = q * (1.0 + delta)
     if reach < REACH_SHORT:
@@ -104,7 +105,7 @@ _LARGEST_CORRECTION: Final = 1e-4
 _CORRECTIONS: Final = 3
 _MAXIMUM_STEPS: Final = 400
 
-#: Growth sqrt(delta) t above which a search only halves: a landing there is within rounding of none.
+#: Growth sqrt(delta) t above which a search only halves: an impact there is within rounding of none.
 _LARGEST_GROWTH: Final = 100.0
 
 _SIXTH: Final = 1.0 / 6.0
@@ -118,8 +119,8 @@ class State(NamedTuple):
     D: float
 
 
-class Landing(NamedTuple):
-    """An estimate's correction: duration, state just before the impact (V is positive), and size of the correction."""
+class Correction(NamedTuple):
+    """A corrected duration, the state just before the impact (V is positive), and the size of the correction."""
 
     t: float
     impact: State
@@ -133,10 +134,10 @@ def pull(P: float, s: float) -> float:
 
 
 @inlined
-def guess_landing(start: State, s: float, delta: float) -> float:
+def estimated_duration(start: State, s: float, delta: float) -> float:
     """Estimate the duration of a short arc: root of the series to t^2, then one Newton step on it to t^3.
 
-    Times a reciprocal, here and below: a compiler may not turn the division by a constant into a product.
+    Reciprocals are written out, here and below: a compiler may not replace the division by a constant by a product.
     """
     V, P, D = start
     G = pull(P, s)
@@ -150,11 +151,8 @@ def guess_landing(start: State, s: float, delta: float) -> float:
 
 
 @inlined
-def guess_brief(start: State, s: float, delta: float) -> float:
-    """Estimate the duration of a brief arc: root of the series to t^2, itself expanded in the speed.
-
-    For an arc that is `brief` it errs by less than a relative 1e-4, and without square root or second division.
-    """
+def estimated_brief_duration(start: State, s: float, delta: float) -> float:
+    """Estimate the duration of a brief arc to a relative 1e-4: root of the series to t^2, expanded in the speed."""
     V, P, D = start
     inverse = 1.0 / pull(P, s)
     curved = (2.0 / 3.0) * V * inverse * inverse * (delta * V - s * D)
@@ -162,12 +160,12 @@ def guess_brief(start: State, s: float, delta: float) -> float:
 
 
 @inlined
-def brief(entered: State, delta: float) -> bool:
-    """Whether both arcs after entering the second side are brief: little growth, and accelerations change little."""
+def is_brief(entered: State, delta: float) -> bool:
+    """Whether both arcs after entering the second side are brief: little growth, small changes of acceleration."""
     V, P, D = entered
     least = min(P, 2.0 - P)
-    turning = V * (delta * V + abs(D)) <= 0.03 * (least * least)
-    return turning & (V * V * (1.0 + delta * least) <= 1.5e-4 * (least * least * least))
+    steady = V * (delta * V + abs(D)) <= 0.03 * (least * least)
+    return steady & (V * V * (1.0 + delta * least) <= 1.5e-4 * (least * least * least))
 
 
 @inlined
@@ -192,11 +190,11 @@ def rise(t: float, start: State, s: float, delta: float, at: Basis) -> float:
 
 
 @inlined
-def land(t: float, start: State, s: float, delta: float, at: Basis) -> Landing:
+def corrected_duration(t: float, start: State, s: float, delta: float, at: Basis) -> Correction:
     """Correct an estimate t of an arc's duration to fourth order; ``at`` is the basis at t.
 
-    The size is that of Newton's step, larger where the arc lands flat: relative to t, its fourth power is the error.
-    Not that of the whole correction, which vanishes at places that are no roots, too.
+    The size is that of Newton's step, increased where the impact speed is small: relative to t, its fourth power is the
+    error. The size of the whole correction would be no measure: it is zero also where there is no root.
     """
     P, D = start.P, start.D
     q = t * t
@@ -217,37 +215,37 @@ def land(t: float, start: State, s: float, delta: float, at: Basis) -> Landing:
     mean = 1.0 - P_there
     P_impact = P_there + dt * (D_there + dt * (0.5 * mean - dt * D_there * _SIXTH))
     D_impact = D_there + dt * (mean - dt * (0.5 * D_there + dt * mean * _SIXTH))
-    return Landing(t + dt, State(impact_speed, P_impact, D_impact), abs(newton) * (1.0 + abs(t * c2)))
+    return Correction(t + dt, State(impact_speed, P_impact, D_impact), abs(newton) * (1.0 + abs(t * c2)))
 
 
 @inlined
-def precise(landing: Landing, t: float, delta: float) -> bool:
-    """Whether the correction of the estimate t was small enough to be the last; never for NaN."""
+def is_precise(correction: Correction, t: float, delta: float) -> bool:
+    """Whether the correction of the estimate t is small enough to be the last; False for NaN."""
     reach = t * t * (1.0 + delta)
-    return landing.change * landing.change * (1.0 + reach) <= _LARGEST_CORRECTION * _LARGEST_CORRECTION * (t * t)
+    return correction.change * correction.change * (1.0 + reach) <= _LARGEST_CORRECTION * _LARGEST_CORRECTION * (t * t)
 
 
 @shared
 def arc(start: State, t: float, s: float, delta: float, left: float) -> tuple[int, float, State]:
     """Duration of an arc and state just before its impact, from an estimate t of the duration.
 
-    Status: FOUND; INCOMPLETE if it is still up when the time ``left`` to x = pi is over; UNRESOLVED.
+    Status: FOUND; INCOMPLETE if it is still up after the time ``left`` to x = pi; UNRESOLVED.
     """
     for _ in range(_CORRECTIONS):
         if not (0.0 < t < left and delta * t * t < _LARGEST_GROWTH**2):
             break
-        landing = land(t, start, s, delta, basis(t, delta))
-        if precise(landing, t, delta) and landing.t < left:
-            return Verdict.FOUND, landing.t, landing.impact
-        t = landing.t
+        correction = corrected_duration(t, start, s, delta, basis(t, delta))
+        if is_precise(correction, t, delta) and correction.t < left:
+            return Verdict.FOUND, correction.t, correction.impact
+        t = correction.t
     return bracketed_arc(start, s, delta, left)
 
 
 @shared
 def bracketed_arc(start: State, s: float, delta: float, left: float) -> tuple[int, float, State]:
-    """Find the same between bounds, where the estimate leads nowhere: a long arc, or one that never ends.
+    """Find the same in a bracket, where the corrections do not converge: a long arc, or one that never ends.
 
-    A corrected estimate is taken where the bounds are closing in at least as fast as by halving.
+    A corrected estimate is tried where the bracket was at least halved by the one before.
     """
     if outlasts(start, s, delta, left):
         return Verdict.INCOMPLETE, left, start
@@ -259,34 +257,34 @@ def bracketed_arc(start: State, s: float, delta: float, left: float) -> tuple[in
         at = basis(t, delta)
         corrected = 0.0
         if delta * t * t < _LARGEST_GROWTH**2:
-            landing = land(t, start, s, delta, at)
-            if precise(landing, t, delta) and landing.t < left:
-                return Verdict.FOUND, landing.t, landing.impact
-            corrected = landing.t
+            correction = corrected_duration(t, start, s, delta, at)
+            if is_precise(correction, t, delta) and correction.t < left:
+                return Verdict.FOUND, correction.t, correction.impact
+            corrected = correction.t
         if height(t, start, s, delta, at) > 0.0:
             low = t
         else:
             high = t
-        closing_in = high - low <= 0.5 * width
+        halved = high - low <= 0.5 * width
         width = high - low
-        t = corrected if closing_in and low < corrected < high else 0.5 * (low + high)
+        t = corrected if halved and low < corrected < high else 0.5 * (low + high)
     return Verdict.UNRESOLVED, left, start
 
 
 @inlined
 def outlasts(start: State, s: float, delta: float, left: float) -> bool:
-    """Whether an arc is still up when the time ``left`` to x = pi is over."""
+    """Whether an arc is still up after the time ``left`` to x = pi."""
     return height(left, start, s, delta, basis(left, delta)) >= 0.0
 
 
 @inlined
-def guess_first_impact(kappa: float, delta: float) -> float:
+def estimated_first_impact(kappa: float, delta: float) -> float:
     """Phase of the first impact to two orders in kappa (Eq. 32, corrected)."""
     return 4.0 * kappa / (1.0 + (4.0 / 15.0) * (1.0 - delta) * kappa * kappa)
 
 
 @inlined
-def uplift(excess: float) -> State:
+def uplift_state(excess: float) -> State:
     """State at uplift for a = 1 + excess; there D is -kappa."""
     return State(0.0, 0.0, -math.sqrt(excess * (2.0 + excess)))
 
@@ -294,10 +292,10 @@ def uplift(excess: float) -> State:
 @shared
 def first_arc(excess: float, delta: float) -> tuple[int, float, State]:
     """Status and phase of the first impact for a = 1 + excess > 1, and the state just before it."""
-    start = uplift(min(excess, LARGEST_EXCESS))
+    start = uplift_state(min(excess, LARGEST_EXCESS))
     if excess > LARGEST_EXCESS:
         return Verdict.INCOMPLETE, math.pi, start
-    return arc(start, guess_first_impact(-start.D, delta), 1.0, delta, math.pi)
+    return arc(start, estimated_first_impact(-start.D, delta), 1.0, delta, math.pi)
 
 
 @inlined
@@ -307,33 +305,33 @@ def bounced(impact: State, eta: float) -> State:
 
 
 #: Longest arc that is followed, as a time p t: rounding grows by its exponential.
-LONGEST_ARC: Final = 20.0
+_LONGEST_ARC: Final = 20.0
 
 _MOST_HALVINGS: Final = 2_000
 
 
 @kernel
-def first_landing(excess: float, omega: float) -> tuple[int, float, float]:
+def first_impact(excess: float, omega: float) -> tuple[int, float, float]:
     """Phase of the first impact for a = 1 + excess > 1, and the speed before it; INCOMPLETE if none comes in time."""
     delta = 1.0 / (omega * omega)
-    start = uplift(excess)
-    turn = 2.0 * math.atan(-start.D)
-    for period in range(1 + int(LONGEST_ARC * omega / (2.0 * math.pi))):
+    start = uplift_state(excess)
+    negative = 2.0 * math.atan(-start.D)
+    for period in range(1 + int(_LONGEST_ARC * omega / (2.0 * math.pi))):
         begin = 2.0 * math.pi * period
-        pulled = begin + turn
+        middle = begin + negative
         end = begin + 2.0 * math.pi
         if period > 0:
-            lowest = lowest_point(begin, pulled, start, delta)
+            lowest = lowest_point(begin, middle, start, delta)
             if height(lowest, start, 1.0, delta, basis(lowest, delta)) <= 0.0:
-                return landed(begin, lowest, start, delta)
+                return impact_between(begin, lowest, start, delta)
         if height(end, start, 1.0, delta, basis(end, delta)) <= 0.0:
-            return landed(pulled, end, start, delta)
+            return impact_between(middle, end, start, delta)
     return Verdict.INCOMPLETE, end, 0.0
 
 
 @inlined
 def lowest_point(low: float, high: float, start: State, delta: float) -> float:
-    """Where an arc that is convex as long as it is up is lowest; where it is not up, if it comes down."""
+    """Phase at which an arc that is convex while it is up is lowest; if it comes down, one at which it is not up."""
     if rise(low, start, 1.0, delta, basis(low, delta)) >= 0.0:
         return low
     if rise(high, start, 1.0, delta, basis(high, delta)) <= 0.0:
@@ -353,8 +351,8 @@ def lowest_point(low: float, high: float, start: State, delta: float) -> float:
 
 
 @shared
-def landed(low: float, high: float, start: State, delta: float) -> tuple[int, float, float]:
-    """Status, phase and speed of the one landing between two phases."""
+def impact_between(low: float, high: float, start: State, delta: float) -> tuple[int, float, float]:
+    """Status, phase and speed of the one impact between two phases."""
     for _ in range(_MOST_HALVINGS):
         middle = 0.5 * (low + high)
         if not low < middle < high:
@@ -363,4 +361,4 @@ def landed(low: float, high: float, start: State, delta: float) -> tuple[int, fl
             low = middle
         else:
             high = middle
-    return Verdict.FOUND, high, land(high, start, 1.0, delta, basis(high, delta)).impact.V
+    return Verdict.FOUND, high, corrected_duration(high, start, 1.0, delta, basis(high, delta)).impact.V

@@ -1,7 +1,7 @@
 """One sequence, impact by impact: the phase of rest with its proof, the resolved impacts, and the critical amplitude.
 
 The phase that remains to rest is an expansion in the speed, extrapolated over successive pairs of impacts. The
-critical amplitude is the largest a whose first chattering sequence accumulates before x = pi.
+critical amplitude is the largest a whose first chattering sequence accumulates before x = pi. Parameters are finite.
 """
 
 import math
@@ -15,33 +15,30 @@ from rocking.kernels.certificate import Bounds, geometric_bracket
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.sine import Verdict
-from rocking.kernels.sine.arc import LARGEST_EXCESS, State, arc, bounced, first_arc, guess_landing
-
-#: Orders of the speed that the expansion of the remaining phase has right.
-ORDER: Final = 2
+from rocking.kernels.sine.arc import LARGEST_EXCESS, State, arc, bounced, estimated_duration, first_arc
 
 #: Extrapolations above that expansion, and the relative agreement at which their result is taken.
 LEVELS: Final = 5
-CLOSED: Final = 1e-13
+_AGREEMENT: Final = 1e-13
 
-#: One closure and its successive extrapolations, and the factors of these.
+#: One estimate of the remaining phase and its successive extrapolations; the factors of these.
 Row = tuple[float, float, float, float, float, float]
 Weights = tuple[float, float, float, float, float]
 
 
 @inlined
 def remaining_phase(entered: State, delta: float, eta: float) -> float:
-    """Remaining phase on entering the second side, to some orders in the speed: `remaining_time`, in phase."""
+    """Remaining phase on entering the second side, to second order in the speed: `remaining_time`, in phase."""
     V, P, D = entered
     return remaining_time(V, Restoring(2.0 - P, -D, 0.0, delta, eta, 0.0), Restoring(P, D, 0.0, delta, eta, 0.0))
 
 
 @inlined
 def richardson_weights(eta: float) -> Weights:
-    """Factors by which extrapolation weighs the change from one pair of impacts to the next.
+    """Factors of the change from one pair of impacts to the next in each extrapolation.
 
-    With Q = eta^2 the closures of successive pairs err by sums of Q^{kn}, k = ORDER + 1, ORDER + 2, ..., with
-    these very ratios at any amplitude, so each column removes one term.
+    With Q = eta^2 the estimates of successive pairs err by sums of Q^{kn}, k = 3, 4, ..., with these ratios at any
+    amplitude, since the estimate is right to second order in the speed; so each column removes one term.
     """
     Q = eta * eta
     q1 = Q * Q * Q
@@ -53,43 +50,44 @@ def richardson_weights(eta: float) -> Weights:
 
 
 @inlined
-def extrapolate(T: float, gone: float, weights: Weights, last: Row) -> Row:
-    """Add one closure T of the remaining phase to the ``last`` row of Richardson's table; ``gone`` has passed since.
+def extrapolate(T: float, passed: float, weights: Weights, last: Row) -> Row:
+    """Next row of Richardson's table, from an estimate T of the remaining phase and the ``last`` row.
 
-    All of it in remaining, not absolute, phase, so that the amplified rounding stays relative to what remains.
+    ``passed`` is the phase between both. In remaining, not absolute, phase the amplified rounding is relative to what
+    remains.
     """
-    r1 = T + (T - (last[0] - gone)) * weights[0]
-    r2 = r1 + (r1 - (last[1] - gone)) * weights[1]
-    r3 = r2 + (r2 - (last[2] - gone)) * weights[2]
-    r4 = r3 + (r3 - (last[3] - gone)) * weights[3]
-    r5 = r4 + (r4 - (last[4] - gone)) * weights[4]
+    r1 = T + (T - (last[0] - passed)) * weights[0]
+    r2 = r1 + (r1 - (last[1] - passed)) * weights[1]
+    r3 = r2 + (r2 - (last[2] - passed)) * weights[2]
+    r4 = r3 + (r3 - (last[3] - passed)) * weights[3]
+    r5 = r4 + (r4 - (last[4] - passed)) * weights[4]
     return T, r1, r2, r3, r4, r5
 
 
 @inlined
-def agree(row: Row, last: Row, gone: float, x: float) -> bool:
+def agree(row: Row, last: Row, passed: float, x: float) -> bool:
     """Whether the remaining phase is settled: the last extrapolation changed little, and so did the last pair.
 
-    The first alone deceives where Q is small, the second where Q is close to one.
+    The first criterion is not enough where Q is small, the second not where Q is close to one.
     """
     remaining = row[LEVELS]
-    expected = last[LEVELS] - gone
-    return (abs(remaining - row[LEVELS - 1]) <= CLOSED * x) & (abs(remaining - expected) <= CLOSED * x)
+    expected = last[LEVELS] - passed
+    return (abs(remaining - row[LEVELS - 1]) <= _AGREEMENT * x) & (abs(remaining - expected) <= _AGREEMENT * x)
 
 
-#: Window of the certificate over the estimate of the remaining phase.
-WINDOW: Final = 1.5
+#: Window of the proof over the estimate of the remaining phase.
+_WINDOW: Final = 1.5
 
-#: Relative allowance for what P has gathered of rounding over a sequence.
+#: Relative allowance for the rounding of P over a sequence.
 _ROUNDING: Final = 1e-12
 
 
 @inlined
 def bracket(entered: State, window: float, delta: float, eta: float) -> tuple[float, float]:
-    """Bounds on the remaining phase on entering the second side; where there is no proof no comparison holds (NaN).
+    """Bounds on the remaining phase on entering the second side; NaN, NaN: no proof.
 
-    They hold if the upper one lies within the window of phase and the window ends before x = pi: P rises there, at
-    a rate of D at first, and |P''| <= a.
+    They hold if the upper one lies within the window and the window ends before x = pi: P rises there, at a rate of D
+    at first, and |P''| <= a.
     """
     V, P, D = entered
     rate = (D + window * math.sqrt((1.0 - P) * (1.0 - P) + D * D)) * (1.0 + _ROUNDING)
@@ -103,24 +101,24 @@ def bracket(entered: State, window: float, delta: float, eta: float) -> tuple[fl
 @inlined
 def proven(x: float, entered: State, delta: float, eta: float, remaining: float) -> bool:
     """Whether complete chattering is proven on entering the second side, with this remaining phase in the bracket."""
-    window = WINDOW * remaining
+    window = _WINDOW * remaining
     lower, upper = bracket(entered, window, delta, eta)
     return (upper <= window) & (lower <= remaining) & (remaining <= upper) & (x + window < math.pi)
 
 
-#: Below this speed a block is at rest: what remains is nothing beside any phase.
+#: Below this speed a block is at rest: no phase changes by what remains.
 _STILL: Final = 1e-120
 
-#: Impact pairs after which a sequence is given up (eta = 0.99999 takes about a million).
+#: Impact pairs after which a sequence is UNRESOLVED (eta = 0.99999 takes about a million).
 _MAXIMUM_PAIRS: Final = 5_000_000
 
-#: What one resolved impact is made of: phase since the one before, speed before and after.
+#: A resolved impact: phase since the one before, speed before and after.
 IMPACT: Final = np.dtype((np.record, [("interval", np.float64), ("before", np.float64), ("after", np.float64)]))
 
 
 @kernel
 def rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float]:
-    """Status and phase omega tau_ch of rest for a = 1 + excess > 1; the phase means nothing unless it is FOUND."""
+    """Status and phase omega tau_ch of rest for a = 1 + excess > 1; the phase is valid only where it is FOUND."""
     status, x, impact = first_arc(excess, delta)
     if status != Verdict.FOUND:
         return status, x
@@ -129,17 +127,17 @@ def rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float]:
 
 @shared
 def rest_after_impact(x: float, entered: State, delta: float, eta: float) -> tuple[int, float]:
-    """Status and phase of rest of a block that enters the second side at x."""
+    """Status and phase of rest of a block that enters the second side at phase x."""
     weights = richardson_weights(eta)
     row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    gone = 0.0
+    passed = 0.0
     for pair in range(_MAXIMUM_PAIRS):
         if entered.V < _STILL:
             return Verdict.FOUND, x
         last = row
-        row = extrapolate(remaining_phase(entered, delta, eta), gone, weights, last)
+        row = extrapolate(remaining_phase(entered, delta, eta), passed, weights, last)
         remaining = row[LEVELS]
-        if pair > LEVELS and agree(row, last, gone, x) and proven(x, entered, delta, eta, remaining):
+        if pair > LEVELS and agree(row, last, passed, x) and proven(x, entered, delta, eta, remaining):
             return Verdict.FOUND, x + remaining
         status, second, impact = next_arc(x, entered, -1.0, delta)
         if status != Verdict.FOUND:
@@ -148,8 +146,8 @@ def rest_after_impact(x: float, entered: State, delta: float, eta: float) -> tup
         if status != Verdict.FOUND:
             return status, x
         entered = bounced(impact, eta)
-        gone = second + first
-        x += gone
+        passed = second + first
+        x += passed
     return Verdict.UNRESOLVED, x
 
 
@@ -158,14 +156,14 @@ def next_arc(x: float, start: State, s: float, delta: float) -> tuple[int, float
     """Status and duration of the arc that starts at phase x, and the state before its impact; a block at rest stays."""
     if start.V < _STILL:
         return Verdict.FOUND, 0.0, State(0.0, start.P, start.D)
-    return arc(start, guess_landing(start, s, delta), s, delta, math.pi - x)
+    return arc(start, estimated_duration(start, s, delta), s, delta, math.pi - x)
 
 
 @kernel
 def resolve(
     excess: float, delta: float, eta: float, tolerance: float, impacts: NDArray[Any]
 ) -> tuple[int, int, float, float, float]:
-    """Fill impacts until the bracket on the phase of rest is narrow, or their array full.
+    """Fill impacts until the bracket on the phase of rest is narrower than ``tolerance`` of it, or their array full.
 
     Returns status, number of impacts, phase of rest, and its bracket [lower, upper] from the last impact's state. The
     phases mean something only where they are FOUND; the status is UNRESOLVED where the array is full.
@@ -184,7 +182,7 @@ def resolve(
         s = -s
         if s < 0.0:
             remaining = remaining_phase(start, delta, eta)
-            window = WINDOW * remaining
+            window = _WINDOW * remaining
             lower, upper = bracket(start, window, delta, eta)
             if upper <= window and x + window < math.pi and upper - lower <= tolerance * x:
                 return Verdict.FOUND, n + 1, x + min(max(remaining, lower), upper), x + lower, x + upper
@@ -199,7 +197,7 @@ def semianalytical_phases(
     phases: Floats,
     statuses: NDArray[np.int8],
 ) -> None:
-    """Status and phase of rest by Eq. 75 with so many resolved intervals, for each (a > 1, omega, eta)."""
+    """Write status and phase of rest by Eq. 75 for each (a > 1, omega, eta), with so many resolved intervals."""
     a, omega, eta = sequences
     for i in range(phases.size):
         delta = 1.0 / (omega[i] * omega[i])
@@ -241,18 +239,18 @@ _MAXIMUM_STEPS: Final = 400
 
 @kernel
 def critical_amplitudes(omega: Floats, eta: Floats, amplitudes: Floats) -> None:
-    """Critical amplitude for each omega and eta < 1."""
+    """Write the critical amplitude for each omega and eta < 1 into ``amplitudes``."""
     for i in range(amplitudes.size):
         amplitudes[i] = 1.0 + critical_excess(1.0 / (omega[i] * omega[i]), eta[i])
 
 
 @shared
 def critical_excess(delta: float, eta: float) -> float:
-    """Largest a - 1 with complete chattering, by a bracket that closes around an extrapolated value.
+    """Largest a - 1 with complete chattering, by a bracket that is narrowed around an extrapolated value.
 
     Near it pi - x_rest ~ (critical - excess)^nu, so (pi - x_rest)^(1/nu) is extrapolated to zero from the last two
-    complete sequences; trying a little below and above the result shrinks the bracket from both ends, and halving it
-    every third time bounds the number of steps whatever the extrapolation is worth.
+    complete sequences. Trials a little below and above the result narrow the bracket from both ends; every third one
+    halves it, which bounds the number of steps however good the extrapolation is.
     """
     power = 1.0 / distance_exponent(eta)
     low = 0.0
@@ -285,9 +283,9 @@ def distance_exponent(eta: float) -> float:
     """Exponent nu of pi - x_rest ~ (critical - excess)^nu.
 
     Close to x = pi the second side's restoring acceleration is proportional to the phase s that is left, and the
-    impact map scales: with speed w = v s^2 times a constant, an arc of duration z s has v = z/2 - z^2/6 and leaves
-    s (1 - z), v' = eta^2 (z/2 - z^2/3)/(1 - z)^2. The critical sequence stays at the fixed point; a
-    neighbour leaves it by the factor dv'/dv per pair while s falls by 1 - z.
+    impact map scales: with speed w = v s^2 times a constant, an arc of duration z s has v = z/2 - z^2/6, after which
+    s (1 - z) is left and v' = eta^2 (z/2 - z^2/3)/(1 - z)^2. The critical sequence is the fixed point; the distance of
+    a neighbouring one grows by the factor dv'/dv per pair while s falls by 1 - z.
     """
     pair = eta * eta
     low = 0.0
@@ -302,3 +300,40 @@ def distance_exponent(eta: float) -> float:
     relative_growth = (0.5 - 2.0 * z / 3.0) / (0.5 * z - z * z / 3.0) + 2.0 / (1.0 - z)
     growth = relative_growth * (0.5 * z - z * z / 6.0) / (0.5 - z / 3.0)
     return -math.log(1.0 - z) / math.log(growth)
+
+
+# ---- The paper's fits of the critical amplitude ----
+
+
+@kernel
+def eq76(omega: float, eta: float) -> float:
+    """Fitted critical amplitude (Eq. 76)."""
+    return (
+        1.079
+        - 0.1885 * eta
+        + 0.1405 * omega
+        + 0.6442 * eta**2
+        - 0.1903 * eta * omega
+        - 0.02818 * omega**2
+        - 0.7372 * eta**3
+        + 0.06413 * eta**2 * omega
+        + 0.03236 * eta * omega**2
+        + 0.00176 * omega**3
+        + 0.2146 * eta**4
+        - 0.0187 * eta**3 * omega
+        - 0.003045 * eta**2 * omega**2
+        - 0.00185 * eta * omega**3
+    )
+
+
+@kernel
+def eq77(eta: float) -> float:
+    """Fitted critical amplitude without the frequency (Eq. 77)."""
+    return -0.3941 * eta**3 + 0.5763 * eta**2 - 0.45 * eta + 1.271
+
+
+@kernel
+def fitted_amplitudes(omega: Floats, eta: Floats, with_frequency: bool, amplitudes: Floats) -> None:
+    """Write Eq. 76 (with the frequency) or Eq. 77 for each omega and eta into ``amplitudes``; NaN gives NaN."""
+    for i in range(amplitudes.size):
+        amplitudes[i] = eq76(omega[i], eta[i]) if with_frequency else eq77(eta[i])

@@ -1,8 +1,11 @@
-"""The consistent expansion of the chattering time: the impact map in truncated power series.
+"""Expansions of the chattering time in eps = a - 1: the paper's (Eq. 65), and the consistent one in power series.
 
-With r = sqrt(eps) every quantity is a power of r times a series in eps = a - 1: phases x = r(...), first-side arcs
-t = r z, second-side arcs t = r^3 z, speeds V = r^3 v, restoring acceleration P = eps p, slope D = r d. So the exact
-impact map acts on coefficient arrays, and its sums are closed as those of numbers are, by the same formula.
+The paper's: in Eqs 57, 60, 62 and 64 amplitude and frequency cancel when durations are counted in sqrt(eps)/omega and
+eps^(3/2)/omega. With z = omega T_{n;1}, y = omega sigma_{n;1} and v = -omega Phi^(1)_{n;3} they depend on eta alone.
+
+The consistent one: with r = sqrt(eps) every quantity is a power of r times a series in eps: phases x = r(...),
+first-side arcs t = r z, second-side arcs t = r^3 z, speeds V = r^3 v, restoring acceleration P = eps p, slope D = r d.
+So the exact impact map acts on arrays of coefficients, and the sums are extrapolated to rest as those of numbers are.
 """
 
 from __future__ import annotations
@@ -13,10 +16,95 @@ from typing import Any, Final
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.kernels.compiled import allocating
-from rocking.kernels.paper import positive_root
+from rocking.kernels.compiled import allocating, inlined, kernel
 from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.sine.sequence import LEVELS, richardson_weights
+
+# ---- The paper's expansion ----
+
+_ROOT2: Final = math.sqrt(2.0)
+
+#: Part of Eq. 65's sum that is left out, relative to the sum.
+_NEGLIGIBLE: Final = 1e-17
+
+_MAXIMUM_NEWTON_STEPS: Final = 60
+
+
+@kernel
+def eq65_time(a: float, omega: float, eta: float) -> float:
+    """Asymptotic chattering time (Eq. 65) for numbers; NaN for a < 1 and for a NaN, infinite for eta = 1."""
+    if not a >= 1.0:
+        return math.nan
+    if a == 1.0:
+        return 0.0
+    first, third = eq65_sums(eta)
+    return math.sqrt(a - 1.0) * (first + (a - 1.0) * third) / omega
+
+
+@kernel
+def eq65_sums(eta: float) -> tuple[float, float]:
+    """Return the sums of omega T_{n;1} (n even) and omega T_{n;3} (n odd) in Eq. 65; infinite for eta = 1 and NaN."""
+    if not eta < 1.0:
+        return math.inf, math.inf
+    y = 0.0
+    third = 0.0
+    v = 0.0
+    z = math.inf
+    while not vanishes(z, y, eta):
+        z, odd, v = eq65_pair(y, v, eta)
+        y += z
+        third += odd
+    return y, third
+
+
+@kernel
+def eq65_terms(eta: float, first: Floats, third: Floats) -> int:
+    """Write omega T_{n;1} and omega T_{n+1;3} until they vanish; returns how many, as many as fit if they do not."""
+    y = 0.0
+    v = 0.0
+    for pair in range(first.size):
+        first[pair], third[pair], v = eq65_pair(y, v, eta)
+        y += first[pair]
+        if vanishes(first[pair], y, eta):
+            return pair + 1
+    return first.size
+
+
+@inlined
+def vanishes(z: float, y: float, eta: float) -> bool:
+    """Whether all terms after z, nearly a geometric series, are negligible beside their sum y."""
+    return z <= _NEGLIGIBLE * (1.0 - eta * eta) * y
+
+
+@inlined
+def eq65_pair(y: float, v: float, eta: float) -> tuple[float, float, float]:
+    """Take steps 2 and 3 of the paper's iterative procedure: omega T_{n;1}, omega T_{n+1;3} and v of the next pair.
+
+    The cubic of Eq. 62, z^3/24 + c2 z^2 + c1 z = v, has one positive root: from the second pair on its coefficients
+    are positive, since y > 2 sqrt(2). In the first, with y = v = 0, it is Eq. 31.
+    """
+    c2 = (y - _ROOT2) / 6.0
+    c1 = y * (y - 2.0 * _ROOT2) / 4.0
+    z = 4.0 * _ROOT2 if y == 0.0 else positive_root(c2, c1, v)
+    speed_before = z * (c1 + z * (2.0 * c2 + z / 8.0))
+    odd = eta * speed_before
+    return z, odd, eta * odd
+
+
+@inlined
+def positive_root(c2: float, c1: float, v: float) -> float:
+    """Root of z^3/24 + c2 z^2 + c1 z - v, all positive: Newton's steps from above, where the cubic is convex."""
+    z = min(v / c1, math.sqrt(v / c2))
+    for _ in range(_MAXIMUM_NEWTON_STEPS):
+        excess = z * (c1 + z * (c2 + z / 24.0)) - v
+        step = excess / (c1 + z * (2.0 * c2 + z / 8.0))
+        z -= step
+        if step <= 1e-16 * z:
+            break
+    return z
+
+
+# ---- The consistent expansion ----
 
 
 class PowerSeries:
@@ -98,22 +186,22 @@ class PowerSeries:
 
 Series = Floats
 
-#: Relative size of the last extrapolation, coefficient by coefficient, at which it is taken.
-_CLOSED: Final = 1e-14
+#: Relative change by the last extrapolation, coefficient by coefficient, at which its result is taken.
+_AGREEMENT: Final = 1e-14
 
 _MAXIMUM_PAIRS: Final = 100_000
 
-#: By so much, as exponent, the speed falls in the first pairs that are formed; and some more pairs.
-_FALLEN: Final = 2.3
-_SPARE_PAIRS: Final = 3
+#: Number of pairs that are formed first: until the speed has fallen by exp(-4.6), and some more.
+_DECAY: Final = 2.3
+_MORE_PAIRS: Final = 3
 
-# Python strings the arcs together: that costs little beside them, and to compile it as well would multiply the time of
-# a first call.
+# The loop over the arcs is Python: it takes little of the time, and to compile it as well would multiply the time of a
+# first call.
 
 
 def phase_coefficients(delta: float, eta: float, order: int) -> Series:
-    """Coefficients c_k of omega tau_ch = sqrt(eps) (c_0 + c_1 eps + ...), ``order`` of them; NaN: not resolved."""
-    count = LEVELS + _SPARE_PAIRS + int(_FALLEN / -math.log(eta))
+    """Coefficients c_k of omega tau_ch = sqrt(eps) (c_0 + c_1 eps + ...), ``order`` of them; all NaN: not resolved."""
+    count = LEVELS + _MORE_PAIRS + int(_DECAY / -math.log(eta))
     passed, entered = first_impact(delta, eta, order)
     while passed.shape[0] < _MAXIMUM_PAIRS:
         more_passed, more_entered = impact_pairs(entered[-1], delta, eta, count)
@@ -125,7 +213,7 @@ def phase_coefficients(delta: float, eta: float, order: int) -> Series:
             remaining = remaining_series(state, delta, eta).from_power(1)
             rest, change = extrapolated(remaining.T, passed, eta)
         x = np.cumsum(passed, axis=0)[-change.shape[0] :]
-        settled = np.flatnonzero((change <= _CLOSED * np.abs(x)).all(axis=1))
+        settled = np.flatnonzero((change <= _AGREEMENT * np.abs(x)).all(axis=1))
         if settled.size:
             coefficients: Series = x[settled[0]] + rest[settled[0]]
             return coefficients
@@ -136,7 +224,7 @@ def phase_coefficients(delta: float, eta: float, order: int) -> Series:
 
 
 def remaining_series(entered: tuple[PowerSeries, PowerSeries, PowerSeries], delta: float, eta: float) -> PowerSeries:
-    """Evaluate the same formula, uncompiled, for a state (V, P, D) of power series."""
+    """`remaining_time` of a state (V, P, D) of power series: the formula of numbers, uncompiled."""
     V, P, D = entered
     formula: Any = getattr(remaining_time, "py_func", remaining_time)
     side: Any = Restoring
@@ -145,7 +233,7 @@ def remaining_series(entered: tuple[PowerSeries, PowerSeries, PowerSeries], delt
 
 
 def extrapolated(remaining: Series, passed: Series, eta: float) -> tuple[Series, Series]:
-    """Extrapolate the closures of successive pairs, as ``closure.extrapolate``: last column, and its last changes."""
+    """Extrapolate the estimates of successive pairs, as `sequence.extrapolate`: last column, and its last changes."""
     weights = getattr(richardson_weights, "py_func", richardson_weights)(eta)
     column = less = remaining
     for k, weight in enumerate(weights):
@@ -162,9 +250,7 @@ def first_impact(delta: float, eta: float, order: int) -> tuple[Series, Series]:
     entered = np.zeros((1, 3, order))
     start = -square_root_of_two_plus(order)
     phase[0], w, p, d = series_arc(np.zeros(order), np.zeros(order), start, True, delta)
-    entered[0, 0] = eta * w
-    entered[0, 1] = p
-    entered[0, 2] = d
+    entered[0] = eta * w, p, d
     return phase, entered
 
 
@@ -173,15 +259,13 @@ def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[S
     order = start.shape[1]
     passed = np.zeros((count, order))
     entered = np.zeros((count, 3, order))
-    v, p, d = start[0].copy(), start[1].copy(), start[2].copy()
+    v, p, d = start
     for n in range(count):
         second, w, p, d = series_arc(v, p, d, False, delta)
         first, w, p, d = series_arc(eta * w, p, d, True, delta)
         v = eta * w
         passed[n] = first + raised(second, 1)
-        entered[n, 0] = v
-        entered[n, 1] = p
-        entered[n, 2] = d
+        entered[n] = v, p, d
     return passed, entered
 
 
@@ -243,7 +327,7 @@ def leading_duration(v: float, p: float, d: float) -> float:
 
 @allocating
 def series_basis(q: Series, delta: float) -> tuple[Series, Series, Series, Series]:
-    """Return the four basis functions of ``basis.Basis`` at a series q without constant term."""
+    """Sine, versine, E and W of `sine.arc.Basis` at a series q without constant term."""
     order = q.size
     sine = np.zeros(order)
     versine = np.zeros(order)

@@ -6,29 +6,24 @@ else is done to them: no filter, no baseline, no offset removed.
 
 from __future__ import annotations
 
-import difflib
 import os
-from collections.abc import Sequence
-from typing import BinaryIO, Protocol
+from collections.abc import Callable, Sequence
+from typing import BinaryIO, Final
 
+from rocking import checks
 from rocking.errors import UnreadableRecord
 from rocking.motion.formats import at2, cosmos, csmip, esm, knet, smc, table, through_obspy
-from rocking.motion.formats.channel import Channel
-from rocking.motion.formats.source import Identification, Request, Source, open_source
+from rocking.motion.formats.channel import Channel, Identification, Recognised
+from rocking.motion.formats.source import Request, Source, open_source
 from rocking.motion.motion import Motion
 
-__all__ = ["Channel", "Identification", "channels", "content", "identify", "read"]
-
-
-class _Reader(Protocol):
-    """What the module of a format has: a test of the content, and a reader."""
-
-    def recognise(self, source: Source) -> Identification | None: ...
-    def read(self, source: Source, request: Request) -> list[Channel]: ...
+__all__ = ["Channel", "Identification", "channels", "identify", "read"]
 
 
 #: In the order in which they are asked; the last two take what no title claims.
-_READERS: tuple[_Reader, ...] = (at2, cosmos, csmip, smc, esm, knet, table, through_obspy)
+_RECOGNISERS: Final[tuple[Callable[[Source], Recognised | None], ...]] = tuple(
+    each.recognise for each in (at2, cosmos, csmip, smc, esm, knet, table, through_obspy)
+)
 
 _LISTED = 30
 
@@ -94,32 +89,18 @@ def read(
 
 
 def read_as(
-    path: str | os.PathLike[str] | BinaryIO,
-    channel: int | str | None,
-    request: Request,
-    *,
-    optional: bool = False,
+    path: str | os.PathLike[str] | BinaryIO, channel: int | str | None, request: Request, *, optional: bool = False
 ) -> Motion:
-    """Read one channel of a record file as a motion, as `read` does, with arguments that are checked already.
-
-    An `optional` channel is for files that have several: the only one of a file is taken whatever its name.
-    """
+    """Read one channel as `read` does; an `optional` one is for files that have several."""
     source = open_source(path)
-    reader = _recognise(source)[0]
-    found = reader.read(source, request)
+    found = _recognised(source).read(request)
     return _choose(source, found, None if optional and len(found) == 1 else channel).motion()
 
 
 def read_vertical(path: str | os.PathLike[str], name: str, horizontal: int | str | None, request: Request) -> Motion:
-    """Read the channel of a record file that is the vertical motion beside another one, the `horizontal`.
-
-    Raises
-    ------
-    UnreadableRecord, InvalidMotion
-        As for `read`; the message names the channels beside the horizontal one.
-    """
+    """Read the channel of a record file that is the vertical motion beside another one, the `horizontal`."""
     source = open_source(path)
-    found = _recognise(source)[0].read(source, request)
+    found = _recognised(source).read(request)
     if _matching(found, name):
         return _choose(source, found, name).motion()
     taken = {one.number for one in (found if len(found) == 1 or horizontal is None else _matching(found, horizontal))}
@@ -133,41 +114,15 @@ def read_vertical(path: str | os.PathLike[str], name: str, horizontal: int | str
 
 
 def content(
-    path: str | os.PathLike[str] | BinaryIO,
-    *,
-    channel: int | str | None = None,
-    dt: float | None = None,
-    units: str | None = None,
-) -> tuple[Identification, tuple[Channel, ...]]:
-    """Return what format a file is taken for, and its acceleration channels, or the one that is named.
-
-    Parameters
-    ----------
-    path, channel, dt, units
-        As for `read`.
-
-    Returns
-    -------
-    Identification, tuple of Channel
-
-    Raises
-    ------
-    UnreadableRecord, InvalidMotion
-        As for `read`.
-    """
-    return content_as(path, channel, Request.checked(dt, units))
-
-
-def content_as(
     path: str | os.PathLike[str] | BinaryIO, channel: int | str | None, request: Request, *, optional: bool = False
-) -> tuple[Identification, tuple[Channel, ...]]:
-    """Return format and channels as `content` does, with arguments that are checked already, as for `read_as`."""
+) -> tuple[Identification, list[Channel]]:
+    """Return what format a file is taken for, and its acceleration channels, or the one that is named."""
     source = open_source(path)
-    reader, identification = _recognise(source)
-    found = reader.read(source, request)
+    identification, read = _recognised(source)
+    found = read(request)
     if channel is None or (optional and len(found) == 1):
-        return identification, tuple(found)
-    return identification, (_choose(source, found, channel),)
+        return identification, found
+    return identification, [_choose(source, found, channel)]
 
 
 def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: str | None = None) -> tuple[Channel, ...]:
@@ -188,15 +143,21 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     UnreadableRecord, InvalidMotion
         As for `read`.
     """
-    return content(path, dt=dt, units=units)[1]
+    return tuple(content(path, None, Request.checked(dt, units))[1])
 
 
 def identify(path: str | os.PathLike[str]) -> Identification:
     r"""Return what format a file is taken for, and why.
 
+    Parameters
+    ----------
+    path : str or path
+        The file.
+
     Returns
     -------
     Identification
+        Format and reason.
 
     Raises
     ------
@@ -212,15 +173,14 @@ def identify(path: str | os.PathLike[str]) -> Identification:
     >>> identify(file)
     Identification(format='text table', reason='from line 2 on each line holds one number')
     """
-    return _recognise(open_source(path))[1]
+    return _recognised(open_source(path)).identification
 
 
-def _recognise(source: Source) -> tuple[_Reader, Identification]:
-    for reader in _READERS:
-        identification = reader.recognise(source)
-        if identification is not None:
-            return reader, identification
-    raise _unknown(source)
+def _recognised(source: Source) -> Recognised:
+    found = next((found for recognise in _RECOGNISERS if (found := recognise(source)) is not None), None)
+    if found is None:
+        raise _unknown(source)
+    return found
 
 
 def _unknown(source: Source) -> UnreadableRecord:
@@ -266,9 +226,8 @@ def _choose(source: Source, found: list[Channel], wanted: int | str | None) -> C
 
 
 def _hint(found: list[Channel], wanted: int | str | None) -> str:
-    names = {channel.name.casefold(): channel.name for channel in found}
-    close = difflib.get_close_matches(str(wanted).casefold(), names, n=1)
-    return f"did you mean {names[close[0]]!r}? " if close else ""
+    hint = checks.meant(str(wanted).casefold(), {channel.name.casefold(): repr(channel.name) for channel in found})
+    return hint and f"{hint} "
 
 
 def _matching(found: list[Channel], wanted: int | str) -> list[Channel]:

@@ -6,12 +6,12 @@ The last header line comes in several shapes: ``NPTS=  5372, DT= .0100 SEC,`` (N
 
 from __future__ import annotations
 
+import functools
 import re
 from typing import NamedTuple
 
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.source import Identification, Line, Request, Source
-from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.channel import Channel, Identification, Recognised, azimuth_of, to_acceleration
+from rocking.motion.formats.source import Line, Request, Source, find_unit
 from rocking.motion.formats.values import NUMBER, Layout, parse, read_values
 
 NAME = "PEER AT2"
@@ -32,21 +32,18 @@ class _PeerHeader(NamedTuple):
     dt: float
 
 
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if one of the first lines gives NPTS and DT."""
     header = _header(source)
     if header is None:
         return None
     other = _other_quantity(header)
     name = f"PEER {_EXTENSIONS[other[0]]}" if other else NAME
-    return Identification(name, f"line {source.line_number(header.sizes.start)} gives NPTS and DT")
+    reason = f"line {source.line_number(header.sizes.start)} gives NPTS and DT"
+    return Recognised(Identification(name, reason), functools.partial(_read, source, header, other))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file."""
-    header = _header(source)
-    assert header is not None
-    other = _other_quantity(header)
+def _read(source: Source, header: _PeerHeader, other: tuple[str, int] | None, request: Request) -> list[Channel]:
     if other:
         raise source.error(f"this PEER file holds {other[0]}; give the AT2 file of the acceleration", other[1])
     at = header.sizes.start
@@ -60,18 +57,19 @@ def read(source: Source, request: Request) -> list[Channel]:
         )
     title = header.titles[1].text.strip() if len(header.titles) > 1 else ""
     event, station, name = _places(title)
-    channel = Channel(
-        name=name,
-        number=1,
-        acceleration=to_acceleration(source, at, values, unit),
-        dt=dt,
-        azimuth=float(name) % 360.0 if re.fullmatch(r"\d{1,3}", name, re.ASCII) else None,
-        units=spelling or unit.name,
-        station=station,
-        event=event,
-        metadata={"format": NAME, "file": source.file},
-    )
-    return [channel]
+    return [
+        Channel(
+            name=name,
+            number=1,
+            acceleration=to_acceleration(source, at, values, unit),
+            dt=dt,
+            azimuth=azimuth_of(name),
+            units=spelling or unit.name,
+            station=station,
+            event=event,
+            metadata={"format": NAME, "file": source.file},
+        )
+    ]
 
 
 def _header(source: Source) -> _PeerHeader | None:

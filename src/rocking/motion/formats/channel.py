@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,7 @@ from numpy.typing import NDArray
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion.description import Description, Origin
-from rocking.motion.formats.source import Source
-from rocking.motion.formats.units import Unit
+from rocking.motion.formats.source import Request, Source, Unit
 from rocking.motion.motion import Motion
 
 #: Even times may be off their grid by this share of the step (or by what the printed decimals round away).
@@ -39,8 +39,8 @@ def first_fault(times: NDArray[np.float64]) -> int | None:
 def even_step(times: NDArray[np.float64]) -> float | None:
     """Return the step of increasing `times` (s) if they are even up to their printed decimals, else None.
 
-    Of all steps that fit, the one with the fewest digits is returned: times printed with three decimals at
-    200 samples per second give exactly 0.005.
+    Of all steps that fit, it is the one with the fewest digits: times printed with three decimals at 200 samples per
+    second give exactly 0.005.
     """
     intervals = len(times) - 1
     mean = float(times[-1] - times[0]) / intervals
@@ -72,10 +72,7 @@ def _slope(times: NDArray[np.float64]) -> float:
 
 
 def _simplest_fit(times: NDArray[np.float64], step: float, drift: float, allowed: float) -> float | None:
-    """Return the step of fewest digits that stays within `drift` of `step`, s, over all the times.
-
-    None if the times leave its grid by more than `allowed`.
-    """
+    """Return the step of fewest digits within `drift` of `step`, s, over all times; None if these leave its grid."""
     candidates = (float(f"{step:.{digits}g}") for digits in range(1, 18))
     simplest = next((each for each in candidates if abs(each - step) * len(times) <= drift), step)
     spread = float(np.ptp(times - simplest * np.arange(len(times))))
@@ -88,6 +85,13 @@ _MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(3, 9) for
 _LARGEST = 1e9
 #: A number stands for a missing value where those beside it are smaller than this share of it.
 _FAR_SMALLER = 0.2
+
+
+class Identification(NamedTuple):
+    """A file's format, and what in its content says so."""
+
+    format: str
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +200,18 @@ class Channel:
     def _facts(self) -> str:
         facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
         return ", ".join(f"{key} {value}" for key, value in {**self.metadata, **facts}.items() if value)
+
+
+class Recognised(NamedTuple):
+    """What a file is taken for, and what reads its channels, from what was seen of it already."""
+
+    identification: Identification
+    read: Callable[[Request], list[Channel]]
+
+
+def azimuth_of(name: str) -> float | None:
+    """Return the direction, in degrees clockwise from north, of a component whose name is a number; else None."""
+    return float(name) % 360.0 if re.fullmatch(r"\d{1,3}", name, re.ASCII) else None
 
 
 def to_acceleration(

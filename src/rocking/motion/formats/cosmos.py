@@ -6,16 +6,16 @@ read. Real header 62 is the step in milliseconds, 34 that of the raw data in sec
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from typing import NamedTuple
 
 from rocking.arrays import Floats
 from rocking.motion.formats import csmip
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.source import Identification, Line, Request, Source
-from rocking.motion.formats.units import find_unit
-from rocking.motion.formats.values import expect, read_values
+from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
+from rocking.motion.formats.source import Line, Request, Source, find_unit
+from rocking.motion.formats.values import read_count
 
 NAME = "COSMOS"
 
@@ -43,20 +43,21 @@ class _CosmosHeader(NamedTuple):
     quantity: str
 
 
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if the first line states its version and number of text lines."""
     line = source.first_line()
     found = _TITLE.search(line.text) if line is not None else None
     if line is None or found is None:
         return None
-    return Identification(NAME, f"line {source.line_number(line.start)} says {found[0] + ' lines)'!r}")
+    identification = Identification(NAME, f"line {source.line_number(line.start)} says {found[0] + ' lines)'!r}")
+    return Recognised(identification, functools.partial(_read, source, line))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
+def _read(source: Source, first: Line, request: Request) -> list[Channel]:
     """Return the accelerations in the file."""
     found: list[Channel] = []
     others: list[str] = []
-    title = source.first_line()
+    title: Line | None = first
     while title is not None:
         header = _header(source, title)
         end = csmip.data_end(source, header.data.next, _TITLE)
@@ -93,8 +94,7 @@ def _numbers(source: Source, start: int, kind: str) -> tuple[Floats, int]:
         raise source.error(f"a line '... {kind}-header values follow' should stand here; get the file again", start)
     end = _after(source, line, int(stated[3]))
     count = int(stated[1])
-    values = read_values(source, line.next, end, count=count, layout=csmip.layout_in(line.text))
-    return expect(source, start, count, values), end
+    return read_count(source, start, line.next, end, count, csmip.layout_in(line.text)), end
 
 
 def _after_comments(source: Source, start: int) -> int:
@@ -113,9 +113,8 @@ def _channel(source: Source, request: Request, header: _CosmosHeader, end: int, 
     spelling = _UNITS.search(line.text)
     unit = request.units(source, find_unit(spelling[1]) if spelling else None, line.start)
     dt = request.step(source, _step(source, header), line.start)
-    layout = csmip.layout_in(line.text)
-    values = read_values(source, line.next, end, count=header.points, layout=layout)
-    _refuse_unknown(source, header, expect(source, line.start, header.points, values))
+    values = read_count(source, line.start, line.next, end, header.points, csmip.layout_in(line.text))
+    _refuse_unknown(source, header, values)
     number, name, place = _name(header.text, ordinal)
     station = next((found[2] or found[1] for each in header.text if (found := _STATION.match(each.text))), "")
     facts = {"format": NAME, "file": source.file, "stage": header.text[0].text.split("(")[0].strip()}

@@ -10,15 +10,15 @@ line before it prints the step with three decimals; real header 53 holds more of
 
 from __future__ import annotations
 
+import functools
 import itertools
 import re
 from typing import NamedTuple
 
 from rocking.arrays import Floats
-from rocking.motion.formats.channel import Channel, even_step, first_fault, to_acceleration
-from rocking.motion.formats.source import Identification, Line, Request, Source
-from rocking.motion.formats.units import Unit, find_unit
-from rocking.motion.formats.values import Layout, bad_number, expect, numeric_end, parse, read_values
+from rocking.motion.formats.channel import Channel, Identification, Recognised, even_step, first_fault, to_acceleration
+from rocking.motion.formats.source import Line, Request, Source, Unit, find_unit
+from rocking.motion.formats.values import Layout, bad_number, numeric_end, parse, read_count
 
 V1_TITLE = re.compile(r"^\s*uncorrected accelerogram", re.IGNORECASE)
 V2_TITLE = re.compile(r"^\s*corrected accelerogram", re.IGNORECASE)
@@ -34,20 +34,15 @@ _END_OF_DATA = re.compile(r"^\s*(/&|-*\s*end[ -]of[ -]data)", re.IGNORECASE)
 _NAME_COLUMNS = 40
 
 
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if the first line is its title."""
     line = source.first_line()
-    for form, title, words in (("CSMIP V1", V1_TITLE, "Uncorrected"), ("CSMIP V2", V2_TITLE, "Corrected")):
+    kinds = ("CSMIP V1", V1_TITLE, "Uncorrected", _read_v1), ("CSMIP V2", V2_TITLE, "Corrected", _read_v2)
+    for form, title, words, read in kinds:
         if line is not None and title.search(line.text):
-            return Identification(form, f"line {source.line_number(line.start)} begins '{words} Accelerogram'")
+            reason = f"line {source.line_number(line.start)} begins '{words} Accelerogram'"
+            return Recognised(Identification(form, reason), functools.partial(read, source, line))
     return None
-
-
-def read(source: Source, request: Request) -> list[Channel]:
-    """Return the accelerations of all channels of the file."""
-    line = source.first_line()
-    is_v1 = line is not None and V1_TITLE.search(line.text) is not None
-    return _read_v1(source, request) if is_v1 else _read_v2(source, request)
 
 
 class Labels(NamedTuple):
@@ -134,10 +129,9 @@ _V1_PAIR_UNITS = re.compile(r"^\s*units\b.*\bsec\w*\s+and\s+([A-Za-z0-9/^]+)", r
 _V1_POINTS = re.compile(r"no\.?\s*of\s*points\s*=\s*(\d{1,12})", re.IGNORECASE | re.ASCII)
 
 
-def _read_v1(source: Source, request: Request) -> list[Channel]:
-    """Return all channels of the file."""
+def _read_v1(source: Source, first: Line, request: Request) -> list[Channel]:
     found: list[Channel] = []
-    title = source.first_line()
+    title: Line | None = first
     while title is not None:
         if not V1_TITLE.search(title.text):
             raise source.error(
@@ -170,25 +164,22 @@ def _v1_samples(
     dt = request.step(source, 1.0 / rate, line.start)
     end = data_end(source, line.next, V1_TITLE)
     count, layout = int(stated[1]), layout_in(line.text)
-    values = expect(source, line.start, count, read_values(source, line.next, end, count=count, layout=layout))
-    units = spelling[1] if spelling else unit.name
-    return _v1_labelled(
-        source, header, ordinal, units, to_acceleration(source, line.start, values, unit), dt, None
-    ), end
+    values = read_count(source, line.start, line.next, end, count, layout)
+    units, acceleration = spelling[1] if spelling else unit.name, to_acceleration(source, line.start, values, unit)
+    return _v1_labelled(source, header, ordinal, units, acceleration, dt, None), end
 
 
 def _v1_pairs(source: Source, request: Request, header: list[Line], ordinal: int) -> tuple[Channel, int]:
     points, spelling, unit = _v1_pair_header(source, request, header)
     start, at = header[-1].next, header[0].start
     end = data_end(source, start, V1_TITLE)
-    values = expect(source, at, 2 * points, read_values(source, start, end, count=2 * points, layout=_V1_PAIRS))
+    values = read_count(source, at, start, end, 2 * points, _V1_PAIRS)
     times, acceleration = values[0::2], to_acceleration(source, at, values[1::2], unit)
     if first_fault(times) is not None:
         raise source.error("the times of the points that follow do not increase throughout; correct the file", start)
-    dt = even_step(times)
-    if dt is None:
-        return _v1_labelled(source, header, ordinal, spelling, acceleration, None, times), end
-    return _v1_labelled(source, header, ordinal, spelling, acceleration, request.step(source, dt, start), None), end
+    step = even_step(times)
+    dt, uneven = (None, times) if step is None else (request.step(source, step, start), None)
+    return _v1_labelled(source, header, ordinal, spelling, acceleration, dt, uneven), end
 
 
 def _v1_pair_header(source: Source, request: Request, header: list[Line]) -> tuple[int, str, Unit]:
@@ -241,11 +232,9 @@ _V2_NEXT_QUANTITY = re.compile(r"^\s*\d+\s+points\s+of\s+(?:veloc|displ)", re.IG
 _V2_TITLE = re.compile(rb"(?im)^[ \t]*corrected accelerogram")
 
 
-def _read_v2(source: Source, request: Request) -> list[Channel]:
-    """Return the accelerations of all channels of the file."""
+def _read_v2(source: Source, first: Line, request: Request) -> list[Channel]:
     found: list[Channel] = []
-    first = source.first_line()
-    start = None if first is None else first.start
+    start: int | None = first.start
     while start is not None:
         channel, end = _v2_channel(source, request, start, len(found) + 1)
         found.append(channel)
@@ -272,7 +261,7 @@ def _v2_acceleration(
     dt = request.step(source, _v2_step(source, header, stated[2]), line.start)
     end = data_end(source, line.next, V2_TITLE, _V2_NEXT_QUANTITY)
     count, layout = int(stated[1]), layout_in(line.text) or _V2_COLUMNS
-    values = expect(source, line.start, count, read_values(source, line.next, end, count=count, layout=layout))
+    values = read_count(source, line.start, line.next, end, count, layout)
     label = labels(header[:_V2_TEXT_LINES], ordinal)
     channel = Channel(
         name=label.name,

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import re
-from typing import NamedTuple
 
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.source import Identification, Request, Source
-from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
+from rocking.motion.formats.source import Entry, Request, Source, find_unit
 from rocking.motion.formats.values import parse, read_values
 
 NAME = "ESM"
@@ -18,27 +17,21 @@ _SIGNS = ("DATA_TYPE", "SAMPLING_INTERVAL_S", "NDATA")
 _AZIMUTHS = {"N": 0.0, "E": 90.0}
 
 
-class _EsmEntry(NamedTuple):
-    value: str
-    at: int
-
-
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if the first lines are keys and values, step and type of data among them."""
-    entries, _ = _entries(source)
+    entries, start = _entries(source)
     if not all(key in entries for key in _SIGNS):
         return None
     line = source.line_number(entries["DATA_TYPE"].at)
-    return Identification(NAME, f"the first lines read 'KEY: value', line {line} is DATA_TYPE")
+    identification = Identification(NAME, f"the first lines read 'KEY: value', line {line} is DATA_TYPE")
+    return Recognised(identification, functools.partial(_read, source, entries, start))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file."""
-    entries, start = _entries(source)
+def _read(source: Source, entries: dict[str, Entry], start: int, request: Request) -> list[Channel]:
     kind = entries["DATA_TYPE"]
     if kind.value.upper() != "ACCELERATION":
         raise source.error(f"this ESM file holds {kind.value.lower()!r}; give the file of the acceleration", kind.at)
-    spelling = entries.get("UNITS", _EsmEntry("", start))
+    spelling = entries.get("UNITS", Entry("", start))
     unit = request.units(source, find_unit(spelling.value), spelling.at)
     dt = request.step(source, _number(source, entries, "SAMPLING_INTERVAL_S"), entries["SAMPLING_INTERVAL_S"].at)
     values = read_values(source, start, len(source.data))
@@ -50,34 +43,35 @@ def read(source: Source, request: Request) -> list[Channel]:
     text = {key: entry.value for key, entry in entries.items() if entry.value}
     name = text.get("STREAM", "acceleration")
     processing = {"processing": text["PROCESSING"]} if "PROCESSING" in text else {}
-    channel = Channel(
-        name=name,
-        number=1,
-        acceleration=to_acceleration(source, start, values, unit),
-        dt=dt,
-        azimuth=_AZIMUTHS.get(name[-1]),
-        units=spelling.value or unit.name,
-        station=".".join(text[key] for key in ("NETWORK", "STATION_CODE") if key in text),
-        event=text.get("EVENT_ID", text.get("EVENT_NAME", "")),
-        metadata={"format": NAME, "file": source.file, **processing},
-    )
-    return [channel]
+    return [
+        Channel(
+            name=name,
+            number=1,
+            acceleration=to_acceleration(source, start, values, unit),
+            dt=dt,
+            azimuth=_AZIMUTHS.get(name[-1]),
+            units=spelling.value or unit.name,
+            station=".".join(text[key] for key in ("NETWORK", "STATION_CODE") if key in text),
+            event=text.get("EVENT_ID", text.get("EVENT_NAME", "")),
+            metadata={"format": NAME, "file": source.file, **processing},
+        )
+    ]
 
 
-def _entries(source: Source) -> tuple[dict[str, _EsmEntry], int]:
+def _entries(source: Source) -> tuple[dict[str, Entry], int]:
     """Return the header's values by their key, and where the data start."""
-    entries: dict[str, _EsmEntry] = {}
+    entries: dict[str, Entry] = {}
     start = 0
     for line in source.lines(0, _HEADER_LINES):
         found = _KEY.match(line.text)
         if found is None:
             break
-        entries[found[1]] = _EsmEntry(found[2].strip(), line.start)
+        entries[found[1]] = Entry(found[2].strip(), line.start)
         start = line.next
     return entries, start
 
 
-def _number(source: Source, entries: dict[str, _EsmEntry], key: str) -> float:
+def _number(source: Source, entries: dict[str, Entry], key: str) -> float:
     entry = entries[key]
     number = parse(entry.value.encode("latin-1"))
     if number is None:

@@ -13,8 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
-from rocking.motion.formats.source import Source
-from rocking.motion.formats.units import SECOND, Unit, find_time_unit, find_unit
+from rocking.motion.formats.source import SECOND, Source, Unit, find_time_unit, find_unit
 
 #: What a column holds: times, numbers of rows, periods or ordinates of a spectrum, or values of a channel.
 Kind = Literal["time", "count", "spectrum", "channel"]
@@ -68,18 +67,8 @@ class Heading:
 def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
     """Return what the lines before the offset `end` say of the `count` columns that begin there.
 
-    Without names the first of several columns holds times, in seconds.
-
-    Parameters
-    ----------
-    source : Source
-        The file.
-    end : int
-        Where the first row of numbers starts.
-    count : int
-        Numbers in a row.
-    delimiter : {",", ";", " "}
-        What is between them; a tab is a blank.
+    Without names the first of several columns holds times, in seconds. The delimiter is "," or ";", or " " for blanks
+    and tabs.
     """
     at = max(0, end - _LONGEST)
     lines: list[tuple[str, int]] = []

@@ -6,38 +6,21 @@ baseline correction of the motion. "Record Time" is 15 s later than the first sa
 
 from __future__ import annotations
 
+import functools
 import re
-from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.source import Identification, Line, Request, Source
-from rocking.motion.formats.units import find_unit
+from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
+from rocking.motion.formats.source import Entry, Request, Source, find_unit
 from rocking.motion.formats.values import Layout, parse, read_values
 
 NAME = "K-NET/KiK-net"
 
 _KEYS = (
-    "Origin Time",
-    "Lat.",
-    "Lon",
-    "Depth",
-    "Mag.",
-    "Station Code",
-    "Station Lat",
-    "Station Lon",
-    "Station Height",
-    "Record Time",
-    "Sampling Freq",
-    "Duration Time",
-    "Dir.",
-    "Scale Factor",
-    "Max",
-    "Last Correction",
-    "Memo",
-)
+    "Origin Time", "Lat.", "Lon", "Depth", "Mag.", "Station Code", "Station Lat", "Station Lon", "Station Height",
+    "Record Time", "Sampling Freq", "Duration Time", "Dir.", "Scale Factor", "Max", "Last Correction", "Memo",
+)  # fmt: skip
 _KEY_COLUMNS = 18
 _COUNTS = Layout(per_line=8, width=9)
 _RATE = re.compile(r"([\d.]{1,20})\s*Hz", re.IGNORECASE | re.ASCII)
@@ -49,22 +32,17 @@ _SENSORS = {"1": "N-S borehole", "2": "E-W borehole", "3": "U-D borehole", "4": 
 _AZIMUTHS = {"N-S": 0.0, "E-W": 90.0}
 
 
-class _KnetEntry(NamedTuple):
-    value: str
-    at: int
-
-
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if the file begins with 'Origin Time' and has a 'Scale Factor'."""
     lines = source.lines(0, 2 * len(_KEYS))
     scale = next((line for line in lines if line.text.startswith("Scale Factor")), None)
     if scale is None or not lines[0].text.startswith("Origin Time"):
         return None
-    return Identification(NAME, f"line 1 begins 'Origin Time', line {source.line_number(scale.start)} 'Scale Factor'")
+    reason = f"line 1 begins 'Origin Time', line {source.line_number(scale.start)} 'Scale Factor'"
+    return Recognised(Identification(NAME, reason), functools.partial(_read, source))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file, its offset kept."""
+def _read(source: Source, request: Request) -> list[Channel]:
     entries, start = _entries(source)
     (rate,) = _positive(source, entries, "Sampling Freq", _RATE)
     gal, counts = _positive(source, entries, "Scale Factor", _SCALE)
@@ -76,28 +54,31 @@ def read(source: Source, request: Request) -> list[Channel]:
     with np.errstate(over="ignore"):
         scaled = values * gal / counts
     acceleration = to_acceleration(source, scale_at, scaled, unit)
+    with np.errstate(over="ignore"):
+        mean = float(acceleration.mean())
     direction = entries["Dir."].value
     name = _SENSORS.get(direction, direction) or "acceleration"
-    channel = Channel(
-        name=name,
-        number=1,
-        acceleration=acceleration,
-        dt=dt,
-        azimuth=_AZIMUTHS.get(name.split(" ")[0]),
-        units="gal",
-        station=entries["Station Code"].value,
-        event=f"{entries['Origin Time'].value}, magnitude {entries['Mag.'].value}",
-        metadata={
-            "format": NAME,
-            "file": source.file,
-            "record time": entries["Record Time"].value,
-            "offset": f"kept, the mean is {_mean(acceleration):.4g} m/s^2",
-        },
-    )
-    return [channel]
+    return [
+        Channel(
+            name=name,
+            number=1,
+            acceleration=acceleration,
+            dt=dt,
+            azimuth=_AZIMUTHS.get(name.split(" ")[0]),
+            units="gal",
+            station=entries["Station Code"].value,
+            event=f"{entries['Origin Time'].value}, magnitude {entries['Mag.'].value}",
+            metadata={
+                "format": NAME,
+                "file": source.file,
+                "record time": entries["Record Time"].value,
+                "offset": f"kept, the mean is {mean:.4g} m/s^2",
+            },
+        )
+    ]
 
 
-def _entries(source: Source) -> tuple[dict[str, _KnetEntry], int]:
+def _entries(source: Source) -> tuple[dict[str, Entry], int]:
     """Return the header's values by their key, and where the data start."""
     lines = source.lines(0, len(_KEYS))
     for line, key in zip(lines, _KEYS, strict=False):
@@ -105,14 +86,11 @@ def _entries(source: Source) -> tuple[dict[str, _KnetEntry], int]:
             raise source.error(f"the header line {key!r} should stand here; get the record again", line.start)
     if len(lines) < len(_KEYS):
         raise source.error("the file ends within its header; get the whole file again", lines[-1].start)
-    return dict(zip(_KEYS, map(_entry, lines), strict=True)), lines[-1].next
+    entries = [Entry(line.text[_KEY_COLUMNS:].strip(), line.start) for line in lines]
+    return dict(zip(_KEYS, entries, strict=True)), lines[-1].next
 
 
-def _entry(line: Line) -> _KnetEntry:
-    return _KnetEntry(line.text[_KEY_COLUMNS:].strip(), line.start)
-
-
-def _positive(source: Source, entries: dict[str, _KnetEntry], key: str, pattern: re.Pattern[str]) -> list[float]:
+def _positive(source: Source, entries: dict[str, Entry], key: str, pattern: re.Pattern[str]) -> list[float]:
     """Return the numbers that `pattern` finds in the entry `key`; each must be positive."""
     entry = entries[key]
     found = pattern.match(entry.value)
@@ -123,7 +101,7 @@ def _positive(source: Source, entries: dict[str, _KnetEntry], key: str, pattern:
     return positive
 
 
-def _check_duration(source: Source, entries: dict[str, _KnetEntry], rate: float, count: int) -> None:
+def _check_duration(source: Source, entries: dict[str, Entry], rate: float, count: int) -> None:
     """Refuse fewer samples than the duration, which is in whole seconds, or a second's more."""
     (seconds,) = _positive(source, entries, "Duration Time", _SECONDS)
     stated = seconds * rate
@@ -132,8 +110,3 @@ def _check_duration(source: Source, entries: dict[str, _KnetEntry], rate: float,
             f"{seconds:g} s at {rate:g} Hz make {stated:g} samples but {count} follow; get the whole file again",
             entries["Duration Time"].at,
         )
-
-
-def _mean(acceleration: Floats) -> float:
-    with np.errstate(over="ignore"):
-        return float(acceleration.mean())

@@ -6,16 +6,24 @@ film record has no rate: its values are pairs of time and acceleration. Unknown 
 
 from __future__ import annotations
 
+import functools
 import re
 from typing import NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.motion.formats.channel import Channel, even_step, first_fault, to_acceleration
-from rocking.motion.formats.source import Identification, Line, Request, Source
-from rocking.motion.formats.units import find_unit
-from rocking.motion.formats.values import Layout, expect, read_values
+from rocking.motion.formats.channel import (
+    Channel,
+    Identification,
+    Recognised,
+    azimuth_of,
+    even_step,
+    first_fault,
+    to_acceleration,
+)
+from rocking.motion.formats.source import Line, Request, Source, find_unit
+from rocking.motion.formats.values import Layout, read_count
 
 NAME = "USGS SMC"
 
@@ -48,39 +56,37 @@ class _SmcHeader(NamedTuple):
         return int(self.integers[number - 1])
 
 
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if the first line is one of its seven titles."""
     line = source.first_line()
     found = _TITLE.match(line.text) if line is not None else None
     if line is None or found is None:
         return None
-    return Identification(NAME, f"line {source.line_number(line.start)} begins {found[0].strip()!r}")
+    identification = Identification(NAME, f"line {source.line_number(line.start)} begins {found[0].strip()!r}")
+    return Recognised(identification, functools.partial(_read, source, line, found))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
-    """Return the one channel of the file."""
-    title = source.first_line()
-    kind = _TITLE.match(title.text) if title is not None else None
-    assert title is not None and kind is not None
+def _read(source: Source, title: Line, kind: re.Match[str], request: Request) -> list[Channel]:
     if kind[1] not in _ACCELERATIONS:
         raise source.error(f"this SMC file holds {kind[2].lower()!r}; give the file of the acceleration", title.start)
     header = _header(source, title)
     unit = request.units(source, find_unit("cm/s2"), title.start)
     dt, times, values = _series(source, request, header)
     name = _first(_COMPONENT, header.text).strip(" *") or "acceleration"
-    channel = Channel(
-        name=name,
-        number=1,
-        acceleration=to_acceleration(source, header.data, values, unit),
-        dt=dt,
-        times=times,
-        azimuth=float(name) % 360.0 if re.fullmatch(r"\d{1,3}", name, re.ASCII) else None,
-        units="cm/s2",
-        station=_first(_STATION, header.text),
-        event=" ".join(header.text[_EVENT_LINE].text.split()),
-        metadata={"format": NAME, "file": source.file, "stage": kind[2].lower()},
-    )
-    return [channel]
+    return [
+        Channel(
+            name=name,
+            number=1,
+            acceleration=to_acceleration(source, header.data, values, unit),
+            dt=dt,
+            times=times,
+            azimuth=azimuth_of(name),
+            units="cm/s2",
+            station=_first(_STATION, header.text),
+            event=" ".join(header.text[_EVENT_LINE].text.split()),
+            metadata={"format": NAME, "file": source.file, "stage": kind[2].lower()},
+        )
+    ]
 
 
 def _header(source: Source, title: Line) -> _SmcHeader:
@@ -98,9 +104,8 @@ def _header(source: Source, title: Line) -> _SmcHeader:
 
 
 def _numbers(source: Source, lines: list[Line], layout: Layout) -> Floats:
-    count = layout.per_line * len(lines)
-    values = read_values(source, lines[0].start, lines[-1].next, count=count, layout=layout)
-    return expect(source, lines[0].start, count, values)
+    start, count = lines[0].start, layout.per_line * len(lines)
+    return read_count(source, start, start, lines[-1].next, count, layout)
 
 
 def _series(source: Source, request: Request, header: _SmcHeader) -> tuple[float | None, Floats | None, Floats]:
@@ -124,8 +129,7 @@ def _series(source: Source, request: Request, header: _SmcHeader) -> tuple[float
 def _values(source: Source, header: _SmcHeader) -> Floats:
     count = header.integer(_VALUE_COUNT)
     layout = _PRECISE_VALUES if header.integer(_DIGITS) == _PRECISE_DIGITS else _VALUES
-    values = read_values(source, header.data, len(source.data), count=count, layout=layout)
-    expect(source, header.text[-1].next, count, values)
+    values = read_count(source, header.text[-1].next, header.data, len(source.data), count, layout)
     if (np.abs(values) >= _UNKNOWN).any():
         raise source.error("some values are 1.7e38, which means 'unknown'; get a record without gaps", header.data)
     return values

@@ -9,6 +9,7 @@ without two names above them, may be one number or two: they are refused.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import re
 from collections.abc import Iterator, Sequence
@@ -18,10 +19,18 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats.channel import Channel, even_step, first_fault, gap_at, missing_value, to_acceleration
+from rocking.motion.formats.channel import (
+    Channel,
+    Identification,
+    Recognised,
+    even_step,
+    first_fault,
+    gap_at,
+    missing_value,
+    to_acceleration,
+)
 from rocking.motion.formats.heading import RULE, Column, Heading, heading_of, names_columns
-from rocking.motion.formats.source import Identification, Line, Request, Source
-from rocking.motion.formats.units import CHOICES, Unit
+from rocking.motion.formats.source import CHOICES, Line, Request, Source, Unit
 from rocking.motion.formats.values import convert, not_a_number, parse, rows_of_numbers
 
 NAME = "text table"
@@ -74,7 +83,7 @@ class _Shape(NamedTuple):
     start: int
     fault: UnreadableRecord | None
 
-    def ambiguous(self, source: Source) -> bool:
+    def ambiguous(self, source: Source, heading: Heading) -> bool:
         """Whether the commas may be decimal signs as well as delimiters: rows such as "1,5" and no point anywhere."""
         # A comma that blanks follow is no decimal sign, and one at the end of a row neither.
         return (
@@ -82,41 +91,38 @@ class _Shape(NamedTuple):
             and self.columns <= 2
             and _DECIMAL_COMMA.fullmatch(source.line(self.start).text.strip().strip('"')) is not None
             and b"." not in source.data[self.start :]
-            and not (self.columns == 2 and self.heading(source).named)
+            and not (self.columns == 2 and heading.named)
         )
-
-    def heading(self, source: Source) -> Heading:
-        """Return what the lines before the first row say."""
-        return heading_of(source, self.start, self.columns, self.delimiter)
 
     def row_at(self, source: Source, index: int) -> int:
         """Return the offset of a row."""
         return next(row.at for k, row in enumerate(_rows(source, self)) if k == index)
 
 
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the format if rows of one or two numbers begin after comments and headings, or of more that are named."""
     shape = _shape(source)
-    if shape is None or (shape.columns > 2 and not shape.heading(source).named):
+    if shape is None:
+        return None
+    heading = heading_of(source, shape.start, shape.columns, shape.delimiter)
+    if shape.columns > 2 and not heading.named:
         return None
     if shape.columns == 1:
         what = "one number"
-    elif shape.ambiguous(source):
+    elif shape.ambiguous(source, heading):
         what = "one number with a decimal comma, or two numbers"
     else:
         what = f"{'two' if shape.columns == 2 else shape.columns} numbers, between them {_DELIMITERS[shape.delimiter]}"
-    return Identification(NAME, f"from line {source.line_number(shape.start)} on each line holds {what}")
+    identification = Identification(NAME, f"from line {source.line_number(shape.start)} on each line holds {what}")
+    return Recognised(identification, functools.partial(_read, source, shape, heading))
 
 
 def refusal(source: Source) -> UnreadableRecord | None:
     """Return why what looks like a table is not read as one, or None if it does not look so."""
     shape = _shape(source)
     if shape is not None:
-        decimal = (
-            ""
-            if shape.columns != 4 or b"." in source.raw
-            else "; decimal commas need semicolons or tabs between columns"
-        )
+        commas = shape.columns == 4 and b"." not in source.raw
+        decimal = "; decimal commas need semicolons or tabs between columns" if commas else ""
         return shape.fault or source.error(
             f"each line holds {shape.columns} numbers, but a text table has one (acceleration) or two (time, "
             f"acceleration); keep only these, or name all {shape.columns} columns in a heading line{decimal}",
@@ -137,19 +143,16 @@ def is_foreign(source: Source) -> bool:
     return any(line.text.startswith(_OTHER_TITLES) for line in source.lines(0, _HEADING_LINES))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
+def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> list[Channel]:
     """Return the channels of the file: one, unless a heading names several."""
-    shape = _shape(source)
-    assert shape is not None
     if shape.fault is not None:
         raise shape.fault
-    if shape.ambiguous(source):
+    if shape.ambiguous(source, heading):
         raise source.error(
             f"{source.line(shape.start).text.strip()!r} may be one number with a decimal comma, or two numbers; write "
             "decimal points, or blanks between two numbers",
             shape.start,
         )
-    heading = shape.heading(source)
     held = _channels(source, heading)
     if not heading.places("time") and request.dt is None:
         raise source.error("the file does not say its sampling step; give {} in seconds", shape.start, "dt")

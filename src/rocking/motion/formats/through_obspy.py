@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import re
 import warnings
@@ -9,13 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from rocking.motion.formats.channel import Channel, to_acceleration
-from rocking.motion.formats.source import Identification, Request, Source
-from rocking.motion.formats.units import Unit
+from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
+from rocking.motion.formats.source import Request, Source, Unit
 
 #: PICKLE runs what a file tells it to; the other two open further files that a file names.
 _REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
-_SUFFIX = " (through ObsPy)"
 _REASON_LENGTH = 200
 _TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
 
@@ -31,7 +30,7 @@ def installed() -> bool:
     return True
 
 
-def recognise(source: Source) -> Identification | None:
+def recognise(source: Source) -> Recognised | None:
     """Return the first format whose reader in ObsPy claims the file (and, of several, can read it)."""
     claims = _claims(source)
     if not claims:
@@ -39,20 +38,19 @@ def recognise(source: Source) -> Identification | None:
     name = claims[0]
     if len(claims) > 1:
         name = next((each for each in claims if not isinstance(_traces(source, each), str)), name)
-    return Identification(f"{name}{_SUFFIX}", f"ObsPy's {name} reader recognises it")
+    identification = Identification(f"{name} (through ObsPy)", f"ObsPy's {name} reader recognises it")
+    return Recognised(identification, functools.partial(_read, source, name))
 
 
-def read(source: Source, request: Request) -> list[Channel]:
+def _read(source: Source, name: str, request: Request) -> list[Channel]:
     """Return all traces of the file, times their calibration factor."""
-    identification = recognise(source)
-    assert identification is not None
     unit = request.units(source, None, None)
-    name = identification.format.removesuffix(_SUFFIX)
     traces = _traces(source, name)
     if isinstance(traces, str):
         raise source.error(f"ObsPy's {name} reader cannot read this ({traces}); get the record again")
     _refuse_cut(source, traces)
-    return [_channel(source, request, unit, trace, identification.format, n) for n, trace in enumerate(traces, 1)]
+    form = f"{name} (through ObsPy)"
+    return [_channel(source, request, unit, trace, form, number) for number, trace in enumerate(traces, 1)]
 
 
 def _channel(source: Source, request: Request, unit: Unit, trace: Any, form: str, number: int) -> Channel:

@@ -50,20 +50,10 @@ class Layout(NamedTuple):
 
 
 def read_aligned(block: bytes, layout: Layout | None = None) -> Floats | None:
-    """Return all numbers of lines that are written alike; the last line may be shorter.
+    """Return all numbers of lines that are written alike, the last of which may be shorter; None if they are not so.
 
-    Parameters
-    ----------
-    block : bytes
-        Lines of text.
-    layout : Layout, optional
-        Columns of the numbers, which may touch if each has a decimal point, for what touches then is no number by
-        itself. By default numbers end where those of the first line do, with blanks between them.
-
-    Returns
-    -------
-    ndarray or None
-        None if the lines are not written alike, or a number is not finite.
+    Numbers end where those of the first line do, with blanks between them; or where the columns of a layout do. There
+    they may touch if each has a decimal point, for what touches then is no number by itself.
     """
     body, newline, last = block.rstrip().rpartition(b"\n")
     parts = [_alike(lines, layout) for lines in (body + newline, last + b"\n") if lines]
@@ -74,10 +64,7 @@ def read_aligned(block: bytes, layout: Layout | None = None) -> Floats | None:
 def read_columns(block: bytes, count: int) -> Floats | None:
     """Return the numbers of lines of `count` numbers each, row by row; blanks between them may vary.
 
-    Returns
-    -------
-    ndarray or None
-        None if a line holds more or fewer pieces of text, or the numbers of a column do not have the same decimals.
+    None if a line holds more or fewer pieces of text, or the numbers of a column do not have the same decimals.
     """
     text = np.frombuffer(b" " * (_WIDEST - 1) + b"\n" + block.rstrip() + b"\n", dtype=np.uint8)
     line_ends = np.flatnonzero(text == _NEWLINE)
@@ -285,8 +272,9 @@ def rows_of_numbers(source: Source, start: int, columns: int, translation: bytes
     return np.concatenate(parts) if parts else None
 
 
-def expect(source: Source, at: int, count: int, values: Floats) -> Floats:
-    """Return `values`, of which the header at the offset `at` says that there are `count`."""
+def read_count(source: Source, at: int, start: int, end: int, count: int, layout: Layout | None = None) -> Floats:
+    """Return the numbers between two offsets, of which the header at the offset `at` says that there are `count`."""
+    values = read_values(source, start, end, count=count, layout=layout)
     if len(values) != count:
         raise source.error(f"the header says {count} values but {len(values)} follow; get the whole file again", at)
     return values

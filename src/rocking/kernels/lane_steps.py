@@ -1,48 +1,79 @@
-"""One step of all lanes of a group: linear, linear while the weight changes, nonlinear; and what may happen on the way.
+"""One step of all lanes of a group: linear, linear while the weight changes, nonlinear; and bounds on its events.
 
-A step marks, counts and leaves the lanes in which it may hold an event; only the others go on. Lanes without a block
+A step marks and counts the lanes in which it may hold an event, and changes only the others. Lanes without a block
 never have an event, nor do their numbers change. A lane with a NaN always has one.
 """
 
 from typing import TypeVar
 
-from rocking.kernels.arc import is_left_out_nothing, strength_of
+import numpy as np
+
+from rocking.kernels.arc import strength_of, truncation_is_negligible
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.lanes.pool import WIDTH
 from rocking.kernels.recurrences import Line, nonlinear_rates, weighted_rates
 from rocking.kernels.state import Record
 
+#: Lanes that step together. A constant, so that their loops have a fixed length.
+WIDTH = 32
+
+_LANES = ("f8", (WIDTH,))
+_SIDES = ("f8", (2,))
+
+#: A group of lanes: the block's index, and whether its step may hold an event; u, u' and (nonlinear) sin and
+#: cos(alpha - u), now and after the step; constants of the block's present side (`STEP_CONSTANTS`); highest rotation.
+GROUP = np.dtype(
+    [("block", "i8", (WIDTH,)), ("event", "i8", (WIDTH,))]
+    + [
+        (name, *_LANES)
+        for name in (
+            "u", "v", "sine", "cosine", "next_u", "next_v", "next_sine", "next_cosine",
+            "stiffness", "pull", "push", "first", "second", "third", "curve", "peak",
+        )
+    ],
+    align=True,
+)  # fmt: skip
+
+#: Constants of a step of length h on each side. Linear: lam, gain threshold, side gain (u'' = lam u - pull - push a),
+#: h c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 in place of lam, the side's sign
+#: in place of its gain. ``curve`` max |u''| bounds how far the rotation is above or below both ends of the step.
+STEP_CONSTANTS = np.dtype(
+    [(name, *_SIDES) for name in ("stiffness", "pull", "push", "first", "second", "third", "curve")],
+    align=True,
+)
+
 MaybeLine = TypeVar("MaybeLine", Line, None, Line | None)
 
-#: Largest of what the last terms feed into those left out, over the first two: what is left out is a hundredth of it.
-_TAIL = 2.0**-46
+#: Largest bound on the next terms, from the last ones, over the first two: the truncation is a hundredth of it.
+_NEXT_TERMS = 2.0**-46
 
 
 @inlined
-def is_event_free(ends: Line, rise: float, dip: float, bulge: float, turn: Line, peak: float, fallen: float) -> bool:
+def is_event_free(
+    ends: Line, rate: float, below: float, above: float, change: Line, peak: float, fallen: float
+) -> bool:
     """Whether a step certainly holds no impact, no new peak and no overturning; never with a NaN among the numbers.
 
-    Over a step from u to u1 (``ends``) the rotation stays above min(u, u1) - dip and below max(u, u1) + bulge, and its
-    rate, ``rise`` at the start, changes by no less than the first and no more than the second number of ``turn``. A
-    rotation that rises all the way has its peak at the end, where it is seen; one that falls all the way has it at the
-    start, where it must have been seen already.
+    Over a step from u to u1 (``ends``) the rotation stays above min(u, u1) - below and under max(u, u1) + above, and
+    its rate, ``rate`` at the start, changes by no less than the first and no more than the second number of
+    ``change``. A rotation that rises throughout has its peak at the end, which the next step compares; one that falls
+    throughout has it at the start, and must not be above the peak so far.
     """
     u, u1 = ends
-    least, most = turn
+    least, most = change
     highest = max(u, u1)
-    rises = rise + least > 0.0
-    falls = (rise + most < 0.0) & (u <= peak)
-    # One by one: a minimum would pass over a NaN.
-    return (u > dip) & (u1 > dip) & ((highest + bulge <= peak) | rises | falls) & (highest + bulge < fallen)
+    rises = rate + least > 0.0
+    falls = (rate + most < 0.0) & (u <= peak)
+    # One by one: a minimum may ignore a NaN.
+    return (u > below) & (u1 > below) & ((highest + above <= peak) | rises | falls) & (highest + above < fallen)
 
 
 @shared
-def step_linear(group: Record, push: Line, h: float, late: float, fallen: float) -> int:
+def step_linear(group: Record, push: Line, h: float, longer: float, fallen: float) -> int:
     """Step a group through one sample by Stumpff's functions, exact for any lam and h; returns how many have an event.
 
-    ``push`` is the ground acceleration and its slope. w = u'' obeys w'' = lam w under a ground acceleration that
-    changes evenly, so its extrema are at the ends of the step (but for what ``curve`` allows). Samples whose times are
-    rounded are not all of one length: ``late`` is what this one has more than ``h``.
+    ``push`` is the ground acceleration and its slope. w = u'' obeys w'' = lam w under a ground acceleration that is
+    linear in time, so its extrema are at the ends of the step (but for what ``curve`` allows). Samples whose times are
+    rounded are not all of one length: this one is longer than ``h`` by ``longer``.
     """
     start, slope = push
     end = start + slope * h
@@ -55,13 +86,13 @@ def step_linear(group: Record, push: Line, h: float, late: float, fallen: float)
         u1 = u + (h * v + (group.second[lane] * w + group.third[lane] * j))
         v1 = v + (group.first[lane] * w + group.second[lane] * j)
         w1 = lam * u1 - (group.pull[lane] + push_gain * end)
-        u1 += late * v1
-        v1 += late * w1
+        u1 += longer * v1
+        v1 += longer * w1
         least, most = min(min(w, w1), 0.0), max(max(w, w1), 0.0)
         curve = group.curve[lane]
-        # Eight times the bulge's factor is h^2: times the least w, that is h times the least change of the rate.
-        turn = (8.0 * curve * least, 8.0 * curve * most)
-        free = is_event_free((u, u1), h * v, curve * most, -(curve * least), turn, group.peak[lane], fallen)
+        # Eight times ``curve`` is h^2: times the least w, that is h times the least change of the rate.
+        change = (8.0 * curve * least, 8.0 * curve * most)
+        free = is_event_free((u, u1), h * v, curve * most, -(curve * least), change, group.peak[lane], fallen)
         group.u[lane] = u1 if free else u
         group.v[lane] = v1 if free else v
         group.event[lane] = not free
@@ -73,7 +104,7 @@ def step_linear(group: Record, push: Line, h: float, late: float, fallen: float)
 
 
 @inlined
-def begin(group: Record, h: float) -> None:
+def copy_states(group: Record, h: float) -> None:
     """Copy the state of all lanes, with the velocity per time h."""
     for lane in range(WIDTH):
         group.next_u[lane] = group.u[lane]
@@ -93,7 +124,7 @@ def over_substep(line: MaybeLine, k: int, h: float) -> MaybeLine:
 
 
 @inlined
-def commit(group: Record, rate: float) -> int:
+def accept_states(group: Record, rate: float) -> int:
     """Make the copies the state of the lanes that have no event; returns how many have one."""
     events = 0
     for lane in range(WIDTH):
@@ -112,19 +143,19 @@ def step_weighted(group: Record, push: Line, weight: Line, length: float, subste
 
     ``push`` is the ground acceleration, ``weight`` that in the ground's frame over that at rest.
     """
-    share = length / substeps
-    begin(group, 1.0)
+    h = length / substeps
+    copy_states(group, 1.0)
     for k in range(substeps):
-        weighted_substep(group, over_substep(push, k, share), over_substep(weight, k, share), share, fallen)
-    return commit(group, 1.0)
+        weighted_substep(group, over_substep(push, k, h), over_substep(weight, k, h), h, fallen)
+    return accept_states(group, 1.0)
 
 
 @shared
 def weighted_substep(group: Record, push: Line, weight: Line, h: float, fallen: float) -> None:
     """Move the copies through a substep of length h; mark the lanes in which it may hold an event.
 
-    With z = h^2 (lam u - pull), r' = weight z - h^2 push: a term feeds into the next but one, and by the change of the
-    weight into the one after that. The last of them are bounds on all that are left out.
+    With z = h^2 (lam u - pull), r' = weight z - h^2 push: a term contributes to the next but one, and by the change of
+    the weight to the one after that. So the last ones bound the truncation.
     """
     w, d = weight
     square, rate = h * h, 1.0 / h
@@ -138,12 +169,12 @@ def weighted_substep(group: Record, push: Line, weight: Line, h: float, fallen: 
         low = (1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + ((1.0 / 7.0) * r7 + high))))
         u1 = u + (r1 + (0.5 * r2 + low))
         v1 = v + rate * (r2 + (r3 + (r4 + (r5 + (r6 + (r7 + (r8 + (r9 + (r10 + r11)))))))))
-        rest = 3.0 * abs(r4) + (4.0 * abs(r5) + (5.0 * abs(r6) + (6.0 * abs(r7) + 7.0 * abs(r8))))
-        rest += 8.0 * abs(r9) + (9.0 * abs(r10) + 10.0 * abs(r11))
-        least, most = min(r2 + 2.0 * min(r3, 0.0) - rest, 0.0), max(r2 + 2.0 * max(r3, 0.0) + rest, 0.0)
+        later = 3.0 * abs(r4) + (4.0 * abs(r5) + (5.0 * abs(r6) + (6.0 * abs(r7) + 7.0 * abs(r8))))
+        later += 8.0 * abs(r9) + (9.0 * abs(r10) + 10.0 * abs(r11))
+        least, most = min(r2 + 2.0 * min(r3, 0.0) - later, 0.0), max(r2 + 2.0 * max(r3, 0.0) + later, 0.0)
         free = is_event_free((u, u1), r1, 0.125 * most, -0.125 * least, (least, most), group.peak[lane], fallen)
         last = (abs(w) + abs(d)) * (abs(r10) + abs(r11)) + abs(d) * abs(r9)
-        free &= abs(q) * last <= _TAIL * (abs(r1) + abs(r2))
+        free &= abs(q) * last <= _NEXT_TERMS * (abs(r1) + abs(r2))
         group.event[lane] |= not free
         group.next_u[lane] = u1
         group.next_v[lane] = v1
@@ -160,43 +191,44 @@ def step_nonlinear(
     are for ``h``.
     """
     share = length / substeps
-    begin(group, share)
+    copy_states(group, share)
     for k in range(substeps):
-        stretch = (length / h) ** 2
-        nonlinear_substep(group, over_substep(push, k, share), over_substep(weight, k, share), stretch, fallen)
-    return commit(group, 1.0 / share)
+        scale = (length / h) ** 2
+        nonlinear_substep(group, over_substep(push, k, share), over_substep(weight, k, share), scale, fallen)
+    return accept_states(group, 1.0 / share)
 
 
 @shared
-def nonlinear_substep(group: Record, push: Line, weight: Line | None, stretch: float, fallen: float) -> None:
+def nonlinear_substep(group: Record, push: Line, weight: Line | None, scale: float, fallen: float) -> None:
     """Move the copies through one substep; mark the lanes in which it may hold an event.
 
-    ``push`` and ``weight`` have the changes over it; ``stretch`` is the square of its length over the usual one. The
-    sine and cosine of alpha - u are turned by the addition theorem.
+    ``push`` and ``weight`` have the changes over it; ``scale`` is the square of its length over the usual one. The
+    sine and cosine of alpha - u follow by the addition theorem.
     """
     for lane in range(WIDTH):
         u, r1 = group.next_u[lane], group.next_v[lane]
         s0, c0 = group.next_sine[lane], group.next_cosine[lane]
-        toward = (group.push[lane] * push[0], group.push[lane] * push[1])
-        l2 = group.stiffness[lane] * stretch
-        terms, angles = nonlinear_rates(r1, (s0, c0), l2, toward, weight)
+        side_push = (group.push[lane] * push[0], group.push[lane] * push[1])
+        l2 = group.stiffness[lane] * scale
+        terms, angles = nonlinear_rates(r1, (s0, c0), l2, side_push, weight)
         _, r2, r3, r4, r5, r6, r7, r8, r9 = terms
         last = (1.0 / 7.0) * r7 + (0.125 * r8 + (1.0 / 9.0) * r9)
-        moved = r1 + (0.5 * r2 + ((1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + last)))))
-        u1 = u + moved
+        change = r1 + (0.5 * r2 + ((1.0 / 3.0) * r3 + (0.25 * r4 + (0.2 * r5 + ((1.0 / 6.0) * r6 + last)))))
+        u1 = u + change
         v1 = r1 + (r2 + (r3 + (r4 + (r5 + (r6 + (r7 + (r8 + r9)))))))
         sizes = (abs(r1), abs(r2), abs(r3), abs(r4), abs(r5), abs(r6), abs(r7), abs(r8), abs(r9))
-        converged, rest = is_left_out_nothing(sizes, angles, -2.0 * l2, strength_of(weight, toward, 1.0))
-        least, most = min(r2 - rest, 0.0), max(r2 + rest, 0.0)
+        strength = strength_of(weight, side_push, 1.0)
+        converged, later = truncation_is_negligible(sizes, angles, -2.0 * l2, strength)
+        least, most = min(r2 - later, 0.0), max(r2 + later, 0.0)
         free = is_event_free((u, u1), r1, 0.125 * most, -0.125 * least, (least, most), group.peak[lane], fallen)
         free &= converged
         group.event[lane] |= not free
-        # sin and 1 - cos of the rotation moved through
-        square = moved * moved
-        fine = 1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0))
-        sine = moved * (1.0 - square * (1.0 / 6.0 - square * fine))
-        fine = 1.0 / 720.0 - square * (1.0 / 40320.0 - square * (1.0 / 3628800.0))
-        versine = square * (0.5 - square * (1.0 / 24.0 - square * fine))
+        # sin and 1 - cos of the change of the rotation
+        square = change * change
+        higher = 1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0))
+        sine = change * (1.0 - square * (1.0 / 6.0 - square * higher))
+        higher = 1.0 / 720.0 - square * (1.0 / 40320.0 - square * (1.0 / 3628800.0))
+        versine = square * (0.5 - square * (1.0 / 24.0 - square * higher))
         group.next_u[lane] = u1
         group.next_v[lane] = v1
         group.next_sine[lane] = s0 - (s0 * versine + c0 * sine)

@@ -1,4 +1,4 @@
-"""A map as Python and as a command, which compute the same points."""
+"""A case, and a map of it, as Python and as a command that compute the same."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from rocking.analysis.overturning import PULSES
 from rocking.constants import STANDARD_GRAVITY
-from rocking.explorer.inputs import BLOCK_NAMES, NAMES, arguments_of, block_as_python, is_pulse, pulse_call
+from rocking.explorer.inputs import BLOCK_NAMES, NAMES, Case, arguments_of, block_as_python, is_pulse, pulse_call
 from rocking.explorer.maps import QUANTITIES, Axis, MapGrid
 from rocking.named_pulses import pulse_values
 
@@ -58,7 +58,61 @@ print(found.summary())
 """
 
 
-def as_python(grid: MapGrid, quantity: str) -> str:
+def case_as_python(case: Case) -> str:
+    """Write the case as a script that runs as it stands.
+
+    Examples
+    --------
+    >>> from rocking.explorer.inputs import read_case
+    >>> from rocking.explorer.uploads import UploadStore
+    >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
+    >>> print(case_as_python(read_case(texts, UploadStore())))
+    import rocking
+    <BLANKLINE>
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2)
+    motion = None
+    response = rocking.simulate(block, motion, initial_rotation=0.02)
+    print(response.summary())
+    """
+    numbers = {
+        "model": None if case.model == "nonlinear" else case.model,
+        "chattering": case.texts.get("chattering"),
+        "duration": case.duration,
+        "initial_rotation": case.initial_rotation or None,
+        "initial_velocity": case.initial_velocity or None,
+    }
+    options = "".join(f", {name}={value!r}" for name, value in numbers.items() if value is not None)
+    return "\n".join(
+        [
+            "import rocking",
+            "",
+            f"block = rocking.{block_as_python(case.texts)}",
+            f"motion = {case.python}",
+            f"response = rocking.simulate(block, motion{options})",
+            "print(response.summary())",
+        ]
+    )
+
+
+def case_as_command(case: Case) -> str | None:
+    """Write the case as a command; None for what the command line does not do.
+
+    Examples
+    --------
+    >>> from rocking.explorer.inputs import read_case
+    >>> from rocking.explorer.uploads import UploadStore
+    >>> texts = {"p": "2", "alpha": "12deg", "motion": "ridgecrest-clc-090", "sa": "0.4g@1"}
+    >>> case_as_command(read_case(texts, UploadStore()))
+    'rocking simulate ridgecrest-clc-090 --p 2 --alpha 12deg --sa 0.4g@1'
+    """
+    if not case.words or "gravity" in case.texts:
+        return None
+    options = [name for name in NAMES if name in case.texts and name not in ("motion", "vertical")]
+    each = ([f"--{name.replace('_', '-')}", case.texts[name]] for name in options)
+    return shlex.join(["rocking", "simulate", *case.words, *itertools.chain.from_iterable(each)])
+
+
+def map_as_python(grid: MapGrid, quantity: str) -> str:
     """Write a script that computes a quantity of a map; it runs as it stands.
 
     Chattering is mapped by `chattering_map`, overturning by `overturning_map` where the map is over frequency and
@@ -86,7 +140,7 @@ def as_python(grid: MapGrid, quantity: str) -> str:
     return (_HEAD + _PEAKS).format(**texts, names="families")
 
 
-def as_command(grid: MapGrid) -> str | None:
+def map_as_command(grid: MapGrid) -> str | None:
     """Write a map of overturning as a command; None for what the command line does not map."""
     texts = grid.case.texts
     if not _is_overturning_map(grid) or "gravity" in texts:
@@ -102,11 +156,11 @@ def as_command(grid: MapGrid) -> str | None:
     return shlex.join(["rocking", "map", name, *itertools.chain.from_iterable(words)])
 
 
-def described(grid: MapGrid) -> dict[str, Any]:
+def map_as_code(grid: MapGrid) -> dict[str, Any]:
     """Return a script for every quantity, and the command for those that it computes."""
-    command = as_command(grid)
+    command = map_as_command(grid)
     return {
-        "python": {each: as_python(grid, each) for each in QUANTITIES},
+        "python": {each: map_as_python(grid, each) for each in QUANTITIES},
         "command": dict.fromkeys(_OVERTURNING, command),
     }
 

@@ -1,29 +1,56 @@
-"""What the commands share: a folder for what came out, writing into it, and printing."""
+"""What comes out of a command: a folder for it, writing into that, printing, and the options that say so."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
-from dataclasses import replace
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from cyclopts import Group, Parameter
 
 from rocking.errors import OutputError
 from rocking.progress import note
-from rocking.result import Result
 from rocking.tables import to_json, write_figure, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rocking.analysis.fragility.result import Fragility
-    from rocking.cli.options import Records
 
 #: Resolution of figures as PNG.
 _DOTS_PER_INCH: Final = 160
 
 
-def write(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, Any] | None = None) -> None:
+OUTPUT: Final = Parameter(name="*", group=Group("Output", sort_key=4))
+
+
+@dataclass(frozen=True)
+class QuietOptions:
+    """What every command takes."""
+
+    quiet: Annotated[bool, Parameter(name="--quiet", negative="", help="No notes on stderr.")] = False
+
+
+@dataclass(frozen=True)
+class PrintOptions(QuietOptions):
+    """How a result is printed."""
+
+    as_json: Annotated[bool, Parameter(name="--json", negative="", help="Print the result as JSON.")] = False
+
+
+@dataclass(frozen=True)
+class OutputOptions(PrintOptions):
+    """How a result is printed, and where its files go."""
+
+    out: Annotated[Path | None, Parameter(help="Folder for the files: figures, tables, result.json.")] = None
+
+    def folder(self) -> AbstractContextManager[Path | None]:
+        """Make the folder, if one is wanted, before the work; on failure, remove it again where it is empty."""
+        return nullcontext() if self.out is None else output_folder(self.out)
+
+
+def write_results(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, Any] | None = None) -> None:
     """Write figures by name (PNG and PDF) and, if there is one, a result (JSON) into a folder.
 
     Raises
@@ -38,36 +65,7 @@ def write(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, A
         write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
 
 
-def deliver(
-    found: Result, stem: str, read: Records | None, *, folder: Path | None, as_json: bool, **figure: Any
-) -> None:
-    """Write an analysis into a folder where there is one (figure, tables, dataset, result), and print it.
-
-    Its tables name each motion by the record that was read, too, as those of other commands do.
-    """
-    result = found.to_dict()
-    if read is not None:
-        result |= read.to_dict()
-        found = replace(found, data=found.data.assign_coords(record=("motion", [*read.motions])))
-    if folder is not None:
-        for table in found.TABLES:
-            found.to_csv(folder / f"{table}.csv", table)
-        found.to_netcdf(folder / f"{stem}.nc")
-        write(folder, figures={stem: found.plot(**figure)}, result=result)
-    show(result, found.summary(), as_json=as_json, folder=folder)
-
-
-def with_records(found: Fragility, read: Records) -> Fragility:
-    """Name the motion of each outcome by the record that was read, too."""
-    if found.outcomes is None:
-        return found
-    records = {row["motion"]: row["record"] for row in read.to_dict()["records"]}
-    named = found.outcomes.copy()
-    named.insert(0, "record", named["motion"].map(records))
-    return replace(found, outcomes=named)
-
-
-def show(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | None) -> None:
+def print_result(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | None) -> None:
     """Print a result, for machines or for people, and what was written."""
     if as_json:
         print(to_json(result))

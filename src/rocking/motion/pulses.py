@@ -1,4 +1,8 @@
-"""Pulses: straight lines, which are exact, sines and sums of them, wavelets with an envelope."""
+"""Analytic ground motions: rectangles and triangles, sines, lobes, Ricker and Mavroeidis-Papageorgiou pulses.
+
+Each is a `Motion` whose pieces approximate the formula to 1e-15 of the largest acceleration (`Motion.error`); those of
+straight lines are exact. Pulses start at time 0, are zero after their end, and are added with ``+``.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,7 @@ from rocking import checks
 from rocking.errors import InvalidMotion
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
-from rocking.motion.pulses.series import (
+from rocking.motion.series import (
     ERROR,
     GAUSSIAN_PIECE,
     MOST_CYCLES,
@@ -30,20 +34,31 @@ from rocking.motion.pulses.series import (
     whole_pieces,
 )
 
+__all__ = [
+    "half_sine",
+    "mavroeidis_papageorgiou",
+    "n_lobe",
+    "one_cosine",
+    "one_sine",
+    "rectangular",
+    "ricker",
+    "sine",
+    "triangular",
+]
+
 
 def rectangular(amplitude: float, duration: float) -> Motion:
     """Return a constant acceleration; exact.
 
     Parameters
     ----------
-    amplitude : float
-        m/s^2.
-    duration : float
-        s.
+    amplitude, duration : float
+        m/s^2; s.
 
     Returns
     -------
     Motion
+        One piece.
 
     Raises
     ------
@@ -55,15 +70,13 @@ def rectangular(amplitude: float, duration: float) -> Motion:
     >>> rectangular(2.0, 0.5).pgv
     1.0
     """
-    amplitude, duration = (
-        checks.finite(amplitude, "amplitude", InvalidMotion),
-        checks.positive(duration, "duration", InvalidMotion, "s"),
-    )
+    amplitude, duration = _amplitude(amplitude), checks.positive(duration, "duration", InvalidMotion, "s")
+    numbers = {"amplitude": amplitude, "duration": duration}
     return Motion(
         np.array([0.0, duration]),
         np.array([[amplitude]]),
         name="rectangular",
-        description=Description("rectangular", {"amplitude": amplitude, "duration": duration}, "constant"),
+        description=Description("rectangular", numbers, "constant"),
     )
 
 
@@ -72,14 +85,13 @@ def triangular(amplitude: float, duration: float) -> Motion:
 
     Parameters
     ----------
-    amplitude : float
-        m/s^2.
-    duration : float
-        s.
+    amplitude, duration : float
+        m/s^2; s.
 
     Returns
     -------
     Motion
+        Two pieces.
 
     Raises
     ------
@@ -91,19 +103,14 @@ def triangular(amplitude: float, duration: float) -> Motion:
     >>> triangular(2.0, 0.5).pgv
     0.5
     """
-    amplitude, duration = (
-        checks.finite(amplitude, "amplitude", InvalidMotion),
-        checks.positive(duration, "duration", InvalidMotion, "s"),
-    )
+    amplitude, duration = _amplitude(amplitude), checks.positive(duration, "duration", InvalidMotion, "s")
+    numbers = {"amplitude": amplitude, "duration": duration}
+    formula = "linear from 0 to amplitude at duration/2 and back to 0"
     return Motion.from_points(
         [0.0, 0.5 * duration, duration],
         [0.0, amplitude, 0.0],
         name="triangular",
-        description=Description(
-            "triangular",
-            {"amplitude": amplitude, "duration": duration},
-            "linear from 0 to amplitude at duration/2 and back to 0",
-        ),
+        description=Description("triangular", numbers, formula),
     )
 
 
@@ -112,24 +119,22 @@ def sine(amplitude: float, frequency: float, *, cycles: float, phase: float = 0.
 
     Parameters
     ----------
-    amplitude : float
-        m/s^2.
-    frequency : float
-        Hz.
+    amplitude, frequency : float
+        m/s^2; Hz.
     cycles : float
-        Duration times frequency; need not be whole.
+        Duration times frequency, at most 100,000; need not be whole.
     phase : float
         rad.
 
     Returns
     -------
     Motion
+        Of family "sine", which `rocking.AsymptoticTime` asks for.
 
     Raises
     ------
     InvalidMotion
-        If `frequency` or `cycles` is not positive, there are more than 100,000 cycles, or a number is not
-        finite.
+        If `frequency` or `cycles` is not positive, there are too many cycles, or a number is not finite.
 
     Examples
     --------
@@ -145,14 +150,13 @@ def half_sine(amplitude: float, frequency: float) -> Motion:
 
     Parameters
     ----------
-    amplitude : float
-        m/s^2.
-    frequency : float
-        Hz, of the whole sine: the pulse lasts ``1 / (2 frequency)``.
+    amplitude, frequency : float
+        m/s^2; Hz, of the whole sine.
 
     Returns
     -------
     Motion
+        It lasts ``1 / (2 frequency)``.
 
     Raises
     ------
@@ -172,14 +176,13 @@ def one_sine(amplitude: float, frequency: float) -> Motion:
 
     Parameters
     ----------
-    amplitude : float
-        m/s^2.
-    frequency : float
-        Hz.
+    amplitude, frequency : float
+        m/s^2; Hz.
 
     Returns
     -------
     Motion
+        It ends at rest.
 
     Raises
     ------
@@ -195,18 +198,17 @@ def one_sine(amplitude: float, frequency: float) -> Motion:
 
 
 def one_cosine(amplitude: float, frequency: float) -> Motion:
-    """Return a one-cosine acceleration pulse (Zhang and Makris 2001): one cycle of a cosine, jumps included.
+    """Return a one-cosine acceleration pulse (Zhang and Makris 2001): one cycle of a cosine.
 
     Parameters
     ----------
-    amplitude : float
-        m/s^2.
-    frequency : float
-        Hz.
+    amplitude, frequency : float
+        m/s^2; Hz.
 
     Returns
     -------
     Motion
+        It jumps at both ends.
 
     Raises
     ------
@@ -224,8 +226,8 @@ def one_cosine(amplitude: float, frequency: float) -> Motion:
 def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int | None = None) -> Motion:
     """Return half cycles of a sine, each with its own amplitude.
 
-    Lobe k (k = 0, 1, ...) is ``amplitude[k] * sin(2 pi frequency t)`` for ``k <= 2 frequency t <= k + 1``, so
-    equal amplitudes make a sine.
+    Lobe k (k = 0, 1, ...) is ``amplitude[k] * sin(2 pi frequency t)`` for ``k <= 2 frequency t <= k + 1``, so equal
+    amplitudes make a sine.
 
     Parameters
     ----------
@@ -239,6 +241,7 @@ def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int |
     Returns
     -------
     Motion
+        It starts and ends without a jump.
 
     Raises
     ------
@@ -258,40 +261,36 @@ def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int |
     unit = sine_pieces(breakpoints, frequency, 0.0)
     one = np.ndim(amplitude) == 0
     numbers = {"amplitude" if one else f"amplitude_{k}": a for k, a in enumerate(amplitudes)}
+    formula = "amplitude sin(2 pi frequency t), an amplitude for each half cycle"
     return Motion(
         breakpoints,
         unit * np.repeat(amplitudes, per_lobe)[:, np.newaxis],
         name=f"{len(amplitudes)} lobes",
-        description=Description(
-            "n-lobe",
-            numbers | {"frequency": frequency, "lobes": len(amplitudes)},
-            "amplitude sin(2 pi frequency t), an amplitude for each half cycle",
-        ),
+        description=Description("n-lobe", numbers | {"frequency": frequency, "lobes": len(amplitudes)}, formula),
         error=ERROR * max(map(abs, amplitudes)),
     )
 
 
+def _amplitude(value: float) -> float:
+    return checks.finite(value, "amplitude", InvalidMotion)
+
+
+def _phase(value: float) -> float:
+    return checks.finite(value, "phase", InvalidMotion)
+
+
 def _sine(family: str, amplitude: float, frequency: float, cycles: float, phase: float) -> Motion:
-    amplitude, phase = (
-        checks.finite(amplitude, "amplitude", InvalidMotion),
-        checks.finite(phase, "phase", InvalidMotion),
-    )
-    frequency, cycles = (
-        checked_frequency(frequency),
-        checks.positive(cycles, "number of cycles", InvalidMotion, "cycles"),
-    )
+    amplitude, phase, frequency = _amplitude(amplitude), _phase(phase), checked_frequency(frequency)
+    cycles = checks.positive(cycles, "number of cycles", InvalidMotion, "cycles")
     if cycles > MOST_CYCLES:
-        raise InvalidMotion(f"a sine may have at most {MOST_CYCLES} cycles, not {cycles:g}")
+        raise InvalidMotion(f"a sine may have at most {MOST_CYCLES} {{}}, not {cycles:g}", "cycles", value=cycles)
     breakpoints = np.linspace(0.0, cycles / frequency, whole_pieces(PIECES_PER_CYCLE * cycles))
+    numbers = {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase}
     return Motion(
         breakpoints,
         amplitude * sine_pieces(breakpoints, frequency, phase),
         name=family,
-        description=Description(
-            family,
-            {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase},
-            "amplitude sin(2 pi frequency t + phase) over the given cycles",
-        ),
+        description=Description(family, numbers, "amplitude sin(2 pi frequency t + phase) over the given cycles"),
         error=ERROR * abs(amplitude),
     )
 
@@ -299,10 +298,8 @@ def _sine(family: str, amplitude: float, frequency: float, cycles: float, phase:
 def _lobe_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> list[float]:
     if np.ndim(amplitude) > 1:
         raise InvalidMotion("the amplitudes of the lobes must be one number or a flat sequence of numbers")
-    given = [
-        checks.finite(a, "amplitude of a lobe", InvalidMotion)
-        for a in np.atleast_1d(np.asarray(amplitude, dtype=object))
-    ]
+    each = np.atleast_1d(np.asarray(amplitude, dtype=object))
+    given = [checks.finite(value, "amplitude of a lobe", InvalidMotion) for value in each]
     count = None if lobes is None else checks.whole(lobes, "number of lobes", InvalidMotion, 1, 2 * MOST_CYCLES)
     if np.ndim(amplitude) == 0 and count is not None:
         return given * count
@@ -327,38 +324,34 @@ def ricker(
 ) -> Motion:
     """Return a symmetric or antisymmetric Ricker pulse (Vassiliou and Makris 2011).
 
-    With t counted from the middle of the motion and f the frequency, the symmetric pulse is
-    ``amplitude (1 - x^2) exp(-x^2 / 2)``, ``x = sqrt(2) pi f t``, and the antisymmetric one
-    ``(amplitude / beta) (x^2 - 3) x exp(-x^2 / 2)``, ``x = 2 pi f t / sqrt(3)``, where beta = 1.3801... makes
-    its peak (before the middle) equal to `amplitude`.
+    With t counted from the middle of the motion and f the frequency, the symmetric pulse is ``amplitude (1 - x^2)
+    exp(-x^2 / 2)``, ``x = sqrt(2) pi f t``, and the antisymmetric one ``(amplitude / beta) (x^2 - 3) x exp(-x^2 / 2)``,
+    ``x = 2 pi f t / sqrt(3)``, where beta = 1.3801... makes its peak (before the middle) equal to `amplitude`.
 
     Parameters
     ----------
-    amplitude : float
-        Peak acceleration, m/s^2.
-    frequency : float
-        Dominant frequency 1/T_p, Hz.
+    amplitude, frequency : float
+        Peak acceleration, m/s^2; dominant frequency 1/T_p, Hz.
     kind : {"symmetric", "antisymmetric"}
         Second or third derivative of a Gaussian.
     duration : float, optional
-        Length of the motion, s, if the pulse is to be cut on both sides before it falls below 1e-16 of its
-        peak.
+        Length of the motion, s, if the pulse is to be cut on both sides before it falls below 1e-16 of its peak.
 
     Returns
     -------
     Motion
+        The peak is in its middle, or on both sides of it.
 
     Raises
     ------
     InvalidMotion
-        If a number is not finite, `frequency` or `duration` is not positive, `duration` is longer than the
-        pulse, or `kind` is neither.
+        If a number is not finite, `frequency` or `duration` is not positive, `duration` is longer than the pulse, or
+        `kind` is neither.
 
     References
     ----------
     Vassiliou, M. F. and Makris, N. (2011). Estimating time scales and length scales in pulselike earthquake
-    acceleration records with wavelet analysis. Bulletin of the Seismological Society of America 101(2),
-    596-618.
+    acceleration records with wavelet analysis. Bulletin of the Seismological Society of America 101(2), 596-618.
 
     Examples
     --------
@@ -366,7 +359,7 @@ def ricker(
     >>> round(pulse.pga, 12), abs(pulse.velocity(pulse.duration)) < 1e-15
     (2.0, True)
     """
-    amplitude, frequency = checks.finite(amplitude, "amplitude", InvalidMotion), checked_frequency(frequency)
+    amplitude, frequency = _amplitude(amplitude), checked_frequency(frequency)
     kinds = ("symmetric", "antisymmetric")
     symmetric = checks.one_of(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
     rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
@@ -395,29 +388,28 @@ def ricker(
 def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float, gamma: float) -> Motion:
     """Return the near-fault pulse of Mavroeidis and Papageorgiou (2003).
 
-    Its ground velocity is ``v(t) = (amplitude / 2) [1 + cos(2 pi f s / gamma)] cos(2 pi f s + phase)``, with
-    f the frequency and ``s = t - gamma / (2 f)`` counted from the middle; the motion is its derivative::
+    Its ground velocity is ``v(t) = (amplitude / 2) [1 + cos(2 pi f s / gamma)] cos(2 pi f s + phase)``, with f the
+    frequency and ``s = t - gamma / (2 f)`` counted from the middle; the motion is its derivative::
 
         -(amplitude pi f / gamma) [ sin(2 pi f s / gamma) cos(2 pi f s + phase)
                                     + gamma sin(2 pi f s + phase) (1 + cos(2 pi f s / gamma)) ].
 
-    Note that `amplitude` is a velocity; use ``.scaled_to(level)`` for a given acceleration. The
-    motion starts from rest, so its velocity equals v(t), which is zero at both ends.
+    Note that `amplitude` is a velocity; use ``.scaled_to(level)`` for a given acceleration. The motion starts from
+    rest, so its velocity equals v(t), which is zero at both ends.
 
     Parameters
     ----------
-    amplitude : float
-        Amplitude A of the velocity pulse, m/s.
-    frequency : float
-        Prevailing frequency f_p, Hz.
+    amplitude, frequency : float
+        Amplitude A of the velocity pulse, m/s; prevailing frequency f_p, Hz.
     phase : float
         Phase nu, rad: 0 gives a symmetric and pi/2 an antisymmetric velocity pulse.
     gamma : float
-        Oscillatory character, at least 1: the motion lasts ``gamma / frequency``.
+        Oscillatory character, at least 1.
 
     Returns
     -------
     Motion
+        It lasts ``gamma / frequency``.
 
     Raises
     ------
@@ -435,13 +427,11 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
     >>> pulse.duration, round(pulse.pgv, 12)
     (4.0, 0.8)
     """
-    amplitude, phase = (
-        checks.finite(amplitude, "amplitude", InvalidMotion),
-        checks.finite(phase, "phase", InvalidMotion),
-    )
-    frequency, gamma = checked_frequency(frequency), checks.positive(gamma, "gamma", InvalidMotion, "cycles")
+    amplitude, phase, frequency = _amplitude(amplitude), _phase(phase), checked_frequency(frequency)
+    gamma = checks.positive(gamma, "gamma", InvalidMotion, "cycles")
     if not 1.0 <= gamma <= MOST_CYCLES:
-        raise InvalidMotion(f"gamma of a Mavroeidis-Papageorgiou pulse must be from 1 to {MOST_CYCLES}, not {gamma}")
+        sentence = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {MOST_CYCLES}, not {gamma}"
+        raise InvalidMotion(sentence, "gamma", value=gamma)
     breakpoints = np.linspace(0.0, gamma / frequency, whole_pieces(PIECES_PER_CYCLE * (gamma + 1.0)))
     turns, rest = exact_product(frequency, middles(breakpoints))
     carrier = sine_and_cosine(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)

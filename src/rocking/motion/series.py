@@ -1,4 +1,4 @@
-"""Formulas as piecewise polynomials: each piece is the Taylor series about its middle, moved to its start.
+"""Formulas of pulses as piecewise polynomials: each piece is the Taylor series about its middle, moved to its start.
 
 The pieces are so short that the first term left out is below 1e-16 of the peak. Large angles are taken without their
 rounding: products and quotients with their errors, whole turns taken off exactly.

@@ -1,0 +1,236 @@
+"""`rocking spectrum`, `map`, `ida`, `measures`: many simulations, one answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+from rocking.analysis.efficiency import compare_measures
+from rocking.analysis.incremental import incremental_dynamic_analysis
+from rocking.analysis.overturning import overturning_map
+from rocking.analysis.spectrum import Abscissa, rocking_spectrum
+from rocking.block import Blocks
+from rocking.cli.options import (
+    BLOCK,
+    MEASURE,
+    MODEL,
+    BlockOptions,
+    EnsembleOptions,
+    MeasureOptions,
+    ModelOptions,
+    SlendernessOptions,
+    TreatmentOptions,
+    ensemble_of,
+)
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, UnscaledOptions
+from rocking.errors import InvalidOption
+from rocking.quantities import angle, tilt, values
+from rocking.result import DatasetResult
+
+
+def spectrum(
+    *names: Names,
+    alpha: str | None = None,
+    p: str | None = None,
+    size: str | None = None,
+    restitution: str | None = None,
+    ensemble: Path | None = None,
+    fractiles: str = "0.16,0.5,0.84",
+    against: Abscissa = "p",
+    motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
+    model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Compute rocking spectra: peak rotation against the frequency parameter or the size of the block.
+
+    Lists of numbers are 1,2,5 or START:STOP:COUNT, with :log at the end for equal ratios. In the results, peaks are
+    null where the block overturns. --out holds spectrum.png, .pdf, .nc, fractiles.csv, peaks.csv (of every motion) and
+    result.json.
+
+    Parameters
+    ----------
+    alpha
+        Slendernesses, as 10deg,15deg or 0.1:0.3:5 (rad); or give --ensemble.
+    p
+        Frequency parameters, rad/s; or give --size.
+    size
+        Half diagonals of rectangular blocks, m; or give --p.
+    restitution
+        Restitutions; Housner's by default.
+    ensemble
+        The ensemble.csv that rocking calibrate writes, in place of slendernesses and restitutions: its blocks are made
+        larger or smaller together, so that their median p is each of --p (by default half to twice their own).
+    fractiles
+        Shares of the motions that stay below the fractile curves.
+    against
+        Abscissa of the figure.
+    """
+    if alpha is None and ensemble is None:
+        raise InvalidOption("a spectrum needs {}, or the {} of a calibration", "alpha", "ensemble")
+    if ensemble is not None and (alpha is not None or restitution is not None):
+        raise InvalidOption(
+            "the blocks of {} have slendernesses and restitutions of their own: leave {} and {} out",
+            "ensemble",
+            "alpha",
+            "restitution",
+        )
+    with output.folder() as folder:
+        axes: dict[str, Any] = {
+            "p": None if p is None else values(p, "p"),
+            "size": None if size is None else values(size, "size"),
+        }
+        how = model.chosen()
+        if alpha is not None:
+            restitutions = None if restitution is None else values(restitution, "restitution")
+            blocks = Blocks.grid(alpha=values(alpha, "alpha", tilt), restitution=restitutions, **axes)
+            axes = {}
+        elif ensemble is not None:
+            given = ensemble_of(ensemble, model)
+            blocks = given.pop("blocks")
+            how |= given
+        shares = values(fractiles, "fractiles").tolist()
+        read = motion.read_all(names)
+        found = rocking_spectrum(blocks, [*read.motions.values()], **axes, fractiles=shares, **how)
+        _deliver(found, "spectrum", read, folder=folder, as_json=output.as_json, against=against)
+
+
+def map(
+    pulse: str,
+    *,
+    amplitudes: str = "0.5:10:96",
+    frequencies: str = "0.25:8:63",
+    cycles: float | None = None,
+    phase: str | None = None,
+    gamma: float | None = None,
+    kind: str | None = None,
+    tolerance: float = 1e-9,
+    block: Annotated[SlendernessOptions, BLOCK] = SlendernessOptions(),
+    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Map what a pulse does to a block, over amplitude and frequency, with refined boundaries.
+
+    Lists of numbers are 1,2,5 or START:STOP:COUNT, with :log at the end for equal ratios. --out holds map.png, .pdf,
+    .nc, modes.csv, boundaries.csv and result.json.
+
+    Parameters
+    ----------
+    pulse
+        sine (with --cycles), half-sine, one-sine, one-cosine, ricker (with --kind) or mavroeidis-papageorgiou (with
+        --phase and --gamma).
+    amplitudes
+        Peak accelerations over the smallest that lifts the block.
+    frequencies
+        2 pi times the pulse's frequency, over the block's p.
+    cycles
+        Cycles of a sine.
+    phase
+        Phase of a sine or a Mavroeidis-Papageorgiou pulse, 90deg or 1.57 (rad).
+    gamma
+        Length of a Mavroeidis-Papageorgiou pulse in cycles.
+    kind
+        symmetric or antisymmetric, of a Ricker pulse.
+    tolerance
+        Width, relative to the amplitude, that boundaries are refined to.
+    """
+    given: dict[str, Any] = {
+        "cycles": cycles,
+        "phase": None if phase is None else angle(phase, "phase"),
+        "gamma": gamma,
+        "kind": kind,
+    }
+    with output.folder() as folder:
+        found = overturning_map(
+            block.block(),
+            pulse,
+            amplitudes=values(amplitudes, "amplitudes"),
+            frequencies=values(frequencies, "frequencies"),
+            model=model.model,
+            tolerance=tolerance,
+            **{name: value for name, value in given.items() if value is not None},
+        )
+        _deliver(found, "map", None, folder=folder, as_json=output.as_json)
+
+
+def ida(
+    *names: Names,
+    tolerance: float = 1e-6,
+    measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
+    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
+    motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
+    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Scale motions up until the block overturns and beyond (incremental dynamic analysis).
+
+    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Without
+    --levels, they go in steps of 5 % to three times that by which every motion has overturned the block. Bands and
+    gaps between two levels are not seen; close ones see more of them. --out holds ida.png, .pdf, .nc, levels.csv,
+    bands.csv (of levels that overturn) and result.json.
+
+    Parameters
+    ----------
+    tolerance
+        Width, relative to the level, that the ends of bands are refined to.
+    """
+    body = block.block()
+    with output.folder() as folder:
+        read = motion.read_all(names)
+        motions = [*read.motions.values()]
+        found = incremental_dynamic_analysis(body, motions, **measure.chosen(), model=model.model, tolerance=tolerance)
+        _deliver(found, "ida", read, folder=folder, as_json=output.as_json)
+
+
+def measures(
+    *names: Names,
+    periods: str = "0.5,1,2",
+    damping: float = 0.05,
+    block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
+    motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
+    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Compare intensity measures: how widely motions scatter, by each, at which they first overturn a block.
+
+    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha), or the
+    ensemble of a calibration stands for it (--ensemble). Every motion is scaled up until it overturns the block. --out
+    holds measures.png, .pdf, .nc, measures.csv, intensities.csv (at which each motion overturns) and result.json.
+
+    Parameters
+    ----------
+    periods
+        Periods of spectral accelerations, s: 0.5,1,2 or 0.2:4:10:log.
+    damping
+        Their fraction of critical damping.
+    """
+    bodies = block.blocks(model)
+    with output.folder() as folder:
+        read = motion.read_all(names)
+        found = compare_measures(
+            motions=[*read.motions.values()],
+            periods=values(periods, "periods"),
+            damping=damping,
+            **bodies,
+        )
+        _deliver(found, "measures", read, folder=folder, as_json=output.as_json)
+
+
+def _deliver(
+    found: DatasetResult, stem: str, read: ReadRecords | None, *, folder: Path | None, as_json: bool, **figure: Any
+) -> None:
+    """Write an analysis into a folder where there is one (figure, tables, dataset, result), and print it.
+
+    Its tables name each motion by the record that was read, too, as those of other commands do.
+    """
+    result = found.to_dict()
+    if read is not None:
+        result |= read.to_dict()
+        found = replace(found, data=found.data.assign_coords(record=("motion", [*read.motions])))
+    if folder is not None:
+        for table in found.TABLES:
+            found.to_csv(folder / f"{table}.csv", table)
+        found.to_netcdf(folder / f"{stem}.nc")
+        write_results(folder, figures={stem: found.plot(**figure)}, result=result)
+    print_result(result, found.summary(), as_json=as_json, folder=folder)

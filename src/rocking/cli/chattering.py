@@ -1,0 +1,130 @@
+"""`rocking chatter`, `rocking critical`, `rocking paper`: the paper's theory of chattering under a sine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Group, Parameter
+
+from rocking.chattering.report import chattering_report, critical_report
+from rocking.cli.output import OUTPUT, OutputOptions, QuietOptions, output_folder, print_result, write_results
+from rocking.errors import InvalidOption
+from rocking.quantities import angle
+
+
+def chatter(
+    a: float,
+    omega: float,
+    eta: float,
+    *,
+    p: float | None = None,
+    order: int = 4,
+    resolved: int | None = None,
+    table: Annotated[bool, Parameter(negative="")] = False,
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.
+
+    Times are dimensionless, p t; with --p also in seconds. --out holds chatter.png, .pdf (intervals between
+    the impacts), result.json, impacts.csv and cycles.csv.
+
+    Parameters
+    ----------
+    a
+        Amplitude of the ground acceleration over g alpha, at least 1.
+    omega
+        Frequency of the ground acceleration (rad/s) over the block's p.
+    eta
+        Coefficient of restitution.
+    p
+        The block's frequency parameter, rad/s.
+    order
+        Terms of the expansion in a - 1, 1 to 34.
+    resolved
+        Impacts that the semi-analytical method resolves; by default as many as the restitution asks for.
+    table
+        Show the paper's iterative procedure (Eqs 62 and 64): its first cycles and the last; all are in cycles.csv.
+    """
+    with output.folder() as folder:
+        report = chattering_report(a, omega, eta, order=order, resolved=resolved, p=p)
+        result, text = report.to_dict(), report.summary()
+        if table:
+            text += f"\n\n{report.table()}"
+            result = {**result, "asymptotic_table": report.to_dataframe("cycles").to_dict("records")}
+        if folder is not None:
+            report.to_csv(folder / "impacts.csv")
+            if report.cycles is not None:
+                report.to_csv(folder / "cycles.csv", "cycles")
+            write_results(folder, figures={"chatter": report.plot()}, result=report.to_dict())
+        print_result(result, text, as_json=output.as_json, folder=folder)
+
+
+def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPUT] = OutputOptions()) -> None:
+    """Give the amplitude up to which chattering under a sine is complete, by every method.
+
+    --out holds result.json.
+
+    Parameters
+    ----------
+    omega
+        Frequency of the ground acceleration (rad/s) over the block's p.
+    eta
+        Coefficient of restitution.
+    """
+    with output.folder() as folder:
+        report = critical_report(omega, eta)
+        if folder is not None:
+            report.to_json(folder / "result.json")
+        print_result(report.to_dict(), report.summary(), as_json=output.as_json, folder=folder)
+
+
+_CASE = Parameter(name="*", group=Group("Other parameters than the paper's, for one figure", sort_key=1))
+
+
+@dataclass(frozen=True)
+class _CaseOptions:
+    """Block and excitation that one figure is drawn for."""
+
+    a: Annotated[float | None, Parameter(help="Amplitude of the ground acceleration over g alpha.")] = None
+    omega: Annotated[float | None, Parameter(help="Its frequency (rad/s) over the block's p.")] = None
+    eta: Annotated[float | None, Parameter(help="Coefficient of restitution.")] = None
+    p: Annotated[float | None, Parameter(help="The block's frequency parameter, rad/s.")] = None
+    alpha: Annotated[str | None, Parameter(help="Its slenderness, 12deg or 0.2 (rad).")] = None
+
+    def chosen(self) -> dict[str, float]:
+        """Return what is given, as arguments."""
+        slenderness = None if self.alpha is None else angle(self.alpha, "alpha")
+        given = {"a": self.a, "omega": self.omega, "eta": self.eta, "p": self.p, "alpha": slenderness}
+        return {name: value for name, value in given.items() if value is not None}
+
+
+def paper(
+    *,
+    out: Path,
+    figure: int | None = None,
+    case: Annotated[_CaseOptions, _CASE] = _CaseOptions(),
+    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+) -> None:
+    """Redraw the paper's figures from computation: PDF, PNG, the data as CSV, and what the paper states in numbers.
+
+    Parameters
+    ----------
+    out
+        Folder for the files.
+    figure
+        Number of one figure; all of them by default.
+    """
+    from rocking.chattering.paper import FIGURES, paper_figure
+
+    parameters = case.chosen()
+    if parameters and figure is None:
+        named = " and ".join(["{}"] * len(parameters))
+        raise InvalidOption(f"with {named} one figure is drawn: say which with {{}}", *parameters, "figure")
+    with output_folder(out) as folder:
+        for number in FIGURES if figure is None else [figure]:
+            drawn = paper_figure(number, **parameters)
+            print(drawn.summary())
+            for path in drawn.write(folder):
+                print(f"  {path}")
