@@ -79,9 +79,9 @@ def test_the_bound_holds_all_that_a_series_leaves_out(nonlinear: bool, order: in
             sine, cosine = angles(alpha, c, order)
             scratch["sine"][:order] = [float(x) for x in sine[:order]]
             scratch["cosine"][:order] = [float(x) for x in cosine[:order]]
-            bound, _ = arc.left_out_nonlinear(scratch, 1.0, (len(push) - 1, len(weight) - 1), order, h)
+            bound, _ = arc.truncation_nonlinear(scratch, 1.0, (len(push) - 1, len(weight) - 1), order, h)
         else:
-            bound, _ = arc.left_out_linear(scratch, 1.0, len(weight) - 1, order, h)
+            bound, _ = arc.truncation_linear(scratch, 1.0, len(weight) - 1, order, h)
         left_out = float(mp.fsum(abs(k * c[k]) * mp.mpf(h) ** k for k in range(order + 1, TERMS)))
         if math.isinf(bound):
             continue
@@ -110,8 +110,8 @@ def test_the_bound_of_nine_terms_is_that_of_any_number() -> None:
         if sizes.sum() > 0.25 or lam * strength[0] > 0.25 or angles.sum() > 0.4:
             continue
         judged += 1
-        bound, _ = arc.left_out_nonlinear(scratch, lam, (1, 1), 9, 1.0)
-        nothing, rest = arc.is_left_out_nothing(tuple(sizes), tuple(angles), lam, strength)
+        bound, _ = arc.truncation_nonlinear(scratch, lam, (1, 1), 9, 1.0)
+        nothing, rest = arc.truncation_is_negligible(tuple(sizes), tuple(angles), lam, strength)
         assert rest == pytest.approx(np.arange(2.0, 9.0) @ sizes[2:])
         if nothing:
             assert bound <= 2.0**-52 * sizes.sum()
