@@ -8,13 +8,17 @@ PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_authentication.py explorer_server.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test browser slow lowest latest .bounds doctest lint types docs bench clean distclean
+.PHONY: help demo wheel test browser slow lowest latest .bounds doctest lint types docs bench clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: .venv/.base ## simulate a block under a shipped record; writes out/demo.png
 	@$(BIN)/python examples/demo.py
+
+wheel: .venv/.all ## build a wheel for this platform, with kernels compiled beforehand, into dist
+	$(BIN)/python scripts/ship_kernels.py
+	$(BIN)/python -m pip wheel --disable-pip-version-check -q --no-deps --wheel-dir dist .
 
 test: .venv/.all ## run the test suite (some minutes on two cores)
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m "not slow and not browser"

@@ -10,6 +10,7 @@ import functools
 import hashlib
 import os
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
@@ -29,6 +30,9 @@ UNCOMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 before_compiling: list[Callable[[], None]] = []
 
 
+_ONE_AT_A_TIME = threading.RLock()
+
+
 class OnUse:
     """A function that is compiled when it is first needed, by a call or by a kernel that calls it."""
 
@@ -40,10 +44,11 @@ class OnUse:
 
     @functools.cached_property
     def compiled(self) -> Any:
-        """What numba makes of it."""
-        while before_compiling:
-            before_compiling.pop()()
-        return self._compile(self.py_func)
+        """What numba makes of it; one thread at a time asks for it."""
+        with _ONE_AT_A_TIME:
+            while before_compiling:
+                before_compiling.pop()()
+            return vars(self).get("compiled") or self._compile(self.py_func)
 
     @property
     def _numba_type_(self) -> Any:
