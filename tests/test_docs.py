@@ -1,6 +1,7 @@
 """The documentation keeps its word: examples run, names exist, pages load nothing from the network."""
 
 import doctest
+import json
 import re
 import runpy
 import shutil
@@ -167,19 +168,44 @@ def test_pages_load_nothing_from_the_network(tmp_path):
         assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", style.read_text("utf-8"))
 
 
-def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there(monkeypatch):
-    # What builds the package is not installed beside it.
-    monkeypatch.setitem(
-        sys.modules, "hatchling.metadata.plugin.interface", SimpleNamespace(MetadataHookInterface=object)
-    )
-    namespace = runpy.run_path(str(ROOT / "hatch_build.py"))
-    shown = namespace["for_index"]((ROOT / "README.md").read_text("utf-8"))
+@pytest.fixture
+def hooks(monkeypatch):
+    """The names of `hatch_build.py`; what builds the package is not installed beside it."""
+    for interface, named in (
+        ("metadata", {"MetadataHookInterface": object}),
+        ("builders.hooks", {"BuildHookInterface": list}),
+    ):
+        monkeypatch.setitem(sys.modules, f"hatchling.{interface}.plugin.interface", SimpleNamespace(**named))
+    return runpy.run_path(str(ROOT / "hatch_build.py"))
+
+
+def test_a_wheel_holds_the_kernels_that_were_compiled_for_it_and_else_none(hooks, tmp_path):
+    hook = hooks["KernelsHook"]()
+    hook.root, hook.target_name = str(tmp_path), "wheel"
+    hook.initialize("standard", build := {"force_include": {}})
+    assert build == {"force_include": {}}
+    folder = tmp_path / "build" / "shipped"
+    folder.mkdir(parents=True)
+    manifest = {"platform": "manylinux_2_35_x86_64", "libraries": {"kernels-x86-64.so": "0" * 64}}
+    (folder / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+    hook.initialize("editable", build)
+    assert build == {"force_include": {}}
+    hook.initialize("standard", build)
+    assert (build["pure_python"], build["tag"]) == (False, "py3-none-manylinux_2_35_x86_64")
+    assert sorted(build["force_include"].values()) == [
+        "rocking/kernels/shipped/kernels-x86-64.so",
+        "rocking/kernels/shipped/manifest.json",
+    ]
+
+
+def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there(hooks):
+    shown = hooks["for_index"]((ROOT / "README.md").read_text("utf-8"))
     assert not re.search(r"\]\((?!https?:)", shown)
     assert "(the explorer, `docs/howto/explorer.md` in the source)" in shown
     assert "`ARCHITECTURE.md` in the source" in shown
     assert "```pycon\n>>> import rocking" in shown
     metadata: dict = {}
-    hook = namespace["ReadmeHook"]()
+    hook = hooks["ReadmeHook"]()
     hook.root = str(ROOT)
     hook.update(metadata)
     assert metadata == {"readme": {"content-type": "text/markdown", "text": shown}}

@@ -23,6 +23,7 @@ from rocking.explorer.parameters import PULSES as OFFERED
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
 from rocking.motion.measures import exceedances
+from rocking.named_pulses import FAMILIES
 
 STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
 SINE = {
@@ -81,8 +82,8 @@ def test_a_motion_is_scaled_to_what_the_text_says(scale, measure):
 
 
 @pytest.mark.parametrize("family", PULSES)
-def test_every_pulse_of_the_package_can_be_written_and_read_back(family):
-    assert set(PULSES) == set(OFFERED)
+def test_every_pulse_of_the_page_can_be_written_and_read_back(family):
+    assert set(PULSES) == set(OFFERED) == set(FAMILIES) - {"n-lobe"}  # its amplitudes are many
     motion = pulse_of(f"{family}:{PULSES[family]}")
     again = pulse_of(pulse_as_text(motion))
     assert np.array_equal(again.coefficients, motion.coefficients)

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from oracles import record_files as written
 
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
-from rocking.motion import records
+from rocking.motion import formats, records
 from rocking.motion.formats import Channel, channels, identify, read, source, through_obspy, values
 from rocking.motion.formats.channel import even_step
 
@@ -227,6 +227,18 @@ def test_at2_may_touch_and_may_lack_the_units_line(file: Callable[[str], Path]) 
     text = f"header\nNPTS=5, DT=.01\n{packed}"
     assert "does not say its units; give units as" in complaint(file(text))
     assert read(file(text), units="m/s2").samples[1].tolist() == [-0.5, -0.25, 0.125, -0.0625, -0.03125]
+
+
+def test_units_that_are_stated_and_not_known_are_named(file: Callable[[str], Path]) -> None:
+    text = written.at2([0.1, -0.2, 0.1], "NPTS=3, DT=.01", "ACCELERATION TIME SERIES IN UNITS OF FURLONG")
+    assert "the units 'FURLONG' are not known; give units as one of" in complaint(file(text))
+
+
+def test_every_module_that_recognises_a_format_is_asked() -> None:
+    folder = Path(formats.__file__).parent
+    names = {path.stem for path in folder.glob("*.py") if "\ndef recognise(" in path.read_text("utf-8")}
+    assert len(names) >= 8
+    assert {each.__module__.rpartition(".")[2] for each in formats._RECOGNISERS} == names
 
 
 def test_at2_with_a_wrong_npts_names_both_numbers(file: Callable[[str], Path]) -> None:

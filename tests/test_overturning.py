@@ -11,9 +11,10 @@ from scipy.optimize import brentq
 
 import rocking
 from rocking.analysis.levels import boundaries
-from rocking.analysis.overturning import mode_name, overturning_map
+from rocking.analysis.overturning import PULSES, mode_name, overturning_map
 from rocking.block import Blocks
 from rocking.engine import Setup, simulate_each
+from rocking.named_pulses import FAMILIES
 from rocking.treatment import Certified
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "overturning_map.py"
@@ -303,3 +304,11 @@ def test_the_summary_tells_none_from_already_the_first():
     assert "none of those up to 1.5" in low
     high = rocking.overturning_map(block, "one-sine", amplitudes=[4.0, 5.0], frequencies=[5.0]).summary()
     assert "4 or less" in high
+
+
+def test_every_family_of_pulses_is_mapped_by_name_or_known_to_need_a_function() -> None:
+    of_a_duration_or_several_amplitudes = {"rectangular", "triangular", "n-lobe"}
+    assert set(FAMILIES) == {*PULSES} | of_a_duration_or_several_amplitudes
+    page = (Path(__file__).parent.parent / "docs" / "howto" / "overturning-map.md").read_text("utf-8")
+    for text in (overturning_map.__doc__ or "", page):
+        assert all(name in text for name in PULSES)

@@ -64,7 +64,8 @@ _NAMES: Final = {
     0: "overturns without impact",
 }
 
-#: Families of one amplitude and one frequency; the others of `rocking.pulses` are given as functions.
+#: Families of one amplitude and one frequency; others of `rocking.pulses`, of a duration or of several amplitudes, are
+#: given as functions.
 PULSES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
 #: Share of a map that is written as a number.

@@ -11,7 +11,7 @@ import re
 from typing import NamedTuple
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, azimuth_of, to_acceleration
-from rocking.motion.formats.source import Line, Request, Source, find_unit
+from rocking.motion.formats.source import Line, Request, Source
 from rocking.motion.formats.values import NUMBER, Layout, parse, read_values
 
 NAME = "PEER AT2"
@@ -48,7 +48,7 @@ def _read(source: Source, header: _PeerHeader, other: tuple[str, int] | None, re
         raise source.error(f"this PEER file holds {other[0]}; give the AT2 file of the acceleration", other[1])
     at = header.sizes.start
     spelling = next((found[1] for line in header.titles if (found := _UNITS.search(line.text))), "")
-    unit = request.units(source, find_unit(spelling), at)
+    unit = request.units(source, spelling, at)
     dt = request.step(source, header.dt, at)
     values = read_values(source, header.sizes.next, len(source.data), count=header.points, layout=_LAYOUT)
     if len(values) != header.points:

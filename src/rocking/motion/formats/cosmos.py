@@ -14,7 +14,7 @@ from typing import NamedTuple
 from rocking.arrays import Floats
 from rocking.motion.formats import csmip
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
-from rocking.motion.formats.source import Line, Request, Source, find_unit
+from rocking.motion.formats.source import Line, Request, Source
 from rocking.motion.formats.values import read_count
 
 NAME = "COSMOS"
@@ -111,7 +111,7 @@ def _after(source: Source, line: Line, count: int) -> int:
 def _channel(source: Source, request: Request, header: _CosmosHeader, end: int, ordinal: int) -> Channel:
     line = header.data
     spelling = _UNITS.search(line.text)
-    unit = request.units(source, find_unit(spelling[1]) if spelling else None, line.start)
+    unit = request.units(source, spelling[1] if spelling else None, line.start)
     dt = request.step(source, _step(source, header), line.start)
     values = read_count(source, line.start, line.next, end, header.points, csmip.layout_in(line.text))
     _refuse_unknown(source, header, values)

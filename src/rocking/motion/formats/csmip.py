@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from rocking.arrays import Floats
 from rocking.motion.formats.channel import Channel, Identification, Recognised, even_step, first_fault, to_acceleration
-from rocking.motion.formats.source import Line, Request, Source, Unit, find_unit
+from rocking.motion.formats.source import Line, Request, Source, Unit
 from rocking.motion.formats.values import Layout, bad_number, numeric_end, parse, read_count
 
 V1_TITLE = re.compile(r"^\s*uncorrected accelerogram", re.IGNORECASE)
@@ -160,7 +160,7 @@ def _v1_samples(
     if rate is None or not rate > 0.0:
         raise source.error(f"the sampling rate {stated[2]!r} is not a positive number; correct it", line.start)
     spelling = _V1_UNITS.search(line.text)
-    unit = request.units(source, find_unit(spelling[1]) if spelling else None, line.start)
+    unit = request.units(source, spelling[1] if spelling else None, line.start)
     dt = request.step(source, 1.0 / rate, line.start)
     end = data_end(source, line.next, V1_TITLE)
     count, layout = int(stated[1]), layout_in(line.text)
@@ -191,7 +191,7 @@ def _v1_pair_header(source: Source, request: Request, header: list[Line]) -> tup
         raise source.error(
             "no line 'points at ... in units of ...' ends this channel's header; get the file again", header[0].start
         )
-    return int(points), spelling, request.units(source, find_unit(spelling), header[0].start)
+    return int(points), spelling, request.units(source, spelling, header[0].start)
 
 
 def _v1_labelled(
@@ -257,7 +257,7 @@ def _v2_acceleration(
 ) -> tuple[Channel, int]:
     line = header[-1]
     spelling = _V2_UNITS.search(line.text, stated.end())
-    unit = request.units(source, find_unit(spelling[1]) if spelling else None, line.start)
+    unit = request.units(source, spelling[1] if spelling else None, line.start)
     dt = request.step(source, _v2_step(source, header, stated[2]), line.start)
     end = data_end(source, line.next, V2_TITLE, _V2_NEXT_QUANTITY)
     count, layout = int(stated[1]), layout_in(line.text) or _V2_COLUMNS

@@ -6,7 +6,7 @@ import functools
 import re
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
-from rocking.motion.formats.source import Entry, Request, Source, find_unit
+from rocking.motion.formats.source import Entry, Request, Source
 from rocking.motion.formats.values import parse, read_values
 
 NAME = "ESM"
@@ -32,7 +32,7 @@ def _read(source: Source, entries: dict[str, Entry], start: int, request: Reques
     if kind.value.upper() != "ACCELERATION":
         raise source.error(f"this ESM file holds {kind.value.lower()!r}; give the file of the acceleration", kind.at)
     spelling = entries.get("UNITS", Entry("", start))
-    unit = request.units(source, find_unit(spelling.value), spelling.at)
+    unit = request.units(source, spelling.value, spelling.at)
     dt = request.step(source, _number(source, entries, "SAMPLING_INTERVAL_S"), entries["SAMPLING_INTERVAL_S"].at)
     values = read_values(source, start, len(source.data))
     count = _number(source, entries, "NDATA")

@@ -12,7 +12,7 @@ import re
 import numpy as np
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
-from rocking.motion.formats.source import Entry, Request, Source, find_unit
+from rocking.motion.formats.source import Entry, Request, Source
 from rocking.motion.formats.values import Layout, parse, read_values
 
 NAME = "K-NET/KiK-net"
@@ -47,7 +47,7 @@ def _read(source: Source, request: Request) -> list[Channel]:
     (rate,) = _positive(source, entries, "Sampling Freq", _RATE)
     gal, counts = _positive(source, entries, "Scale Factor", _SCALE)
     scale_at = entries["Scale Factor"].at
-    unit = request.units(source, find_unit("gal"), scale_at)
+    unit = request.units(source, "gal", scale_at)
     dt = request.step(source, 1.0 / rate, entries["Sampling Freq"].at)
     values = read_values(source, start, len(source.data), layout=_COUNTS)
     _check_duration(source, entries, rate, len(values))

@@ -22,7 +22,7 @@ from rocking.motion.formats.channel import (
     first_fault,
     to_acceleration,
 )
-from rocking.motion.formats.source import Line, Request, Source, find_unit
+from rocking.motion.formats.source import Line, Request, Source
 from rocking.motion.formats.values import Layout, read_count
 
 NAME = "USGS SMC"
@@ -70,7 +70,7 @@ def _read(source: Source, title: Line, kind: re.Match[str], request: Request) ->
     if kind[1] not in _ACCELERATIONS:
         raise source.error(f"this SMC file holds {kind[2].lower()!r}; give the file of the acceleration", title.start)
     header = _header(source, title)
-    unit = request.units(source, find_unit("cm/s2"), title.start)
+    unit = request.units(source, "cm/s2", title.start)
     dt, times, values = _series(source, request, header)
     name = _first(_COMPONENT, header.text).strip(" *") or "acceleration"
     return [

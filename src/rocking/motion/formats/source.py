@@ -18,7 +18,7 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.errors import InvalidMotion, UnreadableRecord, literal
 
 #: Largest file that is read, bytes; the longest strong-motion records are a hundred times smaller.
 SIZE_LIMIT = 512 * 2**20
@@ -308,13 +308,15 @@ class Request:
             )
         return stated
 
-    def units(self, source: Source, stated: Unit | None, at: int | None) -> Unit:
-        """Return the unit that the file states at the offset `at`, or else the one asked for."""
-        unit = stated or self.unit
+    def units(self, source: Source, stated: Unit | str | None, at: int | None) -> Unit:
+        """Return the unit that the file states at the offset `at`, in its own spelling, or else the one asked for."""
+        spelling = stated.strip() if isinstance(stated, str) else ""
+        unit = (find_unit(spelling) if isinstance(stated, str) else stated) or self.unit
         if unit is None:
-            raise source.error(
-                f"the file does not say its units; give {{}} as one of {', '.join(CHOICES)}", at, "units"
-            )
+            fault = "the file does not say its units"
+            if spelling:
+                fault = f"the units {literal(repr(spelling))} are not known"
+            raise source.error(f"{fault}; give {{}} as one of {', '.join(CHOICES)}", at, "units")
         if self.unit is not None and not self.several and unit != self.unit:
             raise source.error(
                 f"the units are {unit.name}, not {{}} {self.unit.name!r}; leave {{}} out", at, "units", "units"
