@@ -13,7 +13,7 @@ from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.families import SimulationInput
 from rocking.chattering.maps import Outcome, chattering_map
-from rocking.motion.measures import exceedances
+from rocking.motion.exceedance import exceedances
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
 THRESHOLD = BLOCK.gravity * 0.2

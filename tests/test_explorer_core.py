@@ -22,7 +22,7 @@ from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.parameters import PULSES as OFFERED
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
-from rocking.motion.measures import exceedances
+from rocking.motion.exceedance import exceedances
 from rocking.named_pulses import FAMILIES
 
 STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}

@@ -9,7 +9,7 @@ from kernel_records import long_uncompiled, rocking_block, state_of
 import rocking
 from rocking.kernels.state import AT_REST, new_scratch, records
 from rocking.kernels.uplift import note_complete
-from rocking.motion.measures import exceedances
+from rocking.motion.exceedance import exceedances
 from rocking.problem import ground_of
 
 Pair = tuple[float, float]

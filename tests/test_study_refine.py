@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.motion.measures import exceedances
+from rocking.motion.exceedance import exceedances
 from rocking.progress import Progress
 from rocking.studies import read_study, refine
 from rocking.studies.inputs import OUTCOMES

@@ -22,7 +22,7 @@ from rocking.explorer.maps import grid_of, parts
 from rocking.explorer.uploads import UploadStore
 from rocking.kernels import state
 from rocking.kernels.certificate import arc_bounds, bounds_on_motion, prove_rest, side_bounds
-from rocking.motion.measures import exceedances, lifting_factors
+from rocking.motion.exceedance import exceedances, lifting_factors
 from rocking.plausibility import vertical_notes
 from rocking.problem import ground_of, rules_of
 from rocking.tables import plain

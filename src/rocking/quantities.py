@@ -12,7 +12,7 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
-from rocking.motion.formats.source import find_unit
+from rocking.motion.formats.units import find_unit
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.tables import decimal
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import rocking
 from rocking.arrays import Floats
-from rocking.motion.measures import exceedances
+from rocking.motion.exceedance import exceedances
 
 GRAVITY = 9.80665
 ULP = 2.0**-52

@@ -27,7 +27,7 @@ from rocking.constants import Model
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.description import labelled
-from rocking.motion.measures import lifting_factors
+from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.errors import InvalidOption
-from rocking.motion.measures import exceedances
+from rocking.motion.exceedance import exceedances
 from rocking.response import Response
 from rocking.result import Result
 from rocking.tables import rows_of, text_table

@@ -19,7 +19,7 @@ from rocking.constants import VERSION
 from rocking.engine import OUTCOME, complete_chattering, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.motion.measures import exceedances
+from rocking.motion.exceedance import exceedances
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response, trail_of

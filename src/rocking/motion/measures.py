@@ -1,25 +1,22 @@
-"""What is measured of a motion's pieces: intensities, from exact integrals, and when they pass a block's thresholds."""
+"""What is measured of a motion's pieces: intensities, from exact integrals."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rocking import checks
-from rocking.arrays import Flags, Floats
+from rocking.arrays import Floats
 from rocking.bisection import bisected
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 from rocking.motion.piecewise import Piecewise
 from rocking.tables import named
-
-if TYPE_CHECKING:
-    from rocking.motion.motion import Motion
 
 #: Damping of a spectral acceleration, if none is named.
 DAMPING: Final = 0.05
@@ -151,83 +148,3 @@ def _time_at(motion: Piecewise, cumulated: Floats, fraction: float) -> float:
         return bool(cumulated[piece] + _energy(motion.coefficients[piece], np.asarray(span)) >= wanted)
 
     return float(start + bisected(0.0, end - start, is_reached, halvings=53)[1])
-
-
-def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float = STANDARD_GRAVITY) -> Floats:
-    """Stretches of time in which a resting block would be lifted: start and end of each, s, in order, shape (n, 2).
-
-    The thresholds (m/s^2) lift it to side + where -a passes the first, and to side - where a passes the second, as
-    `Block.uplift_thresholds` gives them; a vertical acceleration adds to the gravity (m/s^2) under which they hold.
-
-    Examples
-    --------
-    >>> import math, rocking
-    >>> exceedances(rocking.pulses.sine(2.0, 0.5, cycles=1), (1.0, 1.0)).round(9)
-    array([[0.16666667, 0.83333333],
-           [1.16666667, 1.83333333]])
-    """
-    plus, minus = thresholds
-    towards_plus, towards_minus = _push(motion, -plus / gravity), _push(motion, minus / gravity)
-    reaching = _reaching(towards_plus, plus) | _reaching(towards_minus, minus)
-    ends = towards_plus.breakpoints[np.append(reaching, False) | np.append(False, reaching)]
-    crossings = [_crossings(towards_plus, -plus, reaching), _crossings(towards_minus, minus, reaching)]
-    cuts = np.unique(np.concatenate([ends, *crossings]))
-    middle = 0.5 * (cuts[:-1] + cuts[1:])
-    beyond = (towards_minus.acceleration(middle) > minus) | (towards_plus.acceleration(middle) < -plus)
-    return cuts[np.flatnonzero(np.diff(beyond, prepend=False, append=False))].reshape(-1, 2)
-
-
-def lifting_factors(motion: Motion, thresholds: ArrayLike, gravity: float = STANDARD_GRAVITY) -> Floats:
-    """Lowest factors on both components of a motion from which on it lifts blocks from rest, shape (n,); or infinity.
-
-    The thresholds, pairs as `exceedances` takes one, have shape (n, 2).
-
-    Examples
-    --------
-    A vertical acceleration of -g/2 at the moment of the horizontal peak halves the factor that lifts this block:
-
-    >>> from rocking import Motion
-    >>> push = Motion.from_samples([0.0, 2.0, 0.0], 0.1)
-    >>> pull = Motion.from_samples([0.0, -9.80665 / 2.0, 0.0], 0.1)
-    >>> lifting_factors(push, [(4.0, 4.0)]), lifting_factors(push.with_vertical(pull), [(4.0, 4.0)])
-    (array([2.]), array([1.]))
-    """
-    pairs = np.asarray(thresholds, dtype=np.float64)
-    if motion.vertical is None:
-        widths = np.diff(motion.breakpoints)
-        reached = np.array([[piecewise.highest(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
-    else:
-        breakpoints, (push, lift) = piecewise.together(motion, motion.vertical)
-        widths = np.diff(breakpoints)
-
-        def highest(sign: float, threshold: float) -> float:
-            return piecewise.highest(widths, sign * push - threshold / gravity * lift)
-
-        reached = np.array([[highest(-1.0, plus), highest(1.0, minus)] for plus, minus in pairs])
-    with np.errstate(divide="ignore"):
-        factors = np.where(reached > 0.0, pairs / np.maximum(reached, 0.0), np.inf)
-    lowest: Floats = factors.min(axis=1)
-    return lowest
-
-
-def _push(motion: Motion, threshold_over_g: float) -> Motion:
-    """Return the horizontal motion less what the vertical one adds to a threshold."""
-    alone = motion.with_vertical(None)
-    return alone if motion.vertical is None else alone + motion.vertical.scaled(-threshold_over_g)
-
-
-def _reaching(motion: Motion, level: float) -> Flags:
-    """Which pieces may be of this magnitude somewhere: of a record with few strong pulses, few."""
-    bounds = piecewise.bounds(np.diff(motion.breakpoints), motion.coefficients)
-    return np.asarray(bounds >= level * (1.0 - 1e-12))
-
-
-def _crossings(motion: Motion, level: float, pieces: Flags) -> Floats:
-    """Find times, s, among which are all those at which the motion passes a level inside one of the pieces."""
-    widths = np.diff(motion.breakpoints)[pieces]
-    shifted = motion.coefficients[pieces]
-    shifted[:, 0] -= level
-    offsets = piecewise.root_candidates(widths, shifted)
-    inside = (offsets > 0.0) & (offsets < widths[:, np.newaxis])
-    times: Floats = (motion.breakpoints[:-1][pieces][:, np.newaxis] + offsets)[inside]
-    return times

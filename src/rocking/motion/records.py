@@ -18,7 +18,7 @@ import numpy as np
 from rocking import checks
 from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description, Origin
-from rocking.motion.formats.source import choose_unit
+from rocking.motion.formats.units import choose_unit
 from rocking.motion.motion import Motion
 
 __all__ = ["Record", "info", "load", "names"]

@@ -30,7 +30,8 @@ from rocking.motion.formats.channel import (
     to_acceleration,
 )
 from rocking.motion.formats.heading import RULE, Column, Heading, heading_of, names_columns
-from rocking.motion.formats.source import CHOICES, Line, Request, Source, Unit
+from rocking.motion.formats.source import Line, Request, Source
+from rocking.motion.formats.units import CHOICES, Unit
 from rocking.motion.formats.values import convert, not_a_number, parse, rows_of_numbers
 
 NAME = "text table"
