@@ -13,11 +13,13 @@ import hashlib
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 import sysconfig
 import tempfile
 from collections.abc import Collection
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +50,14 @@ int rocking_level(void) {
 """,
     "arm64": "int rocking_level(void) { return 0; }\n",
 }
+
+#: The first version of the C library for a processor. Functions of it are asked for, as if linked there, so that a
+#: library serves older systems too: `exp` and its like were given new versions, which differ in how they tell errors.
+FIRST_VERSION = {"x86_64": "GLIBC_2.2.5", "aarch64": "GLIBC_2.17"}
+
+#: The oldest C library that wheels are named for, even where nothing newer than an older one is needed.
+OLDEST_NAMED = 17
+
 SUFFIX = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
 
 PROCESSOR["amd64"], PROCESSOR["aarch64"] = PROCESSOR["x86_64"], PROCESSOR["arm64"]
@@ -93,6 +103,7 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
         "sine.series.eq65_time": [(1.0, 1.0, 1.0)],
         "sine.series.eq65_sums": [(1.0,)],
         "sine.series.eq65_terms": [(1.0, reals(), reals())],
+        "sine.series.series_arcs": [(reals(1, 1), True, 1.0, 1.0, reals(1, 1), reals(1, 1), reals(1, 1, 1))],
         "sine.sequence.eq76": [(1.0, 1.0)],
         "sine.sequence.eq77": [(1.0,)],
         "sine.sequence.fitted_amplitudes": [(given(), given(), True, reals())],
@@ -212,12 +223,12 @@ def compiled(level: str, folder: Path, names: Collection[str]) -> dict[str, list
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+    llvm.initialize_native_asmparser()
     target = llvm.Target.from_triple(llvm.get_process_triple())
     machine = target.create_target_machine(cpu=level, features="", opt=3, reloc="pic", codemodel="default")
     manifest: dict[str, list[dict[str, Any]]] = {}
-    for name, several in signatures().items():
-        if names and name not in names:
-            continue
+    every = signatures()
+    for name, several in every.items() if not names else ((name, every[name]) for name in names):
         module, _, function = name.rpartition(".")
         kernel = getattr(importlib.import_module(f"rocking.kernels.{module}"), function).compiled
         for number, arguments in enumerate(several):
@@ -258,9 +269,17 @@ def object_of(text: str, symbol: str, machine: Any) -> bytes:
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
     passes.run(module, builder)
-    wanted = {each.name for each in module.functions if each.is_declaration and not each.name.startswith("llvm.")}
+    # A function of the C library is named as such, or as one that LLVM knows: llvm.exp.f32 calls expf.
+    declared = {each.name for each in module.functions if each.is_declaration}
+    known = (re.fullmatch(r"llvm\.(\w+)\.f(32|64)", name) for name in declared)
+    wanted = {name for name in declared if not name.startswith("llvm.")}
+    wanted |= {each[1] + ("f" if each[2] == "32" else "") for each in known if each}
     if unknown := {name for name in wanted if name.startswith(("numba", "NRT", "Py"))}:
         raise RuntimeError(f"{symbol} needs {', '.join(sorted(unknown))}, which only numba and Python have")
+    if platform.libc_ver()[0] == "glibc":
+        first = FIRST_VERSION[platform.machine()]
+        versions = "\n".join(f'module asm ".symver {name},{name}@{first}"' for name in sorted(wanted))
+        module = llvm.parse_assembly(f"{module}\n{versions}")
     code: bytes = machine.emit_object(module)
     return code
 
@@ -288,18 +307,19 @@ def ship(out: Path, levels: list[str], names: Collection[str] = ()) -> None:
     """Make the libraries of some levels, the lowest first, and the manifest."""
     from rocking.kernels.library import FOLDER, sources
 
-    kernels = {level: library(level, out, names) for level in levels}[levels[0]]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        kernels, *_ = pool.map(library, levels, [out] * len(levels), [names] * len(levels))
     files = [out / f"kernels-{level}{SUFFIX}" for level in levels]
     libraries = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
-    manifest = {"sources": sources(FOLDER.parent), "platform": tag(), "libraries": libraries, "kernels": kernels}
+    manifest = {"sources": sources(FOLDER.parent), "platform": tag(files), "libraries": libraries, "kernels": kernels}
     (out / "manifest.json").write_text(json.dumps(manifest), "utf-8")
 
 
-def tag() -> str:
-    """Name the platform as wheels do: Linux with the C library that the functions were linked to, or a newer one."""
-    if sys.platform == "linux":
-        _, version = platform.libc_ver()
-        return f"manylinux_{version.replace('.', '_')}_{platform.machine()}"
+def tag(libraries: list[Path]) -> str:
+    """Name the platform as wheels do: Linux with the newest version of the C library that is needed, or a later one."""
+    if platform.libc_ver()[0] == "glibc":
+        needed = [int(minor) for path in libraries for minor in re.findall(rb"GLIBC_2\.(\d+)", path.read_bytes())]
+        return f"manylinux_2_{max([OLDEST_NAMED, *needed])}_{platform.machine()}"
     return sysconfig.get_platform().replace("-", "_").replace(".", "_")
 
 

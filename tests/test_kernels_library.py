@@ -54,9 +54,9 @@ def shipped(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
     shutil.copytree(made, folder)
     monkeypatch.setattr(library, "FOLDER", folder)
     monkeypatch.delenv("ROCKING_SHIPPED", raising=False)
-    library.opened.cache_clear()
+    library._search.cache_clear()
     yield folder
-    library.opened.cache_clear()
+    library._search.cache_clear()
 
 
 def both(name: str) -> tuple[Any, Any]:
@@ -170,5 +170,5 @@ def test_a_library_that_does_not_fit_is_not_used(shipped: Path, name: str) -> No
 def test_the_long_way_is_chosen_by_a_variable(shipped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert library.opened() is not None
     monkeypatch.setenv("ROCKING_SHIPPED", "0")
-    library.opened.cache_clear()
+    library._search.cache_clear()
     assert library.opened() is None

@@ -19,7 +19,7 @@ from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import Model
 from rocking.errors import Unfinished
 from rocking.kernels import lanes, state
-from rocking.kernels.ground import Ground, greatest_weight, has_vertical
+from rocking.kernels.ground import Ground, greatest_weight
 from rocking.kernels.lane_steps import WIDTH
 from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
@@ -229,7 +229,7 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
     records = bodies.kernel_records(setup.model, limits)
     states = state.new_states(len(bodies), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))
     step = step_of(task.motion)
-    for chosen, substeps in _groups(ground, records, step, setup.model):
+    for chosen, substeps in _groups(ground, records, task.motion, setup.model):
         if stop is not None and stop.is_set():
             break
         _march_together(ground, rules, (records, states), chosen, step, substeps)
@@ -239,23 +239,25 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
     return outcomes
 
 
-def _groups(ground: Ground, records: Records, step: float | None, model: Model) -> Iterator[tuple[Integers, int]]:
+def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> Iterator[tuple[Integers, int]]:
     """Bodies that go together, with the substeps that they need; -1 for those that march alone."""
-    substeps = np.full(len(records), -1)
+    substeps, step = np.full(len(records), -1), step_of(motion)
     if step is not None:
         width = step * np.sqrt(np.abs(records["stiffness"]).max(axis=1) * greatest_weight(ground))
-        substeps = np.where(width <= lanes.LONGEST_STEP, _substeps(ground, width, model), -1.0).astype(np.int64)
+        substeps = np.where(
+            width <= lanes.LONGEST_STEP, _substeps(width, model, motion.vertical is not None), -1.0
+        ).astype(np.int64)
     for count in np.unique(substeps):
         chosen = np.flatnonzero(substeps == count)
         for start in range(0, len(chosen), _TOGETHER):
             yield chosen[start : start + _TOGETHER], int(count)
 
 
-def _substeps(ground: Ground, width: Floats, model: Model) -> Floats:
+def _substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:
     """Count the substeps of a sample in lanes, for each sqrt(|lam W|) h; 0 where one formula spans it."""
     if model == "nonlinear":
         return np.ceil(width / lanes.LONGEST_SUBSTEP)
-    return np.ceil(width / lanes.LONGEST_WEIGHTED_SUBSTEP) if has_vertical(ground) else np.zeros(len(width))
+    return np.ceil(width / lanes.LONGEST_WEIGHTED_SUBSTEP) if with_vertical else np.zeros(len(width))
 
 
 def _march_together(

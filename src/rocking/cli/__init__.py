@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError
 
-import rocking
 from rocking.cli import wording
 from rocking.errors import RockingError
 from rocking.progress import notes_for
@@ -16,8 +15,7 @@ from rocking.progress import notes_for
 app = App(
     name="rocking",
     help="Rocking, chattering, rest and overturning of free-standing rigid blocks under ground motion.",
-    version=rocking.__version__,
-    version_flags=["--version", "-V"],
+    version_flags=[],
     result_action="return_value",
 )
 for _command, (_module, _help) in {
@@ -41,6 +39,7 @@ for _command, (_module, _help) in {
     "study": ("study", "Run a study too long for one sitting: created once, resumed after anything."),
 }.items():
     app.command(f"rocking.cli.{_module}:{_command}", name=_command, help=_help)
+app.command("rocking.cli.version:version", name=["--version", "-V"], help="Display the version.")
 app.register_install_completion_command(help="Install completion of commands and options for this shell.")
 
 

@@ -86,7 +86,8 @@ def of(error: RockingError | CycloptsError, app: App, arguments: Sequence[str]) 
 
 def _unknown_option(typed: str, app: App, arguments: Sequence[str]) -> str:
     name = typed.partition("=")[0]
-    known = {*_options(called(app, arguments)), "--help", "--version"}
+    command = called(app, arguments)
+    known = {"--help", *_options(command), *(each for each in command if each.startswith("-"))}
     words = {each.lstrip("-"): each for each in known if len(each) > _SHORT}
     hint = meant(name.lstrip("-"), words if len(name) > _SHORT else {}, "see its --help", _ALIKE)
     return f"{_named(app, arguments)} has no option {name}; {hint}"

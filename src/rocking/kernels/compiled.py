@@ -99,17 +99,6 @@ def shared(function: F) -> F:
     return _part(function, inline=False)
 
 
-def allocating(function: F) -> F:
-    """Declare a kernel that makes arrays, unlike all others; no library holds it."""
-
-    def compile_(function: Callable[..., Any]) -> Any:
-        from rocking.kernels import compiler
-
-        return compiler.kernel_of(function, cache_folder(), allocates=True)
-
-    return function if UNCOMPILED else OnUse(function, compile_)  # type: ignore[return-value]
-
-
 def _part(function: F, *, inline: bool) -> F:
     def compile_(function: Callable[..., Any]) -> Any:
         from rocking.kernels import compiler
@@ -153,3 +142,14 @@ def _parents() -> Iterator[Path]:
 def fingerprint() -> str:
     """Hash of all kernels' sources and of the compiler's version."""
     return hashlib.sha256(f"{metadata.version('numba')} {library.sources(_HERE)}".encode()).hexdigest()[:16]
+
+
+def state() -> str:
+    """Say where compiled code comes from in this process: a library, numba's folder, or nowhere."""
+    if UNCOMPILED:
+        return "none: NUMBA_DISABLE_JIT has Python read the kernels"
+    if library.opened() is not None:
+        return f"{library.state()}, made beforehand from exactly these sources"
+    folder = cache_folder()
+    kept = f"keeps it in {folder}" if folder else "can keep it nowhere"
+    return f"numba compiles when something is first used, and {kept}; {library.state()}"

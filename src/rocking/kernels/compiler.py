@@ -195,13 +195,12 @@ _OPTIONS = {"error_model": "numpy", "_nrt": False}
 _KERNEL = {"forceinline": False, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
 
 
-def kernel_of(function: Callable[..., Any], cache: Path | None, *, allocates: bool = False) -> Any:
+def kernel_of(function: Callable[..., Any], cache: Path | None) -> Any:
     """Compile an entry point that Python calls, kept in a folder, and free of Python's lock while it runs."""
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache or "")
     try:
-        options = {"error_model": "numpy"} if allocates else {"nogil": True, **_KERNEL, **_OPTIONS}
-        return numba.njit(cache=cache is not None, **options)(function)
+        return numba.njit(cache=cache is not None, nogil=True, **_KERNEL, **_OPTIONS)(function)
     finally:
         numba.config.CACHE_DIR = before
 

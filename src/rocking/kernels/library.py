@@ -38,21 +38,45 @@ class _Library:
         self.handle = ctypes.CDLL(str(FOLDER / name))
 
 
+class _Unused(Exception):
+    """Why no library is used, in words."""
+
+
 @functools.cache
-def opened() -> _Library | None:
-    """Open the library of the highest level that this processor has; None if none was made from these sources."""
-    if os.environ.get("ROCKING_SHIPPED", "1") == "0":
-        return None
+def _search() -> _Library | str:
+    """Open the library of the highest level that this processor has, or say why none is used."""
     try:
-        manifest = json.loads((FOLDER / "manifest.json").read_text("utf-8"))
-        if manifest["sources"] != sources(Path(__file__).parent):
-            return None
-        lowest, *higher = manifest["libraries"]
-        found = _Library(lowest, manifest)
-        best = higher[: found.handle.rocking_level()][-1:]
-        return _Library(best[0], manifest) if best else found
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return None
+        return _fitting()
+    except _Unused as why:
+        return str(why)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as damage:
+        return f"the libraries that came with the package are damaged ({damage})"
+
+
+def _fitting() -> _Library:
+    if os.environ.get("ROCKING_SHIPPED", "1") == "0":
+        raise _Unused("ROCKING_SHIPPED=0 leaves libraries aside")
+    if not (FOLDER / "manifest.json").exists():
+        raise _Unused("no library came with this installation")
+    manifest = json.loads((FOLDER / "manifest.json").read_text("utf-8"))
+    if manifest["sources"] != sources(Path(__file__).parent):
+        raise _Unused("the libraries that came with the package were made from other sources")
+    lowest, *higher = manifest["libraries"]
+    found = _Library(lowest, manifest)
+    best = higher[: found.handle.rocking_level()][-1:]
+    return _Library(best[0], manifest) if best else found
+
+
+def opened() -> _Library | None:
+    """Return the library that serves this process; None if there is none that fits."""
+    found = _search()
+    return None if isinstance(found, str) else found
+
+
+def state() -> str:
+    """Name the library that serves this process, or say why there is none."""
+    found = _search()
+    return found if isinstance(found, str) else f"library {found.name}"
 
 
 def sources(folder: Path) -> str:

@@ -71,7 +71,7 @@ def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
     centre, from_middle = centre - middle, points - middle
     precision = (widened * dispersion) ** -2
     constant = 0.5 * (np.log(precision / (2.0 * np.pi)) - precision * centre**2).sum(axis=1)
-    powers = np.vstack([(precision * centre).T, -0.5 * precision.T, constant])
+    powers = np.ascontiguousarray(np.vstack([(precision * centre).T, -0.5 * precision.T, constant]))
     factors = np.hstack([from_middle, from_middle**2, np.ones((len(points), 1))])
     found = np.empty(len(points))
     kernel.log_density(factors, powers, np.empty(len(populations)), found)
@@ -206,7 +206,8 @@ class Evidence:
         They are counted from the candidates' middle: single precision then serves.
         """
         points = self.candidates.points - self._middle
-        return np.vstack([points.T, points.T**2, self.candidates.log_weights]).astype(np.float32)
+        powers = np.vstack([points.T, points.T**2, self.candidates.log_weights])
+        return np.ascontiguousarray(powers, dtype=np.float32)
 
     @cached_property
     def _middle(self) -> Floats:

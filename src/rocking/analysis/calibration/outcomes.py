@@ -521,7 +521,7 @@ def _outcomes(
     """1 where a block overturns under a motion, else 0; shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
     require_finished(simulated.unfinished.values)
-    return np.asarray(simulated.overturned.transpose("block", "motion").values, dtype=np.float32)
+    return np.ascontiguousarray(simulated.overturned.transpose("block", "motion").values, dtype=np.float32)
 
 
 def _distinct(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.kernels.compiled import allocating, inlined, kernel
+from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.sine.sequence import LEVELS, richardson_weights
 
@@ -185,6 +185,8 @@ class PowerSeries:
 
 
 Series = Floats
+ThreeSeries = tuple[Series, Series, Series]
+FourSeries = tuple[Series, Series, Series, Series]
 
 #: Relative change by the last extrapolation, coefficient by coefficient, at which its result is taken.
 _AGREEMENT: Final = 1e-14
@@ -194,9 +196,6 @@ _MAXIMUM_PAIRS: Final = 100_000
 #: Number of pairs that are formed first: until the speed has fallen by exp(-4.6), and some more.
 _DECAY: Final = 2.3
 _MORE_PAIRS: Final = 3
-
-# The loop over the arcs is Python: it takes little of the time, and to compile it as well would multiply the time of a
-# first call.
 
 
 def phase_coefficients(delta: float, eta: float, order: int) -> Series:
@@ -246,106 +245,25 @@ def extrapolated(remaining: Series, passed: Series, eta: float) -> tuple[Series,
 
 def first_impact(delta: float, eta: float, order: int) -> tuple[Series, Series]:
     """Phase of the first impact, over r, and v, p, d after it; shapes (1, order), (1, 3, order)."""
-    phase = np.zeros((1, order))
-    entered = np.zeros((1, 3, order))
-    start = -square_root_of_two_plus(order)
-    phase[0], w, p, d = series_arc(np.zeros(order), np.zeros(order), start, True, delta)
-    entered[0] = eta * w, p, d
-    return phase, entered
+    start = np.zeros((3, order))
+    start[2] = -square_root_of_two_plus(order)
+    return _arcs(start, True, delta, eta, 1)
 
 
 def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[Series, Series]:
     """Phase passed, over r, in each of the next pairs of impacts, and v, p, d after it; ``start``: those before."""
+    durations, states = _arcs(start, False, delta, eta, 2 * count)
+    passed = durations[1::2]
+    passed[:, 1:] += durations[::2, :-1]
+    return passed, states[1::2]
+
+
+def _arcs(start: Series, first_side: bool, delta: float, eta: float, count: int) -> tuple[Series, Series]:
+    """Scaled durations of arcs on alternating sides, and v, p, d after the impacts at their ends."""
     order = start.shape[1]
-    passed = np.zeros((count, order))
-    entered = np.zeros((count, 3, order))
-    v, p, d = start
-    for n in range(count):
-        second, w, p, d = series_arc(v, p, d, False, delta)
-        first, w, p, d = series_arc(eta * w, p, d, True, delta)
-        v = eta * w
-        passed[n] = first + raised(second, 1)
-        entered[n] = v, p, d
-    return passed, entered
-
-
-@allocating
-def series_arc(
-    v: Series, p: Series, d: Series, first_side: bool, delta: float
-) -> tuple[Series, Series, Series, Series]:
-    """One arc: scaled duration z and impact speed, p and d at the impact."""
-    order = v.size
-    mean = -raised(p, 1)
-    mean[0] += 1.0
-    lift = 1 if first_side else 3
-    pull = p.copy()
-    slope_term = d
-    mean_term = mean
-    if not first_side:
-        pull = -raised(p, 1)
-        pull[0] += 2.0
-        slope_term = -raised(d, 2)
-        mean_term = -raised(mean, 3)
-    z = np.zeros(order)
-    z[0] = leading_duration(v[0], p[0], d[0]) if first_side else v[0]
-    correct = 1
-    while True:
-        q = raised(product(z, z), lift)
-        sine, versine, E, W = series_basis(q, delta)
-        A = sine + (1.0 + delta) * product(q, E)
-        B = versine + (1.0 + delta) * product(q, W)
-        bend = versine + delta * product(q, W)
-        grown = v + delta * product(v, product(q, B))
-        height = product(v, A) - product(
-            z, product(pull, B) + product(z, product(slope_term, E) + product(z, product(mean_term, W)))
-        )
-        speed = grown - product(
-            z, product(pull, A) + product(z, product(slope_term, bend) + product(z, product(mean_term, E)))
-        )
-        if correct >= 2 * order:
-            break
-        z = z - quotient(product(height, z), speed - height)
-        correct *= 2
-    turned = product(q, versine)
-    swept = product(z, sine)
-    if first_side:
-        p_impact = p + product(product(z, z), product(versine, mean)) + product(d, swept)
-        d_impact = d - product(turned, d) + product(mean, swept)
-    else:
-        p_impact = p + raised(product(product(z, z), product(versine, mean)), 2) + raised(product(d, swept), 1)
-        d_impact = d - product(turned, d) + raised(product(mean, swept), 1)
-    return z, -speed, p_impact, d_impact
-
-
-@allocating
-def leading_duration(v: float, p: float, d: float) -> float:
-    """Duration of a first-side arc to leading order (the cubic of Eq. 62)."""
-    if v == 0.0:
-        return -4.0 * d
-    return positive_root(d / 6.0, p / 2.0, v)
-
-
-@allocating
-def series_basis(q: Series, delta: float) -> tuple[Series, Series, Series, Series]:
-    """Sine, versine, E and W of `sine.arc.Basis` at a series q without constant term."""
-    order = q.size
-    sine = np.zeros(order)
-    versine = np.zeros(order)
-    E = np.zeros(order)
-    W = np.zeros(order)
-    power = np.zeros(order)
-    power[0] = 1.0
-    mixed = power.copy()
-    factor = 1.0
-    for m in range(order):
-        sine += factor * power
-        versine += factor / (2 * m + 2) * power
-        factor /= (2 * m + 2) * (2 * m + 3)
-        E += factor * mixed
-        W += factor / (2 * m + 4) * mixed
-        power = -product(q, power)
-        mixed = delta * product(q, mixed) + power
-    return sine, versine, E, W
+    durations, states = np.zeros((count, order)), np.zeros((count, 3, order))
+    series_arcs(start, first_side, delta, eta, np.empty((_ROWS, order)), durations, states)
+    return durations, states
 
 
 def square_root_of_two_plus(order: int) -> Series:
@@ -358,33 +276,197 @@ def square_root_of_two_plus(order: int) -> Series:
     return root
 
 
-@allocating
-def product(a: Series, b: Series) -> Series:
-    """Multiply, truncated."""
-    c = np.zeros(a.size)
+@kernel
+def series_arcs(
+    start: Series, first_side: bool, delta: float, eta: float, space: Series, durations: Series, states: Series
+) -> None:
+    """Write what `_arcs` returns; ``space`` is scratch space, of `_ROWS` series."""
+    state = start
+    for n in range(durations.shape[0]):
+        series_arc(state, first_side, delta, space, durations[n], states[n])
+        state, first_side = states[n], not first_side
+        for k in range(start.shape[1]):
+            state[0, k] *= eta
+
+
+#: Series that `series_arc` needs space for.
+_ROWS: Final = 17
+
+
+@inlined
+def series_arc(state: Series, first_side: bool, delta: float, space: Series, z: Series, end: Series) -> None:
+    """One arc from v, p, d: its scaled duration z, and impact speed, p and d at its end."""
+    order = z.size
+    mean, forces, q, basis = (
+        space[0],
+        (space[1], space[2], space[3]),
+        space[4],
+        (space[5], space[6], space[7], space[8]),
+    )
+    height, speed, spare = space[9], space[10], space[11:]
+    _set_forces(state, first_side, mean, forces)
+    for k in range(order):
+        z[k] = 0.0
+    z[0] = leading_duration(state[0, 0], state[1, 0], state[2, 0]) if first_side else state[0, 0]
+    correct = 1
+    while True:
+        _multiply(z, z, spare[0])
+        _shift(spare[0], 1 if first_side else 3, 1.0, q)
+        series_basis(q, delta, spare, basis)
+        _rise(state[0], z, q, basis, forces, delta, spare, height, speed)
+        if correct >= 2 * order:
+            break
+        _multiply(height, z, spare[0])
+        for k in range(order):
+            spare[1, k] = speed[k] - height[k]
+        _divide(spare[0], spare[1], spare[2])
+        for k in range(order):
+            z[k] -= spare[2, k]
+        correct *= 2
+    _turn(state, first_side, mean, z, q, basis, spare, end)
+    for k in range(order):
+        end[0, k] = -speed[k]
+
+
+@inlined
+def _set_forces(state: Series, first_side: bool, mean: Series, forces: ThreeSeries) -> None:
+    """Write what pulls the block back: its mean, and its coefficients of degrees 0, 1 and 2 in time."""
+    _shift(state[1], 1, -1.0, mean)
+    mean[0] += 1.0
+    if first_side:
+        _shift(state[1], 0, 1.0, forces[0])
+        _shift(state[2], 0, 1.0, forces[1])
+        _shift(mean, 0, 1.0, forces[2])
+    else:
+        _shift(state[1], 1, -1.0, forces[0])
+        forces[0][0] += 2.0
+        _shift(state[2], 2, -1.0, forces[1])
+        _shift(mean, 3, -1.0, forces[2])
+
+
+@inlined
+def _rise(
+    v: Series, z: Series, q: Series, basis: FourSeries, forces: ThreeSeries, delta: float,
+    spare: Series, height: Series, speed: Series,
+) -> None:  # fmt: skip
+    """Write height, over z, and speed after the duration z."""
+    sine, versine, E, W = basis
+    A, B, bend, product = spare[2], spare[3], spare[4], spare[5]
+    _multiply(q, E, A)
+    _multiply(q, W, B)
+    for k in range(z.size):
+        bend[k] = versine[k] + delta * B[k]
+        A[k] = sine[k] + (1.0 + delta) * A[k]
+        B[k] = versine[k] + (1.0 + delta) * B[k]
+    _push(z, forces, (B, E, W), spare, height)
+    _push(z, forces, (A, bend, E), spare, speed)
+    _multiply(v, A, product)
+    for k in range(z.size):
+        height[k] = product[k] - height[k]
+    _multiply(q, B, product)
+    _multiply(v, product, A)
+    for k in range(z.size):
+        speed[k] = (v[k] + delta * A[k]) - speed[k]
+
+
+@inlined
+def _turn(
+    state: Series, first_side: bool, mean: Series, z: Series, q: Series, basis: FourSeries, spare: Series, end: Series
+) -> None:
+    """Write p and d at the end of an arc. In the second arc of a pair the phase is r^2 times that in the first."""
+    sine, versine, _, _ = basis
+    product, swept, turned, steeper, steady = spare[0], spare[1], spare[2], spare[3], spare[4]
+    _multiply(versine, mean, product)
+    _multiply(z, z, swept)
+    _multiply(swept, product, steady)
+    _multiply(q, versine, product)
+    _multiply(product, state[2], turned)
+    _multiply(z, sine, swept)
+    _multiply(state[2], swept, steeper)
+    _multiply(mean, swept, product)
+    later = 0 if first_side else 1
+    for k in range(z.size):
+        end[1, k] = state[1, k]
+        end[2, k] = state[2, k] - turned[k]
+        if k >= 2 * later:
+            end[1, k] += steady[k - 2 * later]
+        if k >= later:
+            end[1, k] += steeper[k - later]
+            end[2, k] += product[k - later]
+
+
+@inlined
+def leading_duration(v: float, p: float, d: float) -> float:
+    """Duration of a first-side arc to leading order (the cubic of Eq. 62)."""
+    if v == 0.0:
+        return -4.0 * d
+    return positive_root(d / 6.0, p / 2.0, v)
+
+
+@shared
+def series_basis(q: Series, delta: float, spare: Series, basis: FourSeries) -> None:
+    """Sine, versine, E and W of `sine.arc.Basis` at a series q without constant term."""
+    sine, versine, E, W = basis
+    power, mixed, turned = spare[0], spare[1], spare[2]
+    order = q.size
+    for k in range(order):
+        sine[k] = versine[k] = E[k] = W[k] = power[k] = mixed[k] = 0.0
+    power[0] = mixed[0] = 1.0
+    factor = 1.0
+    for m in range(order):
+        for k in range(order):
+            sine[k] += factor * power[k]
+            versine[k] += factor / (2 * m + 2) * power[k]
+        factor /= (2 * m + 2) * (2 * m + 3)
+        for k in range(order):
+            E[k] += factor * mixed[k]
+            W[k] += factor / (2 * m + 4) * mixed[k]
+        _multiply(q, power, turned)
+        for k in range(order):
+            power[k] = -turned[k]
+        _multiply(q, mixed, turned)
+        for k in range(order):
+            mixed[k] = delta * turned[k] + power[k]
+
+
+@inlined
+def _push(z: Series, forces: ThreeSeries, basis: ThreeSeries, spare: Series, found: Series) -> None:
+    """Write what the forces of degrees 0, 1 and 2 in time do in the duration z: z (f0 b0 + z (f1 b1 + z f2 b2))."""
+    some, more = spare[0], spare[1]
+    _multiply(forces[2], basis[2], some)
+    _multiply(z, some, more)
+    for i in (1, 0):
+        _multiply(forces[i], basis[i], some)
+        for k in range(z.size):
+            some[k] += more[k]
+        _multiply(z, some, more)
+    for k in range(z.size):
+        found[k] = more[k]
+
+
+@shared
+def _multiply(a: Series, b: Series, c: Series) -> None:
+    """Write the product of two series, truncated, into a third one."""
+    for k in range(c.size):
+        c[k] = 0.0
     for i in range(a.size):
         if a[i] != 0.0:
             for j in range(a.size - i):
                 c[i + j] += a[i] * b[j]
-    return c
 
 
-@allocating
-def quotient(a: Series, b: Series) -> Series:
-    """Divide, truncated."""
-    c = np.zeros(a.size)
+@inlined
+def _divide(a: Series, b: Series, c: Series) -> None:
+    """Write the quotient of two series, truncated, into a third one."""
     for n in range(a.size):
         total = a[n]
         for k in range(n):
             total -= c[k] * b[n - k]
         c[n] = total / b[0]
-    return c
 
 
-@allocating
-def raised(a: Series, power: int) -> Series:
-    """Multiply by eps^power."""
-    b = np.zeros(a.size)
-    for k in range(power, a.size):
-        b[k] = a[k - power]
-    return b
+@inlined
+def _shift(a: Series, power: int, sign: float, b: Series) -> None:
+    """Write a series times eps^power, or its negative, into another one."""
+    for k in range(a.size):
+        b[k] = sign * a[k - power] if k >= power else 0.0
