@@ -104,8 +104,6 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
         "sine.series.eq65_sums": [(1.0,)],
         "sine.series.eq65_terms": [(1.0, reals(), reals())],
         "sine.series.series_arcs": [(reals(1, 1), True, 1.0, 1.0, reals(1, 1), reals(1, 1), reals(1, 1, 1))],
-        "sine.sequence.eq76": [(1.0, 1.0)],
-        "sine.sequence.eq77": [(1.0,)],
         "sine.sequence.fitted_amplitudes": [(given(), given(), True, reals())],
         "population.shares": [(*shares, reals(1, 1, kind=np.float32), reals())],
         "population.log_density": [(reals(1, 1), reals(1, 1), reals(), reals())],

@@ -493,7 +493,7 @@ def calibrate(
     distinct, which = _distinct(tested)
 
     def tried(points: Floats) -> NDArray[np.float32]:
-        return _outcomes(space.blocks(points), distinct, model, threads, progress)[:, which]
+        return np.take(_outcomes(space.blocks(points), distinct, model, threads, progress), which, axis=1)
 
     found = search(Problem(space, observed, lapse, tried, threads), candidates, rng)
     evidence = found.evidence
@@ -521,7 +521,7 @@ def _outcomes(
     """1 where a block overturns under a motion, else 0; shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
     require_finished(simulated.unfinished.values)
-    return np.ascontiguousarray(simulated.overturned.transpose("block", "motion").values, dtype=np.float32)
+    return np.asarray(simulated.overturned.transpose("block", "motion").values, dtype=np.float32)
 
 
 def _distinct(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:

@@ -305,7 +305,7 @@ def distance_exponent(eta: float) -> float:
 # ---- The paper's fits of the critical amplitude ----
 
 
-@kernel
+@inlined
 def eq76(omega: float, eta: float) -> float:
     """Fitted critical amplitude (Eq. 76)."""
     return (
@@ -326,7 +326,7 @@ def eq76(omega: float, eta: float) -> float:
     )
 
 
-@kernel
+@inlined
 def eq77(eta: float) -> float:
     """Fitted critical amplitude without the frequency (Eq. 77)."""
     return -0.3941 * eta**3 + 0.5763 * eta**2 - 0.45 * eta + 1.271

@@ -1,0 +1,145 @@
+"""What an installation with compiled kernels promises: no compiler, first answers at once, the same bits everywhere."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from rocking.kernels import library
+
+#: Set where a library must be there: its absence is then an error.
+REQUIRED = os.environ.get("ROCKING_LIBRARY_REQUIRED") == "1"
+
+pytestmark = pytest.mark.skipif(
+    library.opened() is None and not REQUIRED, reason="no library of kernels came with this installation"
+)
+
+WITHOUT_NUMBA = "import sys; sys.modules['numba'] = None\n"
+
+FIRST = """
+import time
+import rocking
+motion = rocking.records.load("el-centro-meloland-270")
+response = rocking.simulate(rocking.Block(half_width=0.12, half_height=0.55), motion)
+assert "rest" in str(response.summary())
+print(time.process_time())
+"""
+
+MANY = """
+import time
+import numpy as np
+import rocking
+motion = rocking.records.load("el-centro-meloland-270")
+blocks = rocking.Blocks(p=np.repeat(np.linspace(1.0, 5.0, 100), 100), alpha=np.tile(np.linspace(0.1, 0.4, 100), 100))
+found = rocking.simulate_many(blocks, motion, model={model!r})
+assert 0.0 < float(found.overturned.mean()) < 1.0
+print(time.process_time())
+"""
+
+#: One of everything that calls a kernel; prints the names of those that were called.
+EVERYTHING = """
+import json
+import numpy as np
+import rocking
+from rocking import chattering
+from rocking.kernels import library
+
+called = set()
+found = library.function
+def noting(name):
+    native = found(name)
+    def call(*arguments):
+        called.add(name)
+        return native(*arguments)
+    return native and call
+library.function = noting
+
+motion = rocking.records.load("el-centro-meloland-270")
+shaken = motion.with_vertical(motion.scaled(0.5))
+pulse = rocking.pulses.ricker(0.4, 1.0)
+sine = rocking.pulses.sine(0.3, 1.0, cycles=4)
+blocks = rocking.Blocks(p=np.linspace(1.0, 4.0, 7), alpha=0.2)
+for model in ("linear", "nonlinear"):
+    for each in (motion, shaken, pulse):
+        response = rocking.simulate(rocking.Block(half_width=0.12, half_height=0.55), each, model=model)
+        response.summary()
+        rocking.simulate_many(blocks, each, model=model)
+motion.spectral_acceleration(1.0)
+for treatment in (rocking.AsymptoticTime(), rocking.VelocityThreshold(1e-3), rocking.IntervalThreshold(1e-3)):
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.1, restitution=0.9)
+    rocking.simulate(block, sine, model="linear", chattering=treatment)
+for method in ("exact", "semianalytical", "asymptotic", "series"):
+    chattering.chattering_time(np.array([1.05, 1.1]), 3.0, 0.9, method=method)
+chattering.chattering_time(1.05, 3.0, 0.9)
+chattering.first_interval(1.05, 3.0)
+chattering.sequence(1.05, 3.0, 0.9)
+chattering.asymptotic_table(1.05, 3.0, 0.9)
+chattering.critical_amplitude(3.0, [0.8, 0.9])
+chattering.critical_report(3.0, 0.9)
+chattering.chattering_report(1.05, 3.0, 0.9)
+chattering.chattering_report(8.0, 3.0, 0.9)
+motions = [motion.scaled(factor) for factor in np.linspace(0.3, 2.5, 12)]
+outcomes = [rocking.simulate(rocking.Block.from_parameters(p=2.0, alpha=0.2), each).overturned for each in motions]
+rocking.calibrate(motions, outcomes, model="linear", two_sided=False, candidates=256, seed=1)
+print(json.dumps(sorted(name.removeprefix("rocking.kernels.") for name in called)))
+"""
+
+#: A digest of many responses, from the library that an argument names.
+DIGEST = """
+import ctypes
+import hashlib
+import numpy as np
+import rocking
+from rocking.kernels import library
+
+library.opened().handle = ctypes.CDLL(str(library.FOLDER / sys.argv[1]))
+digest = hashlib.sha256()
+motion = rocking.records.load("el-centro-meloland-270")
+blocks = rocking.Blocks(p=np.repeat(np.linspace(1.0, 5.0, 20), 20), alpha=np.tile(np.linspace(0.1, 0.4, 20), 20))
+for model in ("linear", "nonlinear"):
+    for each in (motion, motion.with_vertical(motion.scaled(0.5))):
+        found = rocking.simulate_many(blocks, each, model=model)
+        for name in sorted(found.data_vars):
+            digest.update(np.ascontiguousarray(found[name].values).tobytes())
+omega, eta = np.meshgrid(np.linspace(0.5, 8.0, 20), np.linspace(0.5, 0.95, 20))
+digest.update(rocking.chattering.critical_amplitude(omega, eta).tobytes())
+digest.update(rocking.chattering.chattering_time(1.02, omega, eta).tobytes())
+print(digest.hexdigest())
+"""
+
+
+def answer(code: str, *arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_NUMBA + code, *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_first_response_takes_less_than_a_second_of_processor_time() -> None:
+    assert float(answer(FIRST)) < 1.0
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_ten_thousand_blocks_need_no_compiler(model: str) -> None:
+    assert float(answer(MANY.format(model=model))) > 0.0
+
+
+def test_everything_that_computes_needs_no_compiler() -> None:
+    found = library.opened()
+    assert found is not None
+    # Only other kernels call this one.
+    expected = {name.removeprefix("rocking.kernels.") for name in found.manifest["kernels"]} - {
+        "sine.sequence.rest_phase"
+    }
+    assert set(json.loads(answer(EVERYTHING))) == expected
+
+
+def test_libraries_of_all_levels_give_the_same_bits() -> None:
+    found = library.opened()
+    assert found is not None
+    names = list(found.manifest["libraries"])
+    digests = {answer(DIGEST, name) for name in names[: names.index(found.name) + 1]}
+    assert len(digests) == 1
