@@ -58,8 +58,8 @@ library.function = noting
 
 motion = rocking.records.load("el-centro-meloland-270")
 shaken = motion.with_vertical(motion.scaled(0.5))
-pulse = rocking.pulses.ricker(0.4, 1.0)
-sine = rocking.pulses.sine(0.3, 1.0, cycles=4)
+pulse = rocking.pulses.ricker(4.0, 1.0)
+sine = rocking.pulses.sine(3.0, 1.0, cycles=4)
 blocks = rocking.Blocks(p=np.linspace(1.0, 4.0, 7), alpha=0.2)
 for model in ("linear", "nonlinear"):
     for each in (motion, shaken, pulse):

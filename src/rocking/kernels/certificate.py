@@ -207,7 +207,7 @@ def restoring_parabola(block: Record, rules: Record, j: int, scratch: Record, ho
         stiffness = lam * (cosine * W[0] - sign * A[0] * sine)
         push_change = horizontal.slope * horizon.window + 2.0 * horizon.error
         change = lam * (sine * push_change + cosine * weight_change)
-        curvature = lam * math.hypot(largest_weight(vertical), largest(horizontal))
+        curvature = lam * diagonal(largest_weight(vertical), largest(horizontal))
         error = deviation(lam * (error + weight_error), change, curvature, horizon.height)
     g = gain * (threshold * W[0] + sign * A[0])
     rate, half_curvature = gain * (sign * A[1]), gain * (sign * A[2]) if horizon.columns > 2 else 0.0
@@ -252,6 +252,12 @@ def largest_weight(vertical: Window) -> float:
 
 
 @inlined
+def diagonal(a: float, b: float) -> float:
+    """Length of a vector. The C library's hypot rounds differently from version to version, and in Python."""
+    return math.sqrt(a * a + b * b)
+
+
+@inlined
 def side_bounds(block: Record, rules: Record, j: int, motion: MotionBounds) -> Bounds:
     """Bounds on side j, rounding included, for bounds on the motion."""
     horizontal, vertical = motion
@@ -261,7 +267,7 @@ def side_bounds(block: Record, rules: Record, j: int, motion: MotionBounds) -> B
     push, weight = largest(horizontal), largest_weight(vertical)
     rounding = ROUNDING * (threshold * weight + push)
     # A rotation changes both models' stiffness and, in the nonlinear one, what the motion adds (at most p^2 a/g).
-    stiffness = abs(block.stiffness[j]) * (math.hypot(weight, push) if rules.nonlinear else weight) * (1.0 + ROUNDING)
+    stiffness = abs(block.stiffness[j]) * (diagonal(weight, push) if rules.nonlinear else weight) * (1.0 + ROUNDING)
     per_push = (block.stiffness[j] if rules.nonlinear else block.gain[j]) * (1.0 + ROUNDING)
     per_weight = block.gain[j] * threshold * (1.0 + ROUNDING)  # largest at zero rotation: `is_greatest_at_zero`
     return Bounds(

@@ -68,6 +68,17 @@ class Kernel(OnUse):
         """What calls its code in the library; None if there is none."""
         return library.function(f"{self.py_func.__module__}.{self.py_func.__qualname__}")
 
+    @property
+    def is_at_hand(self) -> bool:
+        """Whether a call compiles nothing, as far as can be told without importing numba."""
+        return self.native is not None or "compiled" in vars(self) or self._is_cached
+
+    @functools.cached_property
+    def _is_cached(self) -> bool:
+        folder = cache_folder()
+        entry = f"{self.py_func.__module__.rpartition('.')[2]}.{self.py_func.__name__}-*.nbi"
+        return folder is not None and any(folder.rglob(entry))
+
     def __call__(self, *arguments: Any) -> Any:
         """Call the code in the library, or what numba compiles where the library does not take these arguments."""
         if self.native is not None:

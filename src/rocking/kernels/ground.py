@@ -5,12 +5,13 @@ of the vertical component, where there is one, after the horizontal ones. The la
 so that no function has to check whether the motion is over. Nothing here checks for NaN; it is passed on.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.interpreted import Interpreted
 
 #: Relative allowance for rounding in bounds.
 ROUNDING = 2.0**-48
@@ -64,8 +65,10 @@ def ground_of(
     pieces = np.zeros((len(coefficients) + 1, _FIRST + columns * len(components)))
     stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), len(Window._fields)))
     ground = Ground(pieces, stretches, error * unit, columns, _FIRST)
+    write = _interpreted_fill if _interpreted_fill.work() > len(coefficients) else fill
+    _interpreted_fill.spend(len(coefficients))
     for k, component in enumerate(components):
-        fill(breakpoints, component, unit, ground._replace(first=_FIRST + k * columns), np.zeros(columns))
+        write(breakpoints, component, unit, ground._replace(first=_FIRST + k * columns), np.zeros(columns))
     return ground
 
 
@@ -99,6 +102,11 @@ def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground,
         before = stretch_bounds(ground, k // STRETCH)
         low, high = min(before.low, piece.low), max(before.high, piece.high)
         set_stretch(ground, k // STRETCH, Window(low, high, max(before.slope, piece.slope), before.jumps + jumps))
+
+
+#: Pieces of motions in one process that Python writes: a fraction of a second's work, where compiling takes half of one
+#: and numba another to import.
+_interpreted_fill: Final = Interpreted(fill, 20_000)
 
 
 @inlined

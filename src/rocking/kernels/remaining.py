@@ -77,8 +77,9 @@ def remaining_time(v: float, i: Restoring, j: Restoring) -> float:
     own_i = slope_i * (2.0 * e_i * A_j - 4.0 * inverse_i) * THIRD + 2.0 * e_i * inverse_i * drift_j
     own_j = slope_j * (2.0 * e_j * A_i - 4.0 * inverse_j) * THIRD + 2.0 * e_j * inverse_j * drift_i
     B_i = (own_i + e_i * e_i * own_j) / (1.0 - pair * pair)
-    stiff_i, stiff_j = i.stiffness * inverse_i**3, j.stiffness * inverse_j**3
-    C_i = 2.0 * THIRD * (stiff_i + e_i**3 * stiff_j) / (1.0 - pair**3)
+    stiff_i = i.stiffness * (inverse_i * inverse_i * inverse_i)
+    stiff_j = j.stiffness * (inverse_j * inverse_j * inverse_j)
+    C_i = 2.0 * THIRD * (stiff_i + e_i * e_i * e_i * stiff_j) / (1.0 - pair * pair * pair)
     return v * (A_i + v * (B_i + v * C_i))
 
 

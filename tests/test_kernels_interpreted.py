@@ -1,0 +1,124 @@
+"""Kernels as Python reads them where nothing is compiled yet: the same bits, and a compiler where it is worth one."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking import simulation
+from rocking.kernels import compiled, ground
+from rocking.kernels.interpreted import Interpreted
+from rocking.kernels.march import march
+from rocking.response import Response
+
+pytestmark = pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+
+
+def motion_of(random: np.random.Generator, kind: int) -> rocking.Motion:
+    """Motions from far below uplift to ten times g, smooth and rough, with and without a vertical component."""
+    amplitude, frequency = 10.0 ** random.uniform((-0.5, -0.7), (2.0, 1.0))
+    if kind == 0:
+        return rocking.pulses.sine(amplitude, frequency, cycles=float(random.integers(1, 4)))
+    if kind == 1:
+        return rocking.pulses.ricker(amplitude, frequency)
+    noise = np.convolve(random.normal(size=(120)), np.ones(5))
+    motion = rocking.Motion.from_samples(
+        np.append(amplitude * noise / np.abs(noise).max(), 0.0), 10.0 ** random.uniform(-2.3, -1.0)
+    )
+    return motion if kind == 2 else motion.with_vertical(motion.delayed(0.1).scaled(1.5 / amplitude * random.random()))
+
+
+def bits(response: Response) -> tuple[bytes, ...]:
+    tables = (response.impacts, response.events, response.chattering, response._trail.nodes)
+    return tuple(table.tobytes() for table in tables)
+
+
+@pytest.fixture
+def choose(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
+    """Have Python follow marches, or compiled code."""
+
+    def choose(interpreted: bool) -> None:
+        monkeypatch.setattr(compiled.Kernel, "is_at_hand", not interpreted)
+        monkeypatch.setattr(simulation, "_interpreted", Interpreted(march, 10**9))
+        monkeypatch.setattr(ground, "_interpreted_fill", Interpreted(ground.fill, 10**9))
+
+    return choose
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("count", [60, pytest.param(4000, marks=pytest.mark.slow)])
+def test_python_gives_the_same_bits(count: int, choose: Callable[[bool], None]) -> None:
+    random = np.random.default_rng(count)
+    impacts = 0
+    for number in range(count):
+        motion = motion_of(random, number % 4)
+        block = rocking.Block.from_parameters(
+            p=10.0 ** random.uniform(-0.5, 1.0), alpha=random.uniform(0.05, 0.8), restitution=random.uniform(0.3, 0.99)
+        )
+        how: dict[str, Any] = {"model": ("linear", "nonlinear")[number // 4 % 2]}
+        if random.random() < 0.4:
+            how["initial_rotation"] = random.uniform(-0.04, 0.04)
+        found = []
+        for interpreted in (False, True):
+            choose(interpreted)
+            found.append(rocking.simulate(block, motion, **how))
+        assert bits(found[0]) == bits(found[1])
+        impacts += len(found[0].impacts)
+    assert impacts > 8 * count
+
+
+def test_where_python_cannot_divide_compiled_code_goes_on(
+    choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion, block = rocking.pulses.sine(4.0, 1.0, cycles=2), rocking.Block.from_parameters(p=2.0, alpha=0.2)
+    choose(False)
+    expected = rocking.simulate(block, motion)
+    choose(True)
+    refused = []
+
+    def divide(*arguments: Any) -> int:
+        arguments[-1]["u"] = 12.0
+        arguments[-1]["nodes"] = 7
+        refused.append(1.0)
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(Interpreted, "__call__", lambda self, *arguments: divide(*arguments))
+    monkeypatch.setattr(ground, "_interpreted_fill", Interpreted(ground.fill, 0))
+    found = rocking.simulate(block, motion)
+    assert len(refused) == 1
+    assert bits(found) == bits(expected)
+    assert len(found.impacts) > 3
+    rocking.simulate(block, motion)
+    assert len(refused) == 1
+
+
+def test_after_some_work_the_march_is_compiled(choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch) -> None:
+    motion, block = rocking.pulses.sine(4.0, 1.0, cycles=2), rocking.Block.from_parameters(p=2.0, alpha=0.2)
+    choose(False)
+    expected = rocking.simulate(block, motion)
+    choose(True)
+    few = Interpreted(march, 5)
+    monkeypatch.setattr(simulation, "_interpreted", few)
+    found = rocking.simulate(block, motion)
+    assert few.work() == 0
+    assert bits(found) == bits(expected)
+    assert len(found.impacts) > 5
+
+
+def test_a_first_simulation_needs_no_compiler(tmp_path: Path) -> None:
+    code = """
+import sys
+sys.modules["numba"] = None
+import rocking
+block = rocking.Block(half_width=0.12, half_height=0.55)
+print(len(rocking.simulate(block, rocking.records.load("el-centro-meloland-270")).impacts))
+"""
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path), "ROCKING_SHIPPED": "0", "PATH": ""}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 0
