@@ -38,9 +38,6 @@ _FACTORS: Final = np.geomspace(0.5, 2.0, 25)
 
 _HALF: Final = np.array([0.5])
 
-#: Most curves that one figure shows.
-_MOST_CURVES: Final = 4
-
 _UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "fractile": "1"}
 
 
@@ -232,6 +229,9 @@ class RockingSpectrum(DatasetResult):
     ) -> Figure:
         """Draw single motions thin, fractiles thick, and the share that overturns.
 
+        Of more than two combinations of slenderness and restitution only the fractiles nearest to the median are
+        drawn, of more than four no single motions.
+
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
@@ -252,7 +252,7 @@ class RockingSpectrum(DatasetResult):
         Raises
         ------
         InvalidOption
-            If there are more than four combinations of slenderness and restitution, or no such abscissa.
+            If there is no such abscissa.
 
         Examples
         --------
@@ -266,8 +266,6 @@ class RockingSpectrum(DatasetResult):
 
         checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
         named_curves = self._curves()
-        if len(named_curves) > _MOST_CURVES:
-            raise InvalidOption(f"a figure shows at most {_MOST_CURVES} curves, not {len(named_curves)}; select some")
         alone = len(named_curves) == 1
         curves = [
             SpectrumCurves(

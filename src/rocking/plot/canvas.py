@@ -38,6 +38,9 @@ CURVES: Final[tuple[dict[str, Any], ...]] = (
     {"color": "#b8860b", "linestyle": (0, (6, 1.5, 1, 1.5))},
 )
 
+#: Where a scale of colours is still seen on white.
+_LIGHTEST: Final = 0.85
+
 STYLE: Final[dict[Any, Any]] = {
     "font.size": 8.5,
     "axes.titlesize": 8.5,
@@ -146,6 +149,17 @@ def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
     for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
         letter = _LETTER * axes.figure.dpi * float(axis.label.get_fontsize()) / 72.0
         axis.set_label_text(_in_lines(label, max(_FEWEST_LETTERS, int(length / letter))))
+
+
+def styles_of(count: int) -> list[dict[str, Any]]:
+    """Return a colour and dashes for each of so many curves; those of more than four go from dark to light in order."""
+    if count <= len(CURVES):
+        return [*CURVES[:count]]
+    from matplotlib import colormaps
+
+    colours = colormaps["cividis"](np.linspace(0.0, _LIGHTEST, count))
+    dashes = [style["linestyle"] for style in CURVES]
+    return [{"color": colour, "linestyle": dashes[k % len(dashes)]} for k, colour in enumerate(colours)]
 
 
 def write(axes: Axes, text: str, at: tuple[Any, Any], off: tuple[float, float], **look: Any) -> None:
