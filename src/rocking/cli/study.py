@@ -23,7 +23,7 @@ from rocking.studies.run import local_executor, scheduler_executor
 from rocking.studies.study import Study, study_of
 from rocking.tables import counted, to_json, write_text
 
-study = App(name="study", help="Run a study too long for one sitting: created once, resumed after anything.")
+study = App(name="study")
 
 
 @study.command
