@@ -199,7 +199,7 @@ def _tell_sides(
 
 def _mark_impacts(axes: Axes, impact_times: Floats, uplift_times: Floats) -> None:
     if impact_times.size:
-        add_ticks(axes, impact_times, 0.055, label=f"impacts ({impact_times.size})")
+        add_ticks(axes, impact_times, 0.055, label=f"resolved impacts ({impact_times.size})")
     if uplift_times.size:
         add_ticks(axes, uplift_times, 0.13, "^", color=ABOVE, markersize=4.5, markeredgewidth=0.0, label="uplift")
 
