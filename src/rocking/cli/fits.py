@@ -22,8 +22,8 @@ from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.fragility.fit import fragility as run
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.hazard import HazardCurve
+from rocking.analysis.input_tables import History, Outcomes, read_calibration, read_observed
 from rocking.analysis.risk import check_measure
-from rocking.analysis.tables import History, Outcomes, read_calibration, read_observed
 from rocking.cli.options import BLOCK, MEASURE, MODEL, EnsembleOptions, MeasureOptions, TreatmentOptions
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, ScaledPulseOptions

@@ -200,7 +200,7 @@ def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> No
     _break_lines(figure.legend(**below), figure)
 
 
-def labelled(*panels: Axes) -> list[Artist]:
+def handles_of(*panels: Axes) -> list[Artist]:
     """Collect the handles of all that has a label in these panels, each label once."""
     named: dict[str, Artist] = {}
     for panel in panels:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.plot.boundaries import Stack, runs
-from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, figure_for, labelled
+from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, figure_for, handles_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -207,5 +207,5 @@ def blocks_figure(
         for spare in axes[len(panels) :]:
             spare.remove()
         figure.colorbar(marks, ax=axes[: len(panels)], label=value_label, shrink=0.9)
-        add_legend(figure, ax, labelled(*axes[: len(panels)]))
+        add_legend(figure, ax, handles_of(*axes[: len(panels)]))
     return figure

@@ -17,7 +17,7 @@ from rocking.plot.canvas import (
     add_legend,
     add_ticks,
     figure_for,
-    labelled,
+    handles_of,
     write,
 )
 
@@ -123,7 +123,7 @@ def response_figure(
         if zoom and sequence is not None:
             _mark_sequence(main, zoom)
             _draw_sequence(sequence, zoom)
-        add_legend(figure, ax, labelled(main, *grounds))
+        add_legend(figure, ax, handles_of(main, *grounds))
     return figure
 
 
