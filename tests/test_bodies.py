@@ -48,7 +48,7 @@ class Ball:
         return self.gravity, math.inf
 
     def alone(self) -> Balls:
-        return Balls(np.array([[self.e, self.e]]), self.gravity)
+        return Balls.of([self])
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +57,10 @@ class Balls:
     gravity: float = G
     kind: ClassVar[str] = "balls"
     is_symmetric: ClassVar[bool] = True
+
+    @classmethod
+    def of(cls, bodies):
+        return cls(np.array([[ball.e, ball.e] for ball in bodies]), bodies[0].gravity)
 
     def __len__(self):
         return len(self.restitution)

@@ -17,7 +17,7 @@ from rocking.analysis.calibration.evidence import WIDENED, Candidates, Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
 from rocking.analysis.calibration.search import AGREEMENT, Problem, posterior, r_hat, search
 from rocking.analysis.calibration.space import Space
-from rocking.analysis.tables import read_calibration, read_ensemble
+from rocking.analysis.input_tables import read_calibration, read_ensemble
 
 HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
 STEP = 0.02

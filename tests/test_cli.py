@@ -218,3 +218,6 @@ def test_the_list_of_commands_has_a_line_for_each(run):
     code, out, _ = run("--help")
     assert code == 0
     assert all(f"│ {command} " in out for command in [*COMMANDS, "study"])
+    lines = " ".join(re.sub(r"[│╭╰─╮╯]", " ", out).split())
+    for command in COMMANDS:  # the first line of what its own help says
+        assert f"{command} {inspect.getdoc(app[command].default_command).splitlines()[0]}" in lines

@@ -2,6 +2,7 @@
 
 import json
 import re
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from rocking.tables import to_json
 RECORD = "el-centro-meloland-270"
 OTHER = "el-centro-meloland-360"
 SIZES = ["--half-width", "0.12", "--half-height", "0.55"]
+CALIBRATED = ["--candidates", "128", "--p", "3", "--restitution", "housner", "--no-two-sided"]
 
 
 def test_spectrum_json_is_the_spectrum(run):
@@ -182,6 +184,111 @@ def test_a_folder_that_cannot_be_written_to_is_refused_before_work(run, tmp_path
     assert "--out" in err
 
 
+@pytest.fixture
+def no_work(monkeypatch):
+    """Fail where anything is simulated."""
+
+    def simulated(*arguments):
+        raise AssertionError("this was simulated")
+
+    monkeypatch.setattr("rocking.engine.simulate_task", simulated)
+    # A function has the name of its module there.
+    monkeypatch.setattr(import_module("rocking.analysis.rules.check"), "simulate", simulated)
+
+
+LEVELS = ["--levels", "0.1g:1.2g:12"]
+
+
+@pytest.mark.usefixtures("no_work")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["fragility", RECORD, OTHER, *SIZES, *LEVELS, "--taxonomy", "a block", "--out", "out"], "--taxonomy of NRML"),
+        (["fragility", RECORD, *SIZES, *LEVELS, "--limits", "a half=0.5", "--out", "out"], "limit state of NRML"),
+        (["fragility", RECORD, OTHER, *SIZES, *STRIPES, "--hazard", "site.csv"], "fit the one against the other's"),
+        (["fragility", RECORD, OTHER, *SIZES, "--levels", "0.5g"], "--levels that differ"),
+        (["measures", RECORD, OTHER, *SIZES, "--damping", "1.5"], "--damping must be a fraction"),
+        (["check", RECORD, OTHER, *SIZES, "--rules", "west,east"], "--rules must be one of"),
+    ],
+)
+def test_what_is_wrong_with_what_is_given_is_said_before_the_work(run, tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "site.csv").write_text("pga_g,annual_rate\n0.05,0.05\n1.0,0.00005\n")
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert words in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.usefixtures("no_work")
+def test_a_motion_of_zeros_among_others_is_refused_before_the_rules_are_checked():
+    motions = [rocking.records.load(RECORD), rocking.Motion.from_samples(np.zeros(100), 0.01)]
+    with pytest.raises(rocking.InvalidMotion, match="zero"):
+        rocking.rules.check(rocking.Block(width=0.24, height=1.1), motions)
+
+
+@pytest.mark.usefixtures("no_work")
+@pytest.mark.parametrize("specimens", [False, True])
+def test_more_folds_than_groups_are_refused_before_the_calibration(run, outcomes_table, specimens):
+    if specimens:
+        header, *rows = outcomes_table.read_text().splitlines()
+        named = [f"{row},{name}" for name, each in (("A", rows), ("B", rows[:6] + rows[-4:])) for row in each]
+        outcomes_table.write_text("\n".join([f"{header},specimen", *named]))
+    code, _, err = run("calibrate", outcomes_table, *CALIBRATED, "--folds", "6" if specimens else "40")
+    assert code == 2
+    assert "--folds must be a whole number" in err and ("specimen B" in err) == specimens
+
+
+def test_a_spectrum_of_many_curves_is_written_with_its_figure(run, tmp_path):
+    code, _, err = run("spectrum", RECORD, "--alpha", "0.1:0.4:6", "--p", "2,3", "--out", tmp_path)
+    assert (code, err) == (0, "")
+    assert {"spectrum.png", "spectrum.pdf", "result.json"} <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_a_fragility_that_nrml_does_not_hold_is_written_without(run, tmp_path):
+    """A measure in units of blocks that are many, and so have no common unit."""
+    ensemble = tmp_path / "ensemble.csv"
+    columns = [f"{name}_{side}{unit}" for name, unit in (("p", "_rad_s"), ("alpha", "_rad"), ("restitution", ""))
+               for side in ("plus", "minus")]  # fmt: skip
+    rows = [f"{p},{p},0.2,0.2,0.9,0.9,1,linear" for p in (2.0, 2.5, 3.0)]
+    ensemble.write_text("\n".join([",".join([*columns, "weight", "model"]), *rows]) + "\n")
+    about = ["--ensemble", ensemble, "--measure", "pga_ratio", "--levels", "1:6:11", "--out", tmp_path / "out"]
+    code, _, err = run("fragility", RECORD, OTHER, "ridgecrest-clc-090", *about)
+    assert code == 0
+    for form in ("continuous", "discrete"):
+        assert f"note: fragility-{form}.xml left out: pga_ratio counts in a block's own unit" in err
+    written = {path.name for path in (tmp_path / "out").iterdir()}
+    assert written == {"fragility.png", "fragility.pdf", "fragility.csv", "outcomes.csv", "result.json"}
+
+
+COMMANDS = {
+    "spectrum": [RECORD, "--alpha", "0.2", "--p", "2,3"],
+    "map": ["half-sine", *SIZES, "--amplitudes", "0.5:4:5", "--frequencies", "2,3"],
+    "ida": [RECORD, *SIZES],
+    "measures": [RECORD, OTHER, *SIZES],
+    "fragility": [RECORD, OTHER, "ridgecrest-clc-090", *SIZES, *STRIPES],
+    "calibrate": [*CALIBRATED],
+    "simulate": [RECORD, *SIZES],
+    "chatter": ["1.03", "2", "0.92"],
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_figure_that_is_refused_takes_nothing_else_away(run, tmp_path, monkeypatch, request, command):
+    def refused(*arguments, **options):
+        raise rocking.InvalidOption("nothing can be drawn of {}", "alpha")
+
+    arguments = COMMANDS[command]
+    if command == "calibrate":
+        arguments = [request.getfixturevalue("outcomes_table"), *arguments]
+    monkeypatch.setattr("rocking.cli.output.write_figure", refused)
+    code, out, err = run(command, *arguments, "--out", tmp_path / "out")
+    assert code == 0, err
+    assert ".png and " in err and "left out: nothing can be drawn of" in err
+    files = {path.name for path in (tmp_path / "out").iterdir()}
+    assert "result.json" in files and not any(name.endswith((".png", ".pdf")) for name in files)
+    assert "result.json" in out
+
+
 def test_the_help_of_every_command_names_its_options(run):
     for command, option in (
         ("spectrum", "--alpha"),
@@ -208,9 +315,6 @@ def outcomes_table(tmp_path):
     table = tmp_path / "outcomes.csv"
     table.write_text("\n".join(["motion,scale,overturned,group", *rows]))
     return table
-
-
-CALIBRATED = ["--candidates", "128", "--p", "3", "--restitution", "housner", "--no-two-sided"]
 
 
 def test_calibrate_json_is_the_calibration(run, outcomes_table):

@@ -78,6 +78,16 @@ def test_a_field_is_called_by_its_label_and_another_argument_by_its_name():
     assert field_label("tolerance") == "tolerance"
 
 
+def test_a_parameter_of_a_pulse_is_called_as_that_pulse_has_it():
+    judged = 0
+    for name, pulse in PULSES.items():
+        for parameter in pulse["parameters"]:
+            assert field_label(parameter.name, f"{name}:frequency=1") == f"“{parameter.label}”"
+            judged += 1
+    assert judged >= 20
+    assert field_label("amplitude") == "amplitude"  # of the acceleration, or of the velocity
+
+
 def test_the_page_is_given_every_parameter_with_its_label():
     given = specification()["parameters"]
     assert [each["name"] for each in given] == [*PARAMETERS]

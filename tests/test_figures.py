@@ -147,6 +147,7 @@ FIGURES = {
     "response": (response_of, 4.8),
     "spectrum of two": (lambda **options: spectrum_of(2, 2, **options), 4.2),
     "spectrum of twelve": (lambda **options: spectrum_of(12, 4, **options), 4.2),
+    "spectrum of many curves": (lambda **options: spectrum_of(12, 30, **options), 4.8),
     "ida of two": (lambda **options: ida_of(2, **options), 4.2),
     "ida of twelve": (lambda **options: ida_of(12, **options), 4.8),
     "fragility": (fragility_of, 3.6),

@@ -51,8 +51,23 @@ def complaint(path: Path | str, error: type[RockingError] = UnreadableRecord, **
 # The fixtures
 
 
+#: What the fixtures hold that are no records of acceleration: the place and the words of their refusal.
+REFUSED = {
+    "nga.vt2": "line 3: this PEER file holds velocity",
+    "nga.dt2": "line 3: this PEER file holds displacement",
+    "velocity.smc": "line 1: this SMC file holds 'velocity'",
+    "velocity.asc": "line 24: this ESM file holds 'velocity'",
+    "velocity.v2c": "this file holds 'velocity'",
+    "raw.v0c": "this file holds 'raw accel.'",
+}
+
+#: Those of records with a header.
+HEADED = sorted(written.fixtures().keys() - REFUSED.keys() - {"times.csv", "column.txt"})
+
+
 def test_fixtures_are_what_their_writer_writes() -> None:
     assert len(written.fixtures()) >= 20
+    assert {path.name for path in written.FOLDER.iterdir()} == written.fixtures().keys()
     for name, content in written.fixtures().items():
         assert (written.FOLDER / name).read_bytes() == content.encode(), name
 
@@ -103,17 +118,7 @@ def test_velocities_and_displacements_are_not_taken_for_acceleration() -> None:
     assert read(written.FOLDER / "two.v2", channel=2).pga == pytest.approx(max(map(abs, written.series(2))) / 100.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "what"),
-    [
-        ("nga.vt2", "line 3: this PEER file holds velocity"),
-        ("nga.dt2", "line 3: this PEER file holds displacement"),
-        ("velocity.smc", "line 1: this SMC file holds 'velocity'"),
-        ("velocity.asc", "line 24: this ESM file holds 'velocity'"),
-        ("velocity.v2c", "this file holds 'velocity'"),
-        ("raw.v0c", "this file holds 'raw accel.'"),
-    ],
-)
+@pytest.mark.parametrize(("name", "what"), REFUSED.items())
 def test_files_without_acceleration_are_refused_and_say_what_they_hold(name: str, what: str) -> None:
     assert what in complaint(written.FOLDER / name)
     assert identify(written.FOLDER / name).format
@@ -244,7 +249,7 @@ def test_every_module_that_recognises_a_format_is_asked() -> None:
 def test_at2_with_a_wrong_npts_names_both_numbers(file: Callable[[str], Path]) -> None:
     for stated in (36, 38, 5372, 999_999_999_999):
         message = complaint(file(written.at2((SERIES / GRAVITY).tolist(), f"NPTS= {stated}, DT= .005 SEC")))
-        assert f"line 4: NPTS is {stated} but 37 values follow" in message
+        assert f"line 4: NPTS says {stated} values but 37 follow" in message
 
 
 def test_a_step_that_is_not_positive_is_refused(file: Callable[[str], Path]) -> None:
@@ -314,7 +319,7 @@ def test_a_channel_cut_short_is_refused(file: Callable[[str], Path]) -> None:
         ("two.v2c", 16, "100 values but 20 follow"),
         ("even.smc", 31, "37 values but"),
         ("even.smc", 20, "ends within its header"),
-        ("esm.asc", 50, "NDATA is 37 but"),
+        ("esm.asc", 50, "NDATA says 37 values but"),
         ("knet.ns", 12, "'Scale Factor'"),
         ("pairs.v1", 30, "74 values but"),
     ):
@@ -351,7 +356,32 @@ def test_knet_shorter_than_its_duration_is_refused(file: Callable[[str], Path]) 
         path = file(head + " ".join(cut[len(head.split()) :]))
         assert f"2 s at 100 Hz make 200 samples but {200 - short} follow" in complaint(path)
     for key, value in (("Scale Factor      3920", "Scale Factor      0"), ("100Hz", "0Hz"), ("100Hz", "fast")):
-        assert "get the record again" in complaint(file("".join(lines).replace(key, value)))
+        assert "which is no positive number" in complaint(file("".join(lines).replace(key, value)))
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("two.v1", 30),
+        ("pairs.v1", 29),
+        ("two.v2", 48),
+        ("two.v2c", 51),
+        ("single.v2c", -2),
+        ("even.smc", 30),
+        ("esm.asc", 49),
+        ("nga.at2", -1),
+        ("knet.ns", -1),
+        ("kiknet.ew2", -1),
+    ],
+)
+def test_more_values_than_are_stated_are_not_taken_for_a_file_cut_short(
+    file: Callable[[str], Path], name: str, line: int
+) -> None:
+    lines = (written.FOLDER / name).read_text().splitlines(keepends=True)
+    for times, advice in ((30, "remove what does not belong to it"), (0, "get the whole file again")):
+        changed = [*lines]
+        changed[line] = times * lines[line]
+        assert f"follow; {advice}, or correct that number" in complaint(file("".join(changed)), channel=1)
 
 
 def test_knet_agrees_with_obspy() -> None:
@@ -392,7 +422,7 @@ def test_esm_without_units_asks_for_them(file: Callable[[str], Path]) -> None:
             "accel data equally spaced at  .0x5",
             "the sampling step '.0x5' is not a number",
         ),
-        ("esm.asc", "NDATA: 37", "NDATA: many", "line 13: NDATA is 'many', which is not a number"),
+        ("esm.asc", "NDATA: 37", "NDATA: many", "line 13: NDATA is 'many', which is no positive number"),
         ("knet.ns", "Mag.   ", "Magn.  ", "line 5: the header line 'Mag.' should stand here"),
         ("even.smc", "         2\n        37", "     20000\n        37", "20000 comment lines are too many"),
         ("even.smc", "  2.0000000E+02", " -2.0000000E+02", "the sampling rate is -200 per second"),
@@ -437,7 +467,7 @@ def test_even_pairs_in_smc_have_a_step(file: Callable[[str], Path]) -> None:
 def test_wrong_counts_are_not_mended_by_columns_that_do_not_fit(file: Callable[[str], Path]) -> None:
     text = written.cosmos([1.5] * 37).replace("      37 acceleration", "      38 acceleration")
     assert "38 values but 37 follow" in complaint(file(text.replace("(8F10.5)", "(2F10.5)")))
-    assert "NPTS is 3 but 0 values follow" in complaint(file(written.at2([], "NPTS= 3, DT= .01")))
+    assert "NPTS says 3 values but 0 follow" in complaint(file(written.at2([], "NPTS= 3, DT= .01")))
 
 
 # Text tables
@@ -656,7 +686,7 @@ def test_a_step_of_short_digits_is_found_exactly() -> None:
 
 
 def test_line_ends_marks_and_page_breaks_do_not_matter(file: Callable[[bytes], Path]) -> None:
-    for name in ("nga.at2", "two.v1", "two.v2", "two.v2c", "even.smc", "knet.ns", "esm.asc"):
+    for name in HEADED:
         plain = (written.FOLDER / name).read_bytes()
         expected = [channel.acceleration.tolist() for channel in channels(written.FOLDER / name)]
         for variant in (
@@ -673,7 +703,7 @@ def test_line_ends_marks_and_page_breaks_do_not_matter(file: Callable[[bytes], P
 
 
 def test_leading_blank_lines_and_page_breaks(file: Callable[[bytes], Path]) -> None:
-    for name in ("two.v1", "two.v2", "two.v2c", "even.smc"):
+    for name in HEADED:
         plain = (written.FOLDER / name).read_bytes()
         expected = [channel.acceleration.tolist() for channel in channels(written.FOLDER / name)]
         for variant in (b"\n\n" + plain, b"\f" + plain, plain.replace(b"\n", b"\n\f", 5)):
@@ -698,10 +728,7 @@ def test_touching_columns_are_split_as_written(numbers: list[float], per_line: i
 def test_large_files_are_read_in_pieces_of_the_same_content(
     monkeypatch: pytest.MonkeyPatch, file: Callable[[str], Path]
 ) -> None:
-    expected = {
-        name: [c.acceleration.tolist() for c in channels(written.FOLDER / name)]
-        for name in ("two.v1", "pairs.v1", "two.v2c", "even.smc", "film.smc", "knet.ns")
-    }
+    expected = {name: [c.acceleration.tolist() for c in channels(written.FOLDER / name)] for name in HEADED}
     monkeypatch.setattr(values, "_CHUNK", 100)
     for name, accelerations in expected.items():
         assert [c.acceleration.tolist() for c in channels(written.FOLDER / name)] == accelerations

@@ -312,3 +312,14 @@ def test_every_family_of_pulses_is_mapped_by_name_or_known_to_need_a_function() 
     page = (Path(__file__).parent.parent / "docs" / "howto" / "overturning-map.md").read_text("utf-8")
     for text in (overturning_map.__doc__ or "", page):
         assert all(name in text for name in PULSES)
+
+
+@pytest.mark.parametrize(("amplitudes", "frequencies"), [([1.5, 2.0, 5.0], [3.0]), ([2.0], [2.0, 3.0]), ([2.0], [3.0])])
+def test_a_map_of_one_column_or_one_row_is_drawn(amplitudes, frequencies):
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    axes = overturning_map(block, "half-sine", amplitudes=amplitudes, frequencies=frequencies).plot().axes[0]
+    corners = np.vstack([path.vertices for shape in axes.collections for path in shape.get_paths()])
+    # What is drawn fills the frame.
+    assert corners.min(axis=0).tolist() == [axes.get_xlim()[0], axes.get_ylim()[0]]
+    assert corners.max(axis=0).tolist() == [axes.get_xlim()[1], axes.get_ylim()[1]]
+    assert (np.ptp(corners, axis=0) > 0.0).all()

@@ -89,7 +89,13 @@ def test_a_part_of_a_response_says_that_it_is_one():
 
 
 def test_what_is_not_drawn_is_not_in_the_legend():
-    assert legend_of(figure_of()) == ["at rest", "impacts (3)", "uplift", "beyond a threshold", "uplift thresholds"]
+    assert legend_of(figure_of()) == [
+        "at rest",
+        "resolved impacts (3)",
+        "uplift",
+        "beyond a threshold",
+        "uplift thresholds",
+    ]
     outside = {"impact_times": np.array([12.0]), "uplift_times": np.array([11.0]), "rest_intervals": [[11.0, 12.0]]}
     quiet = figure_of(motion_acceleration_g=np.full(1001, 0.1), **{k: np.array(v) for k, v in outside.items()})
     assert legend_of(quiet) == ["uplift thresholds"]
@@ -120,7 +126,7 @@ def test_only_the_stretches_beyond_a_threshold_are_filled():
 
 def test_impacts_uplifts_and_rests_are_marked_at_their_times():
     rotation = figure_of().axes[0]
-    np.testing.assert_array_equal(labelled(rotation, "impacts (3)").get_xdata(), np.pi * np.arange(1, 4))
+    np.testing.assert_array_equal(labelled(rotation, "resolved impacts (3)").get_xdata(), np.pi * np.arange(1, 4))
     np.testing.assert_array_equal(labelled(rotation, "uplift").get_xdata(), [0.2])
     spans = [(p.get_x(), p.get_x() + p.get_width()) for p in rotation.patches]
     np.testing.assert_allclose(spans, [[0.0, 0.2], [9.8, 10.0]], rtol=1e-15)

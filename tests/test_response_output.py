@@ -254,7 +254,7 @@ def test_a_window_is_all_that_is_drawn(shaken):
     struck = shaken.impacts["time"]
     count = int(np.sum((struck >= start) & (struck <= end)))
     assert 0 < count < len(struck)
-    assert f"impacts ({count})" in figure.axes[0].get_legend_handles_labels()[1]
+    assert f"resolved impacts ({count})" in figure.axes[0].get_legend_handles_labels()[1]
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """What analyses return: results that say what they are, and none from simulations that were given up."""
 
 import copy
+import inspect
 import math
 import pickle
 import subprocess
@@ -8,11 +9,13 @@ import sys
 
 import pytest
 from matplotlib.figure import Figure
+from public_names import public_names
 
 import rocking
 from rocking import chattering, engine
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.errors import Unfinished
+from rocking.result import DatasetResult
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE = rocking.pulses.one_sine(6.0, 1.0)
@@ -66,14 +69,30 @@ def spectrum():
 
 
 @pytest.fixture(scope="module")
-def results(spectrum):
+def study(tmp_path_factory):
+    motions = [rocking.pulses.one_sine(6.0, frequency) for frequency in (0.5, 0.8, 1.2, 2.0)]
+    levels = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
+    found = rocking.study(tmp_path_factory.mktemp("study") / "one", [BLOCK], motions, levels=levels, measure="pga")
+    found.run()
+    return found
+
+
+@pytest.fixture(scope="module")
+def results(spectrum, study):
     return {
         "RockingSpectrum": spectrum,
         "OverturningMap": rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0, 3.0]),
         "IncrementalDynamicAnalysis": rocking.incremental_dynamic_analysis(BLOCK, PULSE),
         "MeasureComparison": rocking.compare_measures(BLOCK, [PULSE, rocking.pulses.one_sine(6.0, 2.0)]),
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
+        "StudySpectrum": study.spectrum().select(scale=3.0),
+        "BlockFragilities": study.block_fragilities(),
     }
+
+
+def test_every_public_result_with_a_dataset_is_among_those_that_are_judged(results):
+    public = {value for value in public_names().values() if inspect.isclass(value) and issubclass(value, DatasetResult)}
+    assert {each.__name__ for each in public} - {"DatasetResult"} == results.keys()
 
 
 def test_a_result_shows_itself_in_a_line(results):
@@ -138,6 +157,10 @@ HEADERS = {
     ("MeasureComparison", "measures"): "measure,unit,median_intensity,dispersion,dispersion_low,dispersion_high,"
     "dispersion_of_all",
     ("MeasureComparison", "intensities"): "measure,motion,block,unit,intensity",
+    ("StudySpectrum", "fractiles"): "fractile,scale_m_s2,block,p_rad_s,alpha_rad,restitution,"
+    "fractile_over_alpha,overturned_share",
+    ("BlockFragilities", "curves"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
+    "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,fault",
     ("ChatteringMap", "outcomes"): "a,omega,outcome,complete,uplift_s,rest_s,lower_s,upper_s,rests,overturned",
 }
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import rocking
 from rocking import HazardCurve, InvalidOption
 from rocking.analysis.hazard import powers
-from rocking.analysis.tables import read_observed
+from rocking.analysis.input_tables import read_observed
 from rocking.motion.scaling import Measure
 
 G = 9.80665

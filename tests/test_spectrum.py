@@ -141,10 +141,16 @@ def test_the_title_of_a_figure_says_what_the_legend_need_not():
     ]
 
 
-def test_a_figure_of_too_many_curves_is_refused(spectrum):
-    more = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.15, 0.2, 0.25, 0.3], p=[2.0]), PULSES[0])
-    with pytest.raises(rocking.InvalidOption, match="at most 4"):
-        more.plot()
+def test_a_figure_shows_any_number_of_curves_and_names_some_of_many(spectrum):
+    for count in (5, 11):
+        slendernesses = np.linspace(0.1, 0.3, count)
+        found = rocking_spectrum(rocking.Blocks.grid(alpha=slendernesses, p=[2.0, 3.0]), PULSES).plot()
+        peaks, shares = found.axes
+        assert len(peaks.lines) >= count and len(shares.lines) == count
+        assert len({str(line.get_color()) for line in shares.lines}) == count
+        named = [text.get_text() for text in found.legends[0].get_texts() if "alpha" in text.get_text()]
+        assert len(named) == min(count, 8)
+        assert named[0].startswith("alpha = 0.1 ") and named[-1].startswith("alpha = 0.3 ")
     with pytest.raises(rocking.InvalidOption, match="against"):
         spectrum.plot(against="height")
 

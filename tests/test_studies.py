@@ -566,7 +566,15 @@ def test_a_unit_that_kills_every_worker_is_reported_and_left(tmp_path):
 
 COLUMNS = [
     *("motion", "pga_m_s2", "polarity", "block", "p_rad_s", "alpha_rad", "restitution", "overturned"),
-    *("peak_rotation_rad", "peak_time_s", "impacts", "uplifts", "rests", "time_at_rest_s", "complete_chattering"),
+    *(
+        "peak_rotation_rad",
+        "peak_time_s",
+        "impacts_resolved",
+        "uplifts",
+        "rests",
+        "time_at_rest_s",
+        "complete_chattering",
+    ),
     *("stalled", "unfinished", "stopped"),
 ]
 
@@ -617,7 +625,7 @@ def test_a_study_is_exported_to_parquet_or_says_what_is_missing(complete, tmp_pa
     study.to_parquet(tmp_path / "all.parquet")
     found = pandas.read_parquet(tmp_path / "all.parquet")
     assert [*found.columns] == COLUMNS
-    np.testing.assert_array_equal(found.impacts, reference.impacts.values.ravel())
+    np.testing.assert_array_equal(found.impacts_resolved, reference.impacts.values.ravel())
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(rocking.InvalidOption, match=r"install rocking\[parquet\]"):
         study.to_parquet(tmp_path / "other.parquet")

@@ -272,7 +272,7 @@ def test_an_export_has_a_column_for_each_outcome_that_is_kept(complete, tmp_path
     rocking.study(complete).to_csv(tmp_path / "all.csv")
     table = pandas.read_csv(tmp_path / "all.csv")
     assert [*table.columns][-5:] == ["overturned", "peak_rotation_rad", *ALWAYS_KEPT]
-    assert not {"impacts", "rests"} & {*table.columns}
+    assert not {"impacts_resolved", "rests"} & {*table.columns}
     np.testing.assert_array_equal(table.peak_rotation_rad, reference.peak_rotation.values.ravel())
 
 

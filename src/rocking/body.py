@@ -7,7 +7,7 @@ of any stiffness lambda, with one side or two. Everything above the kernels know
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final, NamedTuple, Protocol, Self, runtime_checkable
+from typing import Any, Final, NamedTuple, Protocol, Self, runtime_checkable
 
 from rocking.arrays import Floats, Integers
 from rocking.constants import Model
@@ -218,5 +218,15 @@ class Bodies(Protocol):
         """
 
 
-#: Makes the bodies of a kind from their `parameters`, by name, and from gravity; studies read their inputs so.
-KINDS: Final[dict[str, Callable[..., Bodies]]] = {}
+class Kind(Protocol):
+    """What makes bodies of a kind: their class."""
+
+    def __call__(self, *nothing: Any, **parameters: Any) -> Bodies:
+        """Make them of their `parameters`, by name, and of gravity; studies read their inputs so."""
+
+    def of(self, bodies: Any, /) -> Bodies:
+        """Gather single ones."""
+
+
+#: Kinds by name. A body finds here what it is one of, which knows it and which it cannot import.
+KINDS: Final[dict[str, Kind]] = {}

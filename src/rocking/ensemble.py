@@ -37,7 +37,7 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "overturned": ("1", "whether the rotation reached pi/2"),
     "peak_rotation": ("rad", "largest rotation in size"),
     "peak_time": ("s", "time of the peak rotation"),
-    "impacts": ("1", "impacts that were resolved"),
+    "impacts": ("1", "resolved impacts: those of a sequence after its proof are not among them"),
     "uplifts": ("1", "uplifts from rest"),
     "rests": ("1", "times the block came to rest"),
     "time_at_rest": ("s", "time spent at rest"),
@@ -317,10 +317,10 @@ def simulate_many(
     -------
     xarray.Dataset
         Dimensions (motion, scale, polarity, block), those that apply. Variables: overturned, peak_rotation (rad),
-        peak_time (s), impacts, uplifts, rests, time_at_rest (s), complete_chattering (whether the block came to rest
-        after its first uplift before the motion passed a threshold again), stalled (rests that were not proven),
-        unfinished, stopped (by `duration`, so that overturned is open). Coordinates name the motions and hold the
-        blocks' parameters.
+        peak_time (s), impacts (resolved ones: those of a sequence after its proof are not among them), uplifts, rests,
+        time_at_rest (s), complete_chattering (whether the block came to rest after its first uplift before the motion
+        passed a threshold again), stalled (rests that were not proven), unfinished, stopped (by `duration`, so that
+        overturned is open). Coordinates name the motions and hold the blocks' parameters.
 
     Raises
     ------

@@ -57,6 +57,11 @@ class PulseFamily:
         """Defaults of the other parameters, by name."""
         return {name: each.default for name, each in self._parameters.items() if name not in self.needed}
 
+    @property
+    def is_of_velocity(self) -> bool:
+        """Whether its amplitude is that of its velocity."""
+        return self.make is _OF_VELOCITY
+
     def unit(self, parameter: str) -> str:
         """Return the unit of a parameter; empty where it has none."""
         return self._kind(parameter).unit
@@ -82,7 +87,7 @@ class PulseFamily:
         return inspect.signature(self.make).parameters
 
     def _kind(self, parameter: str) -> _Kind:
-        return _VELOCITY if parameter == "amplitude" and self.make is _OF_VELOCITY else _KINDS[parameter]
+        return _VELOCITY if parameter == "amplitude" and self.is_of_velocity else _KINDS[parameter]
 
 
 #: All families, by name.

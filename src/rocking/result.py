@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from rocking import checks
+from rocking.arrays import evenly
 from rocking.errors import InvalidOption
 from rocking.tables import data_frame, named, plain, text_table, to_json, write_netcdf, write_text
 
@@ -368,6 +369,6 @@ def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     >>> table_of_some(["n"], [[k] for k in range(100)]).splitlines()[-2:]
     ['99', '(12 of 100 rows)']
     """
-    chosen = sorted({round(k) for k in np.linspace(0, len(rows) - 1, min(len(rows), _SHOWN))})
+    chosen = evenly(len(rows), _SHOWN)
     table = text_table(header, [rows[k] for k in chosen])
     return table if len(chosen) == len(rows) else f"{table}\n({len(chosen)} of {len(rows)} rows)"

@@ -108,9 +108,6 @@ def compare_measures(
     if len(shaken) < 2:
         raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
     times = checks.positive_numbers(periods, "periods", InvalidOption)
-    scaled = incremental_dynamic_analysis(
-        many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress
-    )
     measures = [
         Measure("pga"),
         Measure("pgv"),
@@ -118,6 +115,9 @@ def compare_measures(
         Measure("pga_ratio"),
         Measure("pgv_ratio"),
     ]
+    scaled = incremental_dynamic_analysis(
+        many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress
+    )
     lifting = units_of(many, Measure("pga_ratio"), model)
     level = scaled.overturning_level.transpose("motion", "block").values
     factors = level * lifting / np.array([motion.pga for motion in shaken])[:, None]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
+from rocking.analysis.labels import labels_of
 from rocking.analysis.levels import (
     REVERSED_TOO,
     Boundaries,
@@ -26,7 +27,6 @@ from rocking.block import Block, Blocks
 from rocking.constants import Model
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
-from rocking.motion.description import labelled
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, several_motions
@@ -228,11 +228,11 @@ class IncrementalDynamicAnalysis(DatasetResult):
         what = "record" if "record" in data.coords else "motion"
         rows = [
             [
-                self._with_vertical(str(data[what].values[m]), m),
+                label,
                 *([b] if many else []),
                 looked_at.overturning(self.bands(block=b, motion=m)),
             ]
-            for m in range(data.sizes["motion"])
+            for m, label in enumerate(labels_of(data, what, with_history=False))
             for b in range(data.sizes["block"])
         ]
         blocks = data.blocks if not many else counted(data.sizes["block"], "block")
@@ -240,14 +240,6 @@ class IncrementalDynamicAnalysis(DatasetResult):
         head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
         notes = [f"note: {REVERSED_TOO}"] if data.sides_differ else []
         return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table, *notes])
-
-    def _label(self, motion: int) -> str:
-        """Name a motion, by its position, with its vertical component."""
-        return self._with_vertical(str(self.data.motion.values[motion]), motion)
-
-    def _with_vertical(self, name: str, motion: int) -> str:
-        vertical = str(self.data.vertical.values[motion]) if "vertical" in self.data.coords else ""
-        return labelled(name, (), vertical)
 
     def to_dict(self) -> dict[str, Any]:
         data, units = self.data, self.data.level.units
@@ -312,10 +304,10 @@ class IncrementalDynamicAnalysis(DatasetResult):
         ends = np.array([levels[0], levels[-1]])
         peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
         motions = []
-        for m in range(data.sizes["motion"]):
+        for m, label in enumerate(labels_of(data, with_history=False)):
             bands = data.level.scale * np.array(self.bands(block=block, motion=m)).reshape(-1, 2)
             bands = np.where(np.isnan(bands), ends, bands)
-            motions.append(ScaledMotion(self._label(m), levels, peaks[m], bands))
+            motions.append(ScaledMotion(label, levels, peaks[m], bands))
         what = data.blocks if data.sizes["block"] == 1 else f"block {block}"
         return ida_figure(
             motions=motions,

@@ -20,7 +20,6 @@ from rocking.body import Body
 from rocking.constants import VERSION, Model
 from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
-from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_family
 from rocking.progress import Progress
@@ -356,7 +355,7 @@ def _unit_pulse(pulse: str | Callable[[float, float], Motion], frequency: float,
     if family.name not in PULSES:
         raise InvalidOption(f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse")
     unit = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
-    return unit.scaled_to(1.0) if family.make is pulses.mavroeidis_papageorgiou else unit
+    return unit.scaled_to(1.0) if family.is_of_velocity else unit
 
 
 def _resized(block: Block, ratios: Floats) -> Blocks:

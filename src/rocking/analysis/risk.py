@@ -338,12 +338,17 @@ def risk_of(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Meas
             "or read one with HazardCurve.read(path)",
             value=hazard,
         )
+    check_measure(hazard, measure)
+    return Risk(tuple(_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
+
+
+def check_measure(hazard: HazardCurve, measure: Measure) -> None:
+    """Raise an InvalidOption unless a hazard curve is of the measure that a fragility is against."""
     if measure != hazard.measure:
         raise InvalidOption(
             f"the fragility is against {measure.label}, the hazard curve of {hazard.measure.label}; "
             "fit the one against the other's measure"
         )
-    return Risk(tuple(_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
 
 
 def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:

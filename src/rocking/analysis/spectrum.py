@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
+from rocking.analysis.labels import curves_of, labels_of, motions_in_words
 from rocking.analysis.levels import mean_one, pooled
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
@@ -20,7 +20,6 @@ from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
-from rocking.motion.description import labelled
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, several_motions
 from rocking.result import DatasetResult, table_of_some, variable
@@ -37,9 +36,6 @@ Abscissa = Literal["p", "period", "size"]
 _FACTORS: Final = np.geomspace(0.5, 2.0, 25)
 
 _HALF: Final = np.array([0.5])
-
-#: Most curves that one figure shows.
-_MOST_CURVES: Final = 4
 
 _UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "fractile": "1"}
 
@@ -187,8 +183,8 @@ class RockingSpectrum(DatasetResult):
 
     def summary(self) -> str:
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
-        parts = [f"peak rotation over slenderness, {self._motions()}, {self.data.model} model"]
-        for title, one in self._curves():
+        parts = [f"peak rotation over slenderness, {motions_in_words(self.data)}, {self.data.model} model"]
+        for title, one in curves_of(self.data):
             fractiles = one.fractile_over_alpha.transpose("p", "fractile").values
             rows = [
                 [
@@ -232,6 +228,9 @@ class RockingSpectrum(DatasetResult):
     ) -> Figure:
         """Draw single motions thin, fractiles thick, and the share that overturns.
 
+        Of more than two combinations of slenderness and restitution only the fractiles nearest to the median are
+        drawn, of more than four no single motions.
+
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
@@ -252,7 +251,7 @@ class RockingSpectrum(DatasetResult):
         Raises
         ------
         InvalidOption
-            If there are more than four combinations of slenderness and restitution, or no such abscissa.
+            If there is no such abscissa.
 
         Examples
         --------
@@ -265,9 +264,7 @@ class RockingSpectrum(DatasetResult):
         from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
         checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
-        named_curves = self._curves()
-        if len(named_curves) > _MOST_CURVES:
-            raise InvalidOption(f"a figure shows at most {_MOST_CURVES} curves, not {len(named_curves)}; select some")
+        named_curves = curves_of(self.data)
         alone = len(named_curves) == 1
         curves = [
             SpectrumCurves(
@@ -282,10 +279,12 @@ class RockingSpectrum(DatasetResult):
             x=self.data[against].values,
             curves=curves,
             fractiles=self.data.fractile.values.tolist(),
-            motions=self._labels(),
+            motions=labels_of(self.data),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
             title=title
-            or ", ".join([self._motions(), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]),
+            or ", ".join(
+                [motions_in_words(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
+            ),
             ax=ax,
             figsize=figsize,
         )
@@ -300,36 +299,6 @@ class RockingSpectrum(DatasetResult):
             return np.asarray(one.peak_over_alpha.transpose("motion", "p").values)
         peaks = one.peak_over_alpha.transpose("block", "motion", "p").values
         return np.asarray(weighted_fractiles(peaks, one.weight.values, _HALF)[0])
-
-    def _labels(self) -> list[str]:
-        """Names of the motions, with what was done to them."""
-        names, histories = self.data.motion.values, self.data.histories
-        verticals = self.data.vertical.values if "vertical" in self.data.coords else [""] * len(names)
-        return [
-            labelled(str(name), done.split("; ") if done else [], str(vertical))
-            for name, done, vertical in zip(names, histories, verticals, strict=True)
-        ]
-
-    def _motions(self) -> str:
-        """Name the motion, or count them, and those that were scaled or processed among them."""
-        labels = self._labels()
-        changed = sum(bool(done) for done in self.data.histories)
-        if len(labels) == 1:
-            return labels[0]
-        which = "all" if changed == len(labels) else f"{changed} of them"
-        return f"{len(labels)} motions" + (f", {which} scaled or processed" if changed else "")
-
-    def _curves(self) -> list[tuple[str, xr.Dataset]]:
-        """Name and select each combination of slenderness and restitution."""
-        if self._of_ensemble:
-            return [(self.data.blocks, self.data)]
-        stacked = self.data.stack(curve=[name for name in ("alpha", "restitution") if name in self.data.dims])
-        return [(_curve_name(one), one) for one in (stacked.isel(curve=k) for k in range(stacked.sizes["curve"]))]
-
-
-def _curve_name(one: xr.Dataset) -> str:
-    restitution = f", restitution {float(one.restitution):g}" if "restitution" in one.coords else ""
-    return f"alpha = {float(one.alpha):.5g} rad ({math.degrees(one.alpha):.4g}°){restitution}"
 
 
 def _ensemble_spectrum(

@@ -29,7 +29,7 @@ _SHOWN: Final = {
     "record": "record",
     named("pga", "g"): "PGA, g",
     "peak_over_slenderness": "peak/slenderness",
-    "impacts_resolved": "impacts",
+    "impacts_resolved": "resolved impacts",
     "rests": "rests",
     "verdict": "verdict",
 }

@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Never
+from typing import Any, Final, Never
 
 import numpy as np
 
 from rocking import checks, svg
 from rocking.arrays import Floats, Integers
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
-from rocking.body import ContactLaw, Coordinate
+from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
-
-if TYPE_CHECKING:
-    from rocking.block.many import Blocks
 
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
@@ -455,11 +452,9 @@ class Block:
         sign = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning)
         return contact_forces(motion, ground_over_g, sign, alpha, radius / self.gravity)
 
-    def alone(self) -> Blocks:
+    def alone(self) -> Bodies:
         """Return `Blocks` of which this is the only one."""
-        from rocking.block.many import Blocks
-
-        return Blocks.of([self])
+        return KINDS["blocks"].of([self])
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Ground accelerations, m/s^2, that lift the block to side + (when -a passes the first) and to side -."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from cyclopts import App, CycloptsError
 
@@ -18,27 +20,31 @@ app = App(
     version_flags=[],
     result_action="return_value",
 )
-for _command, (_module, _help) in {
-    "simulate": ("simulate", "Simulate a block under a record, or under many, and say what happens to it."),
-    "records": ("records", "List the shipped records, or show what a record file holds."),
-    "pulses": ("records", "List the pulses that --pulse takes, with their parameters."),
-    "chatter": (
-        "chattering",
-        "Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.",
-    ),
-    "critical": ("chattering", "Give the amplitude up to which chattering under a sine is complete, by every method."),
-    "paper": ("chattering", "Redraw the paper's figures from computation."),
-    "spectrum": ("analysis", "Compute rocking spectra: peak rotation against the size of the block."),
-    "map": ("analysis", "Map what a pulse does to a block, over amplitude and frequency."),
-    "ida": ("analysis", "Scale motions up until the block overturns and beyond (incremental dynamic analysis)."),
-    "fragility": ("fits", "Fit the probability that a block overturns against the intensity of the motions."),
-    "measures": ("analysis", "Compare intensity measures: which predicts best when motions overturn a block."),
-    "check": ("simulate", "Say what rules of thumb make of a block, beside the exact answer."),
-    "calibrate": ("fits", "Find the block behind observed outcomes, or behind a measured rotation history."),
-    "explore": ("explore", "Open a page on which a block is seen to rock, chatter, rest and fall."),
-    "study": ("study", "Run a study too long for one sitting: created once, resumed after anything."),
+
+
+def _lines_of(module: str) -> dict[str, str]:
+    """Return the first line of what each function says of itself; nothing is imported for a list of commands."""
+    parsed = ast.parse(Path(__file__).with_name(f"{module}.py").read_text("utf-8"))
+    functions = [each for each in parsed.body if isinstance(each, ast.FunctionDef)]
+    return {each.name: (ast.get_docstring(each) or "").partition("\n")[0] for each in functions}
+
+
+for _module, _commands in {
+    "simulate": ("simulate", "check"),
+    "records": ("records", "pulses"),
+    "chattering": ("chatter", "critical", "paper"),
+    "analysis": ("spectrum", "map", "ida", "measures"),
+    "fits": ("fragility", "calibrate"),
+    "explore": ("explore",),
 }.items():
-    app.command(f"rocking.cli.{_module}:{_command}", name=_command, help=_help)
+    _lines = _lines_of(_module)
+    for _command in _commands:
+        app.command(f"rocking.cli.{_module}:{_command}", name=_command, help=_lines[_command])
+app.command(
+    "rocking.cli.study:study",
+    name="study",
+    help="Run a study too long for one sitting: created once, resumed after anything.",
+)
 app.command("rocking.cli.version:version", name=["--version", "-V"], help="Display the version.")
 app.register_install_completion_command(help="Install completion of commands and options for this shell.")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -232,5 +233,5 @@ def _deliver(
         for table in found.TABLES:
             found.to_csv(folder / f"{table}.csv", table)
         found.to_netcdf(folder / f"{stem}.nc")
-        write_results(folder, figures={stem: found.plot(**figure)}, result=result)
+        write_results(folder, figures={stem: functools.partial(found.plot, **figure)}, result=result)
     print_result(result, found.summary(), as_json=as_json, folder=folder)

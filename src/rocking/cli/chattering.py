@@ -57,7 +57,7 @@ def chatter(
             report.to_csv(folder / "impacts.csv")
             if report.cycles is not None:
                 report.to_csv(folder / "cycles.csv", "cycles")
-            write_results(folder, figures={"chatter": report.plot()}, result=report.to_dict())
+            write_results(folder, figures={"chatter": report.plot}, result=report.to_dict())
         print_result(result, text, as_json=output.as_json, folder=folder)
 
 

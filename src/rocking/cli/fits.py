@@ -13,22 +13,25 @@ from cyclopts import Parameter
 
 from rocking import checks
 from rocking.analysis.calibration.history import HistoryCalibration, calibrate_history
-from rocking.analysis.calibration.outcomes import Calibration, checked_outcomes
+from rocking.analysis.calibration.outcomes import Calibration, checked_outcomes, group_labels
 from rocking.analysis.calibration.outcomes import calibrate as calibrated
 from rocking.analysis.calibration.space import HOUSNER
+from rocking.analysis.fragility import nrml
 from rocking.analysis.fragility.curve import Band
 from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.fragility.fit import fragility as run
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.tables import History, Outcomes, read_calibration, read_observed
+from rocking.analysis.input_tables import History, Outcomes, read_calibration, read_observed
+from rocking.analysis.risk import check_measure
 from rocking.cli.options import BLOCK, MEASURE, MODEL, EnsembleOptions, MeasureOptions, TreatmentOptions
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, ScaledPulseOptions
 from rocking.constants import Model
 from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption, RockingError, literal
 from rocking.motion.motion import Motion
+from rocking.motion.scaling import Measure
 from rocking.quantities import bounds, number, tilt
 from rocking.tables import counted, text_table
 
@@ -97,6 +100,10 @@ def fragility(
     bodies = {} if outcomes is not None else block.blocks(model)
     curve = None if hazard is None else HazardCurve.read(hazard, site=site, period=measure.period)
     checks.positive(years, "years", InvalidOption)
+    states = _limits(limits)
+    if output.out is not None:
+        nrml.check_names([taxonomy], "taxonomy")
+        nrml.check_names(states, "a limit state")
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
     band = Band("bootstrap" if bootstrap != 0 else "likelihood", confidence, samples=bootstrap or 1, seed=seed)
@@ -104,14 +111,16 @@ def fragility(
         read = None
         if outcomes is not None:
             observed = read_observed(outcomes, measure.wanted, channel=motion.channel, dt=motion.dt, units=motion.units)
+            _check_hazard(curve, observed["measure"])
             fitted = fit_fragility(**observed, band=band)
         else:
+            _check_hazard(curve, measure.wanted)
             read = motion.read_all(names)
             fitted = run(
                 motions=list(read.motions.values()),
                 **measure.chosen(),
                 **model.chosen() | bodies,
-                limits=_limits(limits),
+                limits=states,
                 polarity=polarity,
                 band=band,
             )
@@ -127,13 +136,20 @@ def fragility(
             text.append(survived.summary())
         if folder is not None:
             for form in ("continuous", "discrete"):
-                fitted.to_nrml(folder / f"fragility-{form}.xml", taxonomy=taxonomy, format=form)
+                with left_out(name := f"fragility-{form}.xml"):
+                    fitted.to_nrml(folder / name, taxonomy=taxonomy, format=form)
             fitted.to_csv(folder / "fragility.csv")
             if fitted.outcomes is not None:
                 together = fitted if read is None else _with_records(fitted, read)
                 together.to_csv(folder / "outcomes.csv", "outcomes")
-            write_results(folder, figures={name: draw() for name, draw in figures.items()}, result=found)
+            write_results(folder, figures=figures, result=found)
         print_result(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
+
+
+def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
+    """Refuse a hazard curve of another measure, before the work."""
+    if curve is not None:
+        check_measure(curve, measure)
 
 
 def _with_records(found: Fragility, read: ReadRecords) -> Fragility:
@@ -287,7 +303,7 @@ class _Results:
         """Write numbers, and figure and ensemble of a calibration."""
         if isinstance(self.found, Calibration):
             self.found.to_csv(folder / "ensemble.csv")
-        write_results(folder, figures={"calibration": self.found.plot()} if self.found else {}, result=self.numbers)
+        write_results(folder, figures={"calibration": self.found.plot} if self.found else {}, result=self.numbers)
 
 
 def _refuse(belong_to: str, **given: object) -> None:
@@ -308,7 +324,7 @@ def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None
     """Calibrate each specimen by itself, and write each as soon as it is done."""
     for name, table in tables.items():
         with _naming(name):
-            checked_outcomes(table.overturned, len(table.overturned))
+            _check(table, how)
     results = {}
     for name, table in tables.items():
         with _naming(name):
@@ -318,6 +334,13 @@ def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None
             results[name].write(folder / name)
     numbers = {"specimens": {name: one.numbers for name, one in results.items()}}
     return _Results(None, numbers, "\n\n".join(f"specimen {name}\n{one.text}" for name, one in results.items()))
+
+
+def _check(table: Outcomes, how: _How) -> None:
+    """Refuse outcomes that cannot be calibrated, and more folds than groups, before the work."""
+    checked_outcomes(table.overturned, len(table.overturned))
+    if how.folds:
+        group_labels(table.groups, len(table.overturned), how.folds)
 
 
 @contextlib.contextmanager
@@ -331,6 +354,7 @@ def _naming(specimen: str) -> Iterator[None]:
 
 
 def _of_outcomes(table: Outcomes, how: _How) -> _Results:
+    _check(table, how)
     found = calibrated(table.motions, table.overturned, seed=how.seed, **how.choices)
     predicted = dict(zip(how.others, found.predict([*how.others.values()]), strict=True))
     numbers = {**found.to_dict(), "predicted": predicted}

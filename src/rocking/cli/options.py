@@ -174,7 +174,7 @@ class EnsembleOptions(BlockOptions):
 
 def ensemble_of(file: Path, model: ModelOptions) -> dict[str, Any]:
     """Return blocks, weights and equation of motion of an ensemble as arguments."""
-    from rocking.analysis.tables import read_ensemble
+    from rocking.analysis.input_tables import read_ensemble
 
     found = read_ensemble(file)
     return {"blocks": found.blocks, "weights": found.weights, "model": model.equation or found.model}

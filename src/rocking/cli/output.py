@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Group, Parameter
 
-from rocking.errors import OutputError
+from rocking.errors import InvalidOption, Message, OutputError, literal
 from rocking.progress import note
 from rocking.tables import to_json, write_figure, write_text
 
@@ -50,19 +50,29 @@ class OutputOptions(PrintOptions):
         return nullcontext() if self.out is None else output_folder(self.out)
 
 
-def write_results(folder: Path, *, figures: Mapping[str, Figure], result: Mapping[str, Any] | None = None) -> None:
-    """Write figures by name (PNG and PDF) and, if there is one, a result (JSON) into a folder.
+def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], result: Mapping[str, Any]) -> None:
+    """Write figures (PNG and PDF), given by name as what draws them, and a result (JSON) into a folder.
 
     Raises
     ------
     OutputError
         If one of them cannot be written.
     """
-    for stem, figure in figures.items():
-        write_figure(folder / f"{stem}.png", figure, dpi=_DOTS_PER_INCH)
-        write_figure(folder / f"{stem}.pdf", figure)
-    if result is not None:
-        write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
+    for stem, draw in figures.items():
+        with left_out(f"{stem}.png and {stem}.pdf"):
+            figure = draw()
+            write_figure(folder / f"{stem}.png", figure, dpi=_DOTS_PER_INCH)
+            write_figure(folder / f"{stem}.pdf", figure)
+    write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
+
+
+@contextmanager
+def left_out(files: str) -> Iterator[None]:
+    """Go on without files whose content is refused, with a note why: what was computed is not lost for them."""
+    try:
+        yield
+    except InvalidOption as error:
+        note(Message(f"{literal(files)} left out: {error.message.template}", error.message.arguments))
 
 
 def print_result(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | None) -> None:

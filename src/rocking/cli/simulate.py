@@ -98,7 +98,7 @@ def _result(response: Response, record: str, friction: float | None, folder: Pat
         response.to_csv(folder / "events.csv", "events")
         response.to_csv(folder / "impacts.csv", "impacts")
         response.to_netcdf(folder / "response.nc")
-        write_results(folder, figures={"response": response.plot()}, result=result)
+        write_results(folder, figures={"response": response.plot}, result=result)
     return result
 
 

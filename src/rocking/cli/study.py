@@ -23,7 +23,7 @@ from rocking.studies.run import local_executor, scheduler_executor
 from rocking.studies.study import Study, study_of
 from rocking.tables import counted, to_json, write_text
 
-study = App(name="study", help="Run a study too long for one sitting: created once, resumed after anything.")
+study = App(name="study")
 
 
 @study.command
@@ -184,7 +184,7 @@ def report(
         for name, one in made.items():
             one.to_csv(target / f"{name}.csv")
         result = {name: one.to_dict() for name, one in made.items()}
-        write_results(target, figures={name: one.plot() for name, one in made.items()}, result=result)
+        write_results(target, figures={name: one.plot for name, one in made.items()}, result=result)
         text = "\n\n".join(one.summary() for one in made.values())
         print_result(result, text, as_json=as_json, folder=target)
 

@@ -44,7 +44,7 @@ _LIVELIEST: Final = 0.998
 _LONGEST_TEXT: Final = 300
 
 #: Longest pulse, cycles: a page shows no more, and memory is bounded.
-MOST_CYCLES: Final = 1000.0
+MOST_SHOWN: Final = 1000.0
 
 #: Functions that make a block by their names in `rocking`, the one for each shape, and what they call its parameters.
 _MAKERS: Final[Mapping[str, Callable[..., Block]]] = {
@@ -300,8 +300,8 @@ def arguments_of(text: str) -> dict[str, Any]:
     """Read the parameters of a pulse, in SI units; one that is longer than the page shows is refused."""
     _, arguments = pulse_values(text)
     for name in ("cycles", "gamma"):
-        if arguments.get(name, 0.0) > MOST_CYCLES:
-            raise InvalidMotion(f"{{}} of a pulse may be {MOST_CYCLES:g} here at most, not {arguments[name]:g}", name)
+        if arguments.get(name, 0.0) > MOST_SHOWN:
+            raise InvalidMotion(f"{{}} of a pulse may be {MOST_SHOWN:g} here at most, not {arguments[name]:g}", name)
     return arguments
 
 

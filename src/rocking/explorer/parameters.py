@@ -285,19 +285,29 @@ def names_of(*groups: Group) -> tuple[str, ...]:
     return tuple(name for name, parameter in PARAMETERS.items() if parameter.group in groups)
 
 
-def field_label(name: str) -> str:
+def field_label(name: str, motion: str = "") -> str:
     """Return what a message on the page calls an argument: the label of its field, where it has one.
+
+    A parameter of a pulse is called as the pulse that `motion` names has it, or as all that have it do.
 
     Examples
     --------
     >>> field_label("width"), field_label("radius")
     ('“Width”', 'radius')
+    >>> field_label("amplitude", "sine:amplitude=0.2g"), field_label("amplitude", "mavroeidis-papageorgiou")
+    ('“Amplitude”', '“Velocity amplitude”')
     """
-    found = PARAMETERS.get(name) or MAP.get(name) or _LABELLED.get(name)
-    return name if found is None else f"“{found.label}”"
-
-
-_LABELLED: Final = _by_name(_PERIOD, *(each for pulse in PULSES.values() for each in pulse["parameters"]))
+    shown = PULSES.get(motion.partition(":")[0])
+    known = PARAMETERS | MAP | _by_name(_PERIOD)
+    labels = {
+        each.label
+        for pulse in (PULSES.values() if shown is None else [shown])
+        for each in pulse["parameters"]
+        if each.name == name
+    }
+    if name in known:
+        labels = {known[name].label}
+    return f"“{labels.pop()}”" if len(labels) == 1 else name
 
 
 @functools.cache

@@ -240,16 +240,18 @@ class App:
             return grid, {**maps.described(grid), **map_as_code(grid)}
 
         grid, about = await self._in_thread(described)
-        return StreamingResponse(self._parts(grid, about), media_type="application/octet-stream", headers=_FRESH)
+        return StreamingResponse(
+            self._parts(grid, about, _motion_of(request)), media_type="application/octet-stream", headers=_FRESH
+        )
 
-    async def _parts(self, grid: maps.MapGrid, about: dict[str, Any]) -> AsyncIterator[bytes]:
+    async def _parts(self, grid: maps.MapGrid, about: dict[str, Any], motion: str) -> AsyncIterator[bytes]:
         """Parts of a map as bytes; the work ends with the reader."""
         yield _framed(json.dumps({**about, "problem": None}).encode())
         async with self._maps:
             with low_priority() as executor:
                 found = maps.parts(grid)
                 try:
-                    while (part := await asyncio.wrap_future(executor.submit(_next, found))) is not None:
+                    while (part := await asyncio.wrap_future(executor.submit(_next, found, motion))) is not None:
                         yield part
                 finally:
                     with anyio.CancelScope(shield=True):
@@ -305,12 +307,12 @@ def pack(payload: Payload) -> bytes:
     return b"".join([struct.pack("<I", len(header)), header, *arrays])
 
 
-def _next(found: Iterator[maps.Part]) -> bytes | None:
+def _next(found: Iterator[maps.Part], motion: str) -> bytes | None:
     """Return the next part of a map as bytes, or what went wrong; None when it is complete."""
     try:
         part = next(found, None)
     except RockingError as error:
-        return _framed(json.dumps(_problem(error)).encode())
+        return _framed(json.dumps(_problem(error, motion)).encode())
     if part is None:
         return None
     head = struct.pack("<II", part.stride, len(part.points))
@@ -330,9 +332,9 @@ def _static(files: Mapping[str, bytes], name: str, headers: Mapping[str, str]) -
     return Response(files[name], media_type=TYPES[suffix], headers=dict(headers))
 
 
-def _problem(error: RockingError) -> dict[str, str | None]:
-    """Return the sentence of an error, with the labels of fields, and the argument that is wrong."""
-    return {"problem": error.text(field_label), "argument": error.argument}
+def _problem(error: RockingError, motion: str) -> dict[str, str | None]:
+    """Return the sentence of an error, with the labels of fields under a motion, and the argument that is wrong."""
+    return {"problem": error.text(lambda name: field_label(name, motion)), "argument": error.argument}
 
 
 def _too_large() -> Response:
@@ -340,9 +342,13 @@ def _too_large() -> Response:
     return JSONResponse({"problem": problem, "argument": None}, 413, headers={**_FRESH, "connection": "close"})
 
 
-async def _refusal(_: Request, error: Exception) -> Response:
+async def _refusal(request: Request, error: Exception) -> Response:
     assert isinstance(error, RockingError)
-    return JSONResponse(_problem(error), 422, headers=_FRESH)
+    return JSONResponse(_problem(error, _motion_of(request)), 422, headers=_FRESH)
+
+
+def _motion_of(request: Request) -> str:
+    return request.query_params.get("motion", "")
 
 
 async def _failure(_: Request, error: Exception) -> Response:

@@ -38,7 +38,7 @@ OPEN: Final = -1.0
 QUANTITIES: Final = {
     "overturned": "Overturns",
     "peak_rotation": "Peak rotation, rad",
-    "impacts": "Impacts",
+    "impacts": "Resolved impacts",
     "rests": "Rests",
     "time_at_rest": "Time at rest, s",
 }

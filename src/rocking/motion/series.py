@@ -1,7 +1,7 @@
 """Formulas of pulses as piecewise polynomials: each piece is the Taylor series about its middle, moved to its start.
 
-The pieces are so short that the first term left out is below 1e-16 of the peak. Large angles are taken without their
-rounding: products and quotients with their errors, whole turns taken off exactly.
+The pieces are so short that the first term left out is below 1e-16 of the amplitude. Large angles are taken without
+their rounding: products and quotients with their errors, whole turns taken off exactly.
 """
 
 from __future__ import annotations
@@ -72,7 +72,8 @@ def _halves(a: Floats) -> tuple[Floats, Floats]:
     return high, a - high
 
 
-#: Relative to the peak; covers the terms left out and the rounding of the coefficients.
+#: Relative to the amplitude of the acceleration, which a pulse that is cut need not reach; covers the terms left out
+#: and the rounding of the coefficients, which are multiples of it.
 ERROR: Final = 1e-15
 
 #: Of a sine: half a piece is pi/8 = 0.39 rad, and 0.39**14 / 14! = 2.4e-17.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from rocking.arrays import Flags, Floats
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for, labelled
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for, handles_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +54,7 @@ def outcomes_figure(
             _draw_parameter(panel, parameter, weights)
         if panels:
             add_labels(panels[0], parameters[0].label, "share of blocks")
-        add_legend(figure, ax, labelled(tests, *panels))
+        add_legend(figure, ax, handles_of(tests, *panels))
     return figure
 
 
@@ -85,7 +85,7 @@ def measured_figure(
             add_labels(panel, "time (s)", "residual (rad)")
         for panel in panels:
             panel.axhline(0.0, color=INK, linewidth=0.4)
-        add_legend(figure, ax, labelled(main))
+        add_legend(figure, ax, handles_of(main))
     return figure
 
 

@@ -38,6 +38,9 @@ CURVES: Final[tuple[dict[str, Any], ...]] = (
     {"color": "#b8860b", "linestyle": (0, (6, 1.5, 1, 1.5))},
 )
 
+#: Where a scale of colours is still seen on white.
+_LIGHTEST: Final = 0.85
+
 STYLE: Final[dict[Any, Any]] = {
     "font.size": 8.5,
     "axes.titlesize": 8.5,
@@ -148,6 +151,17 @@ def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
         axis.set_label_text(_in_lines(label, max(_FEWEST_LETTERS, int(length / letter))))
 
 
+def styles_of(count: int) -> list[dict[str, Any]]:
+    """Return a colour and dashes for each of so many curves; those of more than four go from dark to light in order."""
+    if count <= len(CURVES):
+        return [*CURVES[:count]]
+    from matplotlib import colormaps
+
+    colours = colormaps["cividis"](np.linspace(0.0, _LIGHTEST, count))
+    dashes = [style["linestyle"] for style in CURVES]
+    return [{"color": colour, "linestyle": dashes[k % len(dashes)]} for k, colour in enumerate(colours)]
+
+
 def write(axes: Axes, text: str, at: tuple[Any, Any], off: tuple[float, float], **look: Any) -> None:
     """Write a text so many points off a place."""
     axes.annotate(text, at, xytext=off, textcoords="offset points", **look)
@@ -186,7 +200,7 @@ def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> No
     _break_lines(figure.legend(**below), figure)
 
 
-def labelled(*panels: Axes) -> list[Artist]:
+def handles_of(*panels: Axes) -> list[Artist]:
     """Collect the handles of all that has a label in these panels, each label once."""
     named: dict[str, Artist] = {}
     for panel in panels:

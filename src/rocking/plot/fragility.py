@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import CURVES, GROUND, INK, add_labels, add_legend, figure_for, labelled
+from rocking.plot.canvas import CURVES, GROUND, INK, add_labels, add_legend, figure_for, handles_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +64,7 @@ def fragility_figure(
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid()
         add_labels(axes, intensity_label, probability_label)
-        add_legend(figure, ax, labelled(axes))
+        add_legend(figure, ax, handles_of(axes))
     return figure
 
 

@@ -19,7 +19,7 @@ from rocking.plot.canvas import (
     add_legend,
     add_ticks,
     figure_for,
-    labelled,
+    handles_of,
     magnified,
     write,
 )
@@ -132,7 +132,7 @@ def history_figure(
         close.set_xlabel("time over period, $t/T$")
         for letter, axes in zip("abc", (response, excitation, close), strict=True):
             axes.set_title(f"({letter})", loc="left", pad=3.0)
-        add_legend(figure, None, labelled(response, excitation))
+        add_legend(figure, None, handles_of(response, excitation))
     return figure
 
 
@@ -306,7 +306,7 @@ def intervals_figure(
             if intervals.size:
                 panel.set_xlim(1.0 - margin, intervals.size + margin)
                 panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
-        add_legend(figure, ax, labelled(*panels))
+        add_legend(figure, ax, handles_of(*panels))
     return figure
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.plot.boundaries import Stack, runs
-from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, figure_for, labelled
+from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, figure_for, handles_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,6 +37,9 @@ _OVERTURNS: Final = (
 
 #: Share of the frame below which nobody sees a region.
 _LEAST_SEEN: Final = 1e-3
+
+#: The ends of a frame around one value, over it.
+_AROUND: Final = np.array([0.9, 1.1])
 
 #: Shares of the frame's height: a region lower than the first, about half a point, is no more than a speck, and one
 #: lower than the second would vanish between the lines on both sides of it.
@@ -97,6 +100,11 @@ def regions_figure(
     from matplotlib.collections import LineCollection, PolyCollection
 
     low, high = y_range
+    # One column, or one level, fills the frame.
+    if x.size == 1:
+        x, edges, regions = x * _AROUND, [*edges] * 2, [*regions] * 2
+    if low == high:
+        low, high = low * _AROUND
     stacks = [Stack(np.array([low, *edge, high]), tuple(at)) for edge, at in zip(edges, regions, strict=True)]
     polygons, specks = dict[int, list[Floats]](), dict[int, list[Floats]]()
     tallest: dict[int, float] = {}
@@ -122,7 +130,7 @@ def regions_figure(
                 shape = PolyCollection(corners, facecolors="none", edgecolors=INK, linewidths=0.0, hatch=hatch)
                 axes.add_collection(shape)
         axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.5, capstyle="round", snap=False))
-        axes.set(xlim=(x[0], x[-1]), ylim=y_range)
+        axes.set(xlim=(x[0], x[-1]), ylim=(low, high))
         add_labels(axes, x_label, y_label)
         strips = {region: f"{name} (a strip)" for region, name in names.items() if tallest.get(region, 1.0) < _STRIP}
         add_legend(figure, ax, _patches(polygons, {**names, **strips}, (x[-1] - x[0]) * (high - low)))
@@ -207,5 +215,5 @@ def blocks_figure(
         for spare in axes[len(panels) :]:
             spare.remove()
         figure.colorbar(marks, ax=axes[: len(panels)], label=value_label, shrink=0.9)
-        add_legend(figure, ax, labelled(*axes[: len(panels)]))
+        add_legend(figure, ax, handles_of(*axes[: len(panels)]))
     return figure

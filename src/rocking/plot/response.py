@@ -17,7 +17,7 @@ from rocking.plot.canvas import (
     add_legend,
     add_ticks,
     figure_for,
-    labelled,
+    handles_of,
     write,
 )
 
@@ -123,7 +123,7 @@ def response_figure(
         if zoom and sequence is not None:
             _mark_sequence(main, zoom)
             _draw_sequence(sequence, zoom)
-        add_legend(figure, ax, labelled(main, *grounds))
+        add_legend(figure, ax, handles_of(main, *grounds))
     return figure
 
 
@@ -199,7 +199,7 @@ def _tell_sides(
 
 def _mark_impacts(axes: Axes, impact_times: Floats, uplift_times: Floats) -> None:
     if impact_times.size:
-        add_ticks(axes, impact_times, 0.055, label=f"impacts ({impact_times.size})")
+        add_ticks(axes, impact_times, 0.055, label=f"resolved impacts ({impact_times.size})")
     if uplift_times.size:
         add_ticks(axes, uplift_times, 0.13, "^", color=ABOVE, markersize=4.5, markeredgewidth=0.0, label="uplift")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, add_labels, add_legend, figure_for, labelled, scale_by_ratio
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, add_labels, add_legend, figure_for, handles_of, scale_by_ratio
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,7 +68,7 @@ def risk_figure(
         shares.set_ylim(bottom=0.0)
         shares.grid()
         add_labels(shares, intensity_label, "share of the rate (per unit of ln)")
-        add_legend(figure, ax, labelled(*panels))
+        add_legend(figure, ax, handles_of(*panels))
     return figure
 
 
@@ -102,7 +102,7 @@ def survival_figure(
         axes.set(xlim=(float(intensity[0]), float(intensity[-1])), ylim=(0.5 * lowest, min(_MARGIN * highest, 10.0)))
         axes.grid()
         add_labels(axes, intensity_label, "exceeded, times a year")
-        add_legend(figure, ax, labelled(axes))
+        add_legend(figure, ax, handles_of(axes))
     return figure
 
 

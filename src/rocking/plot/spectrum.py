@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Flags, Floats
-from rocking.plot.canvas import CURVES, GROUND, INK, add_labels, add_legend, figure_for, scale_by_ratio
+from rocking.arrays import Flags, Floats, evenly
+from rocking.plot.canvas import GROUND, INK, add_labels, add_legend, figure_for, scale_by_ratio, styles_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,8 +18,12 @@ if TYPE_CHECKING:
 #: Up to so many motions are named; of so few there is nothing to take fractiles of, either.
 _FEW: Final = 2
 
-#: So many curves leave room for all of their fractiles.
+#: So many curves leave room for all of their fractiles, and so many for every motion.
 _WITH_ALL_FRACTILES: Final = 2
+_WITH_ALL_MOTIONS: Final = 4
+
+#: Most curves that the legend names.
+_NAMED: Final = 8
 
 #: Widths of the lines of up to two motions, of the fractile nearest to the median, and of the others.
 _WIDTHS: Final = (1.6, 0.7)
@@ -58,8 +62,9 @@ def spectrum_figure(
 ) -> Figure:
     """Draw peak rotations over the abscissa, and below them the share of motions that overturn the block.
 
-    There are at most four curves; one alone needs no label. Two motions are named, more are counted. Of two motions or
-    fewer no fractile is drawn, and of three curves or four only the middle one. A line of a named motion, and a
+    One curve alone needs no label, and of more than eight some are named. Two motions are named, more are counted, and
+    drawn with up to four curves. Of two motions or fewer no fractile is drawn, and of three curves or more only the
+    middle one. A line of a named motion, and a
     fractile, ends in a cross where the block of the next point overturns; of a fractile that means that so many motions
     overturn it that there is none. In `ax`, the peak rotations are drawn without the shares.
     """
@@ -69,11 +74,12 @@ def spectrum_figure(
     with figure_for(ax, (5.6, 4.8), figsize, title) as figure:
         panels = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0)).tolist() if ax is None else [ax]
         peaks, *shares = panels
-        for style, curve in zip(CURVES, curves, strict=False):
+        for style, curve in zip(styles_of(len(curves)), curves, strict=True):
             if few:
                 _draw_named(peaks, x, curve, style)
             else:
-                _draw_family(peaks, x, curve, chosen, style)
+                singles = curve.singles if len(curves) <= _WITH_ALL_MOTIONS else ()
+                _draw_family(peaks, x, curve, singles, chosen, style)
             for panel in shares:
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
         for panel in panels:
@@ -94,10 +100,15 @@ def _draw_named(axes: Axes, x: Floats, curve: SpectrumCurves, style: dict[str, A
 
 
 def _draw_family(
-    axes: Axes, x: Floats, curve: SpectrumCurves, fractiles: Mapping[float, int], style: dict[str, Any]
+    axes: Axes,
+    x: Floats,
+    curve: SpectrumCurves,
+    singles: Iterable[Floats],
+    fractiles: Mapping[float, int],
+    style: dict[str, Any],
 ) -> None:
-    """Draw all motions thin, and the fractiles whose rows are given thicker."""
-    for single in curve.singles:
+    """Draw the motions given thin, and the fractiles whose rows are given thicker."""
+    for single in singles:
         axes.plot(x, _cut(single), color=style["color"], linewidth=0.5, alpha=0.35)
     for share, row in fractiles.items():
         width = _MIDDLE if share == _middle(fractiles) else _OTHER
@@ -131,17 +142,17 @@ def _cut(values: Floats) -> Floats:
 def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles: Iterable[float]) -> list[Line2D]:
     from matplotlib.lines import Line2D
 
-    each = [
-        Line2D([], [], linewidth=1.4, label=curve.label, **style)
-        for curve, style in zip(curves, CURVES, strict=False)
-        if curve.label
-    ]
+    styles, shown = styles_of(len(curves)), evenly(len(curves), _NAMED)
+    each = [Line2D([], [], linewidth=1.4, label=curves[k].label, **styles[k]) for k in shown if curves[k].label]
+    if len(shown) < len(curves):
+        each.append(Line2D([], [], linestyle="none", label=f"({len(shown)} of {len(curves)} curves are named)"))
     if len(motions) == 1:
         return each
     if len(motions) <= _FEW:
         named = zip(motions, _WIDTHS, strict=False)
         return each + [Line2D([], [], color=INK, linewidth=width, label=name) for name, width in named]
-    each.append(Line2D([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions"))
+    if len(curves) <= _WITH_ALL_MOTIONS:
+        each.append(Line2D([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions"))
     middle = _middle(fractiles)
     others = ", ".join(f"{100 * share:g}" for share in sorted(fractiles) if share != middle)
     each.append(Line2D([], [], color=INK, linewidth=_MIDDLE, label=_named(f"{100 * middle:g}")))

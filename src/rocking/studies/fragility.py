@@ -20,7 +20,7 @@ from rocking.ensemble import Product, body_coordinates
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.progress import Progress
-from rocking.result import table_of_some
+from rocking.result import table_of_some, variable
 from rocking.studies.spectrum import BlocksResult, peak_ratios, require_limits
 from rocking.studies.store import Store
 from rocking.tables import counted
@@ -126,8 +126,11 @@ def block_fragilities(
     dims = "limit_state", "block"
     return BlockFragilities(
         xr.Dataset(
-            {name: (dims, values, {"long_name": _KEPT[name]}) for name, values in kept.items()}
-            | {"fault": (dims, faults.astype(str), {"long_name": "why there is no curve"})},
+            {
+                name: variable(dims, values, _KEPT[name], measure.units if name.startswith("median") else "1")
+                for name, values in kept.items()
+            }
+            | {"fault": variable(dims, faults.astype(str), "why there is no curve")},
             {"limit_state": list(limits), **body_coordinates(store.product.blocks)},
             {
                 "outcomes": motions * scales * polarities,

@@ -124,7 +124,7 @@ class WrittenToFiles(ABC):
 
     def _write(self, path: str | Path, critical: StudyVerdict | None, progress: bool | None, writer: _Writer) -> None:
         dataset, along, step = self._results(critical)
-        table, count = _with_named_scales(dataset), max(1, dataset.sizes[along])
+        table, count = _for_tables(dataset), max(1, dataset.sizes[along])
         with Progress("writing", count, show=progress) as bar:
 
             def frames() -> Iterator[pd.DataFrame]:
@@ -139,10 +139,11 @@ class WrittenToFiles(ABC):
 _Writer = Callable[[Iterator["pd.DataFrame"], "xr.Dataset", Path], None]
 
 
-def _with_named_scales(dataset: xr.Dataset) -> xr.Dataset:
-    """Name the scales for what they are: factors, or values of a measure."""
+def _for_tables(dataset: xr.Dataset) -> xr.Dataset:
+    """Name the scales for what they are, factors or values of a measure, and impacts as other tables do."""
     if "scale" in dataset.dims:
-        return dataset.rename(scale=dataset.scale.attrs["measure"])
+        names = {"scale": dataset.scale.attrs["measure"], "impacts": "impacts_resolved"}
+        return dataset.rename({name: other for name, other in names.items() if name in dataset})
     return dataset.rename({name: f"{dataset.measure}_{name}" for name in ("low", "high") if name in dataset})
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from rocking import checks
 from rocking.analysis.fragility.curve import checked_limit
 from rocking.analysis.spectrum import fractiles_of
-from rocking.arrays import Floats
+from rocking.arrays import Floats, evenly
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import require_finished
 from rocking.ensemble import body_coordinates
@@ -260,8 +260,7 @@ class StudySpectrum(BlocksResult):
         return f"{counted(motions, 'motion')}, {self.data.model} model{left_out}"
 
     def _some_scales(self) -> list[int]:
-        count = self.data.sizes["scale"]
-        return sorted({round(k) for k in np.linspace(0, count - 1, min(count, _SCALES))})
+        return evenly(self.data.sizes["scale"], _SCALES)
 
     def _scale_name(self, i: int) -> str:
         value, about = float(self.data.scale.values[i]), self.data.scale.attrs

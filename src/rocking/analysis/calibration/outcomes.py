@@ -236,7 +236,7 @@ class Calibration(DrawnResult, TableResult):
         >>> found.cross_validate(folds=2).probabilities.shape
         (1, 4)
         """
-        labels = _labels(groups, len(self.observed), folds)
+        labels = group_labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
         count = None if threads is None else checks.whole(threads, "threads", InvalidOption, 1)
         evidence = replace(self._evidence, threads=count)
@@ -569,7 +569,7 @@ def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
     return observed
 
 
-def _labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
+def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
     """Give each group a number from 0; without groups each motion is its own."""
     names = [str(label) for label in (range(count) if groups is None else groups)]
     if len(names) != count:

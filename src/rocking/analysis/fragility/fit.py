@@ -129,6 +129,8 @@ def fragility(
         intensity = (values[:, None] / units_of(many, how, model)[None, :])[None, :, :, None]
     else:
         stripes = checks.increasing_numbers(levels, "levels", InvalidOption)
+        if stripes.size < 2:
+            raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
         table = simulate_levels(many, shaken, how, stripes, model=model, **options)
         intensity = stripes[:, None, None, None]
     if "polarity" not in table.dims:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final, Literal, NamedTuple, get_args
 
@@ -129,6 +129,12 @@ def _moments(median: float, dispersion: float) -> tuple[float, float]:
 
 def _listed(values: Floats) -> str:
     return " ".join(f"{value:.8g}" for value in values)
+
+
+def check_names(names: Iterable[str], what: str) -> None:
+    """Raise an InvalidOption unless NRML allows all these names of something."""
+    for name in names:
+        _name(name, what)
 
 
 def _name(text: str, what: str) -> str:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
+from rocking.analysis.levels import values_of
 from rocking.analysis.rules.criteria import TITLES, rate
 from rocking.analysis.survey import BlockUnderRecords, motion_of
 from rocking.block import Block
@@ -15,6 +16,7 @@ from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, motions_by_name
+from rocking.motion.scaling import Measure
 from rocking.progress import Progress
 from rocking.response import Response, in_brief
 from rocking.simulation import simulate
@@ -178,11 +180,15 @@ def check(
     """
     named_motions = motions_by_name(motions)
     names = None if rules is None else checks.several(rules, "rules", InvalidOption)
-    responses, ratios, margins = [], [], []
+    # What is refused is refused before the work.
+    values_of([*named_motions.values()], Measure("pga"))
+    ratios = [
+        {name: float(rating.ratio[0]) for name, rating in rate(block, motion, names).items()}
+        for motion in named_motions.values()
+    ]
+    responses, margins = [], []
     with Progress("checking", total=len(named_motions), show=progress) as bar:
         for motion in named_motions.values():
-            ratings = rate(block, motion, names)
-            ratios.append({name: float(rating.ratio[0]) for name, rating in ratings.items()})
             responses.append(simulate(block, motion, model=model))
             margins.append(_margin(responses[-1], block, motion, model, threads))
             bar.advance()

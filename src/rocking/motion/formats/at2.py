@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, azimuth_of, to_acceleration
 from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.values import NUMBER, Layout, parse, read_values
+from rocking.motion.formats.values import NUMBER, Layout, parse, read_count
 
 NAME = "PEER AT2"
 
@@ -50,11 +50,7 @@ def _read(source: Source, header: _PeerHeader, other: tuple[str, int] | None, re
     spelling = next((found[1] for line in header.titles if (found := _UNITS.search(line.text))), "")
     unit = request.units(source, spelling, at)
     dt = request.step(source, header.dt, at)
-    values = read_values(source, header.sizes.next, len(source.data), count=header.points, layout=_LAYOUT)
-    if len(values) != header.points:
-        raise source.error(
-            f"NPTS is {header.points} but {len(values)} values follow; get the whole file again or correct NPTS", at
-        )
+    values = read_count(source, at, header.sizes.next, len(source.data), header.points, _LAYOUT, said="NPTS")
     title = header.titles[1].text.strip() if len(header.titles) > 1 else ""
     event, station, name = _places(title)
     return [

@@ -7,7 +7,7 @@ import re
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
 from rocking.motion.formats.source import Entry, Request, Source
-from rocking.motion.formats.values import parse, read_values
+from rocking.motion.formats.values import positive_numbers, read_count
 
 NAME = "ESM"
 
@@ -33,13 +33,9 @@ def _read(source: Source, entries: dict[str, Entry], start: int, request: Reques
         raise source.error(f"this ESM file holds {kind.value.lower()!r}; give the file of the acceleration", kind.at)
     spelling = entries.get("UNITS", Entry("", start))
     unit = request.units(source, spelling.value, spelling.at)
-    dt = request.step(source, _number(source, entries, "SAMPLING_INTERVAL_S"), entries["SAMPLING_INTERVAL_S"].at)
-    values = read_values(source, start, len(source.data))
-    count = _number(source, entries, "NDATA")
-    if len(values) != count:
-        raise source.error(
-            f"NDATA is {count:g} but {len(values)} values follow; get the whole file again", entries["NDATA"].at
-        )
+    (dt,), (count,) = (positive_numbers(source, key, entries[key]) for key in ("SAMPLING_INTERVAL_S", "NDATA"))
+    dt = request.step(source, dt, entries["SAMPLING_INTERVAL_S"].at)
+    values = read_count(source, entries["NDATA"].at, start, len(source.data), count, said="NDATA")
     text = {key: entry.value for key, entry in entries.items() if entry.value}
     name = text.get("STREAM", "acceleration")
     processing = {"processing": text["PROCESSING"]} if "PROCESSING" in text else {}
@@ -62,18 +58,10 @@ def _entries(source: Source) -> tuple[dict[str, Entry], int]:
     """Return the header's values by their key, and where the data start."""
     entries: dict[str, Entry] = {}
     start = 0
-    for line in source.lines(0, _HEADER_LINES):
+    for line in source.first_lines(_HEADER_LINES):
         found = _KEY.match(line.text)
         if found is None:
             break
         entries[found[1]] = Entry(found[2].strip(), line.start)
         start = line.next
     return entries, start
-
-
-def _number(source: Source, entries: dict[str, Entry], key: str) -> float:
-    entry = entries[key]
-    number = parse(entry.value.encode("latin-1"))
-    if number is None:
-        raise source.error(f"{key} is {entry.value!r}, which is not a number; correct it", entry.at)
-    return number

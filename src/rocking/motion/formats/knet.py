@@ -13,7 +13,7 @@ import numpy as np
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
 from rocking.motion.formats.source import Entry, Request, Source
-from rocking.motion.formats.values import Layout, parse, read_values
+from rocking.motion.formats.values import Layout, positive_numbers, read_values, wrong_count
 
 NAME = "K-NET/KiK-net"
 
@@ -34,18 +34,19 @@ _AZIMUTHS = {"N-S": 0.0, "E-W": 90.0}
 
 def recognise(source: Source) -> Recognised | None:
     """Return the format if the file begins with 'Origin Time' and has a 'Scale Factor'."""
-    lines = source.lines(0, 2 * len(_KEYS))
+    lines = source.first_lines(2 * len(_KEYS))
     scale = next((line for line in lines if line.text.startswith("Scale Factor")), None)
     if scale is None or not lines[0].text.startswith("Origin Time"):
         return None
-    reason = f"line 1 begins 'Origin Time', line {source.line_number(scale.start)} 'Scale Factor'"
+    first, other = (source.line_number(line.start) for line in (lines[0], scale))
+    reason = f"line {first} begins 'Origin Time', line {other} 'Scale Factor'"
     return Recognised(Identification(NAME, reason), functools.partial(_read, source))
 
 
 def _read(source: Source, request: Request) -> list[Channel]:
     entries, start = _entries(source)
-    (rate,) = _positive(source, entries, "Sampling Freq", _RATE)
-    gal, counts = _positive(source, entries, "Scale Factor", _SCALE)
+    (rate,) = positive_numbers(source, "Sampling Freq", entries["Sampling Freq"], _RATE)
+    gal, counts = positive_numbers(source, "Scale Factor", entries["Scale Factor"], _SCALE)
     scale_at = entries["Scale Factor"].at
     unit = request.units(source, "gal", scale_at)
     dt = request.step(source, 1.0 / rate, entries["Sampling Freq"].at)
@@ -80,7 +81,7 @@ def _read(source: Source, request: Request) -> list[Channel]:
 
 def _entries(source: Source) -> tuple[dict[str, Entry], int]:
     """Return the header's values by their key, and where the data start."""
-    lines = source.lines(0, len(_KEYS))
+    lines = source.first_lines(len(_KEYS))
     for line, key in zip(lines, _KEYS, strict=False):
         if not line.text.startswith(key):
             raise source.error(f"the header line {key!r} should stand here; get the record again", line.start)
@@ -90,23 +91,10 @@ def _entries(source: Source) -> tuple[dict[str, Entry], int]:
     return dict(zip(_KEYS, entries, strict=True)), lines[-1].next
 
 
-def _positive(source: Source, entries: dict[str, Entry], key: str, pattern: re.Pattern[str]) -> list[float]:
-    """Return the numbers that `pattern` finds in the entry `key`; each must be positive."""
-    entry = entries[key]
-    found = pattern.match(entry.value)
-    numbers = [parse(group.encode("latin-1")) for group in found.groups()] if found else []
-    positive = [number for number in numbers if number is not None and number > 0.0]
-    if not positive or len(positive) < len(numbers):
-        raise source.error(f"{entry.value!r} is no {key.lower()}; get the record again", entry.at)
-    return positive
-
-
 def _check_duration(source: Source, entries: dict[str, Entry], rate: float, count: int) -> None:
     """Refuse fewer samples than the duration, which is in whole seconds, or a second's more."""
-    (seconds,) = _positive(source, entries, "Duration Time", _SECONDS)
+    (seconds,) = positive_numbers(source, "Duration Time", entries["Duration Time"], _SECONDS)
     stated = seconds * rate
     if not -0.5 < count - stated < rate:
-        raise source.error(
-            f"{seconds:g} s at {rate:g} Hz make {stated:g} samples but {count} follow; get the whole file again",
-            entries["Duration Time"].at,
-        )
+        said = f"{seconds:g} s at {rate:g} Hz make {stated:g} samples"
+        raise wrong_count(source, entries["Duration Time"].at, said, count, more=count > stated)

@@ -100,6 +100,11 @@ class Source:
         found = _VISIBLE.search(self.data, start)
         return None if found is None else self.line(self.data.rfind(b"\n", 0, found.start()) + 1)
 
+    def first_lines(self, count: int) -> list[Line]:
+        """Return up to `count` lines from the first one on that is not blank."""
+        first = self.first_line()
+        return [] if first is None else self.lines(first.start, count)
+
     def line_number(self, at: int) -> int:
         """Return the number (from 1) of the line that holds the offset `at`."""
         return self.data.count(b"\n", 0, at) + 1

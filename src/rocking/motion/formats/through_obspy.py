@@ -13,6 +13,7 @@ import numpy as np
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
 from rocking.motion.formats.source import Request, Source
 from rocking.motion.formats.units import Unit
+from rocking.motion.formats.values import wrong_count
 
 #: PICKLE runs what a file tells it to; the other two open further files that a file names.
 _REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
@@ -80,10 +81,8 @@ def _refuse_cut(source: Source, traces: Any) -> None:
     titles = list(_TITLE.finditer(source.data))
     for title, trace in zip(titles, traces if len(titles) == len(traces) else (), strict=False):
         if int(title[1]) != len(trace.data):
-            raise source.error(
-                f"the header says {int(title[1])} samples but {len(trace.data)} follow; get the whole file again",
-                title.start(),
-            )
+            said, found = int(title[1]), len(trace.data)
+            raise wrong_count(source, title.start(), f"the header says {said} samples", found, more=found > said)
     lengths = {int(trace.stats.mseed.record_length) for trace in traces if "mseed" in trace.stats}
     if len(lengths) == 1 and len(source.raw) % (length := lengths.pop()):
         raise source.error(f"the last of its blocks of {length} bytes is not whole; get the whole file again")

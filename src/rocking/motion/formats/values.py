@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Floats, Integers
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats.source import Source
+from rocking.motion.formats.source import Entry, Source
 
 #: Characters of one field: one row for each of its columns, one column for each line of the file.
 _Field = NDArray[np.uint8]
@@ -199,6 +199,8 @@ def _integers(digits: NDArray[np.uint8]) -> Integers:
 #: A number in a header, as a regular expression.
 NUMBER = r"[+-]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[EeDd][+-]?\d{1,4})?"
 
+_ONE_NUMBER: Final = re.compile(rf"({NUMBER})\s*$")
+
 _NUMERIC = b"0123456789+-.eEdD"
 _BLANKS = b" \t\n\v"
 _IS_OTHER = bytes(0 if c in _NUMERIC + _BLANKS else 1 for c in range(256))
@@ -232,7 +234,7 @@ def numeric_end(source: Source, start: int) -> int:
 
 
 def read_values(
-    source: Source, start: int, end: int, *, count: int | None = None, layout: Layout | None = None
+    source: Source, start: int, end: int, *, count: float | None = None, layout: Layout | None = None
 ) -> Floats:
     """Return all numbers between the offsets `start` and `end`, which begin lines.
 
@@ -272,12 +274,30 @@ def rows_of_numbers(source: Source, start: int, columns: int, translation: bytes
     return np.concatenate(parts) if parts else None
 
 
-def read_count(source: Source, at: int, start: int, end: int, count: int, layout: Layout | None = None) -> Floats:
-    """Return the numbers between two offsets, of which the header at the offset `at` says that there are `count`."""
+def read_count(
+    source: Source, at: int, start: int, end: int, count: float, layout: Layout | None = None, said: str = "the header"
+) -> Floats:
+    """Return the numbers between two offsets; what is said at the offset `at` states how many there are."""
     values = read_values(source, start, end, count=count, layout=layout)
     if len(values) != count:
-        raise source.error(f"the header says {count} values but {len(values)} follow; get the whole file again", at)
+        raise wrong_count(source, at, f"{said} says {count:.15g} values", len(values), more=len(values) > count)
     return values
+
+
+def wrong_count(source: Source, at: int, stated: str, found: int, *, more: bool) -> UnreadableRecord:
+    """Return the error for more values, or fewer, than are stated at the offset `at`."""
+    advice = "remove what does not belong to it" if more else "get the whole file again"
+    return source.error(f"{stated} but {found} follow; {advice}, or correct that number", at)
+
+
+def positive_numbers(source: Source, key: str, entry: Entry, pattern: re.Pattern[str] = _ONE_NUMBER) -> list[float]:
+    """Return the numbers that a pattern finds in what a header has after a key; each must be positive."""
+    found = pattern.match(entry.value)
+    numbers = [parse(group.encode("latin-1")) for group in found.groups()] if found else []
+    positive = [number for number in numbers if number is not None and number > 0.0]
+    if not positive or len(positive) < len(numbers):
+        raise source.error(f"{key} is {entry.value!r}, which is no positive number; correct it", entry.at)
+    return positive
 
 
 def bad_number(source: Source, start: int, end: int) -> UnreadableRecord:
