@@ -11,7 +11,7 @@ FAST := "not thorough and not slow and not browser"
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_authentication.py explorer_server.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo wheel test test-all browser slow lowest latest .bounds doctest lint types docs bench clean distclean
+.PHONY: help demo wheel quick test test-all browser slow lowest latest .bounds doctest lint types docs bench clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -22,6 +22,10 @@ demo: .venv/.base ## simulate a block under a shipped record; writes out/demo.pn
 wheel: .venv/.all ## build a wheel for this platform, with kernels compiled beforehand, into dist
 	$(BIN)/python scripts/ship_kernels.py
 	$(BIN)/python -m pip wheel --disable-pip-version-check -q --no-deps --wheel-dir dist .
+
+quick: .venv/.all ## run the tests of what has changed since the last commit, or since BASE=..., within half a minute
+	@files=$$($(BIN)/python tests/of_changes.py $(BASE)) && { test -z "$$files" || \
+	    $(PYTEST) --dist load --maxschedchunk 4 --within 18 -m $(FAST) $$files; }
 
 test: .venv/.all ## run the tests (three minutes on two cores)
 	$(PYTEST) -m $(FAST)

@@ -3,6 +3,8 @@
 import json
 import os
 import tempfile
+import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,31 @@ hypothesis.settings.load_profile("fixed")
 
 # Figures are not looked at here, whatever display there is.
 os.environ["MPLBACKEND"] = "agg"
+
+
+STARTED = time.monotonic()
+TOO_LATE = "later than --within allows"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the limit that `make quick` sets."""
+    parser.addoption("--within", type=float, metavar="SECONDS", help="leave out tests that would start later than that")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Leave out what comes too late."""
+    within = item.config.getoption("within")
+    if within is not None and time.monotonic() - STARTED > within:
+        pytest.skip(TOO_LATE)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say what came too late."""
+    late = [each for each in terminalreporter.stats.get("skipped", ()) if TOO_LATE in str(each.longrepr)]
+    if late:
+        files = Counter(each.nodeid.partition("::")[0] for each in late)
+        counted = ", ".join(f"{count} of {file}" for file, count in files.items())
+        terminalreporter.write_line(f"left out for lack of time: {counted}", yellow=True)
 
 
 def pytest_configure(config: pytest.Config) -> None:
