@@ -25,7 +25,7 @@ wheel: .venv/.all ## build a wheel for this platform, with kernels compiled befo
 
 quick: .venv/.all ## run the tests of what has changed since the last commit, or since BASE=..., within half a minute
 	@files=$$($(BIN)/python tests/of_changes.py $(BASE)) && { test -z "$$files" || \
-	    $(PYTEST) --dist load --maxschedchunk 4 --within 18 -m $(FAST) $$files; }
+	    $(PYTEST) --dist load --maxschedchunk 4 --within 14 -m $(FAST) $$files; }
 
 test: .venv/.all ## run the tests (three minutes on two cores)
 	$(PYTEST) -m $(FAST)

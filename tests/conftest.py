@@ -20,19 +20,21 @@ hypothesis.settings.load_profile("fixed")
 os.environ["MPLBACKEND"] = "agg"
 
 
-STARTED = time.monotonic()
 TOO_LATE = "later than --within allows"
+STARTED = pytest.StashKey[float]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the limit that `make quick` sets."""
-    parser.addoption("--within", type=float, metavar="SECONDS", help="leave out tests that would start later than that")
+    help_text = "leave out the tests that would start later than that after the first"
+    parser.addoption("--within", type=float, metavar="SECONDS", help=help_text)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Leave out what comes too late."""
     within = item.config.getoption("within")
-    if within is not None and time.monotonic() - STARTED > within:
+    started = item.session.stash.setdefault(STARTED, time.monotonic())
+    if within is not None and time.monotonic() - started > within:
         pytest.skip(TOO_LATE)
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 #: Files of tests at most.
-MOST = 16
+MOST = 12
 
 #: How many imports farther than the nearest file of tests another one may be.
 FARTHER = 2
