@@ -5,13 +5,16 @@ PYTHON ?= python3
 BIN := .venv/bin
 LESS_STRICT := $(addprefix --allow-,untyped-defs untyped-calls incomplete-defs untyped-decorators any-generics) --no-warn-return-any
 PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1
+# Work stealing gives each worker a run of neighbouring tests, so that few of a module's fixtures are made twice.
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --benchmark-disable
+FAST := "not thorough and not slow and not browser"
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_authentication.py explorer_server.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo wheel test browser slow lowest latest .bounds doctest lint types docs bench clean distclean
+.PHONY: help demo wheel quick test test-all browser slow lowest latest .bounds doctest lint types docs bench clean distclean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: .venv/.base ## simulate a block under a shipped record; writes out/demo.png
 	@$(BIN)/python examples/demo.py
@@ -20,14 +23,21 @@ wheel: .venv/.all ## build a wheel for this platform, with kernels compiled befo
 	$(BIN)/python scripts/ship_kernels.py
 	$(BIN)/python -m pip wheel --disable-pip-version-check -q --no-deps --wheel-dir dist .
 
-test: .venv/.all ## run the test suite (some minutes on two cores)
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m "not slow and not browser"
+quick: .venv/.all ## run the tests of what has changed since the last commit, or since BASE=..., within half a minute
+	@files=$$($(BIN)/python tests/of_changes.py $(BASE)) && { test -z "$$files" || \
+	    $(PYTEST) --dist load --maxschedchunk 4 --within 14 -m $(FAST) $$files; }
+
+test: .venv/.all ## run the tests (three minutes on two cores)
+	$(PYTEST) -m $(FAST)
+
+test-all: .venv/.all ## run them with more cases each (twice as long)
+	$(PYTEST) -m "not slow and not browser"
 
 browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chromium, which must be installed
 	ROCKING_BROWSER_REQUIRED=1 $(BIN)/python -m pytest --benchmark-disable -m browser
 
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m slow
+	$(PYTEST) -m slow
 
 lowest: ## install the oldest versions that pyproject.toml allows, and run a test of every part with them
 	$(PYTHON) scripts/lowest_versions.py > .lowest.txt
@@ -39,7 +49,7 @@ latest: ## the same without constraints: with the versions of the day
 .bounds:
 	@test -x $(ENVIRONMENT)/bin/python || $(PYTHON) -m venv $(ENVIRONMENT)
 	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq --no-compile $(CONSTRAINTS) ".[test,explorer]"
-	$(ENVIRONMENT)/bin/python -m pytest -n auto --maxprocesses 4 --benchmark-disable -m "not slow" $(EVERY_PART)
+	$(PYTEST:$(BIN)/%=$(ENVIRONMENT)/bin/%) -m $(FAST) $(EVERY_PART)
 
 doctest: .venv/.all ## run the examples in the docstrings
 	$(BIN)/python -m pytest --doctest-modules src/rocking

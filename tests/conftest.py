@@ -3,7 +3,9 @@
 import json
 import os
 import tempfile
-from collections.abc import Callable
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,33 @@ hypothesis.settings.load_profile("fixed")
 os.environ["MPLBACKEND"] = "agg"
 
 
+TOO_LATE = "later than --within allows"
+STARTED = pytest.StashKey[float]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the limit that `make quick` sets."""
+    help_text = "leave out the tests that would start later than that after the first"
+    parser.addoption("--within", type=float, metavar="SECONDS", help=help_text)
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Leave out what comes too late."""
+    within = item.config.getoption("within")
+    started = item.session.stash.setdefault(STARTED, time.monotonic())
+    if within is not None and time.monotonic() - started > within:
+        pytest.skip(TOO_LATE)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say what came too late."""
+    late = [each for each in terminalreporter.stats.get("skipped", ()) if TOO_LATE in str(each.longrepr)]
+    if late:
+        files = Counter(each.nodeid.partition("::")[0] for each in late)
+        counted = ", ".join(f"{count} of {file}" for file, count in files.items())
+        terminalreporter.write_line(f"left out for lack of time: {counted}", yellow=True)
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Keep Matplotlib's settings and list of fonts to the tests: a user's own change what is drawn and said."""
     cached = config.pluginmanager.hasplugin("cacheprovider")
@@ -25,6 +54,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _no_waiting_for_disks() -> Iterator[None]:
+    """Let no test wait until a disk has confirmed what it writes; tests of that replace the call themselves."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(os, "fsync", lambda file: None)
+        yield
 
 
 @pytest.fixture

@@ -299,10 +299,17 @@ def test_an_ascii_locale_is_no_error(tmp_path):
     record = tmp_path / "Kraków.txt"
     record.write_text("".join(f"{0.01 * k:.2f} {np.sin(k):.4f}\n" for k in range(9)), "utf-8")
     environment = {**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
-    for arguments in (["records", str(record), "--units", "g"], ["records", "Łódź.txt"], ["simulate", "--help"]):
-        command = [sys.executable, "-c", "import sys; from rocking.cli import main; main(sys.argv[1:])", *arguments]
-        done = subprocess.run(command, capture_output=True, env=environment, check=False)
-        assert b"Traceback" not in done.stderr, done.stderr
+    program = (
+        "import sys\nfrom rocking.cli import main\nrecord = sys.argv[1]\n"
+        "for arguments in (['records', record, '--units', 'g'], ['records', 'Łódź.txt'], ['simulate', '--help']):\n"
+        "    try:\n        main(arguments)\n    except SystemExit as stop:\n        print('ended', stop.code)\n"
+    )
+    (tmp_path / "program.py").write_text(program, "utf-8")
+    command = [sys.executable, str(tmp_path / "program.py"), str(record)]
+    done = subprocess.run(command, capture_output=True, env=environment, check=True)
+    assert b"Traceback" not in done.stderr, done.stderr
+    assert done.stdout.count(b"ended 2") == 1
+    assert b"Usage: rocking simulate" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -497,6 +504,8 @@ def test_compiling_is_said_once_for_each_work_and_not_where_it_is_short():
     assert re.findall(r"note: compiling.* up to (\d) s", done.stderr) == ["7", "9"]
 
 
+# The kernels are compiled for it; what is announced, and how often, is tested above.
+@pytest.mark.thorough
 def test_a_cold_cache_is_announced_by_the_command_line(tmp_path):
     command = [sys.executable, "-c", "from rocking.cli import main; main(['critical', '2', '0.9'])"]
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}

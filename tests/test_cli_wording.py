@@ -158,11 +158,12 @@ def history(tmp_path):
 
 
 def test_a_calibration_takes_semicolons_and_gives_units(run, history):
-    code, plain, err = run("calibrate", history())
+    known = ["--alpha", 0.2, "--restitution", 0.9]
+    code, plain, err = run("calibrate", history(), *known)
     assert (code, err) == (0, "")
     assert "rad/s" in plain and "unit" in plain.splitlines()[0]
-    assert run("calibrate", history(";", ","))[1] == plain
-    assert run("calibrate", history(";", "."))[1] == plain
+    assert run("calibrate", history(";", ","), *known)[1] == plain
+    assert run("calibrate", history(";", "."), *known)[1] == plain
 
 
 def test_a_calibration_names_all_columns_and_answers_that_it_takes(run, tmp_path):

@@ -172,7 +172,7 @@ def shown_boxes(figure):
             yield "an axis", box
 
 
-@pytest.mark.parametrize("dpi", [100.0, 200.0, 300.0])
+@pytest.mark.parametrize("dpi", [100.0, *(pytest.param(dpi, marks=pytest.mark.thorough) for dpi in (200.0, 300.0))])
 @pytest.mark.parametrize("width", [COLUMN, PAGE], ids=["column", "page"])
 @pytest.mark.parametrize("kind", FIGURES)
 def test_no_text_leaves_the_figure(kind, width, dpi):

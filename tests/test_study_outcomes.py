@@ -16,6 +16,7 @@ from rocking.studies.inputs import ALWAYS_KEPT, OUTCOMES
 from rocking.studies.units import UnitGrid
 
 BLOCKS = rocking.Blocks.grid(p=np.linspace(1.0, 6.0, 130), alpha=[0.1, 0.2, 0.25, 0.3], restitution=[0.85])
+FEW = BLOCKS.select(slice(None, None, 27))
 MOTIONS = [rocking.pulses.one_sine(1.0, frequency) for frequency in (0.5, 1.0, 2.0)]
 LEVELS = [2.0, 4.0, 8.0]
 OPTIONS = {"levels": LEVELS, "measure": "pga", "polarity": "both", "model": "linear"}
@@ -23,8 +24,8 @@ TWO = ["peak_rotation", "overturned"]
 KEPT = ["overturned", "peak_rotation", *ALWAYS_KEPT]
 
 
-def made(folder, **changes):
-    return rocking.study(folder, BLOCKS, MOTIONS, **({"outcomes": TWO} | OPTIONS | {"unit_blocks": 512} | changes))
+def made(folder, blocks=BLOCKS, **changes):
+    return rocking.study(folder, blocks, MOTIONS, **({"outcomes": TWO} | OPTIONS | {"unit_blocks": 512} | changes))
 
 
 def contents(folder):
@@ -45,6 +46,14 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole") / "study"
     made(folder, outcomes=None).run(threads=1)
     return folder
+
+
+@pytest.fixture(scope="module")
+def few_blocks(tmp_path_factory):
+    """Study of all outcomes whose blocks are few enough for a fragility of each."""
+    study = made(tmp_path_factory.mktemp("few") / "study", FEW, outcomes=None)
+    study.run(threads=1)
+    return study
 
 
 @pytest.fixture(scope="module")
@@ -175,8 +184,9 @@ def test_a_choice_that_is_none_is_one_sentence_before_anything_is_made(tmp_path,
     assert not (tmp_path / "study").exists()
 
 
-def test_what_is_made_of_two_outcomes_is_what_is_made_of_all(complete, whole):
-    two, all_ = rocking.study(complete), rocking.study(whole)
+def test_what_is_made_of_two_outcomes_is_what_is_made_of_all(few_blocks, tmp_path):
+    two, all_ = made(tmp_path, FEW), few_blocks
+    two.run(threads=1)
     limits = {"overturning": np.inf, "half": 0.5}
     assert two.block_fragilities(limits=limits).data.identical(all_.block_fragilities(limits=limits).data)
     assert two.fragility(limits=limits).to_dict() == all_.fragility(limits=limits).to_dict()
@@ -184,11 +194,11 @@ def test_what_is_made_of_two_outcomes_is_what_is_made_of_all(complete, whole):
     assert two.critical_scales().identical(all_.critical_scales())
 
 
-def test_overturning_alone_is_enough_for_its_own_fragility_and_for_no_more(whole, tmp_path):
-    study = made(tmp_path, outcomes=["overturned"])
+def test_overturning_alone_is_enough_for_its_own_fragility_and_for_no_more(few_blocks, tmp_path):
+    study = made(tmp_path, FEW, outcomes=["overturned"])
     study.run(threads=1)
-    assert study.fragility().to_dict() == rocking.study(whole).fragility().to_dict()
-    assert study.block_fragilities().data.identical(rocking.study(whole).block_fragilities().data)
+    assert study.fragility().to_dict() == few_blocks.fragility().to_dict()
+    assert study.block_fragilities().data.identical(few_blocks.block_fragilities().data)
     lacking = "needs peak_rotation, and the study keeps only overturned, stalled, unfinished, stopped: create one with"
     for make, what in (
         (study.spectrum, "a spectrum"),
@@ -230,7 +240,8 @@ def test_rests_alone_are_enough_for_nothing_else(tmp_path):
 )
 def test_a_refinement_keeps_as_little_as_its_verdict_needs_and_finds_the_same(tmp_path, verdict, outcomes):
     def refined(kept):
-        study = made(tmp_path / f"{len(kept or OUTCOMES)}", outcomes=kept, refine={verdict: 1e-2})
+        blocks = BLOCKS.select(slice(None, None, 5))
+        study = made(tmp_path / f"{len(kept or OUTCOMES)}", blocks, outcomes=kept, refine={verdict: 1e-2})
         study.run(threads=1)
         return study
 

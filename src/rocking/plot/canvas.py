@@ -117,6 +117,9 @@ def figure_for(
         _add_title(figure, None, title)
         yield figure
         _make_ticks(figure)
+        interactive = mpl.is_interactive()
+    # The context undoes what a notebook chose if pyplot was loaded in it: to show figures at the end of a cell.
+    mpl.interactive(interactive)
 
 
 def _add_title(figure: Figure, ax: Axes | None, title: str) -> None:

@@ -1,0 +1,110 @@
+"""The tests of a change are found: for every module some, and first those that are about it."""
+
+import subprocess
+import sys
+
+import pytest
+from of_changes import ROOT, FilesOfTests, changed, ordered
+
+SOURCES = sorted((ROOT / "src" / "rocking").rglob("*.py"))
+
+
+@pytest.fixture(scope="module")
+def tests():
+    return FilesOfTests()
+
+
+def test_every_module_has_tests_and_they_are_near(tests):
+    assert len(SOURCES) > 150
+    for source in SOURCES:
+        found = tests.of(source)
+        assert found, f"no file of tests is known for {source}: name it in one, or import it there"
+        assert min(found.values()) < (3, 0), source
+        assert all(path.is_file() and path.name.startswith("test_") for path in found)
+
+
+@pytest.mark.parametrize(
+    ("change", "first"),
+    [
+        ("src/rocking/kernels/march.py", "kernels_march"),
+        ("src/rocking/kernels/lanes.py", "kernels_lanes"),
+        ("src/rocking/studies/refine.py", "study_refine"),
+        ("src/rocking/analysis/calibration/search.py", "calibration"),
+        ("src/rocking/analysis/spectrum.py", "spectrum"),
+        ("src/rocking/motion/__init__.pyi", "motion"),
+        ("src/rocking/cli/analysis.py", "cli_analysis"),
+        ("src/rocking/explorer/server.py", "explorer_server"),
+        ("src/rocking/explorer/page/map.js", "explorer_server"),
+        ("tests/oracles/balls.py", "certificate"),
+        ("tests/test_vertical.py", "vertical"),
+        ("scripts/validation.py", "validation"),
+        ("docs/howto/notebook.md", "notebook"),
+        ("docs/api/index.md", "docs"),
+    ],
+)
+def test_what_is_about_a_file_comes_first(tests, change, first):
+    found = ordered([tests.of(ROOT / change)])
+    assert found[0] == ROOT / "tests" / f"test_{first}.py"
+
+
+def test_of_several_changes_each_file_of_tests_has_its_nearest_place(tests):
+    far, near = tests.of(ROOT / "src/rocking/simulation.py"), tests.of(ROOT / "src/rocking/kernels/march.py")
+    both = ordered([far, near])
+    assert len(both) == len(set(both)) == len({*far, *near}) > len(near)
+    assert both[0] == ordered([near])[0]
+
+
+def test_a_module_that_no_test_reaches_and_no_name_tells_of_has_none(tmp_path):
+    for name, text in {
+        "src/rocking/__init__.py": "",
+        "src/rocking/alone.py": "",
+        "src/rocking/used.py": "from rocking import far",
+        "src/rocking/far.py": "",
+        "tests/helper.py": "import rocking.used as used",
+        "tests/test_this.py": "from helper import used",
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, "utf-8")
+    known = FilesOfTests(tmp_path)
+    this = tmp_path / "tests" / "test_this.py"
+    assert known.of(tmp_path / "src/rocking/alone.py") == {}
+    assert known.of(tmp_path / "src/rocking/used.py") == {this: (2, 1)}
+    assert known.of(tmp_path / "src/rocking/far.py") == {this: (3, 1)}
+
+
+def test_a_change_is_staged_unstaged_untracked_or_since_a_commit(tmp_path):
+    def git(*arguments):
+        identity = ["-c", "user.name=A", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false"]
+        subprocess.run(["git", *identity, *arguments], cwd=tmp_path, check=True, capture_output=True)
+
+    def write(name):
+        (tmp_path / name).write_text(name, "utf-8")
+        return tmp_path / name
+
+    git("init", "-q")
+    (tmp_path / ".gitignore").write_text("ignored\n", "utf-8")
+    for name in ("kept", "gone", "edited", "staged"):
+        (tmp_path / name).touch()
+    git("add", ".")
+    git("commit", "-qm", "first")
+    committed = write("committed then")
+    git("add", ".")
+    git("commit", "-qm", "second")
+    expected = [write("edited"), write("staged"), write("ñew")]
+    write("ignored")
+    git("add", "staged")
+    (tmp_path / "gone").unlink()
+    assert changed(root=tmp_path) == sorted(expected)
+    assert changed("HEAD~1", tmp_path) == sorted([*expected, committed])
+
+
+def test_a_test_that_comes_too_late_is_left_out_and_said(tmp_path):
+    options = ["-n0", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "--confcutdir", str(tmp_path)]
+    (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text("utf-8"), "utf-8")
+    (tmp_path / "test_it.py").write_text(
+        "import time\ndef test_one(): time.sleep(0.1)\ndef test_other(): assert False\n", "utf-8"
+    )
+    command = [sys.executable, "-m", "pytest", "-q", *options, "--within", "0.05", "test_it.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert "left out for lack of time: 1 of test_it.py" in done.stdout
+    assert "1 passed, 1 skipped" in done.stdout
