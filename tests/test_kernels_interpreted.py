@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import simulation
 from rocking.kernels import compiled, ground
+from rocking.kernels import march as march_module
 from rocking.kernels.interpreted import Interpreted
 from rocking.kernels.march import march
 from rocking.response import Response
@@ -44,7 +44,7 @@ def choose(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
 
     def choose(interpreted: bool) -> None:
         monkeypatch.setattr(compiled.Kernel, "is_at_hand", not interpreted)
-        monkeypatch.setattr(simulation, "_interpreted", Interpreted(march, 10**9))
+        monkeypatch.setattr(march_module, "_interpreted", Interpreted(march, 10**9))
         monkeypatch.setattr(ground, "_interpreted_fill", Interpreted(ground.fill, 10**9))
 
     return choose
@@ -103,7 +103,7 @@ def test_after_some_work_the_march_is_compiled(choose: Callable[[bool], None], m
     expected = rocking.simulate(block, motion)
     choose(True)
     few = Interpreted(march, 5)
-    monkeypatch.setattr(simulation, "_interpreted", few)
+    monkeypatch.setattr(march_module, "_interpreted", few)
     found = rocking.simulate(block, motion)
     assert few.work() == 0
     assert bits(found) == bits(expected)

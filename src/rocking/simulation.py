@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +14,7 @@ from rocking.constants import Model
 from rocking.engine import SLICE, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.ground import Ground
-from rocking.kernels.interpreted import Interpreted
-from rocking.kernels.march import march
+from rocking.kernels.march import follow
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
@@ -35,9 +31,6 @@ _KINDS = np.array(["uplift", "rest", "overturn"])
 
 #: Rows of the first table per piece of the motion.
 _FIRST_ROWS = 1.25
-
-#: Turns of marches in one process that Python reads: a second's work or two, where compiling takes ten.
-_interpreted: Final = Interpreted(march, 2000)
 
 #: Fastest initial velocity, rad/s: beyond all sense, and squares and fourth powers of it are far from overflow.
 _FASTEST = 1e6
@@ -143,8 +136,8 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))
     scratch = state.new_scratch()
     ending: int = state.Ending.PAUSED
-    for follow, budget in _turns(ground):
-        start["budget"] = budget
+    for _ in range(slices(ground)):
+        start["budget"] = SLICE
         ending = follow(ground, block, rules, table, scratch, start)
         while ending == state.Ending.FULL:
             table = state.grown(table)
@@ -154,28 +147,6 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     start["end"] = table["node"]["time"][start["nodes"] - 1]
     start["ending"] = state.Ending.UNFINISHED
     return state.Ending.UNFINISHED, table
-
-
-def _turns(ground: Ground) -> Iterator[tuple[Callable[..., int], int]]:
-    """Say what follows a march for how many turns: first Python, where the march is not compiled yet."""
-    if turns := _interpreted.work():
-        yield _follow_interpreted, turns
-    for _ in range(slices(ground)):
-        yield march, SLICE
-
-
-def _follow_interpreted(*arguments: Any) -> int:
-    start = arguments[-1]
-    before = start.copy()
-    try:
-        ending: int = _interpreted(*arguments)
-    except (ArithmeticError, ValueError):
-        _interpreted.spend(_interpreted.work())
-        for name in start.dtype.names:
-            start[name] = before[name]
-        return state.Ending.PAUSED
-    _interpreted.spend(int(before["budget"] - start["budget"]))
-    return ending
 
 
 def _initial_state(body: Body, record: state.Record, rotation: float, velocity: float) -> tuple[int, float, float]:

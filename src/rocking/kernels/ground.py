@@ -104,9 +104,9 @@ def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground,
         set_stretch(ground, k // STRETCH, Window(low, high, max(before.slope, piece.slope), before.jumps + jumps))
 
 
-#: Pieces of motions in one process that Python writes: a fraction of a second's work, where compiling takes half of one
-#: and numba another to import.
-_interpreted_fill: Final = Interpreted(fill, 20_000)
+#: Pieces of motions in one process that Python writes: half a second's work, which is what compiling takes,
+#: and numba takes longer to import.
+_interpreted_fill: Final = Interpreted(fill, 100_000)
 
 
 @inlined

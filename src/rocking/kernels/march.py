@@ -1,7 +1,7 @@
 """The whole response of one block to one motion: rest, uplift, arc, impact, and so on to the end."""
 
 import math
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from rocking.kernels.certificate import unproven
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import StepEnd, advance, apply_impact, first_root
 from rocking.kernels.ground import Ground, has_vertical, is_straight, last_piece, length_of, start_of
+from rocking.kernels.interpreted import Interpreted
 from rocking.kernels.rest import (
     ULP,
     Rest,
@@ -61,6 +62,28 @@ def march(ground: Ground, block: Record, rules: Record, table: Records, scratch:
         if ending != Ending.RUNNING:
             return ending.value
     return Ending.RUNNING.value
+
+
+#: Turns of marches in one process that Python takes: two seconds' work or three, where compiling takes ten.
+_interpreted: Final = Interpreted(march, 15_000)
+
+
+def follow(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
+    """`march`, whose first turns Python takes where it is not compiled: most responses end before a compiler would."""
+    if (turns := min(_interpreted.work(), int(state["budget"]))) <= 0:
+        return march(ground, block, rules, table, scratch, state)
+    before, later = state.copy(), int(state["budget"]) - turns
+    state["budget"] = turns
+    try:
+        ending = int(_interpreted(ground, block, rules, table, scratch, state))
+    except (ArithmeticError, ValueError):
+        _interpreted.spend(_interpreted.work())
+        for name in before.dtype.names:
+            state[name] = before[name]
+        return march(ground, block, rules, table, scratch, state)
+    _interpreted.spend(turns - int(state["budget"]))
+    state["budget"] += later
+    return march(ground, block, rules, table, scratch, state) if ending == Ending.PAUSED and later else ending
 
 
 @inlined

@@ -17,7 +17,7 @@ from rocking.body import ContactLaw
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import components
-from rocking.kernels.march import march
+from rocking.kernels.march import follow
 from rocking.kernels.trace import Trail, trace, vary
 from rocking.motion import piecewise
 from rocking.tables import counted
@@ -239,7 +239,7 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
             start[name] = nodes[name][row]
         start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
         rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
-        while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
+        while follow(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
             table = state.grown(table)
         found = table["node"][1 : start["nodes"]]
         parts += [nodes[done : row + 1], found[(found["side"] != state.AT_REST) & (found["time"] < rules["stop"])]]
