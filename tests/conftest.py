@@ -24,6 +24,20 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["MPLCONFIGDIR"] = str(config.cache.mkdir("matplotlib")) if cached else tempfile.mkdtemp()
 
 
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calibrations that search less and draw less, for what does not hang on how well a block is known."""
+    from rocking.analysis.calibration import history, search
+
+    monkeypatch.setattr(search, "_GUIDING", (64, 1))
+    monkeypatch.setattr(search, "_COMPARED", (64, 2))
+    monkeypatch.setattr(search, "_EXPONENTS", (0.1, 1.0))
+    monkeypatch.setattr(search, "_MORE", 0)
+    monkeypatch.setattr(history, "_CANDIDATES", 256)
+    monkeypatch.setattr(history, "_STAGES", ((0.15, 6), (0.3, 3), (1.0, 1)))
+    monkeypatch.setattr(history, "_AROUND", 16)
+
+
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 

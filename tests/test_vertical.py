@@ -4,6 +4,7 @@ import json
 import math
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,11 +77,11 @@ def integrated(block: rocking.Block, motion: Motion, model: str, end: float) -> 
 
     threshold = alpha if model == "linear" else math.tan(alpha)
 
-    def margin(t: float) -> float:
+    def margin(t: Any) -> Any:
         return threshold * (1.0 + motion.vertical.acceleration(t) / G) - abs(motion.acceleration(t)) / G
 
     grid = np.linspace(0.0, end, 40001)
-    first = int(np.flatnonzero([margin(t) < 0.0 for t in grid])[0])
+    first = int(np.flatnonzero(margin(grid) < 0.0)[0])
     t = brentq(margin, grid[first - 1], grid[first], xtol=1e-14)
     sign = -math.copysign(1.0, motion.acceleration(t))
     state = np.array([0.0, 0.0])
