@@ -10,8 +10,8 @@ from typing import Any
 import hypothesis
 import pytest
 
-# The same examples on every run; `pytest --hypothesis-profile=default` draws new ones.
-hypothesis.settings.register_profile("fixed", derandomize=True)
+# The same examples on every run, and few; `pytest --hypothesis-profile=default` draws new ones, and more.
+hypothesis.settings.register_profile("fixed", derandomize=True, max_examples=40)
 hypothesis.settings.load_profile("fixed")
 
 # Figures are not looked at here, whatever display there is.
