@@ -69,14 +69,13 @@ def test_what_is_not_resolved_is_told_as_infinite():
     assert told == pytest.approx([1.0, np.nan, np.inf], nan_ok=True)
 
 
-@pytest.mark.parametrize(
-    "count", [1, 2, 63, 64, 65, 512, 513, *(pytest.param(n, marks=pytest.mark.thorough) for n in (511, 1100))]
-)
+@pytest.mark.parametrize("count", [1, 2, 63, 64, 65, 511, 512, 513, 1100])
 def test_every_number_of_sequences_fills_the_lanes(count):
     rng = np.random.default_rng(count)
     eta = rng.choice([0.05, 0.5, 0.92, 0.97, 0.995], count)
-    omega = rng.uniform(0.4, 10.0, count)
-    critical = chattering.critical_amplitude(omega, eta)
+    omega = rng.choice([0.5, 1.7, 4.0, 9.0], count)
+    pairs, which = np.unique([omega, eta], axis=1, return_inverse=True)
+    critical = chattering.critical_amplitude(*pairs)[which.ravel()]
     share = rng.uniform(0.01, 1.9, count)
     share[np.abs(share - 1.0) < 0.02] = 0.5
     a = 1.0 + (critical - 1.0) * share
