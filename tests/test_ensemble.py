@@ -210,7 +210,8 @@ def test_nothing_to_simulate_is_refused(records):
 
 
 LONG = """
-import numpy as np, rocking
+import signal, numpy as np, rocking
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background may have none
 blocks = rocking.Blocks(p=np.linspace(1, 6, 20_000), alpha=0.2, restitution=0.9)
 motion = rocking.records.load("ridgecrest-tow2-090")
 rocking.simulate_many(blocks[0], motion)  # loads the kernels
