@@ -668,12 +668,18 @@ def test_a_release_to_the_other_side_is_found_too(coarse):
     assert found.estimates["restitution"].value == pytest.approx(0.88, abs=2e-3)
 
 
-@pytest.mark.slow
-def test_correlated_noise_widens_the_errors():
+@pytest.mark.parametrize(
+    "known",
+    [
+        pytest.param({}, marks=pytest.mark.slow),
+        {"p": 2.5, "alpha": 0.2, "initial_rotation": 0.1},
+    ],
+)
+def test_correlated_noise_widens_the_errors(coarse, known):
     white = np.random.default_rng(0).normal(0.0, 1.0, len(TIMES))
     correlated = np.convolve(white, np.ones(20) / math.sqrt(20), mode="same")
     clean = released() - np.random.default_rng(0).normal(0.0, NOISE, len(TIMES))
-    sharp, wide = (rocking.calibrate_history(TIMES, clean + NOISE * noise) for noise in (white, correlated))
+    sharp, wide = (rocking.calibrate_history(TIMES, clean + NOISE * noise, **known) for noise in (white, correlated))
     assert wide.misfit == pytest.approx(sharp.misfit, rel=0.15)
     assert wide.estimates["restitution"].deviation > 2.0 * sharp.estimates["restitution"].deviation
 
