@@ -12,8 +12,8 @@ from typing import Any
 import hypothesis
 import pytest
 
-# The same examples on every run; `pytest --hypothesis-profile=default` draws new ones.
-hypothesis.settings.register_profile("fixed", derandomize=True)
+# The same examples on every run, and few; `pytest --hypothesis-profile=default` draws new ones, and more.
+hypothesis.settings.register_profile("fixed", derandomize=True, max_examples=40)
 hypothesis.settings.load_profile("fixed")
 
 # Figures are not looked at here, whatever display there is.
@@ -51,6 +51,20 @@ def pytest_configure(config: pytest.Config) -> None:
     """Keep Matplotlib's settings and list of fonts to the tests: a user's own change what is drawn and said."""
     cached = config.pluginmanager.hasplugin("cacheprovider")
     os.environ["MPLCONFIGDIR"] = str(config.cache.mkdir("matplotlib")) if cached else tempfile.mkdtemp()
+
+
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calibrations that search less and draw less, for what does not hang on how well a block is known."""
+    from rocking.analysis.calibration import history, search
+
+    monkeypatch.setattr(search, "_GUIDING", (64, 1))
+    monkeypatch.setattr(search, "_COMPARED", (64, 2))
+    monkeypatch.setattr(search, "_EXPONENTS", (0.1, 1.0))
+    monkeypatch.setattr(search, "_MORE", 0)
+    monkeypatch.setattr(history, "_CANDIDATES", 256)
+    monkeypatch.setattr(history, "_STAGES", ((0.15, 6), (0.3, 3), (1.0, 1)))
+    monkeypatch.setattr(history, "_AROUND", 16)
 
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"

@@ -89,8 +89,21 @@ MOTIONS = {
 }
 #: With these the ball arithmetic of the nonlinear model takes some ten seconds.
 LONG = {"sine", "shipped record"}
+
+
+def time_of(model: str, block: tuple[Pair, Pair, Pair], motion: str) -> list[pytest.MarkDecorator]:
+    """Some tenths of a second; or seconds, or more than ten, which no more than a second law is worth."""
+    if model == "nonlinear":
+        return (
+            [pytest.mark.slow]
+            if motion in LONG
+            else [pytest.mark.thorough] * ((block, motion) != (TWO_SIDED, "ricker"))
+        )
+    return [pytest.mark.thorough] * ((block, motion) == (SYMMETRIC, "shipped record"))
+
+
 KINDS = [
-    pytest.param(model, block, motion, marks=[pytest.mark.slow] if model == "nonlinear" and motion in LONG else [])
+    pytest.param(model, block, motion, marks=time_of(model, block, motion))
     for model in ("linear", "nonlinear")
     for block in (SYMMETRIC, TWO_SIDED)
     for motion in MOTIONS
@@ -120,8 +133,15 @@ def test_ball_arithmetic_proves_chattering_from_the_first_certified_impact_on(
     assert balls.within(rest, sequence["end"] - 1e-11, sequence["end"] + 1e-11)
 
 
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
-@pytest.mark.parametrize("block", [SYMMETRIC, TWO_SIDED])
+@pytest.mark.parametrize(
+    ("model", "block"),
+    [
+        ("linear", SYMMETRIC),
+        ("linear", TWO_SIDED),
+        pytest.param("nonlinear", SYMMETRIC, marks=pytest.mark.thorough),
+        ("nonlinear", TWO_SIDED),
+    ],
+)
 def test_the_brackets_under_an_approximated_sine_hold_for_the_sine_itself(
     model: str, block: tuple[Pair, Pair, Pair]
 ) -> None:

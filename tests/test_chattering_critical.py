@@ -15,8 +15,12 @@ def test_critical_amplitudes_of_the_reference(reference):
         assert chattering.critical_amplitude(case["omega"], case["eta"]) == pytest.approx(case["value"], abs=1e-13)
 
 
-@pytest.mark.parametrize("omega", [0.3, 2.0, 30.0])
-@pytest.mark.parametrize("eta", [0.1, 0.5, 0.92, 0.975])
+LONG = [(2.0, 0.975), *(pytest.param(omega, 0.975, marks=pytest.mark.thorough) for omega in (0.3, 30.0))]
+
+
+@pytest.mark.parametrize(
+    ("omega", "eta"), [*((omega, eta) for eta in (0.1, 0.5, 0.92) for omega in (0.3, 2.0, 30.0)), *LONG]
+)
 def test_both_sides_of_the_critical_amplitude_are_proven(omega, eta):
     critical = float(chattering.critical_amplitude(omega, eta))
     assert settle(critical - 1e-13, omega, eta).time is not None

@@ -36,9 +36,15 @@ def test_times_and_verdicts_agree_with_many_digits(share, omega, eta):
     assert_agrees(share, omega, eta)
 
 
-@pytest.mark.parametrize("distance", [1e-4, 1e-6, 1e-8, 1e-10])
-@pytest.mark.parametrize("eta", [0.3, 0.92])
-@pytest.mark.parametrize("omega", [0.06, 0.1, 0.15, 2.0, 30.0])
+NEAR = [
+    pytest.param(omega, eta, distance, marks=[] if distance in (1e-4, 1e-8) and omega != 0.06 else pytest.mark.thorough)
+    for omega in (0.06, 0.1, 0.15, 2.0, 30.0)
+    for eta in (0.3, 0.92)
+    for distance in (1e-4, 1e-6, 1e-8, 1e-10)
+]
+
+
+@pytest.mark.parametrize(("omega", "eta", "distance"), NEAR)
 def test_near_the_critical_amplitude_a_time_is_as_accurate_as_the_amplitude_allows(omega, eta, distance):
     """Two ulp of a, by the documented slope, that of the power law, and by the true one, which may be less steep."""
     a = float(chattering.critical_amplitude(omega, eta)) - distance
@@ -80,8 +86,12 @@ def test_under_slow_forcing_the_first_arc_decides(omega):
     assert critical == pytest.approx(np.sqrt(1.0 + omega**2), rel=0.0, abs=1e-15)
 
 
-@pytest.mark.parametrize("eta", [1e-300, 1e-100, 1e-8, 0.01, 0.9, 0.999, 0.99999])
-@pytest.mark.parametrize("omega", [1e-6, 1e-3, 1.0, 1e6])
+CORNERS = [(omega, eta) for omega in (1e-6, 1e-3, 1.0, 1e6) for eta in (1e-300, 1e-100, 1e-8, 0.01, 0.9, 0.999)]
+#: Sequences of a hundred thousand impacts.
+LONG = [(1e-6, 0.99999), *(pytest.param(omega, 0.99999, marks=pytest.mark.thorough) for omega in (1e-3, 1.0, 1e6))]
+
+
+@pytest.mark.parametrize(("omega", "eta"), [*CORNERS, *LONG])
 def test_time_and_sequence_have_an_answer_at_every_corner(omega, eta):
     critical = float(chattering.critical_amplitude(omega, eta)) - 1.0
     assert 0.0 < critical < 0.38

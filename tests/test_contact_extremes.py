@@ -217,3 +217,19 @@ def test_a_friction_coefficient_is_a_positive_number(friction) -> None:
     response = simulate(Block(half_width=0.2, half_height=1.0), None, initial_rotation=0.1)
     with pytest.raises(rocking.InvalidOption, match="friction must be a positive number"):
         response.sliding_time(friction)
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_the_impacts_that_a_proof_sums_push_and_pull_as_those_that_are_followed(model: str) -> None:
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.5)
+    summed, followed = (
+        rocking.simulate(block, None, model=model, initial_rotation=0.1, chattering=how)
+        for how in (rocking.Certified(), rocking.VelocityThreshold(1e-9))
+    )
+    times = followed.impacts["time"][len(summed.impacts) :]
+    assert len(times) > 15
+    between = 0.5 * (times[:-1] + times[1:])[:8]
+    assert np.all(between < summed.events["time"][-1])
+    assert np.all(followed.normal_force(between) < 0.98)  # 1 at rest
+    np.testing.assert_allclose(summed.normal_force(between), followed.normal_force(between), rtol=1e-12)
+    np.testing.assert_allclose(summed.friction_demand(between), followed.friction_demand(between), rtol=1e-12)

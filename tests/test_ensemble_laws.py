@@ -173,9 +173,9 @@ def thousand_g(seed: int) -> tuple[Blocks, Motion]:
 def test_a_batch_of_one_gives_the_same_under_a_thousand_g(seed: int) -> None:
     blocks, motion = thousand_g(seed)
     together = simulate_many(blocks, motion).isel(motion=0)
+    alone = [simulate_many(block, motion) for block in blocks]
     for name in together.data_vars:
-        alone = [simulate_many(block, motion)[name].item() for block in blocks]
-        assert_array_equal(together[name].values, alone)
+        assert_array_equal(together[name].values, [one[name].item() for one in alone])
 
 
 # --- motions that are not samples -----------------------------------------------------------------------------

@@ -66,7 +66,7 @@ def test_counts_and_single_outcomes_are_the_same_data():
     assert single.goodness.statistic == pytest.approx(counted.goodness.statistic, rel=1e-8)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=15)
 @given(st.integers(0, 1000), st.floats(1e-3, 1e3))
 def test_other_units_scale_the_median_and_nothing_else(seed, factor):
     intensity, exceeded = outcomes(seed, 40)
@@ -103,7 +103,10 @@ def test_fishers_covariance_is_the_inverse_of_the_expected_curvature():
 
 
 # Shares of docs/_tables/fragility-coverage.txt, which scripts/fragility_coverage.py measures.
-@pytest.mark.parametrize(("band", "share", "repeats"), [("likelihood", 0.89, 80), ("bootstrap", 0.87, 60)])
+@pytest.mark.parametrize(
+    ("band", "share", "repeats"),
+    [("likelihood", 0.89, 40), pytest.param("bootstrap", 0.87, 60, marks=pytest.mark.thorough)],
+)
 def test_ninety_per_cent_intervals_hold_the_truth_nine_times_in_ten(band, share, repeats):
     held = np.zeros(2)
     for seed in range(repeats):
@@ -123,13 +126,13 @@ def striped(seed, count):
 
 def test_intervals_from_stripes_know_that_the_outcomes_of_a_motion_belong_together():
     held = np.zeros(2)
-    for seed in range(100):
+    for seed in range(50):
         intensity, exceeded, motion = striped(seed, 20)
         for k, clusters in enumerate((motion, None)):
             low, high = fit_fragility(intensity, exceeded, clusters=clusters).curves[0].median_interval
             held[k] += low <= 3.0 <= high
-    assert held[0] >= 82
-    assert held[1] < 70
+    assert held[0] >= 41
+    assert held[1] < 38
 
 
 def test_the_interval_of_the_likelihood_is_where_it_has_fallen_by_half_a_quantile():
@@ -266,8 +269,8 @@ def test_the_test_of_fit_is_pearsons_over_stripes():
 
 
 def test_the_test_of_fit_accepts_lognormals_and_rejects_what_is_none():
-    accepted = [fit_fragility(*outcomes(seed, 200)).curves[0].goodness.p_value > 0.05 for seed in range(60)]
-    assert sum(accepted) > 50
+    accepted = [fit_fragility(*outcomes(seed, 200)).curves[0].goodness.p_value > 0.05 for seed in range(20)]
+    assert sum(accepted) >= 17
     rng = np.random.default_rng(0)
     intensity = rng.uniform(1.0, 10.0, 400)
     # Safe again between 4 and 7, as a rocking block may be.
@@ -275,15 +278,17 @@ def test_the_test_of_fit_accepts_lognormals_and_rejects_what_is_none():
     assert fit_fragility(intensity, exceeded).curves[0].goodness.p_value < 1e-6
 
 
-def test_a_cloud_has_every_motion_at_its_own_intensity():
-    motions = [pulse.scaled(factor) for factor in (2.1, 2.4, 3.0, 4.0, 6.0) for pulse in PULSES]
-    result = fragility(BLOCK, motions, measure="pga", limits={"half": 0.5, "overturning": math.inf})
-    verdicts = [rocking.simulate(BLOCK, motion) for motion in motions]
-    for curve, limit in zip(result.curves, (0.5, math.inf), strict=True):
+@pytest.mark.parametrize("alpha", [0.2, (0.2, 0.25)])
+def test_a_cloud_has_every_motion_at_its_own_intensity(alpha):
+    block = rocking.Block.from_parameters(p=2.0, alpha=alpha, restitution=0.9)
+    motions = [pulse.scaled(factor) for factor in (2.1, 2.4, 2.6, 2.8, 3.0, 4.0, 6.0) for pulse in PULSES]
+    result = fragility(block, motions, measure="pga", limits={"part": 0.3, "overturning": math.inf})
+    verdicts = [rocking.simulate(block, motion) for motion in motions]
+    for curve, limit in zip(result.curves, (0.3, math.inf), strict=True):
         np.testing.assert_allclose(curve.intensity, [motion.pga for motion in motions], rtol=1e-12)
-        passed = [verdict.overturned or verdict.peak_over_slenderness > limit for verdict in verdicts]
+        passed = [verdict.overturned or verdict.peak_rotation / 0.2 > limit for verdict in verdicts]
         np.testing.assert_array_equal(curve.exceeded, passed)
-    assert result.curve("half").median < result.curve("overturning").median
+    assert result.curve("part").median < result.curve("overturning").median
 
 
 def test_stripes_scale_every_motion_to_every_level():

@@ -28,7 +28,7 @@ from rocking.kernels.state import new_scratch
 #: Limits that no motion passes.
 ANYTHING = (-math.inf, math.inf)
 
-quick = settings(deadline=None, max_examples=60)
+quick = settings(deadline=None, max_examples=30)
 few = settings(deadline=None, max_examples=12)
 
 models = st.sampled_from(["linear", "nonlinear"])

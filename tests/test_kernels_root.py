@@ -15,7 +15,7 @@ from rocking.kernels import events
 from rocking.kernels.compiled import UNCOMPILED
 from rocking.kernels.events import curvature_bound, first_root
 
-quick = settings(deadline=None, max_examples=150)
+quick = settings(deadline=None, max_examples=80)
 
 
 def exact_first_root(c: Sequence[float], h: float, raised: float = 0.0) -> float:

@@ -18,7 +18,7 @@ from rocking.kernels.events import StepEnd, advance
 from rocking.kernels.short_arc import short_step
 from rocking.kernels.state import Outcome, Record, new_scratch
 
-quick = settings(deadline=None, max_examples=200)
+quick = settings(deadline=None, max_examples=80)
 weights = pytest.mark.parametrize("weighted", [False, True], ids=["at rest", "weighted"])
 models = pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
 

@@ -292,6 +292,8 @@ def test_a_map_is_the_same_in_one_thread_and_in_several():
     assert one.data.identical(several.data)
 
 
+# The tests above hold the closed form; the example draws a map of five thousand pulses as well.
+@pytest.mark.thorough
 def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert runpy.run_path(str(EXAMPLE))["main"]() < 1e-8

@@ -101,6 +101,18 @@ def test_the_gain_is_butterworths_squared(order):
     assert amplitude_after(15.0, (None, 10.0), order)[0] == pytest.approx(high, rel=1e-4)
 
 
+@pytest.mark.parametrize("corners", [(0.1, 10.0), (0.5, 20.0)])
+def test_a_band_pass_takes_the_ground_to_be_at_rest_before_and_after(corners):
+    """Zeros that are added by hand change nothing: those that the filter adds last long enough for its lower corner."""
+    samples = np.random.default_rng(3).normal(size=2001)
+    zeros = np.zeros(8000)
+    short, long = (
+        Motion.from_samples(values, STEP).processed(band_pass=corners).samples[1]
+        for values in (samples, np.concatenate([zeros, samples, zeros]))
+    )
+    assert_allclose(short, long[8000:10001], rtol=0.0, atol=1e-11 * np.abs(long).max())
+
+
 def test_a_band_pass_takes_the_drift_out_of_a_record():
     record = records.load("ridgecrest-clc-090")
     done = record.processed(baseline=0, band_pass=(0.05, None))

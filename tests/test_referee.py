@@ -15,7 +15,7 @@ import pytest
 from oracles import referee
 from oracles.referee import Batch, Verdict
 
-QUICK, LONG = 2_000, 40_000
+QUICK, LONGER, LONG = 400, 2_000, 40_000
 LAW_BATCHES = 12
 
 vertical = pytest.mark.parametrize("vertical", [False, True], ids=["horizontal", "vertical"])
@@ -34,8 +34,9 @@ def said(verdict: Verdict) -> str:
 
 
 @vertical
-def test_an_ensemble_gives_what_single_simulations_give(vertical: bool) -> None:
-    verdict = judged(1, QUICK, vertical=vertical)
+@pytest.mark.parametrize("pairs", [QUICK, pytest.param(LONGER, marks=pytest.mark.thorough)])
+def test_an_ensemble_gives_what_single_simulations_give(pairs: int, vertical: bool) -> None:
+    verdict = judged(1, pairs, vertical=vertical)
     assert not verdict.differences, said(verdict)
     # Enough of what was drawn must be decided for the comparison to mean anything.
     assert verdict.ambiguous + verdict.refused <= 0.1 * verdict.pairs
@@ -97,7 +98,9 @@ def assert_independent_of_the_batch(given: Batch, alone: range) -> None:
 
 
 @vertical
-@pytest.mark.parametrize("number", range(LAW_BATCHES))
+@pytest.mark.parametrize(
+    "number", [pytest.param(n, marks=[] if n % 3 == 0 else pytest.mark.thorough) for n in range(LAW_BATCHES)]
+)
 def test_an_outcome_does_not_depend_on_the_batch(number: int, vertical: bool) -> None:
     given = referee.batch(4, number, vertical=vertical)
     assert_independent_of_the_batch(given, range(0, len(given.blocks), 4))

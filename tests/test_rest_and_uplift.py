@@ -36,6 +36,15 @@ def assert_course(motion: Motion, model: str, kinds: list[str], *, rtol: float =
 
 @MODELS
 @pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_no_rest_is_proven_before_the_highest_rotation(model: str, sign: float) -> None:
+    """After the first impact the time of rest is known well enough, but the next arc is the highest."""
+    size = sign * threshold(model)
+    response = assert_course(Motion([0.0, 1e-3, 3.0], [[1.01 * size], [-0.9 * size]]), model, ["uplift", "rest"])
+    assert response.peak_time > response.impacts["time"][0]
+
+
+@MODELS
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("second", [1.0, -1.0])
 def test_a_block_rests_and_uplifts_again_within_one_piece(model: str, sign: float, second: float) -> None:
     """One parabola or cubic: over the threshold, under it for long enough to rest, and over one of the two again."""

@@ -21,7 +21,7 @@ from rocking.motion.scaling import Measure
 
 G = 9.80665
 
-quick = settings(deadline=None, max_examples=30)
+quick = settings(deadline=None, max_examples=12)
 
 
 def fragility_with(median: float, dispersion: float) -> rocking.Fragility:
@@ -92,7 +92,7 @@ def test_the_rate_below_an_intensity_is_that_of_the_weaker_motions(exponent: flo
     assert y == pytest.approx(from_motions(x * G / 1.001, x * G * 1.001) / everything / (2 * math.log(1.001)), rel=1e-4)
 
 
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=4)
 @given(st.floats(0.5, 8.0), st.floats(0.05, 0.9), st.integers(0, 10_000))
 def test_against_any_hazard_curve_the_rate_is_the_integral(median: float, beta: float, seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -13,6 +13,8 @@ from rocking.kernels.state import new_scratch
 
 TERMS = 90
 
+CASES = pytest.mark.parametrize("cases", [24, pytest.param(80, marks=pytest.mark.thorough)])
+
 Polynomial = list[float]
 
 
@@ -35,11 +37,12 @@ def drawn(random: np.random.Generator) -> tuple[float, float, float, Polynomial,
     return alpha, u, v, A, weight
 
 
+@CASES
 @pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
-def test_a_series_ends_where_what_it_leaves_out_is_nothing(nonlinear: bool) -> None:
+def test_a_series_ends_where_what_it_leaves_out_is_nothing(nonlinear: bool, cases: int) -> None:
     """Of the velocity at the end of the step: rounding of all terms, and not more, also after terms that vanish."""
     random, lacunary = np.random.default_rng(11), 0
-    for _ in range(80):
+    for _ in range(cases):
         alpha, u, v, push, weight = drawn(random)
         block = rocking_block((1.0, 1.0), (alpha, alpha), nonlinear=nonlinear)
         ground = in_units_of_g([0.0, 1e3], [push], vertical=[[weight[0] - 1.0, *weight[1:]]])
@@ -56,15 +59,16 @@ def test_a_series_ends_where_what_it_leaves_out_is_nothing(nonlinear: bool) -> N
         left_out = float(sum(abs(x) for x in rates[order:]))
         assert left_out <= 2.0**-53 * largest
         lacunary += weight[0] == 0.0
-    assert lacunary > 25
+    assert lacunary > 0.3 * cases
 
 
+@CASES
 @pytest.mark.parametrize("order", [9, 14, ORDER])
 @pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
-def test_the_bound_holds_all_that_a_series_leaves_out(nonlinear: bool, order: int) -> None:
+def test_the_bound_holds_all_that_a_series_leaves_out(nonlinear: bool, order: int, cases: int) -> None:
     """Term by term from exact coefficients; and it is no more than some hundred times what is left out, mostly."""
     random, judged, ratios = np.random.default_rng(order), 0, []
-    for _ in range(80):
+    for _ in range(cases):
         alpha, u, v, push, weight = drawn(random)
         degree = max(len(push), len(weight)) - 1
         if degree >= order - 1:
@@ -89,7 +93,7 @@ def test_the_bound_holds_all_that_a_series_leaves_out(nonlinear: bool, order: in
         assert left_out <= bound * (1.0 + 1e-9)
         if left_out > 0.0:
             ratios.append(bound / left_out)
-    assert judged > 45
+    assert judged > 0.5 * cases
     assert np.median(ratios) < 300.0
 
 

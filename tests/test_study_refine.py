@@ -24,7 +24,8 @@ from rocking.studies.units import name_of
 TOLERANCE = 1e-3
 SCALES = np.linspace(4.0, 20.0, 9)
 MOTIONS = [rocking.pulses.one_sine(1.0, 5.0 / np.pi), rocking.pulses.one_sine(2.0, 0.8)]
-BLOCKS = rocking.Blocks(p=np.linspace(1.8, 3.0, 50), alpha=0.2, restitution=0.9)
+SIDES = [[0.2, 0.21]] * 50  # motions that are reversed find other blocks
+BLOCKS = rocking.Blocks(p=np.linspace(1.8, 3.0, 50), alpha=SIDES, restitution=0.9)
 OPTIONS = {"levels": SCALES, "measure": "pga", "polarity": "both", "model": "linear"}
 
 SCRIPT = """
@@ -392,3 +393,15 @@ model = "linear"
         read_study(file).product.blocks, read_study(file).product.motions, levels=np.linspace(1, 9, 5), model="linear"
     )
     np.testing.assert_allclose(table.pga_high_m_s2, exact.band_start.values.ravel()[:4], rtol=1.1e-4)
+
+
+def test_a_bracket_whose_middle_is_unknown_once_stays_as_it_is():
+    same = np.zeros(3, dtype=np.int64)
+    low, high, above = np.full(3, 1.0), np.full(3, 2.0), np.full(3, True)
+    brackets = refine.Brackets(same, same, same, np.arange(3), low, high, above, np.array([False, True, True]))
+    assert brackets.wide({refine.VERDICTS[0]: 0.1}).tolist() == [1, 2]
+    found = np.array([refine.Finding.YES, refine.Finding.UNKNOWN], dtype=np.int8)
+    after = brackets.halved(np.array([1, 2]), found)
+    assert (after.low.tolist(), after.high.tolist()) == ([1.0, 1.0, 1.0], [2.0, 1.5, 2.0])
+    assert after.known.tolist() == [False, True, False]
+    assert after.wide({refine.VERDICTS[0]: 0.1}).tolist() == [1]

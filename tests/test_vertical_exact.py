@@ -19,7 +19,7 @@ from oracles.vertical_referee import Case, Verdict
 from rocking import Block, Motion, simulate
 
 G = vertical_referee.GRAVITY
-QUICK, LONG = 40, 2_000
+QUICK, LONGER, LONG = 10, 40, 2_000
 MODELS = pytest.mark.parametrize("model", ["linear", "nonlinear"])
 
 
@@ -57,8 +57,9 @@ def followed(case: Case, **options: float) -> Course:
 # --- what simulations say -------------------------------------------------------------------------------------
 
 
-def test_responses_under_vertical_motion_are_right() -> None:
-    assert_without_fault(judged(3, QUICK))
+@pytest.mark.parametrize("count", [QUICK, pytest.param(LONGER, marks=pytest.mark.thorough)])
+def test_responses_under_vertical_motion_are_right(count: int) -> None:
+    assert_without_fault(judged(4, count))
 
 
 @pytest.mark.slow
@@ -188,7 +189,9 @@ def drawn(number: int) -> Case:
     return vertical_referee.case(11, number)
 
 
-@pytest.mark.parametrize("number", range(24))
+@pytest.mark.parametrize(
+    "number", [pytest.param(n, marks=[] if n % 4 == 0 else pytest.mark.thorough) for n in range(24)]
+)
 def test_the_judge_says_the_same_with_more_digits_and_other_steps(number: int) -> None:
     """So 40 digits are enough: errors grow along a response, here up to the last impact that is followed."""
     case = drawn(number)
@@ -205,7 +208,9 @@ def test_the_judge_says_the_same_with_more_digits_and_other_steps(number: int) -
         assert abs(mine[0] - theirs[0]) < 1e-25
 
 
-@pytest.mark.parametrize("number", [0, 2, 4, 5, 9, 10, 12, 15, 18])
+@pytest.mark.parametrize(
+    "number", [2, 5, 9, *(pytest.param(n, marks=pytest.mark.thorough) for n in (0, 4, 10, 12, 15, 18))]
+)
 def test_the_judge_agrees_with_another_integrator(number: int) -> None:
     case = drawn(number)
     course = followed(case, digits=40)

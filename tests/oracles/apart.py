@@ -18,7 +18,8 @@ STARTING = 300.0
 """Seconds to import and to compile the kernels where nobody has yet; not part of a run's time."""
 
 _PROGRAM = """
-import json, math, resource, sys, warnings
+import json, math, resource, signal, sys, warnings
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background may have none
 resource.setrlimit(resource.RLIMIT_AS, ({memory}, {memory}))
 import numpy as np, rocking
 warnings.simplefilter("ignore")
