@@ -10,6 +10,9 @@ PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --be
 FAST := "not thorough and not slow and not browser"
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_authentication.py explorer_server.py)
 
+# Tests start hundreds of processes: without its compiled modules Python takes seconds to import what each of them needs.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help demo wheel quick test test-all browser slow lowest latest .bounds doctest lint types docs bench clean distclean
 

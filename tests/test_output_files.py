@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,11 +24,15 @@ RECORD = "el-centro-meloland-270"
 def full_disk(left: int) -> Iterator[None]:
     """Let no file grow beyond so many bytes: the system itself fails the writes, in compiled libraries as well."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    writes_bytecode = sys.dont_write_bytecode
+    # Python would keep half of what it compiles of a module that is imported meanwhile, and fail on it ever after.
+    sys.dont_write_bytecode = True
     resource.setrlimit(resource.RLIMIT_FSIZE, (left, before[1]))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        sys.dont_write_bytecode = writes_bytecode
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 from public_names import public_names
+from test_output_files import full_disk
 
 import rocking
 from rocking import chattering, engine
@@ -270,15 +271,9 @@ def test_whatever_is_returned_shows_itself_in_a_few_lines(find):
 
 
 def test_why_a_file_cannot_be_written_is_said_without_the_library_s_internals(tmp_path):
-    resource = pytest.importorskip("resource")
     path, dataset = tmp_path / "large.nc", xr.Dataset({"numbers": ("x", np.random.default_rng(1).random(100_000))})
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, before[1]))
-    try:
-        with pytest.raises(rocking.OutputError) as caught:
-            write_netcdf(path, dataset)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    with full_disk(200_000), pytest.raises(rocking.OutputError) as caught:
+        write_netcdf(path, dataset)
     said = f"{path}: cannot be written: File too large; nothing of it was kept; choose another place"
     assert str(caught.value) == said
     assert not path.exists()
