@@ -8,7 +8,7 @@ PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1
 # Work stealing gives each worker a run of neighbouring tests, so that few of a module's fixtures are made twice.
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --benchmark-disable
 FAST := "not thorough and not slow and not browser"
-EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_authentication.py explorer_server.py)
+EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_analysis.py response.py chattering_maps.py processing.py explorer_core.py explorer_authentication.py explorer_server.py first_response.py)
 
 # Tests start hundreds of processes: without its compiled modules Python takes seconds to import what each of them needs.
 unexport PYTHONDONTWRITEBYTECODE
@@ -24,6 +24,7 @@ demo: .venv/.base ## simulate a block under a shipped record; writes out/demo.pn
 
 wheel: .venv/.all ## build a wheel for this platform, with kernels compiled beforehand, into dist
 	$(BIN)/python scripts/ship_kernels.py
+	@rm -f dist/rocking-*.whl
 	$(BIN)/python -m pip wheel --disable-pip-version-check -q --no-deps --wheel-dir dist .
 
 quick: .venv/.all ## run the tests of what has changed since the last commit, or since BASE=..., within half a minute
@@ -44,14 +45,16 @@ slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a h
 
 lowest: ## install the oldest versions that pyproject.toml allows, and run a test of every part with them
 	$(PYTHON) scripts/lowest_versions.py > .lowest.txt
-	@$(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest CONSTRAINTS="-c .lowest.txt"
+	@ROCKING_SHIPPED=0 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest PACKAGE=. CONSTRAINTS="-c .lowest.txt"
 
-latest: ## the same without constraints: with the versions of the day
-	@$(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-latest CONSTRAINTS=
+latest: wheel ## the same with the versions of the day, and with the compiled kernels of the wheel
+	@ROCKING_LIBRARY_REQUIRED=1 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-latest \
+	    PACKAGE="$$(ls $(CURDIR)/dist/rocking-*.whl)" CONSTRAINTS=
 
 .bounds:
 	@test -x $(ENVIRONMENT)/bin/python || $(PYTHON) -m venv $(ENVIRONMENT)
-	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq --no-compile $(CONSTRAINTS) ".[test,explorer]"
+	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq --no-compile $(CONSTRAINTS) "$(PACKAGE)[test,explorer]"
+	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq --no-deps --force-reinstall "$(PACKAGE)"
 	$(PYTEST:$(BIN)/%=$(ENVIRONMENT)/bin/%) -m $(FAST) $(EVERY_PART)
 
 doctest: .venv/.all ## run the examples in the docstrings

@@ -14,7 +14,7 @@ import numpy as np
 import rocking
 from rocking import rules
 from rocking.analysis.rules.criteria import TITLES
-from rocking.plot.canvas import CURVES, add_labels, add_legend, figure_for, labelled
+from rocking.plot.canvas import CURVES, add_labels, add_legend, figure_for, handles_of
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TABLES = DOCS / "_tables"
@@ -142,7 +142,7 @@ def figure(ratios, capacities):
         axes.text(0.97, 0.02, "safe side", ha="right", color="0.35", fontsize=8)
         axes.text(1.03, 0.02, "unsafe side", ha="left", color="0.35", fontsize=8)
         add_labels(axes, "overturning PGA by the rule over the exact one", "share of blocks and records")
-        add_legend(drawn, None, labelled(axes))
+        add_legend(drawn, None, handles_of(axes))
     return drawn
 
 

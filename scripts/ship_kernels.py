@@ -14,6 +14,7 @@ import json
 import os
 import platform
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -302,15 +303,47 @@ def library(level: str, out: Path, names: Collection[str] = ()) -> dict[str, Any
 
 
 def ship(out: Path, levels: list[str], names: Collection[str] = ()) -> None:
-    """Make the libraries of some levels, the lowest first, and the manifest."""
-    from rocking.kernels.library import FOLDER, sources
-
+    """Make the libraries of some levels, the lowest first, and the manifest, unless they are there already."""
+    made_from = origin(levels, names)
+    files = [out / f"kernels-{level}{SUFFIX}" for level in levels]
+    if is_made(out, made_from, files):
+        print(f"{out}: made from these sources already")
+        return
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         kernels, *_ = pool.map(library, levels, [out] * len(levels), [names] * len(levels))
-    files = [out / f"kernels-{level}{SUFFIX}" for level in levels]
-    libraries = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
-    manifest = {"sources": sources(FOLDER.parent), "platform": tag(files), "libraries": libraries, "kernels": kernels}
+    libraries = {path.name: digest(path) for path in files}
+    manifest = {**made_from, "platform": tag(files), "libraries": libraries, "kernels": kernels}
     (out / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+
+
+def origin(levels: list[str], names: Collection[str]) -> dict[str, Any]:
+    """Say what libraries are made from: sources of kernels, this script, versions of the compiler, what was asked."""
+    from importlib import metadata
+
+    from rocking.kernels.library import FOLDER, sources
+
+    versions = {name: metadata.version(name) for name in ("numba", "llvmlite")}
+    return {
+        "sources": sources(FOLDER.parent),
+        "script": digest(Path(__file__)),
+        **versions,
+        "asked": [levels, [*names]],
+    }
+
+
+def is_made(out: Path, made_from: dict[str, Any], files: list[Path]) -> bool:
+    """Whether the libraries and the manifest are there, and whole."""
+    try:
+        manifest = json.loads((out / "manifest.json").read_text("utf-8"))
+        libraries = {path.name: digest(path) for path in files}
+        return bool(manifest == {**manifest, **made_from, "libraries": libraries})
+    except (OSError, ValueError, TypeError):
+        return False
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def tag(libraries: list[Path]) -> str:
@@ -328,6 +361,8 @@ def main() -> None:
     parser.add_argument("kernels", nargs="*", help="names of kernels; by default all")
     parser.add_argument("--level", help="compile for this level alone (used by the script itself)")
     options = parser.parse_args()
+    if shutil.which("cc") is None:
+        sys.exit("error: a C compiler (cc) links the libraries: install one, or make a wheel without them: pip wheel .")
     options.out.mkdir(parents=True, exist_ok=True)
     if options.level:
         kernels = compiled(options.level, options.out, options.kernels)

@@ -250,6 +250,7 @@ print(json.dumps([float(answer) for answer in answers]))
 """
 
 
+@pytest.mark.thorough
 def test_kernels_give_the_same_answers_uncompiled():
     plain, compiled = (
         json.loads(

@@ -273,6 +273,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_figure_that_is_refused_takes_nothing_else_away(run, tmp_path, monkeypatch, request, command):
     def refused(*arguments, **options):
@@ -318,6 +319,7 @@ def outcomes_table(tmp_path):
     return table
 
 
+@pytest.mark.usefixtures("coarse")
 def test_calibrate_json_is_the_calibration(run, outcomes_table):
     code, out, err = run("calibrate", outcomes_table, *CALIBRATED, "--folds", "2", "--predict", RECORD, OTHER, "--json")
     assert (code, err) == (0, "")
@@ -334,6 +336,7 @@ def test_calibrate_json_is_the_calibration(run, outcomes_table):
     assert list(result["predicted"].values()) == pytest.approx(predicted.tolist(), rel=1e-12)
 
 
+@pytest.mark.usefixtures("coarse")
 def test_calibrate_prints_the_diagnostics_and_writes_what_it_says(run, outcomes_table, tmp_path):
     code, out, _ = run("calibrate", outcomes_table, *CALIBRATED, "--out", tmp_path / "out")
     assert code == 0
@@ -343,6 +346,7 @@ def test_calibrate_prints_the_diagnostics_and_writes_what_it_says(run, outcomes_
     assert len((tmp_path / "out" / "ensemble.csv").read_text().splitlines()) > 10
 
 
+@pytest.mark.usefixtures("coarse")
 def test_several_specimens_are_calibrated_each_by_itself(run, outcomes_table, tmp_path, monkeypatch):
     header, *rows = outcomes_table.read_text().splitlines()
     flipped = [",".join((*row.split(",")[:2], "1" if k > 4 else "0", row.split(",")[3])) for k, row in enumerate(rows)]

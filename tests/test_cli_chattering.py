@@ -185,6 +185,7 @@ def test_paper_refuses_a_parameter_that_a_figure_does_not_depend_on(run, tmp_pat
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.thorough
 def test_paper_draws_figure_6_as_contours_and_as_a_surface(run, tmp_path):
     code, _, _ = run("paper", "--figure", 6, "--out", tmp_path)
     assert code == 0

@@ -157,6 +157,7 @@ def history(tmp_path):
     return write
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_calibration_takes_semicolons_and_gives_units(run, history):
     known = ["--alpha", 0.2, "--restitution", 0.9]
     code, plain, err = run("calibrate", history(), *known)
