@@ -1,4 +1,4 @@
-"""One response beside SciPy's, and a process from its start to its first response, kernels compiled or not.
+"""One response beside SciPy's.
 
 Usage: python benchmarks/bench_simulate.py
 
@@ -6,10 +6,7 @@ The baseline (tests/oracles/scipy_events.py) is DOP853 restarted at each impact,
 of tolerances whose peak rotation, and that of the next tighter one, lies within 1e-6 of the response's.
 """
 
-import os
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -32,12 +29,6 @@ BLOCKS: dict[Model, dict[str, float]] = {
     "linear": {"p": 1.2, "alpha": 0.22, "restitution": 0.88},
     "nonlinear": {"p": 2.0, "alpha": 0.15, "restitution": 0.92},
 }
-FIRST_RESPONSE = """
-import rocking
-motion = rocking.records.load({record!r})
-block = rocking.Block(half_width=0.2, half_height=1.0)
-print(rocking.simulate(block, motion).peak_rotation)
-"""
 
 
 def main() -> None:
@@ -47,9 +38,6 @@ def main() -> None:
     print("model      impacts   response     SciPy   rtol peak error   ratio")
     for model, parameters in BLOCKS.items():
         print(compare(motion, samples, model, parameters))
-    print(f"process to its first response  {1e3 * first_response():7.0f} ms")
-    print(f"the same, nothing compiled yet {1e3 * very_first_response():7.0f} ms")
-    print(f"rocking --help                 {1e3 * command_help():7.0f} ms")
 
 
 def compare(motion: rocking.Motion, samples: np.ndarray, model: Model, parameters: dict[str, float]) -> str:
@@ -82,27 +70,6 @@ def loosest_tolerance(samples: np.ndarray, problem: Problem, peak: float) -> tup
         if max(error, tighter) <= SAME_PEAK:
             return rtol, error
     raise SystemExit(f"SciPy's peak stays off by {min(errors):.1e}, more than {SAME_PEAK:.0e}")
-
-
-def first_response() -> float:
-    """Seconds of a new process from its start to its first response, caches warm."""
-    script = FIRST_RESPONSE.format(record=SHIPPED)
-    return shortest(lambda: run([sys.executable, "-c", script]), 5)
-
-
-def very_first_response() -> float:
-    """Seconds of a new process from its start to its first response, with an empty cache."""
-    script = FIRST_RESPONSE.format(record=SHIPPED)
-    with tempfile.TemporaryDirectory() as cache:
-        return shortest(lambda: run([sys.executable, "-c", script], NUMBA_CACHE_DIR=cache), 1)
-
-
-def command_help() -> float:
-    return shortest(lambda: run([str(Path(sys.executable).with_name("rocking")), "--help"]), 5)
-
-
-def run(command: list[str], **environment: str) -> None:
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env={**os.environ, **environment})
 
 
 def shortest(action: Callable[[], object], repeats: int) -> float:

@@ -38,7 +38,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         pytest.skip(TOO_LATE)
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Say what came too late."""
     late = [each for each in terminalreporter.stats.get("skipped", ()) if TOO_LATE in str(each.longrepr)]
     if late:
