@@ -1,5 +1,6 @@
 """The commands with many simulations: their results, their files, one line for every mistake."""
 
+import csv
 import json
 import re
 from importlib import import_module
@@ -453,3 +454,16 @@ def test_a_vertical_motion_is_scaled_along_by_the_commands_that_scale(run, comma
     assert found[part] == expected[part]
     alone = json.loads(run(command, *records, *SIZES, "--json")[1])
     assert found[part] != alone[part]
+
+
+def test_what_was_simulated_is_kept_where_no_curve_can_be_fitted(run, tmp_path):
+    weak = ["--levels", "0.1:0.3:3", "--out", tmp_path / "out"]
+    code, _, err = run("fragility", RECORD, *SIZES, *weak)
+    assert code == 2
+    assert "none of the 3 outcomes exceeds the limit" in err and str(tmp_path / "out" / "outcomes.csv") in err
+    rows = list(csv.DictReader((tmp_path / "out" / "outcomes.csv").open()))
+    assert [row["pga_m_s2"] for row in rows] == ["0.1", "0.2", "0.3"]
+    block = rocking.Block(half_width=0.12, half_height=0.55)
+    with pytest.raises(rocking.Unfitted) as refused:
+        rocking.fragility(block, [rocking.records.load(RECORD)], levels=[0.1, 0.2, 0.3])
+    assert refused.value.outcomes["peak_rotation_rad"].tolist() == [float(row["peak_rotation_rad"]) for row in rows]

@@ -24,6 +24,7 @@ from .errors import (
     StudyError,
     UnequalSides,
     Unfinished,
+    Unfitted,
     UnreadableRecord,
 )
 from .explorer.launch import Frame, explore
@@ -79,6 +80,7 @@ __all__ = [
     "Treatment",
     "UnequalSides",
     "Unfinished",
+    "Unfitted",
     "UnreadableRecord",
     "VelocityThreshold",
     "analysis",

@@ -9,7 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Where a name of an argument stands in a template; or "{}" itself, as `literal` writes it.
 _PLACE: Final = re.compile(r"\{\{\}\}|\{\}")
@@ -154,6 +157,18 @@ class UnreadableRecord(RockingError):
 
 class InvalidOption(RockingError):
     """An argument of an analysis (model, chattering treatment, duration, ...) is not usable."""
+
+
+class Unfitted(InvalidOption):
+    """Outcomes determine no curve. What was simulated is kept.
+
+    Attributes
+    ----------
+    outcomes : pandas.DataFrame or None
+        Every simulation, as in `Fragility.outcomes`; None where nothing was simulated.
+    """
+
+    outcomes: pd.DataFrame | None = None
 
 
 class Unfinished(RockingError):

@@ -29,11 +29,12 @@ from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, wr
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, ScaledPulseOptions
 from rocking.constants import Model
 from rocking.ensemble import Polarity
-from rocking.errors import InvalidOption, RockingError, literal
+from rocking.errors import InvalidOption, RockingError, Unfitted, literal
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
+from rocking.progress import note
 from rocking.quantities import bounds, number, tilt
-from rocking.tables import counted, text_table
+from rocking.tables import counted, text_table, write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -116,14 +117,15 @@ def fragility(
         else:
             _check_hazard(curve, measure.wanted)
             read = motion.read_all(names)
-            fitted = run(
-                motions=list(read.motions.values()),
-                **measure.chosen(),
-                **model.chosen() | bodies,
-                limits=states,
-                polarity=polarity,
-                band=band,
-            )
+            with _outcomes_kept(folder):
+                fitted = run(
+                    motions=list(read.motions.values()),
+                    **measure.chosen(),
+                    **model.chosen() | bodies,
+                    limits=states,
+                    polarity=polarity,
+                    band=band,
+                )
         found, text = fitted.to_dict() | ({} if read is None else read.to_dict()), [fitted.summary()]
         figures: dict[str, Callable[[], Figure]] = {"fragility": fitted.plot}
         if curve is not None:
@@ -144,6 +146,18 @@ def fragility(
                 together.to_csv(folder / "outcomes.csv", "outcomes")
             write_results(folder, figures=figures, result=found)
         print_result(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
+
+
+@contextlib.contextmanager
+def _outcomes_kept(folder: Path | None) -> Iterator[None]:
+    """Write what was simulated although no curve can be fitted to it."""
+    try:
+        yield
+    except Unfitted as refused:
+        if folder is not None and refused.outcomes is not None:
+            write_csv(folder / "outcomes.csv", refused.outcomes)
+            note(f"what was simulated is in {folder / 'outcomes.csv'}")
+        raise
 
 
 def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:

@@ -15,7 +15,7 @@ from rocking.analysis.fragility import lognormal
 from rocking.analysis.fragility.confidence import Confidence, Ends, LikelyRegion, Quantity, Resamples
 from rocking.analysis.fragility.lognormal import Outcomes, Probit, normal_scores, probabilities
 from rocking.arrays import Floats, Integers, as_asked
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.scaling import Measure, intensities
 
 BandKind = Literal["likelihood", "bootstrap"]
@@ -353,11 +353,11 @@ def fitted_curve(
     outcomes = Outcomes(z, exceeded, trials)
     fault = lognormal.unidentified(outcomes, measure.shown)
     if fault is not None:
-        raise InvalidOption(f"no lognormal can be fitted to {name!r}: {fault}")
+        raise Unfitted(f"no lognormal can be fitted to {name!r}: {fault}")
     fitted = lognormal.fit(outcomes.alone())
     middle = float(-fitted.intercept[0] / fitted.slope[0])
     if not z.min() - _BEYOND <= middle <= z.max() + _BEYOND:
-        raise InvalidOption(
+        raise Unfitted(
             f"no lognormal can be fitted to {name!r}: the outcomes hardly depend on the intensity, and put the median "
             f"{'above' if middle > z.max() else 'below'} all intensities by a factor of more than 1000: motions nearer "
             "to it, or another measure, are needed"

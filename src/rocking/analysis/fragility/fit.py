@@ -18,7 +18,7 @@ from rocking.block import Block, Blocks
 from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import Polarity, simulate_many
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.tables import counted
@@ -140,15 +140,17 @@ def fragility(
     ratio[table.overturned.values] = np.inf
     clusters = np.broadcast_to(np.arange(len(shaken))[None, :, None, None], ratio.shape)
     x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
-    curves = [
-        fitted_curve(name, (x, trials * passed(ratio, limit, name).ravel(), trials), clusters.ravel(), band, how, limit)
-        for name, limit in states.items()
-    ]
-    kind = "cloud" if levels is None else counted(len(intensity), "stripe")
-    text = f"{pooled(blocks, weights)}, {counted(len(shaken), 'motion')}, {kind}, {model} model"
     outcomes = _outcomes(table, how, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
+    data = {name: (x, trials * passed(ratio, limit, name).ravel(), trials) for name, limit in states.items()}
+    try:
+        curves = [fitted_curve(name, data[name], clusters.ravel(), band, how, states[name]) for name in states]
+    except Unfitted as refused:
+        refused.outcomes = outcomes
+        raise
+    kind = "cloud" if levels is None else counted(len(intensity), "stripe")
+    text = f"{pooled(blocks, weights)}, {counted(len(shaken), 'motion')}, {kind}, {model} model"
     return Fragility(
         curves=tuple(curves),
         measure=how,
