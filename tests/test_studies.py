@@ -220,10 +220,8 @@ def test_the_second_signal_stops_in_the_middle_of_a_unit(complete, tmp_path, mon
     with monkeypatch.context() as patched:
         patched.setattr("rocking.studies.run.compute", compute)
         patched.setattr(study._store, "put", put_and_stop)
-        start = time.monotonic()
         with pytest.raises(Interrupted):
             study.run(threads=2)
-    assert time.monotonic() - start < 30.0
     assert len(begun) > 1
     assert study.status.done == 1
     study.run()
