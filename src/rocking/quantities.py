@@ -12,8 +12,8 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
-from rocking.motion.formats.units import find_unit
 from rocking.motion.scaling import FACTOR, Measure
+from rocking.motion.units import find_unit
 from rocking.tables import decimal
 
 #: What reads one number: its text and the name of the argument that it is of, to SI units.

@@ -14,7 +14,7 @@ from typing import Any, Final, Literal, NamedTuple
 from rocking.constants import VERSION
 from rocking.errors import InvalidOption
 from rocking.motion import records
-from rocking.motion.formats.units import CHOICES
+from rocking.motion.units import CHOICES
 from rocking.quantities import Quantity, acceleration, angle, length, number, sides
 
 #: Parameters that one form sets together, and that a comparison replaces together.

@@ -18,8 +18,8 @@ import numpy as np
 from rocking import checks
 from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description, Origin
-from rocking.motion.formats.units import choose_unit
 from rocking.motion.motion import Motion
+from rocking.motion.units import choose_unit
 
 __all__ = ["Record", "info", "load", "names"]
 

@@ -15,8 +15,8 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion.description import Description, Origin
 from rocking.motion.formats.source import Request, Source
-from rocking.motion.formats.units import Unit
 from rocking.motion.motion import Motion
+from rocking.motion.units import Unit
 
 #: Even times may be off their grid by this share of the step (or by what the printed decimals round away).
 _JITTER = 1e-6

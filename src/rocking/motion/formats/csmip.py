@@ -18,8 +18,8 @@ from typing import NamedTuple
 from rocking.arrays import Floats
 from rocking.motion.formats.channel import Channel, Identification, Recognised, even_step, first_fault, to_acceleration
 from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.units import Unit
 from rocking.motion.formats.values import Layout, bad_number, numeric_end, parse, read_count
+from rocking.motion.units import Unit
 
 V1_TITLE = re.compile(r"^\s*uncorrected accelerogram", re.IGNORECASE)
 V2_TITLE = re.compile(r"^\s*corrected accelerogram", re.IGNORECASE)

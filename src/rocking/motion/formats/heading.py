@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 from rocking.motion.formats.source import Source
-from rocking.motion.formats.units import SECOND, Unit, find_time_unit, find_unit
+from rocking.motion.units import SECOND, Unit, find_time_unit, find_unit
 
 #: What a column holds: times, numbers of rows, periods or ordinates of a spectrum, or values of a channel.
 Kind = Literal["time", "count", "spectrum", "channel"]

@@ -15,7 +15,7 @@ from typing import Any, BinaryIO, NamedTuple
 
 from rocking import checks
 from rocking.errors import InvalidMotion, UnreadableRecord, literal
-from rocking.motion.formats.units import CHOICES, Unit, choose_unit, find_unit
+from rocking.motion.units import CHOICES, Unit, choose_unit, find_unit
 
 #: Largest file that is read, bytes; the longest strong-motion records are a hundred times smaller.
 SIZE_LIMIT = 512 * 2**20

@@ -31,8 +31,8 @@ from rocking.motion.formats.channel import (
 )
 from rocking.motion.formats.heading import RULE, Column, Heading, heading_of, names_columns
 from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.units import CHOICES, Unit
 from rocking.motion.formats.values import convert, not_a_number, parse, rows_of_numbers
+from rocking.motion.units import CHOICES, Unit
 
 NAME = "text table"
 

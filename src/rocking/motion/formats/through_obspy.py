@@ -12,8 +12,8 @@ import numpy as np
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
 from rocking.motion.formats.source import Request, Source
-from rocking.motion.formats.units import Unit
 from rocking.motion.formats.values import wrong_count
+from rocking.motion.units import Unit
 
 #: PICKLE runs what a file tells it to; the other two open further files that a file names.
 _REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
