@@ -46,8 +46,9 @@ class OnUse:
     def compiled(self) -> Any:
         """What numba makes of it; one thread at a time asks for it."""
         with _ONE_AT_A_TIME:
-            while before_compiling:
-                before_compiling.pop()()
+            while before_compiling:  # an interrupt leaves to the next call what has not been done
+                before_compiling[-1]()
+                before_compiling.pop()
             return vars(self).get("compiled") or self._compile(self.py_func)
 
     @property
