@@ -162,6 +162,29 @@ def test_threads_that_simulate_first_at_once_compile_nothing(unread: None, monke
     assert len(found[0].impacts) > 3
 
 
+def test_threads_share_the_turns_that_python_takes(
+    choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion = rocking.pulses.sine(2.5, 1.0, cycles=20)
+    choose(False)
+    expected = bits(rocking.simulate(BLOCK, motion))
+    choose(True)
+    turns, few = [], Interpreted(march, 60)
+    spend = few.spend
+
+    def noting(work: int) -> None:
+        turns.append(work)
+        spend(work)
+
+    monkeypatch.setattr(few, "spend", noting)
+    monkeypatch.setattr(march_module, "_PORTION", 20)
+    monkeypatch.setattr(march_module, "_interpreted", few)
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(rocking.simulate, [BLOCK] * 4, [motion] * 4))
+    assert {bits(response) for response in found} == {expected}
+    assert 60 <= sum(turns) < 60 + 4 * 20
+
+
 def test_a_first_simulation_needs_no_compiler(tmp_path: Path) -> None:
     code = """
 import sys
