@@ -9,6 +9,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
+from packaging.tags import platform_tags
 
 #: A picture on a line of its own, and a link, where what they lead to is a file of the project.
 _PICTURE = re.compile(r"^!\[[^\]]*\]\((?!https?:)[^)]*\)\n+", re.MULTILINE)
@@ -53,6 +54,9 @@ class KernelsHook(BuildHookInterface[Any]):
         if version != "standard" or self.target_name != "wheel" or not (folder / "manifest.json").exists():
             return
         manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
+        # Another platform's, where machines share the tree: pip would make a wheel that it refuses to install.
+        if manifest["platform"] not in platform_tags():
+            return
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{manifest['platform']}"
         for name in ("manifest.json", *manifest["libraries"]):

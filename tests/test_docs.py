@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from packaging.tags import platform_tags
 
 import rocking
 from rocking.cli import app, main
@@ -224,12 +225,15 @@ def test_a_wheel_holds_the_kernels_that_were_compiled_for_it_and_else_none(hooks
     assert build == {"force_include": {}}
     folder = tmp_path / "build" / "shipped"
     folder.mkdir(parents=True)
-    manifest = {"platform": "manylinux_2_35_x86_64", "libraries": {"kernels-x86-64.so": "0" * 64}}
+    here = next(platform_tags())
+    manifest = {"platform": here, "libraries": {"kernels-x86-64.so": "0" * 64}}
+    for version, platform in (("editable", here), ("standard", "manylinux_2_99_riscv64")):
+        (folder / "manifest.json").write_text(json.dumps(manifest | {"platform": platform}), "utf-8")
+        hook.initialize(version, build)
+        assert build == {"force_include": {}}
     (folder / "manifest.json").write_text(json.dumps(manifest), "utf-8")
-    hook.initialize("editable", build)
-    assert build == {"force_include": {}}
     hook.initialize("standard", build)
-    assert (build["pure_python"], build["tag"]) == (False, "py3-none-manylinux_2_35_x86_64")
+    assert (build["pure_python"], build["tag"]) == (False, f"py3-none-{here}")
     assert sorted(build["force_include"].values()) == [
         "rocking/kernels/shipped/kernels-x86-64.so",
         "rocking/kernels/shipped/manifest.json",

@@ -7,10 +7,12 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from rocking.kernels import compiled
+from rocking.kernels.sine.series import eq65_sums
 
 KERNELS = Path(compiled.__file__).parent
 SOURCE = KERNELS.parent.parent
@@ -102,8 +104,32 @@ def test_the_fingerprint_changes_with_the_content_of_any_kernel(places: Path) ->
     assert compiled.fingerprint() not in seen
 
 
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+def test_what_another_python_or_another_place_has_kept_is_not_at_hand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    declared: Any = eq65_sums
+
+    def anew() -> compiled.Kernel:
+        return compiled.Kernel(declared.py_func, declared._compile)
+
+    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(compiled.Kernel, "native", None)
+    assert not anew().is_at_hand
+    anew().compiled(0.5)
+    assert anew().is_at_hand
+    (kept,) = tmp_path.rglob("*.nbi")
+    other = kept.rename(kept.with_name(kept.name.replace(".py3", ".py2")))
+    assert not anew().is_at_hand
+    other.rename(kept)
+    kept.parent.rename(kept.parent.with_name("kernels_elsewhere"))
+    assert not anew().is_at_hand
+
+
 PROGRAM = """
 import rocking
+from rocking.kernels import march
+march._interpreted.spend(march._interpreted.work())  # Python follows nothing: the march is compiled
 block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 response = rocking.simulate(block, None, model="linear", initial_rotation=0.02)
 print(f"{response.events['time'][-1]:.12f}", len(response.impacts))

@@ -2,8 +2,11 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -11,6 +14,7 @@ import pytest
 
 import rocking
 from rocking.kernels import compiled, ground
+from rocking.kernels import interpreted as reading
 from rocking.kernels import march as march_module
 from rocking.kernels.interpreted import Interpreted
 from rocking.kernels.march import march
@@ -108,6 +112,77 @@ def test_after_some_work_the_march_is_compiled(choose: Callable[[bool], None], m
     assert few.work() == 0
     assert bits(found) == bits(expected)
     assert len(found.impacts) > 5
+
+
+@pytest.fixture
+def unread(choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Python has read no kernel yet; a part that is called compiled is an error."""
+
+    def refuse(part: compiled.OnUse, *arguments: Any) -> None:
+        raise AssertionError(f"{part.py_func.__name__} would be compiled")
+
+    choose(True)
+    monkeypatch.setattr(compiled.OnUse, "__call__", refuse)
+    reading._function.cache_clear()
+    yield
+    reading._function.cache_clear()
+
+
+MOTION, BLOCK = rocking.pulses.sine(4.0, 1.0, cycles=2), rocking.Block.from_parameters(p=2.0, alpha=0.2)
+
+
+@pytest.mark.parametrize("when", [1, 40, 100])
+def test_an_interrupt_while_kernels_are_read_leaves_nothing_half_done(
+    when: int, unread: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+
+    def interrupted(*arguments: Any) -> Any:
+        made.append(FunctionType(*arguments))
+        if len(made) == when:
+            raise KeyboardInterrupt
+        return made[-1]
+
+    monkeypatch.setattr(reading, "FunctionType", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        rocking.simulate(BLOCK, MOTION)
+    assert len(rocking.simulate(BLOCK, MOTION).impacts) > 3
+    assert len(made) > when
+
+
+def test_threads_that_simulate_first_at_once_compile_nothing(unread: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    def slowly(*arguments: Any) -> Any:
+        time.sleep(1e-4)  # another thread goes on
+        return FunctionType(*arguments)
+
+    monkeypatch.setattr(reading, "FunctionType", slowly)
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(rocking.simulate, [BLOCK] * 4, [MOTION] * 4))
+    assert len({bits(response) for response in found}) == 1
+    assert len(found[0].impacts) > 3
+
+
+def test_threads_share_the_turns_that_python_takes(
+    choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion = rocking.pulses.sine(2.5, 1.0, cycles=20)
+    choose(False)
+    expected = bits(rocking.simulate(BLOCK, motion))
+    choose(True)
+    turns, few = [], Interpreted(march, 60)
+    spend = few.spend
+
+    def noting(work: int) -> None:
+        turns.append(work)
+        spend(work)
+
+    monkeypatch.setattr(few, "spend", noting)
+    monkeypatch.setattr(march_module, "_PORTION", 20)
+    monkeypatch.setattr(march_module, "_interpreted", few)
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(rocking.simulate, [BLOCK] * 4, [motion] * 4))
+    assert {bits(response) for response in found} == {expected}
+    assert 60 <= sum(turns) < 60 + 4 * 20
 
 
 def test_a_first_simulation_needs_no_compiler(tmp_path: Path) -> None:

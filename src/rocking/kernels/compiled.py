@@ -9,6 +9,7 @@ import contextlib
 import functools
 import hashlib
 import os
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -46,8 +47,9 @@ class OnUse:
     def compiled(self) -> Any:
         """What numba makes of it; one thread at a time asks for it."""
         with _ONE_AT_A_TIME:
-            while before_compiling:
-                before_compiling.pop()()
+            while before_compiling:  # an interrupt leaves to the next call what has not been done
+                before_compiling[-1]()
+                before_compiling.pop()
             return vars(self).get("compiled") or self._compile(self.py_func)
 
     @property
@@ -75,9 +77,12 @@ class Kernel(OnUse):
 
     @functools.cached_property
     def _is_cached(self) -> bool:
-        folder = cache_folder()
-        entry = f"{self.py_func.__module__.rpartition('.')[2]}.{self.py_func.__name__}-*.nbi"
-        return folder is not None and any(folder.rglob(entry))
+        """Whether numba keeps code of it, named by place of the source and version of Python: no other is loaded."""
+        folder, source = cache_folder(), Path(self.py_func.__code__.co_filename).absolute()
+        place = hashlib.sha1(str(source.parent).encode(), usedforsecurity=False).hexdigest()
+        version = "py{}{}{}".format(*sys.version_info[:2], getattr(sys, "abiflags", ""))
+        entry = f"*_{place}/{source.stem}.{self.py_func.__qualname__}-*.{version}.nbi"
+        return folder is not None and any(folder.glob(entry))
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the code in the library, or what numba compiles where the library does not take these arguments."""

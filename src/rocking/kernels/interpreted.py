@@ -4,6 +4,7 @@ A single march often takes fewer steps than compiling takes seconds.
 """
 
 import ctypes
+import functools
 import sys
 from collections.abc import Callable
 from types import FunctionType
@@ -12,10 +13,6 @@ from typing import Any
 import numpy as np
 
 from rocking.kernels.compiled import Kernel, OnUse
-
-#: Modules' names with the functions in them as Python reads them, and those functions.
-_modules: dict[str, dict[str, Any]] = {}
-_functions: dict[Callable[..., Any], Callable[..., Any]] = {}
 
 
 class Interpreted:
@@ -45,23 +42,25 @@ class Interpreted:
             return _function(self._function)(*map(_attributed, arguments))
 
 
-def _function(function: Any) -> Callable[..., Any]:
-    """Make a function that sees other kernels and parts as Python reads them, too."""
-    names = _names(function.__module__)
-    if function not in _functions:
-        _functions[function] = FunctionType(
-            function.__code__, names, function.__name__, function.__defaults__, function.__closure__
-        )
-    return _functions[function]
+@functools.cache
+def _function(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Make a function that sees other kernels and parts as Python reads them, too.
+
+    It is kept once it is whole: another thread, or a call after an interrupt, would compile what is still missing.
+    """
+    return _with_parts(function, {})
 
 
-def _names(module: str) -> dict[str, Any]:
-    if module not in _modules:
-        names = _modules[module] = dict(vars(sys.modules[module]))
+def _with_parts(function: Callable[..., Any], modules: dict[str, dict[str, Any]]) -> Callable[..., Any]:
+    """Make a function, and those of its module first; ``modules``: names and values of the modules seen so far."""
+    if function.__module__ not in modules:
+        names = modules[function.__module__] = dict(vars(sys.modules[function.__module__]))
         for name, value in list(names.items()):
             if isinstance(value, OnUse):
-                names[name] = _function(value.py_func)
-    return _modules[module]
+                names[name] = _with_parts(value.py_func, modules)
+    return FunctionType(
+        function.__code__, modules[function.__module__], function.__name__, function.__defaults__, function.__closure__
+    )
 
 
 def _attributed(argument: Any) -> Any:

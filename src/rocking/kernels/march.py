@@ -64,26 +64,29 @@ def march(ground: Ground, block: Record, rules: Record, table: Records, scratch:
     return Ending.RUNNING.value
 
 
-#: Turns of marches in one process that Python takes: two seconds' work or three, where compiling takes ten.
+#: Turns of marches in one process that Python takes (two seconds' work or three, where compiling takes ten), and how
+#: many at once, so that threads share them.
 _interpreted: Final = Interpreted(march, 15_000)
+_PORTION: Final = 500
 
 
 def follow(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
     """`march`, whose first turns Python takes where it is not compiled: most responses end before a compiler would."""
-    if (turns := min(_interpreted.work(), int(state["budget"]))) <= 0:
-        return march(ground, block, rules, table, scratch, state)
-    before, later = state.copy(), int(state["budget"]) - turns
-    state["budget"] = turns
-    try:
-        ending = int(_interpreted(ground, block, rules, table, scratch, state))
-    except (ArithmeticError, ValueError):
-        _interpreted.spend(_interpreted.work())
-        for name in before.dtype.names:
-            state[name] = before[name]
-        return march(ground, block, rules, table, scratch, state)
-    _interpreted.spend(turns - int(state["budget"]))
-    state["budget"] += later
-    return march(ground, block, rules, table, scratch, state) if ending == Ending.PAUSED and later else ending
+    while (turns := min(_interpreted.work(), _PORTION, int(state["budget"]))) > 0:
+        before, later = state.copy(), int(state["budget"]) - turns
+        state["budget"] = turns
+        try:
+            ending = int(_interpreted(ground, block, rules, table, scratch, state))
+        except (ArithmeticError, ValueError):
+            _interpreted.spend(_interpreted.work())
+            for name in before.dtype.names:
+                state[name] = before[name]
+            break
+        _interpreted.spend(turns - int(state["budget"]))
+        state["budget"] += later
+        if ending != Ending.PAUSED or not later:
+            return ending
+    return march(ground, block, rules, table, scratch, state)
 
 
 @inlined
