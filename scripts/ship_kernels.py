@@ -94,7 +94,7 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
     shares = (reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), singles)
     return {
         "march.march": [(seen, block, rules, table, scratch, states[0])],
-        "trace.trace": [(trail, scratch, reals(), count, reals(1, 3))],
+        "trace.trace": [(trail, scratch, given(), count, reals(1, 3))],
         "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
         "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
         "ground.fill": [(given(3), given(2, 2), 1.0, seen, reals())],

@@ -66,6 +66,10 @@ for model in ("linear", "nonlinear"):
         response = rocking.simulate(rocking.Block(half_width=0.12, half_height=0.55), each, model=model)
         response.summary()
         rocking.simulate_many(blocks, each, model=model)
+# Times as pandas and xarray give them.
+times = np.linspace(0.0, 1.0, 5)
+times.flags.writeable = False
+response.rotation(times)
 motion.spectral_acceleration(1.0)
 for treatment in (rocking.AsymptoticTime(), rocking.VelocityThreshold(1e-3), rocking.IntervalThreshold(1e-3)):
     block = rocking.Block.from_parameters(p=2.0, alpha=0.1, restitution=0.9)

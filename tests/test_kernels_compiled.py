@@ -115,8 +115,12 @@ def test_what_another_python_or_another_place_has_kept_is_not_at_hand(
 
     monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(compiled.Kernel, "native", None)
-    assert not anew().is_at_hand
-    anew().compiled(0.5)
+    first = anew()
+    assert not first.is_at_hand
+    numbas = first.compiled
+    assert not first.is_at_hand
+    numbas(0.5)
+    assert first.is_at_hand
     assert anew().is_at_hand
     (kept,) = tmp_path.rglob("*.nbi")
     other = kept.rename(kept.with_name(kept.name.replace(".py3", ".py2")))

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import rocking
+from rocking.explorer import background
 from rocking.kernels import compiled, ground
 from rocking.kernels import interpreted as reading
 from rocking.kernels import march as march_module
@@ -183,6 +184,21 @@ def test_threads_share_the_turns_that_python_takes(
         found = list(pool.map(rocking.simulate, [BLOCK] * 4, [motion] * 4))
     assert {bits(response) for response in found} == {expected}
     assert 60 <= sum(turns) < 60 + 4 * 20
+
+
+def test_the_explorer_compiles_the_march_before_python_has_done_its_part(
+    choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    choose(True)
+    called, call = set(), compiled.Kernel.__call__
+
+    def noting(kernel: compiled.Kernel, *arguments: Any) -> Any:
+        called.add(kernel.py_func.__name__)
+        return call(kernel, *arguments)
+
+    monkeypatch.setattr(compiled.Kernel, "__call__", noting)
+    background._compile()
+    assert {"march", "trace", "run_lanes"} <= called
 
 
 def test_a_first_simulation_needs_no_compiler(tmp_path: Path) -> None:

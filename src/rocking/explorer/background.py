@@ -13,6 +13,8 @@ from typing import Any, Final
 
 from rocking.block import Block, Blocks
 from rocking.engine import Setup, Task, simulate_tasks
+from rocking.kernels import state
+from rocking.kernels.march import march
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.simulation import simulate
@@ -82,3 +84,6 @@ def _compile() -> None:
         for model in ("nonlinear", "linear"):
             setup = Setup(Blocks(p=[3.0, 4.0], alpha=0.2), model, Certified())
             list(simulate_tasks(setup, [Task(slice(0, 2), motion)], threads=1))
+    # Python follows the first responses; a march without turns is compiled all the same.
+    ground, body, rules, _ = response._trail
+    march(ground, body, rules, state.new_table(0), state.new_scratch(), state.new_states(1, 0)[0])

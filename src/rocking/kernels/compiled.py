@@ -73,7 +73,9 @@ class Kernel(OnUse):
     @property
     def is_at_hand(self) -> bool:
         """Whether a call compiles nothing, as far as can be told without importing numba."""
-        return self.native is not None or "compiled" in vars(self) or self._is_cached
+        made = vars(self).get("compiled")
+        # numba may still be at work on it, in another thread.
+        return self.native is not None or (made is not None and len(made.overloads) > 0) or self._is_cached
 
     @functools.cached_property
     def _is_cached(self) -> bool:
