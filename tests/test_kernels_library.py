@@ -140,6 +140,27 @@ def test_records_of_another_layout_are_not_taken_for_the_same(shipped: Path) -> 
             take(np.zeros(1, np.dtype(other))[0], packed)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda kernels: {},
+        lambda kernels: None,
+        lambda kernels: {name: [each | {"symbol": "none"} for each in several] for name, several in kernels.items()},
+        lambda kernels: {
+            name: [each | {"arguments": ["text"]} for each in several] for name, several in kernels.items()
+        },
+        lambda kernels: {name: [{"symbol": several[0]["symbol"]}] for name, several in kernels.items()},
+    ],
+    ids=["nothing", "null", "symbol", "types", "no types"],
+)
+def test_a_kernel_that_a_manifest_describes_wrongly_is_left_to_numba(shipped: Path, change: Any) -> None:
+    manifest = shipped / "manifest.json"
+    content = json.loads(manifest.read_text("utf-8"))
+    manifest.write_text(json.dumps(content | {"kernels": change(content["kernels"])}), "utf-8")
+    assert library.opened() is not None
+    assert library.function("rocking.kernels.sine.series.eq65_time") is None
+
+
 def damage(name: str, folder: Path) -> None:
     manifest = folder / "manifest.json"
     content = json.loads(manifest.read_text("utf-8"))

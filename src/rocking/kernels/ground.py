@@ -65,8 +65,9 @@ def ground_of(
     pieces = np.zeros((len(coefficients) + 1, _FIRST + columns * len(components)))
     stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), len(Window._fields)))
     ground = Ground(pieces, stretches, error * unit, columns, _FIRST)
-    write = _interpreted_fill if _interpreted_fill.work() > len(coefficients) else fill
-    _interpreted_fill.spend(len(coefficients))
+    work = len(coefficients) * len(components)
+    write = _interpreted_fill if _interpreted_fill.work() > work else fill
+    _interpreted_fill.spend(work)
     for k, component in enumerate(components):
         write(breakpoints, component, unit, ground._replace(first=_FIRST + k * columns), np.zeros(columns))
     return ground

@@ -93,9 +93,12 @@ def function(name: str) -> Callable[..., Any] | None:
     What is returned raises `OtherTypes` for arguments that no function takes.
     """
     library = opened()
-    if library is None or name not in library.manifest["kernels"]:
+    if library is None:
         return None
-    variants = [_variant(getattr(library.handle, each["symbol"]), each) for each in library.manifest["kernels"][name]]
+    try:
+        variants = [_variant(getattr(library.handle, one["symbol"]), one) for one in library.manifest["kernels"][name]]
+    except (AttributeError, KeyError, TypeError):  # no such kernel, or a damaged manifest
+        return None
     if len(variants) == 1:
         return variants[0]
 
