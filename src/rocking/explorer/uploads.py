@@ -18,7 +18,7 @@ from rocking.plausibility import motion_notes
 #: Largest file, bytes: twenty times a long record of three channels.
 LARGEST: Final = 16 * 2**20
 
-#: Files that are kept; the one that was not used for longest makes room.
+#: Files that are kept; the one that was not used for longest is the first to go.
 MOST: Final = 12
 
 #: Samples of one channel at most: an hour and a half at a hundred a second.

@@ -166,12 +166,12 @@ def _label(axes: Axes, lines: ContourSet, form: str) -> None:
     chosen: list[Floats] = []
     for piece in (piece for pieces in lines.allsegs for piece in pieces if len(piece)):
         places = axes.transAxes.inverted().transform(axes.transData.transform(piece))
-        room = np.minimum(places.min(axis=1), (1.0 - places).min(axis=1))
+        clearance = np.minimum(places.min(axis=1), (1.0 - places).min(axis=1))
         for other in chosen:
             apart = places - axes.transAxes.inverted().transform(axes.transData.transform(other))
-            room[np.hypot(*apart.T) < _LABEL_DISTANCE] = 0.0
-        if room.max() > _LABEL_MARGIN:
-            chosen.append(piece[room.argmax()])
+            clearance[np.hypot(*apart.T) < _LABEL_DISTANCE] = 0.0
+        if clearance.max() > _LABEL_MARGIN:
+            chosen.append(piece[clearance.argmax()])
     for text in axes.clabel(lines, fmt=form, fontsize=7, inline_spacing=2, manual=[tuple(at) for at in chosen]):
         text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.85})
         text.set_clip_on(True)
