@@ -15,7 +15,6 @@ from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.errors import InvalidOption
-from rocking.kernels import state
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
 from rocking.response.history import (
@@ -67,7 +66,7 @@ class Answers:
 
     @cached_property
     def _history(self) -> History:
-        return History(self._trail, self.duration)
+        return History(self._trail, self.duration, self.body.stops)
 
     @cached_property
     def peak_over_slenderness(self) -> float:
@@ -82,7 +81,7 @@ class Answers:
     @property
     def moves_at_end(self) -> bool:
         """Whether the block is not at rest at the end of the response."""
-        return bool(self._trail.nodes["side"][-1] != state.AT_REST)
+        return bool(self._trail.nodes["side"][-1] >= 0)
 
     @property
     def stopped(self) -> bool:
@@ -241,7 +240,7 @@ class Answers:
         if law is None:
             raise InvalidOption(f"the forces of the ground on a {type(self.body).__name__} are not known")
         until = self.duration if math.isnan(self.tipping_time) else self.tipping_time
-        return Contact(History(with_all_impacts(self._trail, cut=cut), self.duration), law, until)
+        return Contact(History(with_all_impacts(self._trail, cut=cut), self.duration, self.body.stops), law, until)
 
 
 def trail_of(response: Answers) -> Trail:
