@@ -70,6 +70,7 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
 
     from rocking.kernels import ground, state
     from rocking.kernels.lanes import pool_of
+    from rocking.kernels.periodic import Setting
     from rocking.kernels.sine import lanes, sequence
     from rocking.kernels.trace import Trail
 
@@ -96,7 +97,9 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
         "march.march": [(seen, block, rules, table, scratch, states[0])],
         "trace.trace": [(trail, scratch, given(), count, reals(1, 3))],
         "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
-        "periodic.iterate": [(seen, block, rules, scratch, table, states, 1, reals(1, 1, 3), count)],
+        "periodic.iterate": [
+            (Setting(seen, block, rules, table, reals(2, 1, 10)), scratch, states, 1, reals(1, 1, 3), count)
+        ],
         "periodic.differentiate": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
         "periodic.to_next_impact": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
         "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
