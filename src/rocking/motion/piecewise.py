@@ -252,10 +252,12 @@ def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
 
 def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
     """Breakpoints and coefficients of a motion as own, read-only arrays."""
-    ends = _finite(breakpoints, "breakpoints", 1)
-    rows = _finite(
-        coefficients, "coefficients", 2, ": of samples make a motion with Motion.from_samples(acceleration, dt)"
-    )
+    ends = _floats(breakpoints, "breakpoints", 1)
+    of_samples = ": of samples make a motion with Motion.from_samples(acceleration, dt)"
+    rows = _floats(coefficients, "coefficients", 2, of_samples)
+    for array, what in ((ends, "breakpoints"), (rows, "coefficients")):
+        if not np.all(np.isfinite(array)):
+            raise InvalidMotion("the {} of a motion must be finite numbers", what)
     if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
         raise InvalidMotion(
             "a motion of n pieces needs n + 1 {} and {} of shape (n, degree + 1), not "
@@ -326,11 +328,4 @@ def _floats(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Fl
     if array.ndim != dimensions:
         sentence = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
         raise InvalidMotion(sentence, what)
-    return array
-
-
-def _finite(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Floats:
-    array = _floats(values, what, dimensions, hint)
-    if not np.all(np.isfinite(array)):
-        raise InvalidMotion("the {} of a motion must be finite numbers", what)
     return array
