@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
+from rocking.block.limits import checked_gravity, checked_sides
 from rocking.block.rigid_body import refusal, rigid_bodies
-from rocking.block.single import Block, checked_gravity, checked_sides, one_block
+from rocking.block.single import Block, one_block
 from rocking.body import KINDS
 from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock
