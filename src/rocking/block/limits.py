@@ -44,17 +44,17 @@ def checked_sides(values: Floats, name: str) -> Floats:
 
 def checked_gravity(gravity: object) -> float:
     """Return an acceleration of gravity, m/s^2, or raise InvalidBlock."""
-    return _within(gravity, "gravity", _GRAVITY, "m/s^2")
+    return checks.positive(gravity, "gravity", InvalidBlock, "m/s^2", _GRAVITY)
 
 
 def checked_mass(mass: object) -> float:
     """Return a mass, kg, or raise InvalidBlock."""
-    return _within(mass, "mass", _MASS, "kg")
+    return checks.positive(mass, "mass", InvalidBlock, "kg", _MASS)
 
 
 def checked_length(value: object, name: str) -> float:
     """Return a length, m, or raise InvalidBlock."""
-    return _within(value, name, _LENGTH, "m")
+    return checks.positive(value, name, InvalidBlock, "m", _LENGTH)
 
 
 def checked_pair(value: Any, name: str) -> tuple[float, float]:
@@ -66,8 +66,3 @@ def checked_pair(value: Any, name: str) -> tuple[float, float]:
         raise InvalidBlock(f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name)
     plus, minus = np.broadcast_to(values, 2).tolist()
     return plus, minus
-
-
-def _within(value: object, name: str, limits: tuple[float, float], unit: str) -> float:
-    """Return a positive number within its limits as a float, or raise InvalidBlock."""
-    return checks.within(checks.positive(value, name, InvalidBlock, unit), name, InvalidBlock, *limits, unit)

@@ -277,9 +277,11 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
         raise InvalidMotion(
             f"a motion must last from {SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
         )
-    if not _stays_below(STRONGEST, rows, widths):
+    with np.errstate(over="ignore"):
+        reached, soon = (value(np.abs(rows), spans) for spans in (widths, np.maximum(widths, SHORTEST)))
+    if not np.all(reached <= STRONGEST):
         raise InvalidMotion(f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale")
-    if not _stays_below(STRONGEST, rows, np.maximum(widths, SHORTEST)):
+    if not np.all(soon <= STRONGEST):
         raise InvalidMotion(
             f"a piece of a motion is too steep: shorter than {SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "
             "within that time: check units and times"
@@ -287,11 +289,6 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
     for array in (ends, rows):
         array.setflags(write=False)
     return ends, rows
-
-
-def _stays_below(limit: float, rows: Floats, widths: Floats) -> bool:
-    with np.errstate(over="ignore"):
-        return bool(np.all(value(np.abs(rows), widths) <= limit))
 
 
 def checked_samples(acceleration: ArrayLike) -> Floats:
