@@ -209,13 +209,8 @@ _ROWS: Final = 17
 def series_arc(state: Series, first_side: bool, delta: float, space: Series, z: Series, end: Series) -> None:
     """One arc from v, p, d: its scaled duration z, and impact speed, p and d at its end."""
     order = z.size
-    mean, forces, q, basis = (
-        space[0],
-        (space[1], space[2], space[3]),
-        space[4],
-        (space[5], space[6], space[7], space[8]),
-    )
-    height, speed, spare = space[9], space[10], space[11:]
+    mean, q, height, speed, spare = space[0], space[4], space[9], space[10], space[11:]
+    forces, basis = (space[1], space[2], space[3]), (space[5], space[6], space[7], space[8])
     _set_forces(state, first_side, mean, forces)
     for k in range(order):
         z[k] = 0.0
