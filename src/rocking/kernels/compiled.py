@@ -121,7 +121,9 @@ def _part(function: F, *, inline: bool) -> F:
     def compile_(function: Callable[..., Any]) -> Any:
         from rocking.kernels import compiler
 
-        return compiler.part_of(function, inline=inline)
+        # The folder's name tells the sources of this package's parts, and of no others.
+        ours = function.__module__.startswith(f"{__package__}.")
+        return compiler.part_of(function, cache_folder() if ours else None, inline=inline)
 
     return function if UNCOMPILED else OnUse(function, compile_)  # type: ignore[return-value]
 
