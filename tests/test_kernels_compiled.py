@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from kernel_records import NO_GROUND
 
@@ -130,6 +131,24 @@ def test_what_another_python_or_another_place_has_kept_is_not_at_hand(
     other.rename(kept)
     kept.parent.rename(kept.parent.with_name("kernels_elsewhere"))
     assert not anew().is_at_hand
+
+
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+def test_a_kernel_is_prepared_for_types_without_being_called(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+
+    @compiled.kernel
+    def put(out: Any) -> None:
+        out[0] = 1.0
+
+    prepared: Any = put
+    out = np.zeros(1)
+    prepared.prepare(out)
+    assert prepared.is_at_hand
+    assert out[0] == 0.0
+    put(out)
+    assert out[0] == 1.0
+    assert len(prepared.compiled.overloads) == 1
 
 
 @pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")

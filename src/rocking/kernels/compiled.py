@@ -86,6 +86,13 @@ class Kernel(OnUse):
         entry = f"*_{place}/{source.stem}.{self.py_func.__qualname__}-*.{version}.nbi"
         return folder is not None and any(folder.glob(entry))
 
+    def prepare(self, *arguments: Any) -> None:
+        """Compile it for arguments of these types, unless the library has code of it; it is not called."""
+        if self.native is None:
+            from numba import typeof
+
+            self.compiled.compile(tuple(typeof(argument) for argument in arguments))
+
     def __call__(self, *arguments: Any) -> Any:
         """Call the code in the library, or what numba compiles where the library does not take these arguments."""
         if self.native is not None:
