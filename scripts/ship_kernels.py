@@ -266,7 +266,8 @@ def origin(levels: list[str], names: Collection[str]) -> dict[str, Any]:
     """Say what libraries are made from: sources of kernels, this script, versions of the compiler, what was asked."""
     from importlib import metadata
 
-    from rocking.kernels.library import FOLDER, sources
+    from rocking.kernels.library import FOLDER
+    from rocking.kernels.sources import sources
 
     versions = {name: metadata.version(name) for name in ("numba", "llvmlite")}
     return {

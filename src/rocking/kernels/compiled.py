@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rocking.kernels import library
+from rocking.kernels.sources import sources
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -168,7 +169,7 @@ def _parents() -> Iterator[Path]:
 
 def fingerprint() -> str:
     """Hash of all kernels' sources and of the compiler's version."""
-    return hashlib.sha256(f"{metadata.version('numba')} {library.sources(_HERE)}".encode()).hexdigest()[:16]
+    return hashlib.sha256(f"{metadata.version('numba')} {sources(_HERE)}".encode()).hexdigest()[:16]
 
 
 def state() -> str:
