@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,14 @@ class KernelsHook(BuildHookInterface[Any]):
         manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
         # Another platform's, where machines share the tree: pip would make a wheel that it refuses to install.
         if manifest["platform"] not in platform_tags():
+            return
+        # Python would leave them aside, and have numba compile: a wheel for every platform says as much.
+        kernels = Path(self.root) / "src" / "rocking" / "kernels"
+        if manifest["sources"] != runpy.run_path(str(kernels / "sources.py"))["sources"](kernels):
+            self.app.display_warning(
+                f"{folder} holds kernels that were made from other sources: the wheel holds none. To renew them run "
+                "scripts/ship_kernels.py"
+            )
             return
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{manifest['platform']}"

@@ -2,8 +2,8 @@
 
 python scripts/ship_kernels.py            # build/shipped: a library for each level of the processor, and a manifest
 
-numba compiles each kernel for the types that `signatures` lists. Of what it makes, the kernel's own function is kept;
-a function around it unpacks arguments from the eight bytes each that `rocking.kernels.library` packs.
+numba compiles each kernel for the types that `rocking.kernels.signatures` lists. Of what it makes, the kernel's own
+function is kept; a function around it unpacks arguments from the eight bytes each that `rocking.kernels.library` packs.
 """
 
 from __future__ import annotations
@@ -62,65 +62,6 @@ OLDEST_NAMED = 17
 SUFFIX = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
 
 PROCESSOR["amd64"], PROCESSOR["aarch64"] = PROCESSOR["x86_64"], PROCESSOR["arm64"]
-
-
-def signatures() -> dict[str, list[tuple[Any, ...]]]:
-    """Arguments as Python passes them to each kernel, by its name: of them only the types count."""
-    import numpy as np
-
-    from rocking.kernels import ground, state
-    from rocking.kernels.lanes import pool_of
-    from rocking.kernels.periodic import Setting
-    from rocking.kernels.sine import lanes, sequence
-    from rocking.kernels.trace import Trail
-
-    def reals(*shape: int, kind: Any = np.float64) -> Any:
-        return np.ones(shape or (1,), dtype=kind)
-
-    def given(*shape: int) -> Any:
-        """Numbers that a kernel only reads: whether Python may write them does not matter."""
-        array = reals(*shape)
-        array.flags.writeable = False
-        return array
-
-    count = reals(1, kind=np.int64)
-    flags, singles = reals(1, kind=np.bool_), reals(1, kind=np.float32)
-    seen = ground.Ground(reals(3, 4), reals(1, 1, 4), 0.0, 2, 2)
-    block, rules, scratch = state.record(state.BLOCK), state.record(state.RULES), state.new_scratch()
-    blocks, states, table = state.records(1, state.BLOCK), state.new_states(1, 1), state.new_table(1)
-    trail = Trail(seen, block, rules, state.records(1, state.NODE_ROW))
-    pool = pool_of(blocks, states, 1, 1.0, 0)
-    sequences = (given(), given(), given())
-    statuses = reals(1, kind=np.int8)
-    shares = (reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), singles)
-    return {
-        "march.march": [(seen, block, rules, table, scratch, states[0])],
-        "trace.trace": [(trail, scratch, given(), count, reals(1, 3))],
-        "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
-        "periodic.iterate": [
-            (Setting(seen, block, rules, table, reals(2, 1, 10)), scratch, states, 1, reals(1, 1, 3), count)
-        ],
-        "periodic.differentiate": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
-        "periodic.to_next_impact": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
-        "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
-        "ground.fill": [(given(3), given(2, 2), 1.0, seen, reals())],
-        "lanes.run_lanes": [(seen, rules, scratch, pool, 0)],
-        "lanes.march_each": [(seen, rules, scratch, pool)],
-        "oscillator.peak_displacements": [(given(3), given(2, 2), given(), 0.05, reals(), reals())],
-        "sine.eq65.eq65_time": [(1.0, 1.0, 1.0)],
-        "sine.eq65.eq65_sums": [(1.0,)],
-        "sine.eq65.eq65_terms": [(1.0, reals(), reals())],
-        "sine.series.series_arcs": [(reals(1, 1), True, 1.0, 1.0, reals(1, 1), reals(1, 1), reals(1, 1, 1))],
-        "sine.sequence.fitted_amplitudes": [(given(), given(), True, reals())],
-        "population.shares": [(*shares, reals(1, 1, kind=np.float32), reals())],
-        "population.log_density": [(reals(1, 1), reals(1, 1), reals(), reals())],
-        "sine.arc.first_impact": [(1.0, 1.0)],
-        "sine.lanes.rest_phases": [(sequences, count, np.zeros(1, lanes.GROUP), lanes.Answers(reals(), statuses))],
-        "sine.sequence.rest_phase": [(1.0, 1.0, 1.0)],
-        "sine.sequence.resolve": [(1.0, 1.0, 1.0, 1.0, np.zeros(1, sequence.IMPACT))],
-        "sine.sequence.semianalytical_phases": [(sequences, count, reals(), statuses)],
-        "sine.sequence.critical_amplitudes": [(given(), given(), reals())],
-    }
 
 
 def described(kind: Any) -> Any:
@@ -221,10 +162,10 @@ class Unpacking:
 
 def compiled(level: str, folder: Path, names: Collection[str]) -> dict[str, list[dict[str, Any]]]:
     """Compile kernels, all by default, for a level, in a process whose numba was told so; objects go to a folder."""
-    import importlib
-
     import llvmlite.binding as llvm
     import numba
+
+    from rocking.kernels.signatures import named, signatures
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
@@ -234,12 +175,11 @@ def compiled(level: str, folder: Path, names: Collection[str]) -> dict[str, list
     manifest: dict[str, list[dict[str, Any]]] = {}
     every = signatures()
     for name, several in every.items() if not names else ((name, every[name]) for name in names):
-        module, _, function = name.rpartition(".")
-        kernel = getattr(importlib.import_module(f"rocking.kernels.{module}"), function).compiled
+        kernel = named(name)
         for number, arguments in enumerate(several):
             kinds = tuple(numba.typeof(argument) for argument in arguments)
-            kernel.compile(kinds)
-            made = kernel.overloads[kinds]
+            kernel.prepare(*arguments)
+            made = kernel.compiled.overloads[kinds]
             symbol = f"rocking_{name.replace('.', '_')}_{number}"
             unpacking = Unpacking()
             for kind in kinds:
@@ -326,7 +266,8 @@ def origin(levels: list[str], names: Collection[str]) -> dict[str, Any]:
     """Say what libraries are made from: sources of kernels, this script, versions of the compiler, what was asked."""
     from importlib import metadata
 
-    from rocking.kernels.library import FOLDER, sources
+    from rocking.kernels.library import FOLDER
+    from rocking.kernels.sources import sources
 
     versions = {name: metadata.version(name) for name in ("numba", "llvmlite")}
     return {

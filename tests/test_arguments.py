@@ -1,5 +1,6 @@
 """A motion or a block that is none is refused, wherever one is taken, and told how it becomes one."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -125,9 +126,17 @@ def test_an_unknown_model_has_no_thresholds():
 
 ARRAY = np.array([[1.0, 1.0], [1.0, 1.0]])
 SITE = rocking.HazardCurve([0.5, 1.0, 2.0], [0.1, 0.01, 0.001])
-FITTED = rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
 
-MAP = rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 2.0], frequencies=[1.0])
+
+@cache
+def fitted():
+    return rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
+
+
+@cache
+def a_map():
+    return rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 2.0], frequencies=[1.0])
+
 
 #: Each takes one argument that is often given as something else.
 TAKES_ONE_THING = {
@@ -149,22 +158,22 @@ TAKES_ONE_THING = {
     "response of episodes": rocking.chattering.chattering_episodes,
     "number of a figure": rocking.chattering.paper_figure,
     "slenderness": rocking.block.housner_restitution,
-    "label of a part": lambda value: MAP.select(frequency=value),
+    "label of a part": lambda value: a_map().select(frequency=value),
     "limits": lambda value: rocking.fragility(BLOCK, [MOTION], limits=value),
     "polarity": lambda value: rocking.fragility(BLOCK, [MOTION], polarity=value),
     "polarity of an ensemble": lambda value: rocking.simulate_many(BLOCK, MOTION, polarity=value),
     "band": lambda value: rocking.fit_fragility([2.0, 3.0], [1, 2], trials=3, band=value),
     "kind of a band": Band,
-    "hazard curve": FITTED.annual_rate,
-    "limit state": FITTED.curve,
-    "intensity of a probability": FITTED.curves[0].probability,
-    "intensity of a band": lambda value: FITTED.curves[0].band(value)[0],
+    "hazard curve": lambda value: fitted().annual_rate(value),
+    "limit state": lambda value: fitted().curve(value),
+    "intensity of a probability": lambda value: fitted().curves[0].probability(value),
+    "intensity of a band": lambda value: fitted().curves[0].band(value)[0],
     "intensity of a rate": SITE.rate_of,
     "chosen blocks": Blocks.of(BLOCK).select,
-    "file of a fragility": FITTED.to_csv,
-    "NRML file": FITTED.to_nrml,
-    "NRML taxonomy": lambda value: FITTED.to_nrml("unwritten.xml", taxonomy=value),
-    "NRML format": lambda value: FITTED.to_nrml("unwritten.xml", format=value),
+    "file of a fragility": lambda value: fitted().to_csv(value),
+    "NRML file": lambda value: fitted().to_nrml(value),
+    "NRML taxonomy": lambda value: fitted().to_nrml("unwritten.xml", taxonomy=value),
+    "NRML format": lambda value: fitted().to_nrml("unwritten.xml", format=value),
     "file of a response": lambda value: rocking.simulate(BLOCK, None, initial_rotation=0.1).to_csv(value),
     "file of histories": lambda value: rocking.simulate(BLOCK, None, initial_rotation=0.1).to_netcdf(value),
     "file of a hazard curve": rocking.HazardCurve.read,
@@ -207,7 +216,7 @@ def test_a_fragility_names_its_limit_states():
     with pytest.raises(InvalidOption, match="exceeded must be a mapping with one entry or more"):
         rocking.fit_fragility([2.0, 3.0], {})
     with pytest.raises(InvalidOption, match="limit_state must be one of overturning, not 'half'"):
-        FITTED.curve("half")
+        fitted().curve("half")
 
 
 @pytest.mark.parametrize("level", [1e60, 1e300])

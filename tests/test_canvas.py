@@ -4,10 +4,8 @@ import os
 import subprocess
 import sys
 
-import nbformat
 import pytest
 from matplotlib.figure import Figure
-from nbclient import NotebookClient
 
 from rocking.errors import InvalidOption
 
@@ -59,6 +57,9 @@ def test_the_command_line_writes_its_figures_without_windows(tmp_path):
 
 def images(*cells: str) -> list[int]:
     """Number of images that each cell of a notebook shows."""
+    import nbformat
+    from nbclient import NotebookClient
+
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in (DRAW, *cells)])
     NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
     return [sum("image/png" in output.get("data", {}) for output in cell.outputs) for cell in notebook.cells[1:]]

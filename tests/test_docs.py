@@ -16,6 +16,7 @@ from packaging.tags import platform_tags
 
 import rocking
 from rocking.cli import app, main
+from rocking.kernels.sources import sources
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -226,13 +227,24 @@ def test_a_wheel_holds_the_kernels_that_were_compiled_for_it_and_else_none(hooks
     folder = tmp_path / "build" / "shipped"
     folder.mkdir(parents=True)
     here = next(platform_tags())
-    manifest = {"platform": here, "libraries": {"kernels-x86-64.so": "0" * 64}}
+    kernels = tmp_path / "src" / "rocking" / "kernels"
+    kernels.mkdir(parents=True)
+    shutil.copy(ROOT / kernels.relative_to(tmp_path) / "sources.py", kernels)
+    (kernels / "arc.py").write_text("x = 1\n", "utf-8")
+    manifest = {"platform": here, "sources": sources(kernels), "libraries": {"kernels-x86-64.so": "0" * 64}}
     for version, platform in (("editable", here), ("standard", "manylinux_2_99_riscv64")):
         (folder / "manifest.json").write_text(json.dumps(manifest | {"platform": platform}), "utf-8")
         hook.initialize(version, build)
         assert build == {"force_include": {}}
     (folder / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+    (kernels / "arc.py").write_text("x = 2\n", "utf-8")
+    hook.app, said = SimpleNamespace(display_warning=lambda text: said.append(text)), []
     hook.initialize("standard", build)
+    assert build == {"force_include": {}}
+    assert [str(folder) in text and "other sources" in text for text in said] == [True]
+    (kernels / "arc.py").write_text("x = 1\n", "utf-8")
+    hook.initialize("standard", build)
+    assert len(said) == 1
     assert (build["pure_python"], build["tag"]) == (False, f"py3-none-{here}")
     assert sorted(build["force_include"].values()) == [
         "rocking/kernels/shipped/kernels-x86-64.so",

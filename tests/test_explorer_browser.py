@@ -21,11 +21,6 @@ from rocking.explorer.core import Explorer
 from rocking.explorer.launch import served
 from rocking.explorer.studies import StudyView
 
-try:
-    from playwright.sync_api import sync_playwright
-except ImportError:
-    sync_playwright = None
-
 pytestmark = pytest.mark.browser
 
 STATUE = "width=0.24&height=1.1&motion=ridgecrest-clc-090&pga=0.4g"
@@ -40,7 +35,9 @@ MARKED = "Array.from(document.querySelectorAll('[aria-invalid=true]'), (each) =>
 
 @pytest.fixture(scope="module")
 def browser():
-    if sync_playwright is None:
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
         missing("playwright is not installed: pip install 'rocking[browser]'")
     with sync_playwright() as player:
         started = player.chromium.launch(executable_path=chromium(), args=flags())

@@ -9,9 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from kernel_records import NO_GROUND
 
 from rocking.kernels import compiled
+from rocking.kernels.ground import has_vertical
 from rocking.kernels.sine.eq65 import eq65_sums
 
 KERNELS = Path(compiled.__file__).parent
@@ -128,6 +131,48 @@ def test_what_another_python_or_another_place_has_kept_is_not_at_hand(
     other.rename(kept)
     kept.parent.rename(kept.parent.with_name("kernels_elsewhere"))
     assert not anew().is_at_hand
+
+
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+def test_a_kernel_is_prepared_for_types_without_being_called(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+
+    @compiled.kernel
+    def put(out: Any) -> None:
+        out[0] = 1.0
+
+    prepared: Any = put
+    out = np.zeros(1)
+    prepared.prepare(out)
+    assert prepared.is_at_hand
+    assert out[0] == 0.0
+    put(out)
+    assert out[0] == 1.0
+    assert len(prepared.compiled.overloads) == 1
+
+
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+def test_what_calls_a_part_from_python_is_kept_too_but_for_a_part_from_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    declared: Any = has_vertical
+    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+
+    def anew() -> Any:
+        return compiled.OnUse(declared.py_func, declared._compile).compiled
+
+    first, second = anew(), anew()
+    assert not first(NO_GROUND)
+    assert len(list(tmp_path.rglob("*.nbi"))) == 1
+    assert not second(NO_GROUND)
+    assert [len(each.dispatcher.signatures) for each in (first, second)] == [1, 0]
+
+    @compiled.shared
+    def twice(x: float) -> float:
+        return 2.0 * x
+
+    assert twice(21.0) == 42.0
+    assert len(list(tmp_path.rglob("*.nbi"))) == 1
 
 
 PROGRAM = """

@@ -19,6 +19,7 @@ from rocking.kernels import interpreted as reading
 from rocking.kernels import march as march_module
 from rocking.kernels.interpreted import Interpreted
 from rocking.kernels.march import march
+from rocking.kernels.signatures import named
 from rocking.response import Response
 
 pytestmark = pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
@@ -186,19 +187,35 @@ def test_threads_share_the_turns_that_python_takes(
     assert 60 <= sum(turns) < 60 + 4 * 20
 
 
-def test_the_explorer_compiles_the_march_before_python_has_done_its_part(
+def test_the_explorer_compiles_what_responses_and_maps_call_and_for_those_types(
     choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(compiled.Kernel, "native", None)
+    kernels = {name: named(name) for name in background._KERNELS}
+    for each in kernels.values():
+        monkeypatch.delitem(vars(each), "compiled", raising=False)
     choose(True)
+    background._compile()
+    prepared = {name: [*each.compiled.overloads] for name, each in kernels.items()}
+    assert [len(types) for types in prepared.values()] == [1] * len(kernels)
+
     called, call = set(), compiled.Kernel.__call__
 
     def noting(kernel: compiled.Kernel, *arguments: Any) -> Any:
-        called.add(kernel.py_func.__name__)
+        called.add(f"{kernel.__module__.removeprefix('rocking.kernels.')}.{kernel.py_func.__name__}")
         return call(kernel, *arguments)
 
     monkeypatch.setattr(compiled.Kernel, "__call__", noting)
-    background._compile()
-    assert {"march", "trace", "run_lanes"} <= called
+    choose(False)
+    record = rocking.Motion.from_samples(MOTION.acceleration([0.01 * k for k in range(200)]), 0.01)
+    for motion in (MOTION, record):
+        response = rocking.simulate(BLOCK, motion)
+        response.rotation([0.5])
+        response.summary()
+        for model in ("linear", "nonlinear"):
+            rocking.simulate_many(rocking.Blocks(p=[3.0, 4.0], alpha=0.2), motion, model=model)
+    assert called == {*kernels}
+    assert {name: [*each.compiled.overloads] for name, each in kernels.items()} == prepared
 
 
 def test_a_first_simulation_needs_no_compiler(tmp_path: Path) -> None:

@@ -3,9 +3,7 @@
 import re
 from pathlib import Path
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
 
 # Each task of the page runs in one notebook, which takes half a minute. What a notebook shows of a figure is held by
 # tests/test_canvas.py, and what a result shows of itself by tests/test_reprs.py.
@@ -17,6 +15,9 @@ CELL = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 @pytest.fixture(scope="module")
 def cells(tmp_path_factory):
+    import nbformat
+    from nbclient import NotebookClient
+
     sources = [match[1].rstrip("\n") for match in CELL.finditer(PAGE.read_text("utf-8"))]
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in sources])
     folder = tmp_path_factory.mktemp("notebook")

@@ -17,7 +17,6 @@ import rocking
 from rocking.studies import place as places
 
 obstore = pytest.importorskip("obstore")
-server = pytest.importorskip("moto.server")
 
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.7)
 MOTIONS = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0)]
@@ -27,6 +26,7 @@ UNITS = 12
 
 @pytest.fixture(scope="module")
 def bucket():
+    server = pytest.importorskip("moto.server")
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
     one = server.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     one.start()

@@ -1,5 +1,6 @@
 """What every oracle is given: plain numbers that state one rocking problem, and nothing of the package."""
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from math import pi, tan
 
@@ -105,7 +106,7 @@ class Problem:
 
 def _piece(pieces: Pieces, time: float) -> tuple[float, float, NDArray[np.float64]]:
     breakpoints, coefficients = pieces
-    k = int(np.searchsorted(breakpoints, time, side="right")) - 1
+    k = bisect_right(breakpoints, time) - 1  # `searchsorted` would make numbers of many digits of all breakpoints
     if k >= len(coefficients):
         return float(breakpoints[-1]), np.inf, np.zeros(1)
     return float(breakpoints[k]), float(breakpoints[k + 1]), coefficients[k]

@@ -11,14 +11,13 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, Final
 
-from rocking.block import Block, Blocks
-from rocking.engine import Setup, Task, simulate_tasks
-from rocking.kernels import state
-from rocking.kernels.march import march
-from rocking.motion import pulses
-from rocking.motion.motion import Motion
-from rocking.simulation import simulate
-from rocking.treatment import Certified
+from rocking.kernels import signatures
+
+#: What responses and maps need.
+_KERNELS: Final = (
+    "ground.fill", "march.march", "trace.trace", "trace.vary", "uplift.note_complete", "lanes.run_lanes",
+    "lanes.march_each",
+)  # fmt: skip
 
 #: Lowest priority of all: such a thread takes what others leave, and all of it where they leave everything.
 _NICENESS: Final = 19
@@ -41,7 +40,7 @@ def _lower_priority() -> None:
 
 
 class Compilation:
-    """Compiles all kernels once, in a thread, by a few small computations."""
+    """Compiles what responses and maps need, once, in a thread."""
 
     def __init__(self) -> None:
         self._thread = threading.Thread(target=self._run, name="rocking-compilation", daemon=True)
@@ -61,29 +60,11 @@ class Compilation:
 
     def _run(self) -> None:
         assert self._started is not None
-        try:
-            _compile()
-        except RuntimeError:
-            # Threads cannot start others once the program has ended.
-            if threading.main_thread().is_alive():
-                raise
-        else:
-            self._took = time.monotonic() - self._started
+        _compile()
+        self._took = time.monotonic() - self._started
 
 
 def _compile() -> None:
     import scipy.signal  # noqa: F401 - it takes a second, and the ground's displacement needs it
 
-    block = Block(width=0.24, height=1.1)
-    sine = pulses.one_sine(2.5, 1.0)
-    record = Motion.from_samples(sine.acceleration([0.01 * k for k in range(200)]), 0.01)
-    for motion in (sine, record):
-        response = simulate(block, motion)
-        response.rotation([0.5])
-        response.summary()
-        for model in ("nonlinear", "linear"):
-            setup = Setup(Blocks(p=[3.0, 4.0], alpha=0.2), model, Certified())
-            list(simulate_tasks(setup, [Task(slice(0, 2), motion)], threads=1))
-    # Python follows the first responses; a march without turns is compiled all the same.
-    ground, body, rules, _ = response._trail
-    march(ground, body, rules, state.new_table(0), state.new_scratch(), state.new_states(1, 0)[0])
+    signatures.prepare(*_KERNELS)

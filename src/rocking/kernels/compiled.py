@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rocking.kernels import library
+from rocking.kernels.sources import sources
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -86,6 +87,13 @@ class Kernel(OnUse):
         entry = f"*_{place}/{source.stem}.{self.py_func.__qualname__}-*.{version}.nbi"
         return folder is not None and any(folder.glob(entry))
 
+    def prepare(self, *arguments: Any) -> None:
+        """Compile it for arguments of these types, unless the library has code of it; it is not called."""
+        if self.native is None:
+            from numba import typeof
+
+            self.compiled.compile(tuple(typeof(argument) for argument in arguments))
+
     def __call__(self, *arguments: Any) -> Any:
         """Call the code in the library, or what numba compiles where the library does not take these arguments."""
         if self.native is not None:
@@ -121,7 +129,9 @@ def _part(function: F, *, inline: bool) -> F:
     def compile_(function: Callable[..., Any]) -> Any:
         from rocking.kernels import compiler
 
-        return compiler.part_of(function, inline=inline)
+        # The folder's name tells the sources of this package's parts, and of no others.
+        ours = function.__module__.startswith(f"{__package__}.")
+        return compiler.part_of(function, cache_folder() if ours else None, inline=inline)
 
     return function if UNCOMPILED else OnUse(function, compile_)  # type: ignore[return-value]
 
@@ -159,7 +169,7 @@ def _parents() -> Iterator[Path]:
 
 def fingerprint() -> str:
     """Hash of all kernels' sources and of the compiler's version."""
-    return hashlib.sha256(f"{metadata.version('numba')} {library.sources(_HERE)}".encode()).hexdigest()[:16]
+    return hashlib.sha256(f"{metadata.version('numba')} {sources(_HERE)}".encode()).hexdigest()[:16]
 
 
 def state() -> str:

@@ -14,6 +14,7 @@ checks for them; without them parts are compiled in numba's own way.
 import contextlib
 import functools
 import gc
+import importlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -156,9 +157,9 @@ register_model(PartType)(OpaqueModel)
 
 
 class Part:
-    """A part of kernels. Python may call it, too: through a kernel that does nothing else."""
+    """A part of kernels. Python may call it, too: through a kernel that does nothing else, kept in a folder."""
 
-    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+    def __init__(self, function: Callable[..., Any], cache: Path | None, **options: Any) -> None:
         functools.update_wrapper(self, function)
         #: The function as it is without compilation, and what kernels call; named as numba names them.
         self.py_func = function
@@ -167,6 +168,11 @@ class Part:
         )(function)
         self._numba_type_ = PartType(self.dispatcher)
         self._options = options
+        self._cache = cache
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Stand for a part by its name: numba then knows again what it has kept of a function that calls it."""
+        return _part_named, (self.py_func.__module__, self.py_func.__qualname__)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the part from Python."""
@@ -179,8 +185,12 @@ class Part:
         def call(*arguments: Any) -> Any:
             return part(*arguments)
 
-        compiled: Callable[..., Any] = numba.njit(pipeline_class=KernelCompiler, **self._options)(call)
-        return compiled
+        call.__qualname__ = f"{self.py_func.__module__}.{self.py_func.__qualname__}"  # a file for each part
+        return _kept(call, self._cache, pipeline_class=KernelCompiler, **self._options)
+
+
+def _part_named(module: str, name: str) -> Any:
+    return getattr(importlib.import_module(module), name).compiled
 
 
 # - error_model: a kernel that divides by zero continues with inf or NaN; its code says what became of it.
@@ -197,15 +207,19 @@ _KERNEL = {"forceinline": False, "no_cfunc_wrapper": True, "pipeline_class": Ker
 
 def kernel_of(function: Callable[..., Any], cache: Path | None) -> Any:
     """Compile an entry point that Python calls, kept in a folder, and free of Python's lock while it runs."""
+    return _kept(function, cache, nogil=True, **_KERNEL, **_OPTIONS)
+
+
+def part_of(function: Callable[..., Any], cache: Path | None, *, inline: bool) -> Any:
+    """Compile a part of kernels; what calls it from Python is kept in a folder."""
+    options = {"forceinline": inline, **_OPTIONS}
+    return Part(function, cache, **options) if _POSSIBLE else numba.njit(**options)(function)
+
+
+def _kept(function: Callable[..., Any], cache: Path | None, **options: Any) -> Any:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache or "")
     try:
-        return numba.njit(cache=cache is not None, nogil=True, **_KERNEL, **_OPTIONS)(function)
+        return numba.njit(cache=cache is not None, **options)(function)
     finally:
         numba.config.CACHE_DIR = before
-
-
-def part_of(function: Callable[..., Any], *, inline: bool) -> Any:
-    """Compile a part of kernels."""
-    options = {"forceinline": inline, **_OPTIONS}
-    return Part(function, **options) if _POSSIBLE else numba.njit(**options)(function)

@@ -17,6 +17,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from rocking.kernels.sources import sources
+
 #: Where libraries and manifest lie.
 FOLDER: Final = Path(__file__).parent / "shipped"
 
@@ -77,14 +79,6 @@ def state() -> str:
     """Name the library that serves this process, or say why there is none."""
     found = _search()
     return found if isinstance(found, str) else f"library {found.name}"
-
-
-def sources(folder: Path) -> str:
-    """Hash of all kernels' sources."""
-    digest = hashlib.sha256()
-    for source in sorted(folder.rglob("*.py")):
-        digest.update(str(source.relative_to(folder)).encode() + b"\0" + source.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
 
 
 def function(name: str) -> Callable[..., Any] | None:

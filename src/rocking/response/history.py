@@ -73,7 +73,9 @@ class History:
     def states_in(self, times: Floats, rows: Integers) -> Floats:
         """Coordinate and its two rates at each time in the step that starts at the node of its row, shape (n, 3)."""
         found = np.empty((len(times), 3))
-        trace(self.trail, state.new_scratch(), times, rows, found)
+        given = times.view()
+        given.flags.writeable = False  # one type, whatever the caller may do: `trace` is compiled once
+        trace(self.trail, state.new_scratch(), given, rows, found)
         if any(self.stops):
             side = self.trail.nodes["side"][rows]
             found[:, 0] += np.array(self.stops)[np.where(side < 0, -1 - side, side)]
