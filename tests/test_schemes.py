@@ -50,6 +50,26 @@ def test_a_threshold_is_early_by_what_the_geometric_series_still_adds():
     assert -first["error"] == pytest.approx(arcs / (1.0 - 0.92**2), rel=1e-6)
 
 
+def test_a_geometric_bypass_is_off_by_the_square_of_its_threshold_where_a_threshold_is_off_by_itself():
+    thresholds = np.geomspace(1e-3, 1e-6, 7)
+    schemes = [
+        kind(threshold) for kind in (rocking.GeometricBypass, rocking.VelocityThreshold) for threshold in thresholds
+    ]
+    outcomes = compared(1.03, *schemes).outcomes
+    assert all(outcome.is_right for outcome in outcomes)
+    errors = np.array([outcome.rests["error"][0] for outcome in outcomes]).reshape(2, -1)
+    speeds = np.array([outcome.rests["speed"][0] for outcome in outcomes]).reshape(2, -1)
+    orders = [np.polyfit(np.log(v), np.log(-error), 1)[0] for v, error in zip(speeds, errors, strict=True)]
+    assert orders == pytest.approx([2.0, 1.0], abs=0.05)
+    np.testing.assert_array_less(-errors[0], -errors[1] / 50.0)
+
+
+def test_a_coarse_geometric_bypass_passes_over_the_motion_to_come():
+    coarse, fine = compared(1.05, rocking.GeometricBypass(5e-2), rocking.GeometricBypass(1e-3)).outcomes
+    assert coarse.false_rests == pytest.approx([2.741502, 5.883095], abs=1e-6)
+    assert fine.is_right
+
+
 def test_the_paper_s_figure_11_only_the_coarse_threshold_rests_wrongly():
     outcomes = by_name(compared(1.05))
     coarse = outcomes.pop("VelocityThreshold(threshold=0.05)")

@@ -57,8 +57,8 @@ def simulate(
     model : {"nonlinear", "linear"}
         Equation of motion: exact, or linearised for slender blocks (paper, Eqs 2 and 3).
     chattering : str or treatment
-        How sequences of impacts end: "certified" (default), "velocity", "interval" or "time", or the object with its
-        parameter (`Certified`, `VelocityThreshold`, `IntervalThreshold`, `AsymptoticTime`).
+        How sequences of impacts end: "certified" (default), "velocity", "bypass", "interval" or "time", or the object
+        with its parameter (`Certified`, `VelocityThreshold`, `GeometricBypass`, `IntervalThreshold`, `AsymptoticTime`).
     duration : float, optional
         Time to stop at, s. By default to the end of the motion, and on until rest or overturning. Where it ends the
         response while the block still moves or the motion goes on, the response is `stopped`, and has no verdict.
