@@ -18,7 +18,7 @@ from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.maps import chattering_map
 from rocking.chattering.paper import FIGURES, paper_figure
 from rocking.chattering.paper.figure import BlockUnderSine
-from rocking.chattering.schemes import compare_schemes
+from rocking.dynamics.schemes import TREATMENTS, compare_schemes
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TABLES = DOCS / "_tables"
@@ -70,7 +70,7 @@ def tables():
     made["schemes-complete.txt"] = schemes_table(1.03)
     made["schemes-incomplete.txt"] = schemes_table(1.05)
     made["schemes-record.txt"] = table_of_comparison(
-        compare_schemes(STATUE, rocking.records.load("ridgecrest-clc-090"))
+        compare_schemes(STATUE, rocking.records.load("ridgecrest-clc-090"), schemes=TREATMENTS)
     )
     made["paper-frequency.txt"] = frequency_table()
     made["paper-excess.txt"] = excess_table()
@@ -176,19 +176,21 @@ def robust_table():
 
 def schemes_table(a):
     """All schemes under the paper's sine of amplitude a."""
-    return table_of_comparison(compare_schemes(PAPER_BLOCK, BlockUnderSine(a).excitation(), model="linear"))
+    return table_of_comparison(
+        compare_schemes(PAPER_BLOCK, BlockUnderSine(a).excitation(), schemes=TREATMENTS, model="linear")
+    )
 
 
 def table_of_comparison(comparison):
     """Rests, errors and verdict of each scheme."""
-    certified = comparison.certified
+    certified = comparison.certified.response
     rests = int(np.sum(certified.events["kind"] == "rest"))
     rows: list[tuple[str | int, ...]] = [("certified", rests, "", "", "", "")]
     for outcome in comparison.outcomes:
         worst = outcome.largest_error
         rows.append(
             (
-                outcome.treatment.label,
+                outcome.scheme.label,
                 len(outcome.rests),
                 outcome.false_rests.size,
                 outcome.missed.size,

@@ -1,4 +1,4 @@
-from . import analysis, chattering, studies
+from . import analysis, chattering, dynamics, studies
 from .analysis import rules
 from .analysis.calibration.history import HistoryCalibration, calibrate_history
 from .analysis.calibration.outcomes import Calibration, calibrate
@@ -89,6 +89,7 @@ __all__ = [
     "calibrate_history",
     "chattering",
     "compare_measures",
+    "dynamics",
     "explore",
     "fit_fragility",
     "fragility",

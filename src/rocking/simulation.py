@@ -103,7 +103,7 @@ def simulate(
     record = alone.kernel_records(model, how.limits(alone, motion, model))[0]
     trail = Trail(ground_of(motion, block.gravity), record, rules, NO_NODES)
     start = state.new_states(1, 0)[0]
-    start["side"], start["u"], start["v"] = _initial_state(block, record, initial_rotation, initial_velocity)
+    start["side"], start["u"], start["v"] = initial_state(block, record, initial_rotation, initial_velocity)
     start["peak"] = start["u"]
     ending, table = _marched(trail, start)
     if ending == state.Ending.BALANCED:
@@ -149,7 +149,7 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     return state.Ending.UNFINISHED, table
 
 
-def _initial_state(body: Body, record: state.Record, rotation: float, velocity: float) -> tuple[int, float, float]:
+def initial_state(body: Body, record: state.Record, rotation: float, velocity: float) -> tuple[int, float, float]:
     """Index of the side, coordinate and velocity in that side's frame; at rest where both are zero."""
     u = checks.finite(rotation, "initial_rotation", InvalidOption)
     v = checks.finite(velocity, "initial_velocity", InvalidOption)
