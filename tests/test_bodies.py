@@ -34,6 +34,7 @@ class Ball:
     gravity: float = G
     coordinate: ClassVar[Coordinate] = Coordinate("height", "velocity", "acceleration", "m")
     balance: ClassVar[tuple[float, float]] = (math.inf, math.inf)
+    stops: ClassVar[tuple[float, float]] = (0.0, 0.0)
     contact: ClassVar[None] = None
 
     @property
@@ -70,6 +71,10 @@ class Balls:
 
     def select(self, index):
         return Balls(self.restitution[index], self.gravity)
+
+    @property
+    def stops(self):
+        return np.zeros((len(self), 2))
 
     def parameters(self):
         return {"restitution": (self.restitution, "1")}
@@ -127,7 +132,7 @@ def test_a_ball_that_falls_stops_bouncing_at_zenos_time(e):
 def test_the_response_of_a_ball_is_told_in_its_own_words():
     found = simulate(BALLS[1], table(), model="linear")
     text, values = found.summary(), found.to_dict()
-    assert text.startswith("block               ball on a table\nparameters          restitution = 0.6\n")
+    assert text.startswith("body                ball on a table\nparameters          restitution = 0.6\n")
     assert "uplift above        1.0000 g\n" in text and "peak height         " in text
     assert "friction" not in text and "slenderness" not in text
     assert values["peak_height_m"] == found.peak_rotation > 0.0
@@ -148,7 +153,7 @@ def test_the_response_of_a_ball_is_told_in_its_own_words():
 def test_what_a_ball_cannot_do_is_refused():
     with pytest.raises(InvalidOption, match="model must be one of linear"):
         simulate(Ball(0.5), None)
-    with pytest.raises(InvalidOption, match="the only one of this body"):
+    with pytest.raises(InvalidOption, match="in front of the body's stop, not"):
         simulate(Ball(0.5), None, model="linear", initial_rotation=-0.1)
     with pytest.raises(InvalidOption, match='chattering "time" is for symmetric blocks'):
         simulate(Ball(0.5), rocking.pulses.sine(15.0, 1.0, cycles=2), model="linear", chattering="time")

@@ -243,4 +243,4 @@ def test_what_has_one_side_is_lifted_to_no_other() -> None:
         (one_sided(0.0, 1.0, -0.1, 0.5), in_units_of_g([0.0, 1.0], [[0.05, 0.0]])),
         (one_sided(0.0, 1.0, 1.0, 0.5), in_units_of_g([0.0, 1.0], [[0.05, 0.0]], vertical=[[-2.0, 0.0]])),
     ):
-        assert next_uplift(ground, body, new_scratch(), 0, 0.0, math.inf).side == 0
+        assert next_uplift(ground, body, new_scratch(), state.AT_REST, 0, 0.0, math.inf).side == 0

@@ -43,7 +43,7 @@ def uplift(
     """Time, side, and whether by a jump."""
     block = rocking_block()
     block["threshold"] = thresholds
-    piece, offset, side, jump = next_uplift(ground, block, new_scratch(), piece, offset, stop)
+    piece, offset, side, jump = next_uplift(ground, block, new_scratch(), AT_REST, piece, offset, stop)
     return ground.pieces[piece, 0] + offset if side != AT_REST else math.inf, side, jump
 
 

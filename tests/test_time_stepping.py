@@ -8,7 +8,8 @@ import pytest
 from oracles.time_stepping import moreau_jean, schatzman_paoli
 
 import rocking
-from rocking.dynamics import MoreauJean, SchatzmanPaoli, integrate
+from rocking import dynamics
+from rocking.dynamics import BouncingBall, ImpactOscillator, MoreauJean, SchatzmanPaoli, integrate
 
 SICONOS = Path(__file__).parent / "data" / "siconos"
 P, ALPHA, E = 2.0, 0.2, 0.9
@@ -55,6 +56,73 @@ def test_schatzman_paoli_is_what_a_plain_program_computes(model):
     assert np.max(np.abs(found.position)) > 1e-3
     assert len(found.impact_times) > 10
     np.testing.assert_allclose(found.position, plain[:, 0] * plain[:, 1], rtol=0.0, atol=1e-11)
+
+
+def siconos(example):
+    """Time, position and velocity, a row for each step."""
+    return np.loadtxt(SICONOS / f"BouncingBall{example}.ref.gz", unpack=True)
+
+
+def test_moreau_jean_is_what_siconos_computes():
+    times, position, velocity = siconos("TS")
+    found = integrate(BouncingBall(0.9, gravity=9.81), None, MoreauJean(0.005), 10.0, initial_position=1.0)
+    assert len(times) == 2001
+    np.testing.assert_allclose(found.times, times, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(found.position, position, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(found.velocity, velocity, rtol=0.0, atol=1e-12)
+    assert np.sum(found.impulse > 0.0) == 345
+
+
+def test_the_exact_response_is_what_siconos_computes_event_by_event():
+    # Siconos' times of impact are sums of what is located with errors of some 1e-13 s, which add up to 4.7e-12 s; the
+    # velocities at later steps are off by g times that.
+    times, position, velocity = siconos("ED")
+    assert len(times) == 1788
+    ball = BouncingBall(0.9, gravity=9.81)
+    found = dynamics.simulate(ball, None, initial_position=1.0, duration=8.5, chattering="velocity=1e-6")
+    after = np.flatnonzero(np.diff(times) == 0.0) + 1
+    assert len(after) == len(found.impacts) == 44
+    np.testing.assert_allclose(times[after], found.impacts["time"], rtol=0.0, atol=5e-12)
+    np.testing.assert_allclose(velocity[after], found.impacts["speed_after"], rtol=0.0, atol=2.5e-12)
+    first, e = math.sqrt(2.0 / 9.81), 0.9
+    closed = first * (1.0 + 2.0 * e * (1.0 - e ** np.arange(44)) / (1.0 - e))
+    np.testing.assert_allclose(found.impacts["time"], closed, rtol=0.0, atol=2e-14)
+    between = np.setdiff1d(np.arange(times.size), [*after, *(after - 1)])
+    assert between.size == 1700
+    np.testing.assert_allclose(found.position(times[between]), position[between], rtol=0.0, atol=2.5e-13)
+    np.testing.assert_allclose(found.velocity(times[between]), velocity[between], rtol=0.0, atol=5e-11)
+
+
+@pytest.mark.parametrize("second", [None, 0.03])
+@pytest.mark.parametrize("kind", BOTH)
+def test_an_oscillator_with_damping_and_stops_is_followed_with_order_one(kind, second):
+    oscillator = ImpactOscillator(1.0, 0.7, damping_ratio=0.05, stop=0.01, second_stop=second)
+    motion, until = rocking.pulses.sine(0.5, 0.7, cycles=4), 1.0 if second is None else 0.5
+    exact = dynamics.simulate(oscillator, motion, duration=until, initial_velocity=-0.8)
+    assert exact.impacts["side"].tolist() == ([1, 1] if second is None else [1, -1, 1])
+    fastest = np.max(np.abs(exact.velocity(np.linspace(0.0, until, 1000))))
+    lengths = np.geomspace(1e-3, 1e-5, 61)
+    errors, depths = np.empty(lengths.size), np.empty(lengths.size)
+    for k, h in enumerate(lengths):
+        found = integrate(oscillator, motion, kind(h), until - h, initial_velocity=-0.8)
+        errors[k] = np.max(np.abs(found.position - exact.position(found.times)))
+        depths[k] = found.penetration
+    assert np.all(depths < 1.01 * fastest * lengths)
+    assert np.sum(depths > 0.0) > 55
+    order, _ = np.polyfit(np.log(lengths), np.log(errors), 1)
+    assert order == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("kind", BOTH)
+def test_with_damping_and_without_impacts_a_scheme_is_of_second_order(kind):
+    oscillator = ImpactOscillator(1.0, 0.7, damping_ratio=0.1, stop=1.0)
+    motion = rocking.pulses.sine(2.0, 0.7, cycles=4)
+    exact = dynamics.simulate(oscillator, motion, duration=2.0)
+    errors = []
+    for steps in (100, 200, 400, 800):
+        found = integrate(oscillator, motion, kind(2.0 / steps), 2.0)
+        errors.append(np.max(np.abs(found.position - exact.position(np.minimum(found.times, 2.0)))))
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(2.0, abs=0.1)
 
 
 @pytest.mark.parametrize(("scheme", "order"), [(MoreauJean, 2), (lambda h: MoreauJean(h, 1.0), 1), (SchatzmanPaoli, 2)])

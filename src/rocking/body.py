@@ -1,7 +1,8 @@
 """What the engine moves: a body with one coordinate, or many of one kind. A block is one kind.
 
 The equation of motion between impacts is that of `kernels.state.BLOCK`: u'' = lambda u - gain (threshold + side a/g),
-of any stiffness lambda, with one side or two. Everything above the kernels knows a body by these protocols alone.
+of any stiffness lambda, with damping or without, with one side or two, or between two stops. Everything above the
+kernels knows a body by these protocols alone.
 """
 
 from __future__ import annotations
@@ -64,6 +65,10 @@ class Body(Protocol):
         """Coordinate of the unstable balance on each side; infinite where there is none."""
 
     @property
+    def stops(self) -> tuple[float, float]:
+        """Coordinate at which it touches the ground on each side; of one side the second is not used."""
+
+    @property
     def contact(self) -> ContactLaw | None:
         """Forces of the ground; None where nothing is known of them."""
 
@@ -123,6 +128,10 @@ class Bodies(Protocol):
     @property
     def restitution(self) -> Floats:
         """Factors on the speed on leaving each side, shape (n, 2); of one side twice the same."""
+
+    @property
+    def stops(self) -> Floats:
+        """Coordinates at which each touches the ground, as `Body.stops`, shape (n, 2)."""
 
     @property
     def is_symmetric(self) -> bool:

@@ -25,7 +25,7 @@ from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
-from rocking.problem import ground_of, rules_of, step_of
+from rocking.problem import ground_of, rules_of, set_start, step_of
 from rocking.treatment import Treatment
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
@@ -71,12 +71,15 @@ class Setup:
         n bodies.
     model, treatment, duration
         As for `rocking.simulate`.
+    start : tuple of float
+        Coordinate of all bodies at time 0, and its rate.
     """
 
     bodies: Bodies
     model: Model
     treatment: Treatment
     duration: float | None = None
+    start: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -228,6 +231,7 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
     ground = ground_of(task.motion, bodies.gravity, task.factor)
     records = bodies.kernel_records(setup.model, limits)
     states = state.new_states(len(bodies), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))
+    set_start(states, records, bodies, *setup.start)
     step = step_of(task.motion)
     for chosen, substeps in _groups(ground, records, task.motion, setup.model):
         if stop is not None and stop.is_set():
@@ -235,6 +239,7 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
         _march_together(ground, rules, (records, states), chosen, step, substeps)
     _march_on(ground, rules, records, states, stop)
     outcomes = _outcomes(states, task.motion.end)
+    outcomes["peak_rotation"] += np.where(records["facing"], np.nan, bodies.stops[:, 0])
     outcomes["complete_chattering"] = complete_chattering(ground, records, states)
     return outcomes
 
@@ -247,6 +252,7 @@ def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> I
         substeps = np.where(
             width <= lanes.LONGEST_STEP, _substeps(width, model, motion.vertical is not None), -1.0
         ).astype(np.int64)
+    substeps[(records["damping"] > 0.0) | records["facing"]] = -1
     for count in np.unique(substeps):
         chosen = np.flatnonzero(substeps == count)
         for start in range(0, len(chosen), _TOGETHER):
@@ -313,7 +319,7 @@ def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes = np.empty(len(states), dtype=OUTCOME)
     outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
-    early = (states["side"] != state.AT_REST) | (states["end"] < motion_end)
+    early = (states["side"] >= 0) | (states["end"] < motion_end)
     outcomes["stopped"] = (states["ending"] == state.Ending.DONE) & early
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),

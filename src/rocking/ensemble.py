@@ -219,7 +219,7 @@ def setup_of(product: Product, bodies: slice | None = None) -> Setup:
     return Setup(chosen, product.model, product.treatment, product.duration)
 
 
-def _tasks(product: Product) -> Iterator[Task]:
+def tasks_of(product: Product) -> Iterator[Task]:
     """Cut a product into tasks for the engine; their keys are (motion, scale, polarity)."""
     for m, motion in enumerate(product.motions):
         for s, factor in enumerate(product.scales.factors(motion).tolist()):
@@ -348,7 +348,7 @@ def simulate_many(
     count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     results = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in VARIABLES}
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:
-        for task, outcomes in simulate_tasks(setup_of(product), _tasks(product), threads=count):
+        for task, outcomes in simulate_tasks(setup_of(product), tasks_of(product), threads=count):
             for name, values in results.items():
                 values[(*task.key, task.bodies)] = outcomes[name]
             bar.advance(len(outcomes))

@@ -10,9 +10,9 @@ from typing import cast
 import numpy as np
 
 from rocking import checks
-from rocking.arrays import Floats
+from rocking.arrays import Flags, Floats
 from rocking.block import Block, Blocks, one_block
-from rocking.body import Bodies, Body
+from rocking.body import Bodies, Body, Coordinate
 from rocking.constants import MODELS, Model
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
@@ -62,6 +62,59 @@ def one_body(body: Body) -> Body:
     if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # a protocol is slow to ask
         return body
     return one_block(cast("Block", body))
+
+
+def set_start(
+    states: state.Records, records: state.Records, bodies: Bodies, coordinate: float | Floats, rate: float | Floats
+) -> None:
+    """Set the states of bodies at time zero, which are at rest, to coordinates and their rates.
+
+    There is one body for each state, or one for all.
+
+    Raises
+    ------
+    InvalidOption
+        If a body cannot be there.
+    """
+    stops, facing, one_sided = bodies.stops, records["facing"], records["entered"][:, 0] == 0
+    if np.all(coordinate == 0.0) and np.all(rate == 0.0) and not np.any(stops):
+        return
+    at, speed = np.broadcast_arrays(np.asarray(coordinate, dtype=float), np.asarray(rate, dtype=float))
+    from_plus = at - stops[:, 0]
+    sign = np.where(one_sided, 1.0, np.sign(np.where(from_plus == 0.0, speed, from_plus)))
+    at_other = facing & (at == stops[:, 1])
+    u, v = np.where(at_other, 0.0, sign * from_plus), np.where(at_other, -speed, sign * speed)
+    _refuse_behind(
+        bodies[0].coordinate, at, one_sided & ((u < 0.0) | (facing & (u > records["fallen"]))), stops, facing
+    )
+    into = one_sided & (u == 0.0) & (v < 0.0)
+    if np.any(into):
+        worst = float(np.broadcast_to(speed, into.shape)[into][0])
+        raise InvalidOption(
+            f"{{}} = {worst:g} leads from the stop into it; change its sign, or {{}}",
+            "initial_velocity",
+            f"initial_{bodies[0].coordinate.name}",
+            value=worst,
+        )
+    side = np.where((sign < 0.0) | at_other, 1, 0)
+    at_rest = (u == 0.0) & (v == 0.0)
+    states["side"] = np.where(at_rest, np.where(facing, -1 - side, state.AT_REST), side)
+    states["u"], states["v"], states["peak"] = u, v, u
+
+
+def _refuse_behind(coordinate: Coordinate, at: Floats, behind: Flags, stops: Floats, facing: Flags) -> None:
+    """Refuse to start where a body cannot be."""
+    if not np.any(behind):
+        return
+    k = int(np.argmax(behind))
+    low, high = np.broadcast_to(stops, (len(behind), 2))[k]
+    where = f"from {low:g} to {high:g}" if np.broadcast_to(facing, behind.shape)[k] else f"at least {low:g}"
+    value = float(np.broadcast_to(at, behind.shape)[k])
+    raise InvalidOption(
+        f"{{}} must be {where} {coordinate.unit}, in front of the body's stop, not {value:g}",
+        f"initial_{coordinate.name}",
+        value=value,
+    )
 
 
 def rules_of(

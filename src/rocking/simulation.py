@@ -18,7 +18,7 @@ from rocking.kernels.march import follow
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
-from rocking.problem import ground_of, one_body, rules_of
+from rocking.problem import ground_of, one_body, rules_of, set_start
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
 
@@ -100,11 +100,9 @@ def simulate(
     announce(SIMULATIONS)
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
     rules = rules_of(alone, model, how, duration, record=True)
-    record = alone.kernel_records(model, how.limits(alone, motion, model))[0]
-    trail = Trail(ground_of(motion, block.gravity), record, rules, NO_NODES)
-    start = state.new_states(1, 0)[0]
-    start["side"], start["u"], start["v"] = initial_state(block, record, initial_rotation, initial_velocity)
-    start["peak"] = start["u"]
+    records = alone.kernel_records(model, how.limits(alone, motion, model))
+    trail = Trail(ground_of(motion, block.gravity), records[0], rules, NO_NODES)
+    start = started(block, records, initial_rotation, initial_velocity)
     ending, table = _marched(trail, start)
     if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
@@ -118,7 +116,7 @@ def simulate(
         overturned=overturned,
         unfinished=ending == state.Ending.UNFINISHED,
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
-        peak_rotation=float(start["peak"]),
+        peak_rotation=math.nan if records["facing"][0] else float(start["peak"]) + block.stops[0],
         peak_time=float(start["peak_time"]),
         duration=float(start["end"]),
         events=_events(events),
@@ -149,29 +147,27 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     return state.Ending.UNFINISHED, table
 
 
-def initial_state(body: Body, record: state.Record, rotation: float, velocity: float) -> tuple[int, float, float]:
-    """Index of the side, coordinate and velocity in that side's frame; at rest where both are zero."""
-    u = checks.finite(rotation, "initial_rotation", InvalidOption)
+def started(body: Body, records: state.Records, rotation: float, velocity: float) -> state.Record:
+    """State of a body at time zero, of which ``records`` has the one record."""
+    _check_start(body, float(records["fallen"][0]), bool(records["facing"][0]), rotation, velocity)
+    states = state.new_states(1, 0)
+    set_start(states, records, body.alone(), rotation, velocity)
+    return states[0]
+
+
+def _check_start(body: Body, fallen: float, facing: bool, rotation: float, velocity: float) -> None:
+    """Check that a simulation may start from a coordinate and a velocity."""
+    name, unit = f"initial_{body.coordinate.name}", body.coordinate.unit
+    u = checks.finite(rotation, name, InvalidOption)
     v = checks.finite(velocity, "initial_velocity", InvalidOption)
-    unit, fallen = body.coordinate.unit, float(record["fallen"])
     if abs(v) > _FASTEST:
         raise InvalidOption(
             f"{{}} must be at most {_FASTEST:g} {unit}/s in size, not {v:g}", "initial_velocity", value=v
         )
-    if abs(u) >= fallen:
+    if abs(u) >= fallen and not facing:
         limit = "pi/2" if fallen == 0.5 * math.pi else f"{fallen:g}"
         hint = checks.hint_of_degrees(u) if unit == "rad" else ""
-        raise InvalidOption(
-            f"{{}} must be below {limit} {unit} in size, not {u:g}{hint}", "initial_rotation", value=rotation
-        )
-    if u == 0.0 and v == 0.0:
-        return state.AT_REST, 0.0, 0.0
-    sign = math.copysign(1.0, u if u != 0.0 else v)
-    if sign < 0.0 and record["entered"][0] == 0:
-        raise InvalidOption(
-            "{} and {} must lead to side +, the only one of this body", "initial_rotation", "initial_velocity"
-        )
-    return (0 if sign > 0.0 else 1), abs(u), sign * v
+        raise InvalidOption(f"{{}} must be below {limit} {unit} in size, not {u:g}{hint}", name, value=rotation)
 
 
 def _public(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:

@@ -214,6 +214,11 @@ class Blocks:
         return made
 
     @property
+    def stops(self) -> Floats:
+        """Rotation at which each stands, for each side: zero."""
+        return np.zeros((len(self), 2))
+
+    @property
     def is_symmetric(self) -> bool:
         """Whether both sides of every block are equal."""
         return all(np.array_equal(values[:, 0], values[:, 1]) for values, _ in self.parameters().values())

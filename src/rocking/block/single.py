@@ -440,6 +440,11 @@ class Block:
         return self.sides[0].alpha, self.sides[1].alpha
 
     @property
+    def stops(self) -> tuple[float, float]:
+        """Rotation at which it stands, for each side: zero."""
+        return 0.0, 0.0
+
+    @property
     def contact(self) -> ContactLaw:
         """Forces of the ground over the weight, from rotation and ground acceleration (see `rocking.body`)."""
         return self._contact_forces

@@ -1,4 +1,7 @@
-"""Nonlinear dynamics of impact: bodies that are no blocks, and what all bodies of the engine have in common."""
+"""Nonlinear dynamics of impact: further bodies of the same engine, and what becomes of any body under periodic motion.
+
+Positions are relative to the table or the support, m; the motion is its acceleration, m/s^2.
+"""
 
 import lazy_loader
 

@@ -11,14 +11,17 @@ import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats
+from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import Model
+from rocking.dynamics.bodies import _LinearBody
+from rocking.dynamics.simulation import start_of
 from rocking.errors import InvalidOption
 from rocking.kernels import state, stepping
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
 from rocking.problem import ground_of, one_body, rules_of
-from rocking.simulation import initial_state
+from rocking.simulation import started
 from rocking.treatment import Certified
 
 #: Steps in contact without a break from which on a body is at rest: an impact takes three at most, and one of the last
@@ -169,6 +172,8 @@ class SteppedResponse:
         body came to the first from an impact. One that lasts to the end ends at infinity.
     impact_times : ndarray
         Starts of all other times in contact, and of rests, s.
+    peak : float
+        As the peak rotation or position of the response by `rocking.simulate` or `rocking.dynamics.simulate`.
     penetration : float
         How far the coordinate comes to be on the wrong side of the contact.
     """
@@ -184,12 +189,8 @@ class SteppedResponse:
     overturned: bool
     rests: Floats
     impact_times: Floats
+    peak: float
     penetration: float
-
-    @property
-    def peak(self) -> float:
-        """Largest absolute value of the coordinate."""
-        return float(np.max(np.abs(self.position)))
 
     def __repr__(self) -> str:
         found = f"{len(self.impact_times)} impacts, {len(self.rests)} rests, peak {self.peak:.5g}"
@@ -204,8 +205,8 @@ def integrate(
     scheme: TimeStepping,
     duration: float,
     *,
-    model: Model = "nonlinear",
-    initial_position: float = 0.0,
+    model: Model | None = None,
+    initial_position: float | None = None,
     initial_velocity: float = 0.0,
 ) -> SteppedResponse:
     """Integrate the motion of a body by time stepping, to compare with `rocking.simulate`.
@@ -213,17 +214,17 @@ def integrate(
     Parameters
     ----------
     body : Body
-        A block, or another body.
+        A block, or one of `rocking.dynamics`.
     motion : Motion or None
         What shakes it; None for free motion.
     scheme : TimeStepping
         `MoreauJean` or `SchatzmanPaoli`, with its step.
     duration : float
         Time to stop at, s; the last step ends there or later.
-    model : {"nonlinear", "linear"}
-        Equation of motion, of a block.
+    model : {"nonlinear", "linear"}, optional
+        Equation of motion, of a block by default the nonlinear one.
     initial_position, initial_velocity : float
-        As the initial rotation and velocity of `rocking.simulate`.
+        As for `rocking.dynamics.simulate`; of a block its rotation.
 
     Returns
     -------
@@ -247,19 +248,22 @@ def integrate(
 
     Examples
     --------
-    A ball of Siconos' examples is dropped; after 10 s it rests a little below the ground:
+    A ball is dropped as in an example of Siconos. It comes to rest a little below the table, and early: the impacts
+    accumulate at 8.579 s.
 
-    >>> import rocking
-    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    >>> found = integrate(block, None, MoreauJean(1e-3), 5.0, model="linear", initial_position=0.02)
-    >>> len(found.rests), f"{found.rests[0, 0]:.3f}"
-    (1, '4.236')
+    >>> from rocking import dynamics
+    >>> ball = dynamics.BouncingBall(0.9, gravity=9.81)
+    >>> found = dynamics.integrate(ball, None, dynamics.MoreauJean(0.005), 10.0, initial_position=1.0)
+    >>> f"{found.rests[0, 0]:.3f} s, {found.position[-1]:.6f} m"
+    '8.255 s, -0.000023 m'
     """
     one, motion = one_body(body), one_motion(motion)
     alone, how = one.alone(), Certified()
     stop = checks.positive(duration, "duration", InvalidOption, "s")
-    rules = rules_of(alone, model, how, stop, record=True)
-    record = alone.kernel_records(model, how.limits(alone, motion, model))[0]
+    equation = equation_of(one, model)
+    rules = rules_of(alone, equation, how, stop, record=True)
+    records = alone.kernel_records(equation, how.limits(alone, motion, equation))
+    record = records[0]
     longest = _LONGEST_STEP / math.sqrt(float(np.max(np.abs(record["stiffness"]))) or math.inf)
     if not isinstance(scheme, TimeStepping):
         raise InvalidOption(f"{{}} must be one of time stepping, as MoreauJean(1e-3), not {scheme!r}", "scheme")
@@ -273,8 +277,7 @@ def integrate(
             *("step",),
             value=h,
         )
-    start = state.new_states(1, 0)[0]
-    start["side"], start["u"], start["v"] = initial_state(one, record, initial_position, initial_velocity)
+    start = started(one, records, position_at_start(one, initial_position), initial_velocity)
     rows = np.zeros((count + 1, stepping.COLUMNS))
     rows = rows[: scheme._follow((ground_of(motion, one.gravity), record, rules, start), rows)]
     times: Floats = h * np.arange(len(rows), dtype=np.float64)
@@ -283,17 +286,32 @@ def integrate(
     return SteppedResponse(
         body=one,
         motion=motion,
-        model=model,
+        model=equation,
         scheme=scheme,
         times=times,
-        position=side * u,
+        position=side * u + one.stops[0],
         velocity=side * rows[:, stepping.VELOCITY],
         impulse=impulse,
-        overturned=bool(u[-1] >= record["fallen"]),
+        overturned=bool(u[-1] >= record["fallen"] and not record["facing"]),
         rests=rests,
         impact_times=impacts,
-        penetration=max(0.0, -float(u.min())),
+        peak=math.nan if record["facing"] else float(u.max()) + one.stops[0],
+        penetration=max(0.0, -float(u.min()), float(u.max() - record["fallen"]) if record["facing"] else 0.0),
     )
+
+
+def equation_of(body: Body, model: Model | None) -> Model:
+    """Return the equation of motion: as it is given, else nonlinear for a block and linear for other bodies."""
+    if model is not None:
+        return model
+    return "nonlinear" if isinstance(body, Block) else "linear"
+
+
+def position_at_start(body: Body, position: float | None) -> float:
+    """Return the position at time 0: as it is given, else zero, or the stop where that is behind it."""
+    if position is not None:
+        return position
+    return start_of(body) if isinstance(body, _LinearBody) else 0.0
 
 
 def _contacts(times: Floats, pushes: Any) -> tuple[Floats, Floats]:

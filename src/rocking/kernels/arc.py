@@ -17,6 +17,7 @@ from rocking.kernels.recurrences import (
     Nine,
     Seven,
     angle_coefficients,
+    damped_coefficient,
     linear_coefficients,
     nonlinear_coefficient,
     weighted_coefficient,
@@ -90,6 +91,9 @@ def expand(
     if rules.nonlinear:
         order, h = expand_nonlinear(block, state, scratch, (degree, changes), h)
         return order, h, degree
+    if block.damping > 0.0:
+        order, h = expand_damped(block, state, scratch, degree, h)
+        return order, h, degree
     if has_vertical(ground):
         order, h = expand_linear_weighted(block, state, scratch, degree, h)
         return order, h, degree
@@ -119,6 +123,8 @@ def raise_degree(A: Floats, degree: int, W: Floats, other: int) -> int:
 def step_length(ground: Ground, block: Record, state: Record, left: float) -> float:
     """Length of the next Taylor step."""
     h = min(left, 1.0 / np.sqrt(abs(block.stiffness[state.side])))
+    if block.damping > 0.0:
+        h = min(h, 1.0 / block.damping)
     if state.u == 0.0 and state.v > 0.0:
         g = restoring(ground, block, state.side, state.piece, state.offset)
         if g > 0.0:
@@ -190,6 +196,36 @@ def expand_linear_weighted(block: Record, state: Record, scratch: Record, degree
             if beyond <= _TRUNCATION * largest:
                 return k + 2, h
     return ORDER, shortened_linear(scratch, lam, degree, h)
+
+
+@shared
+def expand_damped(block: Record, state: Record, scratch: Record, degree: int, h: float) -> tuple[int, float]:
+    """Series of a linear arc with damping, under a constant weight; returns (order, h').
+
+    Past the motion's degree the term of power k + 2 of the velocity is at most q_k times the larger of the two before,
+    q_k = (|lam| h^2/k + c h)/(k + 1), which falls. So those left out are a geometric sum, each power of q_k twice.
+    """
+    c, lam, drag = scratch.rotation, abs(block.stiffness[state.side]), block.damping
+    c[0] = state.u
+    c[1] = state.v
+    for k in range(ORDER - 1):
+        c[k + 2] = damped_coefficient(block, state.side, scratch, degree, k)
+    for _ in range(_SHORTENINGS):
+        largest = term = abs(c[1]) * h
+        power = h * h
+        beyond = np.inf
+        for k in range(2, ORDER + 1):
+            previous = term
+            term = k * abs(c[k]) * power
+            largest = max(largest, term)
+            power *= h
+            if k > degree + 2:
+                ratio = (lam * h * h / (k - 1) + drag * h) / k
+                beyond = 2.0 * max(term, previous) * ratio / (1.0 - ratio) if ratio < 1.0 else np.inf
+                if beyond <= max(_TRUNCATION * largest, _SMALLEST):
+                    return k, h
+        h *= shortening(beyond / max(_TRUNCATION * largest, _SMALLEST))
+    return ORDER, h
 
 
 @shared

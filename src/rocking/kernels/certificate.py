@@ -34,6 +34,10 @@ from rocking.kernels.state import Record
 #: Window of the proof over the first estimate of the remaining time.
 _WINDOW = 1.5
 
+#: Bound on every speed until rest over the first, where damping counts; and on `arc_bounds`' first for it to hold.
+_FASTEST = 1.5
+_ENERGY = 1.25
+
 
 class Bounds(NamedTuple):
     """Bounds on one side over a window.
@@ -122,6 +126,11 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     motion = bounds_on_motion(ground, block, state, window + rounding, scratch)
     first = side_bounds(block, rules, i, motion)
     second = side_bounds(block, rules, j, motion)
+    drag = block.damping * _FASTEST * v * (1.0 + ROUNDING)
+    if drag > 0.0:
+        first, second = with_drag(first, drag), with_drag(second, drag)
+        if not arc_bounds(v, first)[0] <= _ENERGY:
+            return unproven()
     lower, upper = geometric_bracket(v, first, second, e_i, e_j)
     if not upper <= window:
         return unproven()
@@ -131,7 +140,7 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
         return unproven()
     local_series(ground, state.piece, state.offset, 1.0, clear(scratch.ground))
     weight_series(ground, state.piece, state.offset, clear(scratch.weight))
-    horizon = Horizon(motion, ground.error, ground.columns, upper, height)
+    horizon = Horizon(motion, ground.error, ground.columns, upper, height, drag)
     side_i = restoring_parabola(block, rules, i, scratch, horizon)
     side_j = restoring_parabola(block, rules, j, scratch, horizon)
     if upper - lower > rules.tolerance and upper + rounding <= length_of(ground, state.piece) - state.offset:
@@ -159,6 +168,8 @@ def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float
         vertical = widened(exact, ground.error)
     weight = 1.0 + vertical.high
     limits = (-block.threshold[0] * weight, block.threshold[1] * weight)
+    if block.facing:  # the other stop is out of reach
+        limits = (limits[0], np.inf) if state.side == 0 else (-np.inf, limits[1])
     horizontal = bounds_over(ground, state.piece, state.offset, window, limits, scratch.ground)
     return MotionBounds(widened(horizontal, ground.error), vertical)
 
@@ -172,7 +183,8 @@ def is_greatest_at_zero(block: Record, height: float) -> bool:
 class Horizon(NamedTuple):
     """Bounds over the window of a proof.
 
-    Those on the motion, its error and the number of its coefficients, the window's length, the highest rotation.
+    Those on the motion, its error and the number of its coefficients, the window's length, the highest rotation, the
+    greatest acceleration by damping.
     """
 
     motion: MotionBounds
@@ -180,6 +192,17 @@ class Horizon(NamedTuple):
     columns: int
     window: float
     height: float
+    drag: float
+
+
+@inlined
+def with_drag(bounds: Bounds, drag: float) -> Bounds:
+    """Bounds on a side whose acceleration differs by at most ``drag``, at any time and whichever way the body moves.
+
+    On the way up and down again that takes as much energy as a motion which changes by twice as much.
+    """
+    k, m, M, change, rate, jumps = bounds
+    return Bounds(k, m - drag, M + drag, change + 2.0 * drag, rate, jumps + 2.0 * drag)
 
 
 @inlined
@@ -193,13 +216,13 @@ def restoring_parabola(block: Record, rules: Record, j: int, scratch: Record, ho
     horizontal, vertical = horizon.motion
     error = horizon.error + beyond_parabola(A, horizon)
     # Where almost no weight presses the block down, weight and push cancel, and the rounding of both remains.
-    error += ROUNDING * (threshold * (1.0 + largest(vertical)) + largest(horizontal))
+    error += ROUNDING * (abs(threshold) * (1.0 + largest(vertical)) + largest(horizontal))
     weight_changes = vertical.high > vertical.low
     weight_error = horizon.error + beyond_parabola(W, horizon) if weight_changes else 0.0
     weight_change = vertical.slope * horizon.window + 2.0 * horizon.error if weight_changes else 0.0
     if not rules.nonlinear:
         stiffness = lam * W[0]
-        error = gain * (error + threshold * weight_error)
+        error = gain * (error + abs(threshold) * weight_error) + horizon.drag
         if weight_changes:
             error = deviation(error, abs(lam) * weight_change, 0.0, horizon.height)
     else:
@@ -265,7 +288,7 @@ def side_bounds(block: Record, rules: Record, j: int, motion: MotionBounds) -> B
     from_weight = (threshold * (1.0 + vertical.low), threshold * (1.0 + vertical.high))
     from_push = (sign * horizontal.low, sign * horizontal.high)
     push, weight = largest(horizontal), largest_weight(vertical)
-    rounding = ROUNDING * (threshold * weight + push)
+    rounding = ROUNDING * (abs(threshold) * weight + push)
     # A rotation changes both models' stiffness and, in the nonlinear one, what the motion adds (at most p^2 a/g).
     stiffness = abs(block.stiffness[j]) * (diagonal(weight, push) if rules.nonlinear else weight) * (1.0 + ROUNDING)
     per_push = (block.stiffness[j] if rules.nonlinear else block.gain[j]) * (1.0 + ROUNDING)

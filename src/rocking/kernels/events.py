@@ -192,6 +192,10 @@ def apply_impact(block: Record, state: Record) -> float:
     left = state.side
     speed = max(0.0, -state.v)
     state.side = block.entered[left]
+    if block.facing and state.u > 0.0:  # at the stop on the other side
+        left = state.side = 1 - left
+        speed = max(0.0, state.v)
+        state.proof_speed = np.inf
     state.u = 0.0
     state.v = block.restitution[left] * speed
     state.impacts += 1

@@ -17,7 +17,6 @@ from rocking.kernels.ground import Ground, coefficient, has_vertical, last_piece
 from rocking.kernels.lane_steps import GROUP, STEP_CONSTANTS, WIDTH, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.march import march
 from rocking.kernels.state import (
-    AT_REST,
     TO_THE_END,
     Ending,
     Record,
@@ -292,7 +291,7 @@ def march_until(ground: Ground, rules: Record, scratch: Record, pool: Pool, inde
     state.ending = march(ground, pool.blocks[index], rules, pool.table, scratch, state)
     if state.ending != Ending.RUNNING:
         return False
-    if state.side != AT_REST and state.piece == until and state.offset == 0.0:
+    if state.side >= 0 and state.piece == until and state.offset == 0.0:
         return True
     pool.following[index] = pool.first[state.piece]
     pool.first[state.piece] = index

@@ -31,6 +31,7 @@ from rocking.kernels.state import (
     Records,
     RestRule,
     has_space,
+    resting_side,
     write_event,
     write_impact,
     write_node,
@@ -93,12 +94,12 @@ def follow(ground: Ground, block: Record, rules: Record, table: Records, scratch
 def march_step(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> Any:
     """One iteration of a march: to the next uplift of a block at rest, or along an arc to its first event."""
     write_node(ground, rules, table, state)
-    if state.side == AT_REST:
+    if state.side < 0:
         return rest_until_uplift(ground, block, rules, table, scratch, state)
-    if state.run > 0 and state.u == 0.0 and may_pass(ground, rules):
+    if state.run > 0 and state.u == 0.0 and may_pass(ground, block, rules):
         pass_proven_impacts(ground, block, rules, table, state, time_left(ground, rules, state))
     outcome = follow_arc(ground, block, rules, scratch, state)
-    if outcome == Outcome.IMPACT:
+    if outcome == Outcome.IMPACT or (outcome == Outcome.OVERTURN and block.facing):
         return pass_impact(ground, block, rules, table, scratch, state)
     if outcome == Outcome.OVERTURN:
         return end_by_overturning(ground, block, rules, table, state)
@@ -108,9 +109,9 @@ def march_step(ground: Ground, block: Record, rules: Record, table: Records, scr
 
 
 @inlined
-def may_pass(ground: Ground, rules: Record) -> bool:
-    """Whether `pass_proven_impacts` applies: linear, without a changing weight, under a motion linear in time."""
-    return not rules.nonlinear and is_straight(ground) and not has_vertical(ground)
+def may_pass(ground: Ground, block: Record, rules: Record) -> bool:
+    """Whether `pass_proven_impacts` applies: linear, undamped, a constant weight, a motion linear in time."""
+    return not rules.nonlinear and is_straight(ground) and not has_vertical(ground) and block.damping == 0.0
 
 
 @inlined
@@ -118,7 +119,7 @@ def rest_until_uplift(
     ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record
 ) -> int:
     """Stay at rest until the motion passes a threshold; DONE when it never does, and the response is over."""
-    found = next_uplift(ground, block, scratch, state.piece, state.offset, rules.stop)
+    found = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, rules.stop)
     if found.side == AT_REST or start_of(ground, found.piece) + found.offset >= rules.stop:
         over = start_of(ground, last_piece(ground))
         state.end = max(state.rested, over) if rules.endless else rules.stop
@@ -211,7 +212,7 @@ def pass_impact(ground: Ground, block: Record, rules: Record, table: Records, sc
     state.last_impact_time = time
     if math.isnan(rest.time):
         return Ending.RUNNING
-    return come_to_rest(ground, rules, table, state, rest)
+    return come_to_rest(ground, block, rules, table, state, rest)
 
 
 @inlined
@@ -238,7 +239,7 @@ def nearly_touches(ground: Ground, block: Record, rules: Record, scratch: Record
 
 
 @inlined
-def come_to_rest(ground: Ground, rules: Record, table: Records, state: Record, rest: Rest) -> int:
+def come_to_rest(ground: Ground, block: Record, rules: Record, table: Records, state: Record, rest: Rest) -> int:
     """Close a sequence of impacts; DONE when the march stops before the block is at rest."""
     time = time_of(ground, state)
     state.stalled += rest.stalled
@@ -251,7 +252,7 @@ def come_to_rest(ground: Ground, rules: Record, table: Records, state: Record, r
     if time + rest.time >= rules.stop:
         state.end = rules.stop
         return Ending.DONE
-    state.side = AT_REST
+    state.side = resting_side(block, state.side)
     state.u = state.v = 0.0
     state.rested = time + rest.time
     if state.rests == 0:

@@ -3,7 +3,7 @@
 The rotation u >= 0 is counted in the frame of the block's side, and so is the ground acceleration A(t) = i a(t)/g with
 i the sign of that side. A vertical ground acceleration changes the weight: W(t) = 1 + a_v(t)/g. The equations are
 
-    linear      u'' = W lam u - gain (W threshold + A)
+    linear      u'' = W lam u - gain (W threshold + A) [- c u', without a changing weight]
     nonlinear   u'' = -lam (W sin(alpha - u) + A cos(alpha - u))
 
 In the linear model lam may have any sign: p^2 for a rocking block (whose gain is p^2, too), 0 for a ball, negative for
@@ -60,6 +60,16 @@ def linear_coefficients(block: Record, state: Record, scratch: Record, degree: i
 
 
 @inlined
+def damped_coefficient(block: Record, side: int, scratch: Record, degree: int, k: int) -> float:
+    """Coefficient c[k + 2] of a linear arc with damping, from the two before it."""
+    c = scratch.rotation
+    value = block.stiffness[side] * c[k] - block.damping * ((k + 1) * c[k + 1])
+    if k <= degree:
+        value -= block.gain[side] * (scratch.ground[k] + (block.threshold[side] if k == 0 else 0.0))
+    return value * INTEGRATED_TWICE[k]
+
+
+@inlined
 def weighted_coefficient(block: Record, side: int, scratch: Record, degree: int, k: int) -> float:
     """Coefficient c[k + 2] of a linear arc while the weight changes, from those before it.
 
@@ -102,13 +112,18 @@ def angle_coefficients(scratch: Record, k: int) -> None:
 
 
 @inlined
-def variation_coefficients(work: Record, order: int) -> None:
-    """Write the coefficients 2 to ``order`` of x'' = stiffness x + forcing into work.change, from its first two."""
+def variation_coefficients(work: Record, damping: float, order: int) -> None:
+    """Write the coefficients 2 to ``order`` of x'' = stiffness x - damping x' + forcing into work.change.
+
+    Its first two are given.
+    """
     stiffness, forcing, x = work.stiffness, work.forcing, work.change
     for k in range(order - 1):
         value = forcing[k]
         for j in range(k + 1):
             value += stiffness[j] * x[k - j]
+        if damping > 0.0:
+            value -= damping * ((k + 1) * x[k + 1])
         x[k + 2] = value * INTEGRATED_TWICE[k]
 
 

@@ -36,7 +36,7 @@ _CONVERGED = 1e-8
 @inlined
 def short_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> StepEnd:
     """Step to the next impact or over ``left``, or the part of it that is short; UNDECIDED where it is not simple."""
-    if not is_straight(ground):
+    if not is_straight(ground) or block.damping > 0.0:
         return undecided()
     if has_vertical(ground):
         return short_weighted_step(ground, block, rules, state, left)

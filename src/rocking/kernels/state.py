@@ -20,7 +20,7 @@ Record = Any
 #: Highest power in an arc's series; enough for steps of 1/p to full double precision.
 ORDER = 22
 
-#: Side of a block at rest.
+#: Side of a body at rest. Every negative side is one at rest: see `resting_side`.
 AT_REST = -1
 
 #: The value of ``until`` of a march that ends at no piece of the motion.
@@ -89,10 +89,12 @@ _SERIES = ("f8", (ORDER + 2,))
 #: A block, side by side: lambda in u'' = lambda u - ...; uplift threshold in g and its gain (the restoring acceleration
 #: at zero rotation is gain (threshold + side a/g)); restitution on leaving the side, and the side entered from it; the
 #: rotation at which the block has overturned; slenderness, its sine and cosine; limit of a treatment other than the
-#: certificate. The fields that most iterations of a march read come first, here and below: fewer cache lines are read.
+#: certificate; damping, c in u'' = ... - c u' (linear model only); and whether the sides are two stops that face each
+#: other: each side is then entered from itself, and at ``fallen``, their distance, the body hits the other stop.
+#: The fields that most iterations of a march read come first, here and below: fewer cache lines are read.
 BLOCK = _record(
     stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, restitution=_SIDES, entered=("i8", (2,)), fallen="f8",
-    slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES,
+    slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES, damping="f8", facing="?",
 )  # fmt: skip
 
 #: How to compute: model, end of chattering (`RestRule`), width of a good bracket (s), when to stop (s), whether that
@@ -188,7 +190,19 @@ def has_space(rules: Record, table: Records, state: Record) -> bool:
 @inlined
 def signed(side: int) -> int:
     """Sign of the rotation on a side: +1, -1, and 0 at rest."""
-    return 0 if side == AT_REST else 1 - 2 * side
+    return 0 if side < 0 else 1 - 2 * side
+
+
+@inlined
+def resting_side(block: Record, side: int) -> int:
+    """Side of a body that comes to rest on a side: of two stops that face each other it tells which; see `stop_of`."""
+    return -1 - side if block.facing else AT_REST
+
+
+@inlined
+def stop_of(resting: int) -> int:
+    """Return the stop at which a body rests whose side is ``resting``; 0 for all but those between two stops."""
+    return -1 - resting
 
 
 @inlined

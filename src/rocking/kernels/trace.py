@@ -16,7 +16,7 @@ from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import first_root
 from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, start_of, vertical_of
 from rocking.kernels.recurrences import INTEGRATED_TWICE, variation_coefficients
-from rocking.kernels.state import AT_REST, NODE_ROW, Record, Records, records
+from rocking.kernels.state import NODE_ROW, Record, Records, records
 
 #: Nodes of a response before its march.
 NO_NODES = records(0, NODE_ROW)
@@ -50,8 +50,8 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
         row = rows[k]
         node = nodes[row]
         last = row + 1 == nodes.shape[0]
-        closes = last or nodes[row + 1].side == AT_REST  # what follows its arc is not resolved
-        if node.side == AT_REST:
+        closes = last or nodes[row + 1].side < 0  # what follows its arc is not resolved
+        if node.side < 0:
             out[k, _ROTATION] = out[k, _VELOCITY] = out[k, _ACCELERATION] = 0.0
             continue
         if row != expanded:
@@ -108,15 +108,15 @@ def vary(
     for k in range(nodes.shape[0]):
         node = nodes[k]
         if k + 1 == nodes.shape[0]:
-            if node.side != AT_REST and event_count < events.shape[0]:
+            if node.side >= 0 and event_count < events.shape[0]:
                 events[event_count] = -du / node.v
             break
         following = nodes[k + 1]
-        if node.side == AT_REST:
+        if node.side < 0:
             events[event_count] = uplift_shift(trail, following, quantity)
             event_count += 1
             du = dv = 0.0
-        elif following.side == AT_REST:
+        elif following.side < 0:
             shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
             events[event_count] = rest_shift(trail, node, quantity, dv, shift, following)
             event_count += 1
@@ -129,7 +129,8 @@ def vary(
             if following.u == 0.0 and (following.side != node.side or following.v > 0.0):  # no touch
                 _, speed, _ = evaluate(scratch.rotation, order, t)
                 shift = du / -speed
-                du, dv = saltation(trail, node, following, quantity, shift, (dv, -speed))
+                away = -1.0 if trail.block.facing and following.side != node.side else 1.0  # the other stop
+                du, dv = saltation(trail, node, following, quantity, shift, (away * dv, -away * speed))
                 impacts[impact_count] = shift
                 impact_count += 1
     return at_peak
@@ -162,7 +163,7 @@ def expand_variation(
         for k in range(order - 1):
             work.forcing[k] = 0.0
     work.change[0], work.change[1] = start
-    variation_coefficients(work, order)
+    variation_coefficients(work, trail.block.damping, order)
     return order
 
 
@@ -207,9 +208,11 @@ def saltation(
     """Variation after an impact that shifts; ``rates``: variation of the velocity before it, and speed of impact."""
     block = trail.block
     dv, speed = rates
-    left = restoring(trail.ground, block, node.side, following.piece, following.offset)
+    hit = following.side if block.facing else node.side
+    left = restoring(trail.ground, block, hit, following.piece, following.offset) - block.damping * speed
+    e = block.restitution[hit]
     entered = restoring(trail.ground, block, following.side, following.piece, following.offset)
-    e = block.restitution[node.side]
+    entered += block.damping * (e * speed)
     faster = -(dv - left * shift) + (speed if quantity == Quantity.RESTITUTION else 0.0)
     return -e * speed * shift, e * faster + entered * shift
 
@@ -221,7 +224,7 @@ def uplift_shift(trail: Trail, node: Record, quantity: int) -> float:
     threshold = block.threshold[node.side]
     push = -push_at(ground, block, node.side, node.piece, node.offset)
     rate = -push_rate(ground, block, node.side, node.piece, node.offset)
-    if abs(push - threshold) > _JUMP * threshold:
+    if abs(push - threshold) > _JUMP * abs(threshold):
         return 0.0
     if quantity == Quantity.MOTION:
         return -push / rate

@@ -19,7 +19,7 @@ from rocking.kernels.ground import (
     start_of,
     vertical_of,
 )
-from rocking.kernels.state import AT_REST, Record, Records
+from rocking.kernels.state import AT_REST, Record, Records, stop_of
 
 #: Accelerations closer to a threshold than this fraction of it are at the threshold.
 _ROUNDING = 2.0**-48
@@ -35,13 +35,17 @@ class Uplift(NamedTuple):
 
 
 @shared
-def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offset: float, stop: float) -> Uplift:
-    """First instant from (piece, offset) at which the motion passes a side's threshold.
+def next_uplift(
+    ground: Ground, block: Record, scratch: Record, resting: int, piece: int, offset: float, stop: float
+) -> Uplift:
+    """First instant from (piece, offset) at which the motion passes a side's threshold; the body's side is ``resting``.
 
     Side AT_REST when it never does before ``stop``; the piece is then the last one looked at.
     """
     A, d = scratch.ground, scratch.other
     plus, minus = block.threshold[0], block.threshold[1]
+    if block.facing:  # only the stop at which it rests
+        plus, minus = (plus, np.inf) if stop_of(resting) == 0 else (np.inf, minus)
     while True:
         following = next_beyond(ground, piece, -plus, minus)
         if following > piece:
@@ -62,8 +66,8 @@ def next_uplift(ground: Ground, block: Record, scratch: Record, piece: int, offs
             passed = min(to_plus, to_minus)
             # A passing that rounding puts at the end of the piece is decided in the next one, which may turn back.
             if offset + passed < length:
-                side = 0
-                if block.entered[0] != 0:  # there is another side
+                side = stop_of(resting) if block.facing else 0
+                if block.entered[0] != 0:  # it rests on both sides
                     side = pushed_side(ground, piece, offset + passed, length - offset - passed, A)
                 return Uplift(piece, offset + passed, side, jump_minus if side == 1 else jump_plus)
         piece += 1
@@ -106,11 +110,11 @@ def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float
     ``d`` is scratch space.
     """
     gap = threshold - sign * A[0]
-    if gap < -_ROUNDING * threshold:
+    if gap < -_ROUNDING * abs(threshold):
         return 0.0, True
     if degree <= 1:
         rate = sign * A[1] if degree == 1 else 0.0
-        if rate > 0.0 and gap < rate * h - _ROUNDING * threshold:
+        if rate > 0.0 and gap < rate * h - _ROUNDING * abs(threshold):
             return max(0.0, gap) / rate, False
         return np.inf, False
     d[0] = gap
@@ -182,11 +186,11 @@ def note_complete(ground: Ground, blocks: Records, states: Records, scratch: Rec
 def passes_again(ground: Ground, block: Record, scratch: Record, state: Record) -> bool:
     """Whether the motion, having lifted a block and come back within the thresholds, passes one before its rest."""
     until = state.first_rest
-    lifted = next_uplift(ground, block, scratch, piece_before(ground, state.first_uplift), 0.0, until)
+    lifted = next_uplift(ground, block, scratch, AT_REST, piece_before(ground, state.first_uplift), 0.0, until)
     if lifted.side == AT_REST:
         return False
     piece, offset = back_within(ground, block, scratch, lifted)
-    again = next_uplift(ground, block, scratch, piece, offset, until)
+    again = next_uplift(ground, block, scratch, AT_REST, piece, offset, until)
     return bool(again.side != AT_REST and start_of(ground, again.piece) + again.offset < until)
 
 
@@ -230,7 +234,7 @@ def time_beyond(ground: Ground, block: Record, scratch: Record, piece: int, offs
     sign, threshold = 1.0 if side == 1 else -1.0, block.threshold[side]
     A, d = scratch.ground, scratch.other
     degree = push_series(ground, piece, offset, threshold, sign, A, d)
-    d[0] = sign * A[0] - (1.0 - _BACK) * threshold
+    d[0] = sign * A[0] - (threshold - _BACK * abs(threshold))
     for k in range(1, degree + 1):
         d[k] = sign * A[k]
     return first_passing(d, degree, length_of(ground, piece) - offset)

@@ -29,8 +29,8 @@ _LINE: Final = 0.065
 class SchemeCurve(NamedTuple):
     """A family of schemes, from cheap to costly.
 
-    Label; costs; errors of the position over the peak, and of the worst time of rest (s; NaN where there is none);
-    whether rests and verdict are right.
+    Label; costs; errors of the position over the largest one, and of the worst time of rest (s; NaN where there is
+    none); whether rests and verdict are right.
     """
 
     label: str
@@ -58,7 +58,7 @@ def schemes_figure(
     with figure_for(ax, (7.2, 3.4), figsize, title) as figure:
         left, right = (ax, None) if ax is not None else figure.subplots(1, 2)
         _draw(left, curves, [np.maximum(curve.position, _ROUNDING) for curve in curves])
-        add_labels(left, cost_label, "largest error of the position over the peak")
+        add_labels(left, cost_label, "largest error of the position, over the largest position")
         if right is not None:
             _draw(right, curves, [np.maximum(curve.rest, _BRACKET) for curve in curves])
             add_labels(right, cost_label, "error of the worst time of rest (s)")

@@ -15,7 +15,6 @@ from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.errors import InvalidOption
-from rocking.kernels import state
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
 from rocking.response.history import (
@@ -67,7 +66,7 @@ class Answers:
 
     @cached_property
     def _history(self) -> History:
-        return History(self._trail, self.duration)
+        return History(self._trail, self.duration, self.body.stops)
 
     @cached_property
     def peak_over_slenderness(self) -> float:
@@ -82,7 +81,7 @@ class Answers:
     @property
     def moves_at_end(self) -> bool:
         """Whether the block is not at rest at the end of the response."""
-        return bool(self._trail.nodes["side"][-1] != state.AT_REST)
+        return bool(self._trail.nodes["side"][-1] >= 0)
 
     @property
     def stopped(self) -> bool:
@@ -252,7 +251,8 @@ def with_unresolved_impacts(response: Answers) -> History:
     """Return the history of a response with the impacts that follow the closing of each of its sequences."""
     chattering = response.chattering
     closed = bool(len(chattering)) and bool(chattering["end"][-1] >= response.duration)
-    return History(with_all_impacts(response._trail, cut=closed and response.moves_at_end), response.duration)
+    trail = with_all_impacts(response._trail, cut=closed and response.moves_at_end)
+    return History(trail, response.duration, response.body.stops)
 
 
 def _pull(_: Floats, vertical: Floats) -> Floats:

@@ -60,6 +60,7 @@ class History:
 
     trail: Trail
     end: float
+    stops: tuple[float, float]
 
     def states(self, time: ArrayLike) -> Floats:
         """Coordinate and its two rates at times of any shape, in one more dimension; NaN outside [0, end]."""
@@ -73,6 +74,9 @@ class History:
         """Coordinate and its two rates at each time in the step that starts at the node of its row, shape (n, 3)."""
         found = np.empty((len(times), 3))
         trace(self.trail, state.new_scratch(), times, rows, found)
+        if any(self.stops):
+            side = self.trail.nodes["side"][rows]
+            found[:, 0] += np.array(self.stops)[np.where(side < 0, -1 - side, side)]
         return found
 
     def rows(self, times: Floats) -> Integers:
@@ -87,7 +91,7 @@ class History:
     def rests(self) -> Floats:
         """Start and end of each interval at rest, shape (n, 2), s."""
         nodes = self.trail.nodes
-        rows = np.flatnonzero(nodes["side"] == state.AT_REST)
+        rows = np.flatnonzero(nodes["side"] < 0)
         after = np.append(nodes["time"][1:], self.end)
         return np.column_stack([nodes["time"][rows], after[rows]])
 
@@ -97,7 +101,7 @@ class History:
         ``balances``: coordinates of the balance on side + and side -.
         """
         nodes = self.trail.nodes
-        if nodes["side"][-1] == state.AT_REST:
+        if nodes["side"][-1] < 0:
             return math.nan
         last_arc = nodes[np.flatnonzero(nodes["u"] == 0.0)[-1] if np.any(nodes["u"] == 0.0) else 0 :]
         balance = balances[int(nodes["side"][-1])]
@@ -222,8 +226,8 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     """
     nodes = trail.nodes
     # A duration that ends within a sequence that is closed leaves no rest behind its last impact.
-    rests = np.append(nodes["side"][1:] == state.AT_REST, cut)
-    closing = np.flatnonzero(rests & (nodes["side"] != state.AT_REST) & (nodes["u"] == 0.0))
+    rests = np.append(nodes["side"][1:] < 0, cut)
+    closing = np.flatnonzero(rests & (nodes["side"] >= 0) & (nodes["u"] == 0.0))
     slowest = _SLOWEST * np.sqrt(np.abs(trail.block["stiffness"]))
     closing = closing[nodes["v"][closing] > slowest[nodes["side"][closing]]]
     if not len(closing):
@@ -242,7 +246,7 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
         while follow(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
             table = state.grown(table)
         found = table["node"][1 : start["nodes"]]
-        parts += [nodes[done : row + 1], found[(found["side"] != state.AT_REST) & (found["time"] < rules["stop"])]]
+        parts += [nodes[done : row + 1], found[(found["side"] >= 0) & (found["time"] < rules["stop"])]]
         done = row + 1
     return trail._replace(nodes=state.attributed(np.concatenate([*parts, nodes[done:]])))
 
@@ -324,7 +328,7 @@ class Contact:
         """Compute the forces in the steps that start at these rows: on the side and under the piece of each."""
         theta, rate, acceleration = self.history.states_in(times, rows).T
         side = self.history.trail.nodes["side"][rows]
-        ground = self._ground_in(times, rows, side == state.AT_REST)
+        ground = self._ground_in(times, rows, side < 0)
         return self.law((theta, rate, acceleration), ground, side)
 
     def _ground_in(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
@@ -340,15 +344,15 @@ class Contact:
         """Sample every step, and at rest every piece of the motion, ends included and in order; with their steps."""
         nodes = self.history.trail.nodes
         corners = self.history.trail.ground.pieces[:, 0]
-        corners = corners[nodes["side"][self.history.rows(corners)] == state.AT_REST]
+        corners = corners[nodes["side"][self.history.rows(corners)] < 0]
         starts = np.unique(np.concatenate([nodes["time"], corners]))
         starts = starts[(starts < self.until) | (starts == starts[0])]
-        if nodes["side"][self.history.rows(np.array([self.until]))[0]] == state.AT_REST:
+        if nodes["side"][self.history.rows(np.array([self.until]))[0]] < 0:
             starts = np.union1d(starts, [self.until])  # what the motion is after a jump at the end
         ends = np.append(starts[1:], max(self.until, starts[-1]))
         rows = self.history.rows(starts)
         fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES))
         times = starts[:, None] + fractions * (ends - starts)[:, None]
-        resting = nodes["side"][rows] == state.AT_REST  # what the motion is before a jump
+        resting = nodes["side"][rows] < 0  # what the motion is before a jump
         times[resting, -1] = np.maximum(np.nextafter(times[resting, -1], 0.0), times[resting, 0])
         return times, np.repeat(rows[:, None], _SAMPLES, axis=1)

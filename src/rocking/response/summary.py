@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from rocking.block import Block
 from rocking.response.answers import Answers
 from rocking.response.export import records
 from rocking.response.history import driving
@@ -45,13 +46,13 @@ def summary_rows(response: Answers, friction: float | None) -> list[Row]:
     sides = body.sides[:1] if body.sides[0] == body.sides[-1] else body.sides
     sliding = math.nan if friction is None else response.sliding_time(friction)
     rows = [
-        Row("block", body.description),
+        Row("block" if isinstance(body, Block) else "body", body.description),
         Row("parameters", "; ".join(map(str, sides))),
         Row("motion", _motion_text(response)),
         Row("uplift above", _thresholds_text(response)),
         *_event_rows(response),
         Row("impacts resolved", f"{len(response.impacts)}"),
-        _peak_row(response),
+        *_peak_rows(response),
     ]
     if body.contact is not None:
         tips = "" if math.isnan(response.tipping_time) else f", until it tips at {tipping_text(response)}"
@@ -269,15 +270,17 @@ def _rest_text(response: Answers, time: float, change: float, sequence: np.void)
     return f"at about {time:.{decimals}f} s ({off} if {driver} is off by a millionth); {known}"
 
 
-def _peak_row(response: Answers) -> Row:
-    """Peak and its time, each as far as it is known."""
+def _peak_rows(response: Answers) -> list[Row]:
+    """Peak and its time, each as far as it is known; a body between two stops has none."""
+    if math.isnan(response.peak_rotation):
+        return []
     name, _, _, unit, limit = response.body.coordinate
     note = f" at {peak_time_text(response)}"
     if response.overturned:
         note += ", where the block has fallen"
     elif limit:
         note += f", {ratio_text(response)} of the {limit}"
-    return Row(f"peak {name}", f"{response.peak_rotation:.{_peak_digits(response)}g}", unit, note)
+    return [Row(f"peak {name}", f"{response.peak_rotation:.{_peak_digits(response)}g}", unit, note)]
 
 
 def _contact_rows(response: Answers, friction: float | None, sliding: float) -> list[Row]:

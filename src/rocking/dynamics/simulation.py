@@ -1,0 +1,256 @@
+"""Simulations of the bodies of `rocking.dynamics`: `rocking.simulate` and `rocking.simulate_many` in positions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import rocking.response
+from rocking import checks
+from rocking.arrays import Floats, as_asked
+from rocking.dynamics.bodies import BouncingBall, LinearBodies, _LinearBody
+from rocking.engine import OUTCOME, cores, simulate_tasks
+from rocking.ensemble import VARIABLES, dataset_of, product_of, setup_of, tasks_of
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
+from rocking.motion.motion import Motion
+from rocking.motion.named import Motions, one_motion
+from rocking.progress import Progress
+from rocking.simulation import simulate as simulate_body
+from rocking.treatment import Treatment
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(rocking.response.Response):
+    """Response of a body between stops, made by `rocking.dynamics.simulate`: a `rocking.Response` in positions.
+
+    Positions are relative to the table or the support. Of events and impacts ``side`` is +1 at the lower stop and -1 at
+    the upper one.
+    """
+
+    @property
+    def peak_position(self) -> float:
+        """Highest position, m; NaN between two stops."""
+        return self.peak_rotation
+
+    def position(self, time: ArrayLike) -> Floats:
+        """Position relative to the table or the support, at any time.
+
+        Parameters
+        ----------
+        time : array_like
+            Times, s, of any shape.
+
+        Returns
+        -------
+        float or ndarray
+            m; NaN outside the response.
+
+        Examples
+        --------
+        >>> from rocking import dynamics
+        >>> fall = dynamics.simulate(dynamics.BouncingBall(0.5, gravity=10.0), None, initial_position=0.2)
+        >>> f"{fall.position(0.1):.3f}"
+        '0.150'
+        """
+        return as_asked(self.states(time)[..., 0])
+
+    def velocity(self, time: ArrayLike) -> Floats:
+        """Velocity relative to the table or the support, at any time; just after an impact at one.
+
+        Parameters
+        ----------
+        time : array_like
+            Times, s, of any shape.
+
+        Returns
+        -------
+        float or ndarray
+            m/s; NaN outside the response.
+
+        Examples
+        --------
+        >>> from rocking import dynamics
+        >>> fall = dynamics.simulate(dynamics.BouncingBall(0.5, gravity=10.0), None, initial_position=0.2)
+        >>> f"{fall.velocity(0.1):.3f}"
+        '-1.000'
+        """
+        return as_asked(self.states(time)[..., 1])
+
+
+def simulate(
+    body: _LinearBody,
+    motion: Motion | None,
+    *,
+    chattering: str | Treatment = "certified",
+    duration: float | None = None,
+    initial_position: float | None = None,
+    initial_velocity: float = 0.0,
+) -> Response:
+    """Response of a body between stops to a motion of its table or support, with chattering resolved by proof.
+
+    Parameters
+    ----------
+    body : BouncingBall, ImpactOscillator or InvertedPendulum
+        What moves.
+    motion : Motion or None
+        Acceleration of the table (positive up) or the support; None for free motion.
+    chattering : str or treatment
+        As for `rocking.simulate`; thresholds on velocities are in m/s.
+    duration : float, optional
+        Time to stop at, s. By default to the end of the motion, and on until rest; a body that need not come to rest
+        stops with the motion.
+    initial_position : float, optional
+        Position at time 0, m; by default 0, or the stop where that is behind it.
+    initial_velocity : float
+        Velocity at time 0, m/s.
+
+    Returns
+    -------
+    Response
+        Events, impacts, chattering sequences, and the position at any time.
+
+    Raises
+    ------
+    InvalidBlock, InvalidMotion
+        If the body is none of these, or the motion none, or one with a vertical component beside it.
+    InvalidOption
+        If an argument is out of its range, the body starts behind a stop, or it never comes to rest and there is
+        neither motion nor duration.
+
+    Examples
+    --------
+    A ball falls from 0.2 m and stops after the closed geometric time, 0.2 (1 + 2 e/(1 - e)) s:
+
+    >>> from rocking import dynamics
+    >>> response = dynamics.simulate(dynamics.BouncingBall(0.8, gravity=10.0), None, initial_position=0.2)
+    >>> f"{response.events['time'][0]:.12f}"
+    '1.800000000000'
+    """
+    body, motion = _one_body(body), _along_one_line(one_motion(motion))
+    start = start_of(body) if initial_position is None else initial_position
+    found = simulate_body(
+        body,
+        motion,
+        model="linear",
+        chattering=chattering,
+        duration=_duration(body, motion, duration),
+        initial_rotation=start,
+        initial_velocity=initial_velocity,
+    )
+    return Response(**{entry.name: getattr(found, entry.name) for entry in fields(found)})
+
+
+def simulate_many(
+    bodies: _LinearBody | Sequence[_LinearBody] | LinearBodies,
+    motions: Motions,
+    *,
+    chattering: str | Treatment = "certified",
+    duration: float | None = None,
+    initial_position: float | None = None,
+    initial_velocity: float = 0.0,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> xr.Dataset:
+    """Simulate every body under every motion, and keep the outcome of each simulation.
+
+    Parameters
+    ----------
+    bodies : body, sequence of bodies of one kind, or LinearBodies
+        n bodies.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions.
+    chattering : str or treatment
+        As for `simulate`.
+    duration : float, optional
+        As for `simulate`; by default of bodies that need not come to rest the end of the longest motion.
+    initial_position, initial_velocity : float
+        As for `simulate`, for all bodies.
+    threads : int, optional
+        Number of threads; by default one for every core.
+    progress : bool, optional
+        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `rocking.simulate_many`, with ``peak_position`` (m; NaN between two stops).
+
+    Raises
+    ------
+    InvalidBlock, InvalidMotion, InvalidOption
+        As `simulate`.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> from rocking import dynamics
+    >>> balls = [dynamics.BouncingBall(restitution) for restitution in (0.3, 0.6, 0.9)]
+    >>> found = dynamics.simulate_many(balls, rocking.pulses.one_sine(15.0, 2.0))
+    >>> found.restitution.values.tolist(), bool((found.peak_position > 0.0).all())
+    ([0.3, 0.6, 0.9], True)
+    """
+    given = [bodies] if isinstance(bodies, _LinearBody) else bodies
+    gathered = given if isinstance(given, LinearBodies) else LinearBodies([_one_body(each) for each in given])
+    product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
+    for motion in product.motions:
+        _along_one_line(motion)
+    starts = {start_of(each) for each in gathered.members} if initial_position is None else {initial_position}
+    if len(starts) > 1:
+        raise InvalidOption("the bodies start at different stops; give {}, one position for all", "initial_position")
+    setup = replace(
+        setup_of(product),
+        start=(starts.pop(), checks.finite(initial_velocity, "initial_velocity", InvalidOption)),
+        duration=max(
+            _duration(each, motion, duration) or 0.0 for each in gathered.members for motion in product.motions
+        )
+        or None,
+    )
+    count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    results = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in VARIABLES}
+    with Progress("simulating", math.prod(product.shape), show=progress) as bar:
+        for task, outcomes in simulate_tasks(setup, tasks_of(product), threads=count):
+            for name, values in results.items():
+                values[(*task.key, task.bodies)] = outcomes[name]
+            bar.advance(len(outcomes))
+    found = dataset_of(product, results).drop_vars("overturned").rename(peak_rotation="peak_position", block="body")
+    found["peak_position"].attrs.update(units="m", long_name="highest position")
+    return found
+
+
+def _one_body(body: object) -> _LinearBody:
+    if not isinstance(body, _LinearBody):
+        raise InvalidBlock(
+            "a BouncingBall, ImpactOscillator or InvertedPendulum of rocking.dynamics is needed, not "
+            f"{type(body).__name__}; blocks go to rocking.simulate"
+        )
+    return body
+
+
+def _along_one_line(motion: Motion | None) -> Motion | None:
+    if motion is not None and motion.vertical is not None:
+        raise InvalidMotion(
+            "a body of rocking.dynamics moves along one line; give a motion without a vertical component"
+        )
+    return motion
+
+
+def start_of(body: _LinearBody) -> float:
+    """Position at which a body starts if none is given: zero, or the stop where that is behind it."""
+    return max(0.0, body.law.low) if not isinstance(body, BouncingBall) else 0.0
+
+
+def _duration(body: _LinearBody, motion: Motion | None, duration: float | None) -> float | None:
+    """Return the given duration, or that of the motion for a body that nothing presses against its stop."""
+    if duration is not None or min(body.thresholds) > 0.0:
+        return duration
+    if motion is None:
+        raise InvalidOption("nothing presses this body against a stop, so that it need not rest; give {}", "duration")
+    return motion.end

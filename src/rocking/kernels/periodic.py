@@ -1,0 +1,210 @@
+"""Bodies under a motion that repeats for ever: their states after periods and after impacts, and how these change.
+
+The ground holds the motion twice, so that whatever is decided within one period is known for one more, and two pieces
+after that which lift any body off either side: nothing is proven across them. After each period a state is put back
+by as many pieces. What becomes of a state that is not a number is UNFINISHED.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+from rocking.arrays import Floats, Integers
+from rocking.kernels.arc import evaluate, expand, restoring
+from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.ground import Ground, length_of, start_of
+from rocking.kernels.march import march
+from rocking.kernels.recurrences import variation_coefficients
+from rocking.kernels.state import AT_REST, Ending, Record, Records
+from rocking.kernels.trace import Trail, expand_coefficients
+
+#: Turns of a march that one period, or one impact, may take.
+TURNS = 100_000
+
+
+class Fate(IntEnum):
+    """What a state is after some periods, or after an impact."""
+
+    MOVES = 0
+    RESTS = 1
+    OVERTURNED = 2
+    #: It took too many steps: nothing is known.
+    UNFINISHED = 3
+    #: At rest, and the motion never lifts it.
+    RESTS_FOR_EVER = 4
+
+
+@kernel
+def iterate(
+    ground: Ground, block: Record, rules: Record, scratch: Record, table: Records, states: Records, periods: int,
+    orbit: Floats, impacts: Integers,
+) -> None:  # fmt: skip
+    """Take states through some periods; ``ending`` of each is then its `Fate`.
+
+    Row n of ``orbit[k]``, where it has rows, is (u, v, side) after n + 1 periods, NaN after the last known one;
+    ``impacts[k]`` counts the impacts. ``table`` has no rows.
+    """
+    for k in range(states.shape[0]):
+        state = states[k]
+        fate = Fate.RESTS.value if state.side < 0 else Fate.MOVES.value
+        for n in range(periods):
+            fate = pass_period(ground, block, rules, scratch, table, state)
+            if fate == Fate.RESTS_FOR_EVER:
+                for later in range(n, orbit.shape[1]):
+                    write_state(orbit[k, later], state)
+                break
+            if fate == Fate.OVERTURNED or fate == Fate.UNFINISHED:
+                break
+            if n < orbit.shape[1]:
+                write_state(orbit[k, n], state)
+        state.ending = fate
+        impacts[k] = state.impacts
+
+
+@inlined
+def write_state(row: Floats, state: Record) -> None:
+    """Write a state: the coordinate in the frame of its side, the velocity, the side."""
+    row[0], row[1], row[2] = state.u, state.v, state.side
+
+
+@shared
+def pass_period(ground: Ground, block: Record, rules: Record, scratch: Record, table: Records, state: Record) -> int:
+    """March one period from a state; returns its `Fate`."""
+    state.until = pieces_of(ground)
+    state.budget = TURNS
+    return put_back(ground, block, state, march(ground, block, rules, table, scratch, state))
+
+
+@inlined
+def pieces_of(ground: Ground) -> int:
+    """Pieces of one period."""
+    return (ground.pieces.shape[0] - 3) // 2
+
+
+@inlined
+def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
+    """Put a state that has passed a period back by one; returns its `Fate`."""
+    pieces = pieces_of(ground)
+    if ending == Ending.OVERTURNED:
+        return Fate.OVERTURNED
+    if ending == Ending.DONE or (ending == Ending.RUNNING and state.piece >= 2 * pieces):
+        # Not even the second period lifts it; the march may have followed a lift by the pieces behind that.
+        if state.u == 0.0 and state.v == 0.0:
+            state.side = AT_REST if state.side < 0 or not block.facing else -1 - state.side
+            return Fate.RESTS_FOR_EVER
+        return Fate.UNFINISHED
+    if ending == Ending.BALANCED:
+        state.piece, state.offset = 0, 0.0
+        return Fate.MOVES
+    if ending != Ending.RUNNING or not (state.u >= 0.0 and abs(state.v) < np.inf):
+        return Fate.UNFINISHED
+    period = start_of(ground, pieces)
+    state.piece -= pieces
+    state.uplifted -= period
+    state.rested -= period
+    state.run_start -= period
+    state.last_impact_time -= period
+    return Fate.RESTS if state.side < 0 or (state.u == 0.0 and state.v == 0.0) else Fate.MOVES
+
+
+# ---- How a state after a period changes with the state before it ----
+
+
+@kernel
+def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, states: Records, out: Floats) -> None:
+    """Write the derivative of each state after one period by the state before it, in the frames of their sides.
+
+    It is exactly zero where the body has come to rest on the way. The rules of the trail have the march write its
+    table, whose rows are used again and again. The states are those after the period; ``ending`` is their `Fate`.
+    """
+    ground, block, rules, _ = trail
+    for k in range(states.shape[0]):
+        state = states[k]
+        out[k, 0, 0], out[k, 0, 1], out[k, 1, 0], out[k, 1, 1] = 1.0, 0.0, 0.0, 1.0
+        state.until = pieces_of(ground)
+        state.budget = TURNS
+        ending = Ending.FULL.value
+        while ending == Ending.FULL:
+            state.nodes = state.impacts = state.events = state.sequences = 0
+            ending = march(ground, block, rules, table, scratch, state)
+            for n in range(state.nodes - 1):
+                carry_on(trail, scratch, work, table[n].node, table[n + 1].node, out[k])
+            if state.nodes > 0:
+                carry_on(trail, scratch, work, table[state.nodes - 1].node, state, out[k])
+        state.ending = put_back(ground, block, state, ending)
+        if state.ending == Fate.RESTS or state.ending == Fate.RESTS_FOR_EVER:
+            out[k, 0, 0] = out[k, 0, 1] = out[k, 1, 0] = out[k, 1, 1] = 0.0
+        elif state.ending != Fate.MOVES:
+            out[k, 0, 0] = out[k, 0, 1] = out[k, 1, 0] = out[k, 1, 1] = np.nan
+
+
+@shared
+def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, following: Record, M: Floats) -> None:
+    """Multiply a derivative by that along the step from a node to what follows it, an impact at its end included."""
+    if node.side < 0 or following.side < 0:
+        M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
+        return
+    ground, block, rules, _ = trail
+    h = following.offset - node.offset
+    if following.piece > node.piece:
+        h = length_of(ground, node.piece) - node.offset
+        for piece in range(node.piece + 1, following.piece):
+            h += length_of(ground, piece)
+        h += following.offset
+    order, _, degree = expand(ground, block, rules, scratch, node, h)
+    expand_coefficients(trail, scratch, work, node.side, degree, order)
+    for j in range(order - 1):
+        work.forcing[j] = 0.0
+    for column in range(2):
+        work.change[0], work.change[1] = M[0, column], M[1, column]
+        variation_coefficients(work, block.damping, order)
+        M[0, column], M[1, column], _ = evaluate(work.change, order, h)
+    if following.u == 0.0 and (following.side != node.side or following.v > 0.0):
+        _, v, _ = evaluate(scratch.rotation, order, h)
+        apply_saltation(ground, block, node.side, following, v, M)
+
+
+@inlined
+def apply_saltation(ground: Ground, block: Record, left: int, following: Record, v: float, M: Floats) -> None:
+    """Multiply a derivative by that through an impact, before which the velocity was v."""
+    across = block.facing and following.side != left  # at the other stop: seen from there, all signs change
+    hit, sign = (following.side, -1.0) if across else (left, 1.0)
+    speed, e = -sign * v, block.restitution[hit]
+    before = restoring(ground, block, hit, following.piece, following.offset) - block.damping * speed
+    after = restoring(ground, block, following.side, following.piece, following.offset) + block.damping * (e * speed)
+    coupling = (e * before + after) / speed
+    for column in range(2):
+        du, dv = sign * M[0, column], sign * M[1, column]
+        M[0, column], M[1, column] = -e * du, coupling * du - e * dv
+
+
+# ---- From one impact to the next ----
+
+
+@kernel
+def to_next_impact(trail: Trail, scratch: Record, work: Record, table: Records, states: Records, out: Floats) -> None:
+    """Take states just after an impact to just after the next one, as `differentiate` takes them through a period.
+
+    Where there is none, because the body rests or overturns first, ``ending`` says so and the derivative is NaN.
+    """
+    ground, block, rules, _ = trail
+    for k in range(states.shape[0]):
+        state = states[k]
+        out[k, 0, 0], out[k, 0, 1], out[k, 1, 0], out[k, 1, 1] = 1.0, 0.0, 0.0, 1.0
+        fate = Fate.UNFINISHED.value
+        for _ in range(TURNS):
+            state.until = pieces_of(ground)
+            state.budget = 1
+            state.nodes = state.impacts = state.events = state.sequences = 0
+            ending = march(ground, block, rules, table, scratch, state)
+            carry_on(trail, scratch, work, table[0].node, state, out[k])
+            if ending != Ending.PAUSED:
+                fate = put_back(ground, block, state, ending)
+            else:
+                fate = Fate.RESTS.value if state.side < 0 else Fate.MOVES.value
+            if fate != Fate.MOVES or state.impacts > 0:
+                break
+            fate = Fate.UNFINISHED.value
+        state.ending = fate
+        if fate != Fate.MOVES:
+            out[k, 0, 0] = out[k, 0, 1] = out[k, 1, 0] = out[k, 1, 1] = np.nan

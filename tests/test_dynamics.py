@@ -1,0 +1,205 @@
+"""Bodies between stops against an independent integration with events, closed forms, and wrong input."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import rocking
+from rocking import InvalidBlock, InvalidMotion, InvalidOption, dynamics
+
+G = 9.81
+
+
+def integrated(body, motion, end, position, velocity):
+    """Impact times and speeds, and the state at the end (None: it chatters), by DOP853 restarted at each impact."""
+    stiffness, damping, pull, low, high = body.law
+    times, speeds, t, x, v = [], [], 0.0, position, velocity
+
+    def rates(time, y):
+        return [y[1], stiffness * y[0] - damping * y[1] - pull - float(motion.acceleration(time))]
+
+    def at_low(_, y):
+        return y[0] - low
+
+    def at_high(_, y):
+        return (high if math.isfinite(high) else 1e9) - y[0]
+
+    events = [at_low, at_high]
+    for event in events:
+        event.terminal, event.direction = True, -1
+    grid = np.unique(np.append(motion.breakpoints[motion.breakpoints < end], end))
+    for piece_end in grid[1:] if grid[0] == 0.0 else grid:
+        while t < piece_end:
+            found = solve_ivp(
+                rates, (t, piece_end), [x, v], "DOP853", rtol=1e-12, atol=1e-14, events=events, max_step=0.02
+            )
+            t, (x, v) = found.t[-1], found.y[:, -1]
+            if found.status == 1:
+                times.append(t)
+                speeds.append(abs(v))
+                x = low if len(found.t_events[0]) else high
+                v = -body.restitution * v
+                if abs(v) < 2e-2:  # of shorter arcs it misses roots
+                    return times[:-1], speeds[:-1], None
+    return times, speeds, (x, v)
+
+
+def drawn(seed):
+    """A body, a sine, and a start, over wide ranges."""
+    rng = np.random.default_rng(seed)
+    e = rng.uniform(0.3, 0.95)
+    motion = rocking.pulses.sine(rng.uniform(1.0, 30.0), rng.uniform(0.3, 3.0), cycles=4, phase=rng.uniform(0.0, 6.0))
+    kind = seed % 5
+    if kind == 0:
+        return dynamics.BouncingBall(e, gravity=G), motion, rng.uniform(0.05, 1.0), rng.uniform(-1.0, 1.0)
+    if kind == 1:
+        return dynamics.InvertedPendulum(rng.uniform(1.0, 5.0), 0.3, e), motion, rng.uniform(-0.2, 0.2), 0.3
+    damping, stop = rng.uniform(0.0, 0.3) * (kind > 2), rng.uniform(-0.1, 0.3)
+    second = rng.uniform(0.2, 0.5) if kind == 4 else None
+    frequency = rng.uniform(0.3, 2.0)
+    body = dynamics.ImpactOscillator(frequency, e, damping_ratio=damping, stop=stop, second_stop=second)
+    return body, motion, max(0.0, -stop) + 0.1, rng.uniform(-1.0, 1.0)
+
+
+def test_impacts_are_those_of_an_independent_integration():
+    impacts = ends = 0  # slow impacts multiply the error of their times
+    for seed in range(40):
+        body, motion, position, velocity = drawn(seed)
+        end = motion.end
+        times, speeds, last = integrated(body, motion, end, position, velocity)
+        found = dynamics.simulate(body, motion, duration=end, initial_position=position, initial_velocity=velocity)
+        known = list(zip(times, speeds, strict=True))
+        if len(found.chattering):  # closed by proof before the speed is small
+            known = known[: len(found.impacts)]
+        assert len(found.impacts) >= len(known)
+        if known:
+            expected = np.array(known)
+            assert found.impacts["time"][: len(known)] == pytest.approx(expected[:, 0], abs=1e-10)
+            assert found.impacts["speed_before"][: len(known)] == pytest.approx(expected[:, 1], rel=1e-9)
+            assert found.impacts["speed_after"] == pytest.approx(body.restitution * found.impacts["speed_before"])
+        if last is not None:
+            assert len(found.impacts) == len(known)
+            assert found.position(end) == pytest.approx(last[0], abs=1e-10)
+            assert found.velocity(end) == pytest.approx(last[1], abs=1e-9)
+            ends += 1
+        impacts += len(known)
+    assert impacts > 200 and ends > 20
+
+
+def rest_by_following(body, acceleration, speed):
+    """Time of rest of a body at its lower stop that leaves it with a speed under a constant push, in 30 digits."""
+    import mpmath as mp
+
+    stiffness, damping, pull, low, _ = (mp.mpf(each) for each in body.law)
+    a, e = mp.mpf(acceleration), mp.mpf(body.restitution)
+    with mp.workdps(40):
+        split = mp.sqrt(mp.mpc(damping**2 / 4 + stiffness))
+        roots = -damping / 2 + split, -damping / 2 - split
+        balance = (pull + a) / stiffness - low  # u'' = stiffness (u - balance) - damping u'
+        time, v = mp.mpf(0), mp.mpf(speed)
+
+        def position(t, v):
+            r, s = roots
+            first = (v + s * balance) / (r - s)  # u = balance + A e^(rt) + B e^(st), u(0) = 0, u'(0) = v
+            return mp.re(balance + first * mp.exp(r * t) + (-balance - first) * mp.exp(s * t))
+
+        while v > mp.mpf(10) ** -18:
+            g = stiffness * balance
+            t = mp.findroot(lambda t, v=v: position(t, v) / t, 2 * v / g)
+            after = -mp.diff(lambda t, v=v: position(t, v), t)
+            time, v = time + t, e * after
+        return float(time + 2 * v / (g * (1 - e)))
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05, 0.4])
+def test_an_oscillator_pressed_against_its_stop_rests_within_its_bracket(damping):
+    body = dynamics.ImpactOscillator(0.8, 0.7, damping_ratio=damping, stop=-0.2)
+    found = dynamics.simulate(body, None, initial_velocity=0.3)
+    expected = rest_by_following(body, 0.0, 0.3)
+    (sequence,) = found.chattering
+    assert sequence["lower"] - 1e-15 <= expected <= sequence["upper"] + 1e-15
+    assert sequence["upper"] - sequence["lower"] < 2e-12
+    assert found.events["time"][-1] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_body_rests_at_the_stop_where_it_came_to_rest():
+    pendulum = dynamics.InvertedPendulum(3.0, 0.1, 0.6)
+    for start, wall in ((0.02, 0.1), (-0.02, -0.1)):
+        found = dynamics.simulate(pendulum, None, initial_position=start)
+        assert found.position(found.duration) == wall
+        assert found.velocity(found.duration) == 0.0
+    # The support pulls it off one wall, and only off that one.
+    push = rocking.pulses.one_sine(1.2 * 9.0 * 0.1, 0.3)
+    left = dynamics.simulate(pendulum, push, initial_position=-0.1)
+    right = dynamics.simulate(pendulum, push, initial_position=0.1)
+    assert left.events["kind"][0] == right.events["kind"][0] == "uplift"
+    assert left.events["side"][0] == 1 and right.events["side"][0] == -1
+    assert right.events["time"][0] < 1.6 < left.events["time"][0]
+    mirrored = dynamics.simulate(pendulum, push.scaled(-1.0), initial_position=0.1)
+    times = np.linspace(0.0, left.duration, 500)
+    assert mirrored.position(times) == pytest.approx(-left.position(times), abs=1e-13)
+
+
+def test_the_ball_on_a_table_that_goes_down_fast_leaves_it():
+    ball = dynamics.BouncingBall(0.5, gravity=G)
+    found = dynamics.simulate(ball, rocking.pulses.one_sine(1.5 * G, 1.0))
+    # -1.5 sin(2 pi t) < -1 first where the table goes down.
+    assert found.events["time"][0] == pytest.approx(0.5 + math.asin(1.0 / 1.5) / (2.0 * math.pi), abs=1e-12)
+
+
+def test_many_bodies_as_one_by_one():
+    bodies = [
+        dynamics.ImpactOscillator(0.7, e, damping_ratio=d, stop=s)
+        for e, d, s in ((0.5, 0.0, 0.1), (0.8, 0.1, 0.1), (0.9, 0.0, 0.1), (0.6, 0.2, 0.1))
+    ]
+    motions = [rocking.pulses.sine(8.0, 1.1, cycles=5), rocking.records.load("ridgecrest-clc-090")]
+    found = dynamics.simulate_many(bodies, motions, duration=6.0)
+    assert found.sizes == {"motion": 2, "body": 4}
+    judged = 0
+    for m, motion in enumerate(motions):
+        for k, body in enumerate(bodies):
+            alone = dynamics.simulate(body, motion, duration=6.0)
+            assert found.peak_position.values[m, k] == pytest.approx(alone.peak_position, rel=1e-9, abs=1e-12)
+            assert found.impacts.values[m, k] == len(alone.impacts)
+            judged += 1
+    assert judged == 8
+    two = dynamics.simulate_many(dynamics.InvertedPendulum(3.0, 0.1, 0.5), motions[0])
+    assert np.isnan(two.peak_position.values).all() and two.impacts.values.min() > 0
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: dynamics.BouncingBall(1.2), InvalidBlock, "restitution must be from 0 to 1"),
+        (lambda: dynamics.BouncingBall(0.5, gravity=0.0), InvalidBlock, "gravity"),
+        (lambda: dynamics.ImpactOscillator(0.0, 0.5), InvalidBlock, "frequency"),
+        (lambda: dynamics.ImpactOscillator(1.0, 0.5, damping_ratio=1.0), InvalidBlock, "damping_ratio"),
+        (lambda: dynamics.ImpactOscillator(1.0, 0.5, stop=0.1, second_stop=-0.2), InvalidBlock, "must be above -stop"),
+        (lambda: dynamics.InvertedPendulum(2.0, -0.1, 0.5), InvalidBlock, "gap"),
+        (lambda: dynamics.simulate(dynamics.BouncingBall(1.0), None, initial_position=1.0), InvalidOption, "never"),
+        (lambda: dynamics.simulate(dynamics.BouncingBall(0.5), None, initial_position=-1.0), InvalidOption, "in front"),
+        (
+            lambda: dynamics.simulate(dynamics.InvertedPendulum(2.0, 0.1, 0.5), None, initial_position=0.2),
+            InvalidOption,
+            "from -0.1 to 0.1 m",
+        ),
+        (lambda: dynamics.simulate(dynamics.BouncingBall(0.5), None, initial_velocity=-1.0), InvalidOption, "into it"),
+        (lambda: dynamics.simulate(dynamics.ImpactOscillator(1.0, 0.5, stop=0.1), None), InvalidOption, "duration"),
+        (lambda: dynamics.simulate(rocking.Block(width=0.2, height=1.0), None), InvalidBlock, "rocking.simulate"),
+        (lambda: dynamics.simulate_many([], rocking.pulses.one_sine(1.0, 1.0)), InvalidBlock, "same kind"),
+        (
+            lambda: dynamics.simulate(
+                dynamics.BouncingBall(0.5),
+                rocking.pulses.one_sine(1.0, 1.0).with_vertical(rocking.pulses.one_sine(1.0, 1.0)),
+            ),
+            InvalidMotion,
+            "one line",
+        ),
+    ],
+)
+def test_wrong_input_gets_one_sentence(make, error, words):
+    with pytest.raises(error) as caught:
+        make()
+    assert words in str(caught.value) and "\n" not in str(caught.value)

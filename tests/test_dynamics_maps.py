@@ -1,0 +1,183 @@
+"""Maps from period to period and from impact to impact, against simulations, finite differences and closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
+
+BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
+LEANING = Block.from_parameters(p=(2.0, 2.2), alpha=(0.2, 0.15), restitution=(0.8, 0.85))
+CASES = {
+    "linear block": (BLOCK, "linear", (2.4, 1.2)),
+    "nonlinear block": (BLOCK, "nonlinear", (2.4, 1.2)),
+    "block of two sides": (LEANING, "nonlinear", (2.4, 1.2)),
+    "ball": (dynamics.BouncingBall(0.7), None, (25.0, 3.0)),
+    "oscillator": (dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01), None, (3.0, 1.3)),
+    "oscillator between stops": (dynamics.ImpactOscillator(1.0, 0.8, stop=0.05, second_stop=0.04), None, (5.0, 0.9)),
+    "pendulum": (dynamics.InvertedPendulum(3.0, 0.1, 0.7), None, (6.0, 0.8)),
+}
+
+
+def starts(body, count, seed):
+    """States that every body may have."""
+    rng = np.random.default_rng(seed)
+    low, high = body.stops
+    if isinstance(body, Block):
+        low, high = -0.05, 0.05
+    elif high == low:
+        high = low + 0.1
+    return np.column_stack([low + (high - low) * rng.uniform(0.1, 0.9, count), 0.2 * rng.normal(size=count)])
+
+
+def simulated(body, model, motion, state, duration):
+    if isinstance(body, Block):
+        found = rocking.simulate(
+            body, motion, model=model, duration=duration, initial_rotation=state[0], initial_velocity=state[1]
+        )
+        return found, found.states(duration)[:2]
+    found = dynamics.simulate(body, motion, duration=duration, initial_position=state[0], initial_velocity=state[1])
+    return found, found.states(duration)[:2]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_map_is_a_simulation_of_as_many_periods(name):
+    body, model, (amplitude, frequency) = CASES[name]
+    one, many = (pulses.sine(amplitude, frequency, cycles=count) for count in (1, 9))
+    strobe = dynamics.stroboscopic_map(body, one, model=model)
+    given = starts(body, 20, 1)
+    orbits = strobe.orbit(given, 8)
+    judged = moving = 0
+    for state, orbit in zip(given, orbits, strict=True):
+        found, _ = simulated(body, model, many, state, 8.5 / frequency)
+        for n in range(9):
+            time = n / frequency
+            if n == 0 or time >= found.duration:
+                continue
+            near = len(found.impacts) and np.min(np.abs(found.impacts["time"] - time)) < 1e-9
+            if not near:
+                assert orbit[n] == pytest.approx(found.states(time)[:2], abs=2e-9)
+                judged += 1
+                moving += orbit[n, 1] != 0.0
+    assert judged > 100 and moving > 20
+    after, fates, _ = strobe.followed(given, 8)
+    assert np.array_equal(after, orbits[:, -1], equal_nan=True)
+    assert np.all((fates == dynamics.Fate.OVERTURNED) == np.isnan(after[:, 0]))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_derivative_is_that_of_finite_differences_and_zero_after_a_rest(name):
+    body, model, (amplitude, frequency) = CASES[name]
+    strobe = dynamics.stroboscopic_map(body, pulses.sine(amplitude, frequency, cycles=1), model=model)
+    given = starts(body, 60, 2)
+    after, change = strobe.derivative(given)
+    assert np.array_equal(after, strobe(given), equal_nan=True)
+    differences, counts = np.empty_like(change), [strobe.followed(given)[2]]
+    for column, step in enumerate(2e-6 * np.eye(2)):
+        found = {k: strobe.followed(given + k * step) for k in (-2, -1, 1, 2)}
+        difference = 8.0 * (found[1][0] - found[-1][0]) - (found[2][0] - found[-2][0])
+        differences[:, :, column] = difference / (12.0 * 2e-6)
+        counts += [each[2] for each in found.values()]
+    # A difference across another number of impacts is none.
+    same = np.all(np.array(counts) == counts[0], axis=0) & np.all(np.abs(change) < 50.0, axis=(1, 2))
+    rests = after[:, 1] == 0.0
+    assert np.all(change[rests] == 0.0)
+    assert change[same] == pytest.approx(differences[same], rel=1e-6, abs=1e-7)
+    assert np.count_nonzero(same & ~rests) > 10
+
+
+def test_area_shrinks_by_the_square_of_the_restitution_at_each_impact_and_by_damping():
+    damped = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)
+    body, motion = damped, pulses.sine(3.0, 1.3, cycles=1)
+    strobe = dynamics.stroboscopic_map(body, motion)
+    given = starts(body, 40, 3)
+    _, change = strobe.derivative(given)
+    _, fates, impacts = strobe.followed(given)
+    known = (fates == dynamics.Fate.MOVES) & (impacts < 6)
+    drag = math.exp(-2.0 * 0.05 * 2.0 * math.pi * 1.0 / 1.3)
+    # Seen at fixed times an impact multiplies areas by e squared times the ratio of energies, which is one.
+    assert np.linalg.det(change[known]) == pytest.approx(drag * 0.8 ** (2.0 * impacts[known]), rel=1e-9)
+    assert np.count_nonzero(known) > 20
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_impact_map_gives_the_impacts_of_a_simulation(name):
+    body, model, (amplitude, frequency) = CASES[name]
+    one, many = (pulses.sine(amplitude, frequency, cycles=count) for count in (1, 9))
+    following = dynamics.impact_map(body, one, model=model)
+    judged = 0
+    for state in starts(body, 6, 4):
+        found, _ = simulated(body, model, many, state, 8.0 / frequency)
+        impacts = found.impacts
+        side = impacts["side"] if isinstance(body, Block) or body.stops[0] != body.stops[1] else 1.0
+        pairs = np.column_stack([impacts["time"] % (1.0 / frequency), side * impacts["speed_after"]])
+        if len(pairs) < 2:
+            continue
+        gaps, fast = np.diff(impacts["time"]), impacts["speed_before"][1:] > 1e-3
+        rests = np.searchsorted(found.chattering["end"], impacts["time"])
+        plain = (rests[1:] == rests[:-1]) & fast & (gaps < 5.0 / frequency)
+        mapped = following(pairs[:-1])
+        off = np.abs(mapped - pairs[1:])[plain]
+        assert np.all(np.minimum(off[:, 0], 1.0 / frequency - off[:, 0]) < 1e-9) and np.all(off[:, 1] < 1e-9)
+        judged += int(np.count_nonzero(plain))
+        h = 1e-7
+        _, change = following.derivative(pairs[:-1])
+        for column, step in enumerate(h * np.eye(2)):
+            difference = (following(pairs[:-1] + step) - following(pairs[:-1] - step)) / (2.0 * h)
+            sound = (
+                plain & np.all(np.abs(change[:, :, column]) < 20.0, axis=1) & np.all(np.abs(difference) < 20.0, axis=1)
+            )
+            assert change[sound][:, :, column] == pytest.approx(difference[sound], abs=1e-5)
+    assert judged > 10
+
+
+def test_a_ball_flies_for_one_period_in_closed_form():
+    ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
+    # Over a period the table adds nothing where it starts at its greatest acceleration: 1.0 t = 5 t^2 at t = 0.2.
+    assert dynamics.impact_map(ball, table)([0.05, 1.0]) == pytest.approx([0.05, 0.5], abs=1e-14)
+
+
+def test_one_state_does_not_depend_on_others_and_shapes_are_kept():
+    body, model, (amplitude, frequency) = CASES["nonlinear block"]
+    strobe = dynamics.stroboscopic_map(body, pulses.sine(amplitude, frequency, cycles=1), model=model)
+    given = starts(body, 600, 5)
+    together = strobe(given.reshape(2, 300, 2), 3)
+    assert together.shape == (2, 300, 2)
+    alone = np.array([strobe(state, 3) for state in given[::50]])
+    assert np.array_equal(together.reshape(-1, 2)[::50], alone, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: dynamics.stroboscopic_map(BLOCK, None), InvalidMotion, "one period"),
+        (lambda: dynamics.stroboscopic_map(BLOCK, [0.1]), InvalidMotion, "Motion"),
+        (lambda: dynamics.stroboscopic_map(BLOCK, pulses.sine(1.0, 1.0, cycles=1))([0.1]), InvalidOption, "pairs"),
+        (
+            lambda: dynamics.stroboscopic_map(BLOCK, pulses.sine(1.0, 1.0, cycles=1))([0.1, 0], 0),
+            InvalidOption,
+            "periods",
+        ),
+        (
+            lambda: dynamics.stroboscopic_map(CASES["ball"][0], pulses.sine(1.0, 1.0, cycles=1))([-0.1, 0.0]),
+            InvalidOption,
+            "in front of",
+        ),
+        (
+            lambda: dynamics.stroboscopic_map(CASES["ball"][0], pulses.sine(1.0, 1.0, cycles=1), model="nonlinear"),
+            InvalidOption,
+            "linear",
+        ),
+        (
+            lambda: dynamics.impact_map(CASES["ball"][0], pulses.sine(1.0, 1.0, cycles=1))([0.0, -1.0]),
+            InvalidOption,
+            "away",
+        ),
+    ],
+)
+def test_wrong_input_gets_one_sentence(make, error, words):
+    with pytest.raises(error) as caught:
+        make()
+    assert words in str(caught.value) and "\n" not in str(caught.value)
