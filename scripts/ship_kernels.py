@@ -70,6 +70,7 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
 
     from rocking.kernels import ground, state
     from rocking.kernels.lanes import pool_of
+    from rocking.kernels.periodic import Setting
     from rocking.kernels.sine import lanes, sequence
     from rocking.kernels.trace import Trail
 
@@ -96,7 +97,9 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
         "march.march": [(seen, block, rules, table, scratch, states[0])],
         "trace.trace": [(trail, scratch, given(), count, reals(1, 3))],
         "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
-        "periodic.iterate": [(seen, block, rules, scratch, table, states, 1, reals(1, 1, 3), count)],
+        "periodic.iterate": [
+            (Setting(seen, block, rules, table, reals(2, 1, 10)), scratch, states, 1, reals(1, 1, 3), count)
+        ],
         "periodic.differentiate": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
         "periodic.to_next_impact": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
         "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
@@ -106,9 +109,9 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
         "stepping.moreau_jean": [(seen, block, rules, states[0], 0.5, 0.5, 0.1, reals(2, 4))],
         "stepping.schatzman_paoli": [(seen, block, rules, states[0], 0.1, reals(2, 4))],
         "oscillator.peak_displacements": [(given(3), given(2, 2), given(), 0.05, reals(), reals())],
-        "sine.series.eq65_time": [(1.0, 1.0, 1.0)],
-        "sine.series.eq65_sums": [(1.0,)],
-        "sine.series.eq65_terms": [(1.0, reals(), reals())],
+        "sine.eq65.eq65_time": [(1.0, 1.0, 1.0)],
+        "sine.eq65.eq65_sums": [(1.0,)],
+        "sine.eq65.eq65_terms": [(1.0, reals(), reals())],
         "sine.series.series_arcs": [(reals(1, 1), True, 1.0, 1.0, reals(1, 1), reals(1, 1), reals(1, 1, 1))],
         "sine.sequence.fitted_amplitudes": [(given(), given(), True, reals())],
         "population.shares": [(*shares, reals(1, 1, kind=np.float32), reals())],

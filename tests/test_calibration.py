@@ -467,7 +467,7 @@ def test_a_motion_that_is_given_twice_is_simulated_once(coarse, monkeypatch):
         counted.append(len(motions))
         return rocking.simulate_many(blocks, motions, **options)
 
-    monkeypatch.setattr("rocking.analysis.calibration.outcomes.simulate_many", spy)
+    monkeypatch.setattr("rocking.analysis.calibration.result.simulate_many", spy)
     twice = motions + [rocking.Motion(one.breakpoints, one.coefficients, name="again") for one in motions]
     observed = outcomes(twice)
     found = rocking.calibrate(twice, observed, candidates=128, two_sided=False, model="linear")

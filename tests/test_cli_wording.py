@@ -23,6 +23,9 @@ SIZES = ["--width", "0.24", "--height", "1.1"]
         (f"spectrum {RECORD} --p 1", "a spectrum needs --alpha, or the --ensemble of a calibration"),
         ("paper", "rocking paper needs --out; see rocking paper --help"),
         ("chatter 1.5 2", "rocking chatter needs ETA; see rocking chatter --help"),
+        ("--version x", "rocking --version takes no argument 'x'; see rocking --version --help"),
+        ("pulses sine x", "rocking pulses takes no argument 'sine x'; see rocking pulses --help"),
+        ("--version --verbos", "rocking --version has no option --verbos; did you mean --verbose?"),
         (f"simulate {RECORD} --p 2 --alpha 0.2 --pga", "--pga needs a value; see rocking simulate --help"),
         (
             f"simulate {RECORD} --p 2 --alpha 0.2 --pga -0.4g",

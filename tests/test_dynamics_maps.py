@@ -181,3 +181,47 @@ def test_wrong_input_gets_one_sentence(make, error, words):
     with pytest.raises(error) as caught:
         make()
     assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def any_body(rng):
+    e = rng.uniform(0.1, 0.98)
+    kind = rng.integers(5)
+    if kind == 0:
+        sides = rng.uniform(0.5, 6.0, 2), rng.uniform(0.05, 0.5, 2), rng.uniform(0.5, 0.95, 2)
+        p, alpha, restitution = (tuple(each) for each in sides)
+        return Block.from_parameters(p=p, alpha=alpha, restitution=restitution), "linear"
+    if kind == 1:
+        return dynamics.BouncingBall(e), None
+    if kind == 2:
+        return dynamics.InvertedPendulum(10.0 ** rng.uniform(-0.5, 1.0), 10.0 ** rng.uniform(-3.0, 0.0), e), None
+    damping, stop = rng.choice([0.0, rng.uniform(0.0, 0.5)]), rng.uniform(-0.05, 0.2)
+    second = None if kind == 3 else 0.3
+    body = dynamics.ImpactOscillator(
+        10.0 ** rng.uniform(-1.5, 0.7), e, damping_ratio=damping, stop=stop, second_stop=second
+    )
+    return body, None
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.thorough)])
+def test_steps_over_pieces_in_closed_form_are_what_the_march_finds(seed):
+    rng = np.random.default_rng(seed)
+    judged = stepped = 0
+    for _ in range(200):
+        body, model = any_body(rng)
+        frequency = 10.0 ** rng.uniform(-0.5, 1.0)
+        amplitude = 10.0 ** rng.uniform(-0.5, 1.8)
+        motion = pulses.sine(amplitude, frequency, cycles=1, phase=rng.uniform(0.0, 6.0))
+        strobe, marched = (dynamics.stroboscopic_map(body, motion, model=model) for _ in range(2))
+        marched._steps = strobe._steps[:, :0]
+        given = starts(body, 20, int(rng.integers(2**31)))
+        (found, fates, impacts), (expected, known, counted) = (each.followed(given) for each in (strobe, marched))
+        assert np.array_equal(fates, known) and np.array_equal(impacts, counted)
+        _, change = marched.derivative(given)
+        # Rounding grows as the derivative says.
+        allowed = 1e-14 * (1.0 + np.abs(given).max() + np.nanmax(np.abs(expected), initial=0.0))
+        allowed = allowed * (20.0 + np.nan_to_num(np.abs(change).max(axis=(1, 2)), posinf=1e300))
+        error = np.nan_to_num(np.abs(found - expected).max(axis=-1))
+        assert np.all(error <= allowed)
+        judged += np.count_nonzero(fates == dynamics.Fate.MOVES)
+        stepped += strobe._steps.shape[1] > 0
+    assert judged > 1500 and stepped > 100

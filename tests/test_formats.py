@@ -721,7 +721,7 @@ def test_touching_columns_are_split_as_written(numbers: list[float], per_line: i
     block = written.rows([number.rjust(width) for number in text], per_line).encode()
     origin = source.Source("f", block, block)
     layout = values.Layout(per_line, width)
-    found = values.read_values(origin, 0, len(block), count=len(numbers), layout=layout)
+    found = values.read_values(origin, 0, len(block), layout, values.Stated(len(numbers), 0))
     assert found.tolist() == numbers
 
 

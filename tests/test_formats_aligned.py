@@ -89,4 +89,4 @@ def test_no_number_is_rounded_twice():
     words = ["90071992547409.93E+01", "12345678901234567.E-05", "00000000000000001.E-99", "17000000000000000.E+99"]
     for word in words:
         assert read_aligned(f"{word}\n{word}\n".encode()).tolist() == [float(word)] * 2
-    assert read_aligned(b"0.1000000000000000055\n") is None
+    assert read_aligned(b"0.1000000000000000055\n" * 2) is None

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from rocking.kernels import compiled
-from rocking.kernels.sine.series import eq65_sums
+from rocking.kernels.sine.eq65 import eq65_sums
 
 KERNELS = Path(compiled.__file__).parent
 SOURCE = KERNELS.parent.parent

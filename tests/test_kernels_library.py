@@ -18,9 +18,9 @@ from rocking.kernels import compiled, library
 
 SCRIPT = Path(__file__).resolve().parent.parent / "scripts" / "ship_kernels.py"
 NAMES = (
-    "sine.series.eq65_time",
-    "sine.series.eq65_sums",
-    "sine.series.eq65_terms",
+    "sine.eq65.eq65_time",
+    "sine.eq65.eq65_sums",
+    "sine.eq65.eq65_terms",
     "sine.sequence.fitted_amplitudes",
     "ground.fill",
 )
@@ -82,8 +82,8 @@ def test_every_kernel_that_python_calls_is_listed_once() -> None:
 
 def test_numbers_and_tuples_are_those_of_numba(shipped: Path) -> None:
     random = np.random.default_rng(4)
-    time, reference = both("sine.series.eq65_time")
-    sums, sums_reference = both("sine.series.eq65_sums")
+    time, reference = both("sine.eq65.eq65_time")
+    sums, sums_reference = both("sine.eq65.eq65_sums")
     for a, omega, eta in random.uniform((1.0, 0.1, 0.3), (3.0, 9.0, 0.99), (200, 3)).tolist():
         assert np.array_equal(time(a, omega, eta), reference(a, omega, eta), equal_nan=True)
         assert sums(eta) == sums_reference(eta)
@@ -158,7 +158,7 @@ def test_a_kernel_that_a_manifest_describes_wrongly_is_left_to_numba(shipped: Pa
     content = json.loads(manifest.read_text("utf-8"))
     manifest.write_text(json.dumps(content | {"kernels": change(content["kernels"])}), "utf-8")
     assert library.opened() is not None
-    assert library.function("rocking.kernels.sine.series.eq65_time") is None
+    assert library.function("rocking.kernels.sine.eq65.eq65_time") is None
 
 
 def damage(name: str, folder: Path) -> None:
@@ -185,7 +185,7 @@ def damage(name: str, folder: Path) -> None:
 def test_a_library_that_does_not_fit_is_not_used(shipped: Path, name: str) -> None:
     damage(name, shipped)
     assert library.opened() is None
-    assert library.function("rocking.kernels.sine.series.eq65_time") is None
+    assert library.function("rocking.kernels.sine.eq65.eq65_time") is None
 
 
 def test_the_long_way_is_chosen_by_a_variable(shipped: Path, monkeypatch: pytest.MonkeyPatch) -> None:

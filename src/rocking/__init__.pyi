@@ -1,7 +1,8 @@
 from . import analysis, chattering, dynamics, studies
 from .analysis import rules
 from .analysis.calibration.history import HistoryCalibration, calibrate_history
-from .analysis.calibration.outcomes import Calibration, calibrate
+from .analysis.calibration.outcomes import calibrate
+from .analysis.calibration.result import Calibration
 from .analysis.efficiency import compare_measures
 from .analysis.fragility.fit import fit_fragility, fragility
 from .analysis.fragility.result import Fragility

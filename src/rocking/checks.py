@@ -47,11 +47,18 @@ def finite(value: object, name: str, error: Error) -> float:
     return result
 
 
-def positive(value: object, name: str, error: Error, unit: str = "") -> float:
-    """Return `value` as a float, or raise `error` unless it is one positive finite number."""
+def positive(
+    value: object, name: str, error: Error, unit: str = "", limits: tuple[float, float] = (0.0, math.inf)
+) -> float:
+    """Return `value` as a float, or raise `error` unless it is one positive finite number within its limits."""
     result = _real(value)
     if result is None or not (math.isfinite(result) and result > 0.0):
         raise error(f"{{}} must be a positive number{_in(unit)}, not {shown(value)}", name, value=value)
+    low, high = limits
+    if not low <= result <= high:
+        raise error(
+            f"{{}} must be a number from {low:g} to {high:g}{_in(unit)}, not {shown(result)}", name, value=result
+        )
     return result
 
 

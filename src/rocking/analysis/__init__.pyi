@@ -1,7 +1,7 @@
 from . import rules
 from .calibration.diagnostics import BoundReached, Diagnostics, Scores
 from .calibration.history import Measured
-from .calibration.outcomes import Estimate, Validation
+from .calibration.result import Estimate, Validation
 from .efficiency import MeasureComparison
 from .fragility.curve import Band, FragilityCurve
 from .fragility.lognormal import Goodness, Likelihood, Probit

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
+from rocking.block.limits import checked_gravity, checked_sides
 from rocking.block.rigid_body import refusal, rigid_bodies
-from rocking.block.single import Block, checked_gravity, checked_sides, one_block
+from rocking.block.single import Block, one_block
 from rocking.body import KINDS
 from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock
@@ -83,15 +84,12 @@ class Blocks:
                 "{}, {} and {} must be numbers, or arrays of shape (n,) or (n, 2) with one n",
                 "p", "alpha", "restitution",
             ) from None  # fmt: skip
-        object.__setattr__(self, "gravity", checked_gravity(gravity))
+        g = checked_gravity(gravity)
         for name, values in arrays.items():
             checked_sides(values, name)
         if restitution is None:
             arrays["restitution"] = _conserved(arrays["p"], arrays["alpha"])
-        for name, values in arrays.items():
-            held = np.array(values)
-            held.flags.writeable = False
-            object.__setattr__(self, name, held)
+        _filled(self, g, **{name: np.array(values) for name, values in arrays.items()})
 
     @classmethod
     def grid(
@@ -177,18 +175,8 @@ class Blocks:
         if len(gravities) != 1:
             raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same gravity")
         table = np.array([[(side.p, side.alpha, side.restitution) for side in block.sides] for block in gathered])
-        return cls._of_checked(*np.moveaxis(table, 2, 0), gravity=gravities.pop())
-
-    @classmethod
-    def _of_checked(cls, p: Floats, alpha: Floats, restitution: Floats, *, gravity: float) -> Blocks:
-        """Make blocks of values that are known to be sound, each of shape (n, 2)."""
-        made = object.__new__(cls)
-        object.__setattr__(made, "gravity", gravity)
-        for name, values in (("p", p), ("alpha", alpha), ("restitution", restitution)):
-            held = np.ascontiguousarray(values)
-            held.flags.writeable = False
-            object.__setattr__(made, name, held)
-        return made
+        p, alpha, restitution = np.moveaxis(table, 2, 0)
+        return _filled(cls.__new__(cls), gravities.pop(), p=p, alpha=alpha, restitution=restitution)
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         """Return p, alpha and restitution with their units, by name."""
@@ -248,7 +236,8 @@ class Blocks:
         """Return some of the blocks: a slice, indices, or a mask."""
         if not isinstance(index, slice):
             index = self._indices(index)
-        return self._of_checked(self.p[index], self.alpha[index], self.restitution[index], gravity=self.gravity)
+        chosen = {name: values[index] for name, (values, _) in self.parameters().items()}
+        return _filled(Blocks.__new__(Blocks), self.gravity, **chosen)
 
     def _indices(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.int64]:
         """Positions of the blocks of a flat array of indices, or of a mask."""
@@ -263,6 +252,16 @@ class Blocks:
                 f"values, not {checks.shown(index)}; for one block alone blocks[0]"
             )
         return chosen
+
+
+def _filled(blocks: Blocks, gravity: float, **sides: Floats) -> Blocks:
+    """Fill in what blocks are, sound values of shape (n, 2) that nobody can change then, and return them."""
+    object.__setattr__(blocks, "gravity", gravity)
+    for name, values in sides.items():
+        held = np.ascontiguousarray(values)
+        held.flags.writeable = False
+        object.__setattr__(blocks, name, held)
+    return blocks
 
 
 def rates_of(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:

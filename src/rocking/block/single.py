@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Never
+from typing import Final, Never
 
 import numpy as np
 
 from rocking import checks, svg
 from rocking.arrays import Floats, Integers
+from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
 from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.constants import MODELS, STANDARD_GRAVITY, Model
@@ -19,18 +20,6 @@ from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
 
-# Lowest and highest values, both included: far beyond any block, and far enough from the ends of double precision for
-# fourth powers of p, for the quotients of a motion's largest acceleration with gravity and slenderness, and for
-# products of all of them. Below the least restitution one impact is the end of rocking, to double precision.
-GRAVITY: Final = (1e-6, 1e6)
-_LENGTH: Final = (1e-20, 1e20)
-_MASS: Final = (1e-30, 1e30)
-_STEEPEST: Final = 0.5 * math.pi
-_LIMITS: Final = {
-    "p": (1e-6, 1e6, "positive, from 1e-06 to 1e+06 rad/s"),
-    "alpha": (1e-9, math.nextafter(_STEEPEST, 0.0), "from 1e-09 to below pi/2 rad"),
-    "restitution": (1e-9, 1.0, "in (0, 1], at least 1e-09"),
-}
 #: Rounding of a length that was computed, relative.
 _ROUNDING: Final = 1e-12
 #: Restitutions so near are one: that of a body, from p and alpha or from itself.
@@ -226,8 +215,8 @@ class Block:
         [0.95, 0.914]
         """
         g = checked_gravity(gravity)
-        rates = [_checked(value, "p") for value in _pair(p, "p")]
-        angles = [_checked(value, "alpha") for value in _pair(alpha, "alpha")]
+        rates = [checked_parameter(value, "p") for value in checked_pair(p, "p")]
+        angles = [checked_parameter(value, "alpha") for value in checked_pair(alpha, "alpha")]
         radii, text = [0.75 * g / rate**2 for rate in rates], "block from its parameters"
         if rates[0] == rates[1] and angles[0] == angles[1]:
             e = _restitutions(restitution, (housner_restitution(angles[0]),) * 2)
@@ -298,9 +287,9 @@ class Block:
         >>> abs(body.p - rectangle.p) < 1e-15, abs(body.restitution - rectangle.restitution) < 1e-15
         (True, True)
         """
-        plus, minus = (_length(value, "distances") for value in _pair(distances, "distances"))
-        h = _length(height, "height")
-        k = _length(radius_of_gyration, "radius_of_gyration")
+        plus, minus = (checked_length(value, "distances") for value in checked_pair(distances, "distances"))
+        h = checked_length(height, "height")
+        k = checked_length(radius_of_gyration, "radius_of_gyration")
         g = checked_gravity(gravity)
         sides = _sides_on_pivots((plus, minus), h, k * k, g, restitution)
         text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
@@ -351,8 +340,8 @@ class Block:
         >>> frame.alpha == column.alpha, round(frame.radius / column.radius, 12)
         (True, 1.4)
         """
-        b = _length(half_width, "half_width")
-        h = _length(half_height, "half_height")
+        b = checked_length(half_width, "half_width")
+        h = checked_length(half_height, "half_height")
         g = checked_gravity(gravity)
         gamma = checks.within(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _HEAVIEST_BEAM)
         alpha = math.atan2(b, h)
@@ -481,29 +470,6 @@ def one_block(block: Block) -> Block:
     return block
 
 
-def checked_sides(values: Floats, name: str) -> Floats:
-    """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock for the first out of its range."""
-    low, high, _ = _LIMITS[name]
-    bad = np.argwhere(~((values >= low) & (values <= high)))
-    if len(bad):
-        _checked(float(values[tuple(bad[0])]), name, which=f" (block {bad[0][0]})")
-    return values
-
-
-def _checked(value: float, name: str, *, origin: str = "", which: str = "") -> float:
-    """Return p, alpha or restitution of a side, or raise InvalidBlock; the message says where it is from, and whose."""
-    low, high, rule = _LIMITS[name]
-    if not low <= value <= high:
-        hint = checks.hint_of_degrees(value) if name == "alpha" else ""
-        raise InvalidBlock(f"{{}}{origin} must be {rule}, not {value:g}{which}{hint}", name, value=value)
-    return value
-
-
-def checked_gravity(gravity: object) -> float:
-    """Return an acceleration of gravity, m/s^2, or raise InvalidBlock."""
-    return _within(gravity, "gravity", GRAVITY, "m/s^2")
-
-
 def _filled(
     block: Block,
     sides: tuple[Side, Side],
@@ -514,25 +480,16 @@ def _filled(
 ) -> Block:
     """Fill in what a block is, and return it; of a rectangle also half its sizes and its offset, m."""
     for side in sides:
-        _checked(side.p, "p", origin=" (from the sizes)")
-        _checked(side.alpha, "alpha", origin=" (from the sizes)")
+        checked_parameter(side.p, "p", origin=" (from the sizes)")
+        checked_parameter(side.alpha, "alpha", origin=" (from the sizes)")
     if mass is not None:
-        mass = _within(mass, "mass", _MASS, "kg")
+        mass = checked_mass(mass)
         first, second = (replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)
         sides = first, second
     names = ("sides", "gravity", "description", "mass", "half_width", "half_height", "offset")
     for name, value in zip(names, (sides, gravity, description, mass, *rectangle), strict=True):
         object.__setattr__(block, name, value)
     return block
-
-
-def _within(value: object, name: str, limits: tuple[float, float], unit: str) -> float:
-    """Return a positive number within its limits as a float, or raise InvalidBlock."""
-    return checks.within(checks.positive(value, name, InvalidBlock, unit), name, InvalidBlock, *limits, unit)
-
-
-def _length(value: object, name: str) -> float:
-    return _within(value, name, _LENGTH, "m")
 
 
 def _even_sides(
@@ -571,24 +528,13 @@ def _half_sizes(
     """Half width and half height from either pair of sizes, m."""
     given = [size is not None for size in (*halves, *full)]
     if given == [True, True, False, False]:
-        return _length(halves[0], "half_width"), _length(halves[1], "half_height")
+        return checked_length(halves[0], "half_width"), checked_length(halves[1], "half_height")
     if given == [False, False, True, True]:
-        return 0.5 * _length(full[0], "width"), 0.5 * _length(full[1], "height")
+        return 0.5 * checked_length(full[0], "width"), 0.5 * checked_length(full[1], "height")
     raise InvalidBlock(
         "a block takes either {} and {}, or {} and {} (the full sizes), all in m",
         "half_width", "half_height", "width", "height",
     )  # fmt: skip
-
-
-def _pair(value: Any, name: str) -> tuple[float, float]:
-    """Return a number, or a pair (side +, side -), as two numbers."""
-    if type(value) is float:
-        return value, value
-    values = checks.numbers(value, name, InvalidBlock)
-    if values.shape not in ((), (2,)):
-        raise InvalidBlock(f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name)
-    plus, minus = np.broadcast_to(values, 2).tolist()
-    return plus, minus
 
 
 def _perhaps_swapped(half_width: float, half_height: float) -> str:
@@ -608,5 +554,5 @@ def _restitutions(given: object, conserved: Sequence[float], advice: str = "") -
                 "restitution",
             )
         return conserved[0], conserved[1]
-    plus, minus = (_checked(value, "restitution") for value in _pair(given, "restitution"))
+    plus, minus = (checked_parameter(value, "restitution") for value in checked_pair(given, "restitution"))
     return plus, minus

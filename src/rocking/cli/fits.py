@@ -13,8 +13,9 @@ from cyclopts import Parameter
 
 from rocking import checks
 from rocking.analysis.calibration.history import HistoryCalibration, calibrate_history
-from rocking.analysis.calibration.outcomes import Calibration, checked_outcomes, group_labels
 from rocking.analysis.calibration.outcomes import calibrate as calibrated
+from rocking.analysis.calibration.outcomes import checked_outcomes
+from rocking.analysis.calibration.result import Calibration, group_labels
 from rocking.analysis.calibration.space import HOUSNER
 from rocking.analysis.fragility import nrml
 from rocking.analysis.fragility.curve import Band

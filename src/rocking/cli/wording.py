@@ -8,7 +8,7 @@ from inspect import Parameter
 from typing import Final
 
 from cyclopts import App, Argument, CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError
-from cyclopts.exceptions import UnknownOptionError
+from cyclopts.exceptions import UnknownOptionError, UnusedCliTokensError
 
 from rocking.checks import meant
 from rocking.errors import DamagedStudy, InvalidOption, RockingError, Spelling
@@ -35,8 +35,7 @@ def spelling_of(command: App) -> Spelling:
 
 def called(app: App, arguments: Sequence[str]) -> App:
     """Return the command that is called, or the program where none is; to the parser --help is a command as well."""
-    names, apps, _ = app.parse_commands(arguments)
-    return apps[sum(not name.startswith("-") for name in names)]
+    return app.parse_commands(arguments)[1][len(_words(app, arguments))]
 
 
 def option_of(argument: str) -> str:
@@ -81,6 +80,8 @@ def of(error: RockingError | CycloptsError, app: App, arguments: Sequence[str]) 
             sentence = f"{_name(argument)} needs a value"
     elif isinstance(error, CoercionError) and argument and error.token and error.target_type in _NUMBERS:
         sentence = f"{_name(argument)} takes {_NUMBERS[error.target_type]}, not {error.token.value!r}"
+    elif isinstance(error, UnusedCliTokensError):
+        sentence = f"{command} takes no argument {' '.join(error.unused_tokens or ())!r}"
     return f"{sentence}; see {command} --help"
 
 
@@ -95,7 +96,11 @@ def _unknown_option(typed: str, app: App, arguments: Sequence[str]) -> str:
 
 def _named(app: App, arguments: Sequence[str]) -> str:
     """Return how the command that is called is typed."""
-    return " ".join(["rocking", *(each for each in app.parse_commands(arguments)[0] if not each.startswith("-"))])
+    return " ".join(["rocking", *_words(app, arguments)])
+
+
+def _words(app: App, arguments: Sequence[str]) -> list[str]:
+    return [each for each in app.parse_commands(arguments)[0] if each not in app.help_flags]
 
 
 def _options(command: App) -> Iterable[str]:

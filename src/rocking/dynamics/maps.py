@@ -18,7 +18,7 @@ from rocking.errors import InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
 from rocking.kernels.periodic import Fate as Fate
-from rocking.kernels.periodic import differentiate, iterate, to_next_impact
+from rocking.kernels.periodic import Setting, differentiate, iterate, step_rows, to_next_impact
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
@@ -53,6 +53,8 @@ class _Repeated:
         limits = self.treatment.limits(self.bodies, self.motion, self.model)
         self._records = self.bodies.kernel_records(self.model, limits)
         self._ground = repeated(self.motion, self.body.gravity)
+        rows = step_rows(self._ground, self._records[0])
+        self._steps = rows if self.model == "linear" else rows[:, :0]
 
     def _rules(self, *, record: bool) -> state.Record:
         rules = rules_of(self.bodies, self.model, self.treatment, self.period, record=record)
@@ -241,8 +243,9 @@ class StroboscopicMap(_Repeated):
         total = np.broadcast_to(np.eye(2), (len(made), 2, 2)).copy()
         ended = np.zeros(len(made), dtype=np.int64)
         for _ in range(checks.whole(periods, "periods", InvalidOption, least=1)):
-            signs = self._signs(made["side"])
-            change = self._differentiate(made)
+            signs, before = self._signs(made["side"]), made.copy()
+            self._iterate(made, 1, np.empty((len(made), 0, 3)))
+            change = self._differentiate(state.attributed(before))
             ended = np.maximum(ended, np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED)))
             total = (signs * self._signs(made["side"]))[:, None, None] * change @ total
         found = self._coordinates(made["u"], made["v"], made["side"])
@@ -251,21 +254,11 @@ class StroboscopicMap(_Repeated):
 
     def _iterate(self, made: state.Records, periods: int, rows: Floats) -> None:
         announce(SIMULATIONS)
-        rules, record, nothing = self._rules(record=False), self._records[0], state.new_table(0)
+        setting = Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
         impacts = np.zeros(len(made), dtype=np.int64)
 
         def follow(part: slice) -> None:
-            iterate(
-                self._ground,
-                record,
-                rules,
-                state.new_scratch(),
-                nothing,
-                made[part],
-                periods,
-                rows[part],
-                impacts[part],
-            )
+            iterate(setting, state.new_scratch(), made[part], periods, rows[part], impacts[part])
 
         for _ in in_threads(follow, parts_of(len(made)), threads=cores()):
             pass

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from rocking.analysis.overturning import PULSES
 from rocking.constants import STANDARD_GRAVITY
-from rocking.explorer.inputs import BLOCK_NAMES, NAMES, Case, arguments_of, block_as_python, is_pulse, pulse_call
+from rocking.explorer.inputs import BLOCK_NAMES, NAMES, Case, arguments_of, is_pulse, pulse_call
 from rocking.explorer.maps import QUANTITIES, Axis, MapGrid
 from rocking.named_pulses import pulse_values
 
@@ -86,8 +86,8 @@ def case_as_python(case: Case) -> str:
         [
             "import rocking",
             "",
-            f"block = rocking.{block_as_python(case.texts)}",
-            f"motion = {case.python}",
+            f"block = rocking.{case.block_call}",
+            f"motion = {case.motion_call}",
             f"response = rocking.simulate(block, motion{options})",
             "print(response.summary())",
         ]
@@ -191,7 +191,7 @@ def _block(grid: MapGrid) -> str:
     varied = {grid.x.name, grid.y.name} & {"p", "alpha", "restitution"}
     texts, sides = grid.case.texts, grid.case.block.sides
     if not varied:
-        return block_as_python(texts)
+        return grid.case.block_call
     slowest = min(side.p for side in sides)
     arguments = {
         "p": _pair([f"p * {side.p / slowest!r}" if "p" in varied else repr(side.p) for side in sides]),
@@ -213,7 +213,7 @@ def _pair(sides: list[str]) -> str:
 
 def _motion(grid: MapGrid) -> str:
     """Call that makes the motion, with the names of the axes among its arguments."""
-    names, made = {grid.x.name, grid.y.name}, grid.case.python
+    names, made = {grid.x.name, grid.y.name}, grid.case.motion_call
     text = grid.case.texts.get("motion", "")
     if "omega" in names and is_pulse(text):
         p = min(side.p for side in grid.case.block.sides)

@@ -181,7 +181,7 @@ class Explorer:
         case = self.show(texts).case
         start: dict[str, Any] = {"initial_position": case.initial_rotation, "initial_velocity": case.initial_velocity}
         found = compare_schemes(case.block, case.motion, schemes=TREATMENTS, model=case.model, **start)
-        rows = [(each.scheme, each.is_right, each.verdict, _plain(each.largest_error)) for each in found.outcomes]
+        rows = [(each.scheme, each.is_right, each.verdict, each.largest_error) for each in found.outcomes]
         unfit = [(scheme, None, reason, None) for scheme, reason in found.not_applicable]
         return [
             {"label": scheme.label, "text": str(scheme), "right": right, "verdict": words, "error": error}
@@ -354,16 +354,16 @@ def _facts(shown: Simulated) -> dict[str, Any]:
         "duration": response.duration,
         "overturned": response.overturned,
         "unfinished": response.unfinished,
-        "overturn_time": _plain(response.overturn_time),
-        "tipping_time": _plain(response.tipping_time),
+        "overturn_time": response.overturn_time,
+        "tipping_time": response.tipping_time,
         "peak_rotation": response.peak_rotation,
-        "peak_over_slenderness": _plain(response.peak_over_slenderness),
+        "peak_over_slenderness": response.peak_over_slenderness,
         "peak_time": response.peak_time,
         "impacts": len(response.impacts),
         "rests": int(np.sum(response.events["kind"] == "rest")),
         "proven": int(np.sum(np.isfinite(response.chattering["upper"]))),
         "time_at_rest": response.time_at_rest,
-        "share_at_rest": _plain(episodes.share_at_rest),
+        "share_at_rest": episodes.share_at_rest,
         "eta_squared": math.prod(side.restitution for side in block.sides),
         "verdict": verdict(response, block.uplift_thresholds(case.model)),
     }
@@ -433,7 +433,3 @@ def _draw(response: Response, file: Path, window: tuple[float, float] | None) ->
         figure.savefig(file, dpi=160)
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close(figure)
-
-
-def _plain(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -46,11 +46,12 @@ _LONGEST_TEXT: Final = 300
 #: Longest pulse, cycles: a page shows no more, and memory is bounded.
 MOST_SHOWN: Final = 1000.0
 
-#: Functions that make a block by their names in `rocking`, the one for each shape, and what they call its parameters.
-_MAKERS: Final[Mapping[str, Callable[..., Block]]] = {
-    "Block": Block, "Block.from_parameters": Block.from_parameters, "Block.from_pivots": Block.from_pivots,
-}  # fmt: skip
-_MAKER_OF: Final = {"sizes": "Block", "parameters": "Block.from_parameters", "pivots": "Block.from_pivots"}
+#: What makes a block of each shape, its name in `rocking`, and what it calls the parameters.
+_MAKERS: Final[Mapping[str, tuple[Callable[..., Block], str]]] = {
+    "sizes": (Block, "Block"),
+    "parameters": (Block.from_parameters, "Block.from_parameters"),
+    "pivots": (Block.from_pivots, "Block.from_pivots"),
+}
 _ARGUMENTS: Final = {"pivots": "distances", "height_of_mass": "height", "gyration": "radius_of_gyration"}
 
 
@@ -58,8 +59,8 @@ _ARGUMENTS: Final = {"pivots": "distances", "height_of_mass": "height", "gyratio
 class Case:
     """What `rocking.simulate` takes, with the texts from which it was read.
 
-    ``python`` is the expression that makes the motion, ``words`` are the arguments that name it on the command line;
-    there are none where it cannot be named.
+    ``block_call`` and ``motion_call`` are the expressions that make block and motion; ``words`` are the arguments that
+    name the motion on the command line: none where it cannot be named.
     """
 
     texts: Texts
@@ -70,7 +71,8 @@ class Case:
     duration: float | None
     initial_rotation: float
     initial_velocity: float
-    python: str
+    block_call: str
+    motion_call: str
     words: tuple[str, ...]
 
     def simulate(self) -> Response:
@@ -106,9 +108,8 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     (<Block: rectangular block, 0.24 m x 1.1 m; p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184>, 3.92266)
     """
     given = _given(texts)
-    values = _values(given)
-    maker, arguments = _block_call(values)
-    block = _MAKERS[maker](**arguments)
+    values = {name: PARAMETERS[name].read(text) for name, text in given.items()}
+    block, block_call = _block(values)
     found = _motion(given, values, uploads)
     if "duration" not in values and math.prod(side.restitution for side in block.sides) > _LIVELIEST:
         raise InvalidOption(
@@ -125,7 +126,8 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
         duration=values.get("duration"),
         initial_rotation=values.get("initial_rotation", 0.0),
         initial_velocity=values.get("initial_velocity", 0.0),
-        python=found.python,
+        block_call=block_call,
+        motion_call=found.python,
         words=found.words,
     )
 
@@ -176,12 +178,8 @@ def _given(texts: Texts) -> dict[str, str]:
     return given or dict(DEFAULT)
 
 
-def _values(given: Texts) -> dict[str, Any]:
-    return {name: PARAMETERS[name].read(text) for name, text in given.items()}
-
-
-def _block_call(values: Values) -> tuple[str, dict[str, Any]]:
-    """Name in `_MAKERS` and arguments of the call that makes the block."""
+def _block(values: Values) -> tuple[Block, str]:
+    """Make the block, and write the call of `rocking` that makes it."""
     chosen = values.keys() & BLOCK_NAMES - {"restitution"}
     shape = next((each for each in SHAPES if {*each.needed} <= chosen <= {*each.needed, *each.optional}), None)
     if shape is None:
@@ -193,13 +191,8 @@ def _block_call(values: Values) -> tuple[str, dict[str, Any]]:
     arguments = {_ARGUMENTS.get(name, name): values[name] for name in names if name in values}
     if isinstance(arguments.get("distances"), float):
         arguments["distances"] = (arguments["distances"],) * 2
-    return _MAKER_OF[shape.name], arguments
-
-
-def block_as_python(given: Texts) -> str:
-    """Write the call of `rocking` that makes the block."""
-    maker, arguments = _block_call(_values({name: given[name] for name in given.keys() & {*BLOCK_NAMES, "gravity"}}))
-    return f"{maker}({_written(arguments)})"
+    make, name = _MAKERS[shape.name]
+    return make(**arguments), f"{name}({_written(arguments)})"
 
 
 def _written(arguments: Mapping[str, Any]) -> str:

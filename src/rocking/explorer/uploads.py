@@ -116,7 +116,7 @@ class UploadStore:
         missing: list[str] = []
         while True:
             try:
-                identification, channels = formats.content(upload.stream(), None, Request.checked(**given))
+                identification, channels = formats.content(upload.stream(), Request.checked(**given))
                 break
             except (UnreadableRecord, InvalidMotion) as error:
                 name = error.argument

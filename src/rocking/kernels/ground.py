@@ -197,12 +197,19 @@ def local_series(ground: Ground, piece: int, offset: float, sign: float, A: Floa
     while degree > 0 and coefficient(ground, piece, degree) == 0.0:
         A[degree] = 0.0
         degree -= 1
+    if offset == 0.0:
+        for k in range(degree + 1):
+            A[k] = sign * coefficient(ground, piece, k)
+        return degree
     # Horner's rule, for all coefficients at once: unlike in `move` the sums of one turn do not depend on each other.
     A[0] = sign * coefficient(ground, piece, degree)
     for k in range(1, degree + 1):
-        A[k] = A[k - 1]
-        for j in range(k - 1, 0, -1):
-            A[j] = A[j - 1] + offset * A[j]
+        before = A[0]
+        for j in range(1, k):
+            here = A[j]
+            A[j] = before + offset * here
+            before = here
+        A[k] = before
         A[0] = sign * coefficient(ground, piece, degree - k) + offset * A[0]
     return degree
 

@@ -111,7 +111,7 @@ def named_motion(
         motion = records.load(name)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
-        motion = formats.read_as(file, channel, Request.checked(dt, units, several=several), optional=several)
+        motion = formats.read_as(file, Request.checked(dt, units, channel, several=several))
     return motion if scale == 1.0 else motion.scaled(scale)
 
 
@@ -130,8 +130,7 @@ def named_vertical(
             f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels; check "
             "the name"
         )
-    request = Request.checked(dt, units, several=True)
-    return formats.read_vertical(record, name, channel, request)
+    return formats.read_vertical(record, name, Request.checked(dt, units, channel, several=True))
 
 
 def refuse_what_is_known(name: str, **said: object) -> None:
@@ -282,8 +281,7 @@ def contents(
     UnreadableRecord, InvalidMotion
         As for `rocking.read`.
     """
-    request = Request.checked(dt, units, several=several)
-    identification, channels = formats.content(file, channel, request, optional=several)
+    identification, channels = formats.content(file, Request.checked(dt, units, channel, several=several))
     motions = tuple(each.motion() for each in channels)
     name = "standard input" if hasattr(file, "read") else os.fsdecode(file)
     facts = {"file": name, "format": identification.format, "reason": identification.reason}

@@ -252,10 +252,12 @@ def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
 
 def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:
     """Breakpoints and coefficients of a motion as own, read-only arrays."""
-    ends = _finite(breakpoints, "breakpoints", 1)
-    rows = _finite(
-        coefficients, "coefficients", 2, ": of samples make a motion with Motion.from_samples(acceleration, dt)"
-    )
+    ends = _floats(breakpoints, "breakpoints", 1)
+    of_samples = ": of samples make a motion with Motion.from_samples(acceleration, dt)"
+    rows = _floats(coefficients, "coefficients", 2, of_samples)
+    for array, what in ((ends, "breakpoints"), (rows, "coefficients")):
+        if not np.all(np.isfinite(array)):
+            raise InvalidMotion("the {} of a motion must be finite numbers", what)
     if len(ends) < 2 or rows.shape[0] != len(ends) - 1 or rows.shape[1] == 0:
         raise InvalidMotion(
             "a motion of n pieces needs n + 1 {} and {} of shape (n, degree + 1), not "
@@ -275,9 +277,11 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
         raise InvalidMotion(
             f"a motion must last from {SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
         )
-    if not _stays_below(STRONGEST, rows, widths):
+    with np.errstate(over="ignore"):
+        reached, soon = (value(np.abs(rows), spans) for spans in (widths, np.maximum(widths, SHORTEST)))
+    if not np.all(reached <= STRONGEST):
         raise InvalidMotion(f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale")
-    if not _stays_below(STRONGEST, rows, np.maximum(widths, SHORTEST)):
+    if not np.all(soon <= STRONGEST):
         raise InvalidMotion(
             f"a piece of a motion is too steep: shorter than {SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "
             "within that time: check units and times"
@@ -285,11 +289,6 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
     for array in (ends, rows):
         array.setflags(write=False)
     return ends, rows
-
-
-def _stays_below(limit: float, rows: Floats, widths: Floats) -> bool:
-    with np.errstate(over="ignore"):
-        return bool(np.all(value(np.abs(rows), widths) <= limit))
 
 
 def checked_samples(acceleration: ArrayLike) -> Floats:
@@ -326,11 +325,4 @@ def _floats(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Fl
     if array.ndim != dimensions:
         sentence = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
         raise InvalidMotion(sentence, what)
-    return array
-
-
-def _finite(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Floats:
-    array = _floats(values, what, dimensions, hint)
-    if not np.all(np.isfinite(array)):
-        raise InvalidMotion("the {} of a motion must be finite numbers", what)
     return array

@@ -46,22 +46,6 @@ function complete(texts) {
   return ["width", "p", "pivots"].some((name) => name in texts) ? texts : {width, height, ...texts};
 }
 
-/** @param {State} state */
-function query(state) {
-  const given = new URLSearchParams();
-  /** @param {Texts} texts @param {string[]} names @param {string} [prefix] */
-  const put = (texts, names, prefix = "") => { for (const name of names) if (texts[name]) given.set(prefix + name, texts[name]); };
-  if (state.view !== "response") given.set("view", state.view);
-  put(state.texts, namesOf());
-  if (state.view === "compare") {
-    given.set("compare", state.compare);
-    put(state.other, namesOf(), "other.");
-  }
-  if (state.view === "map") put(state.map, specification.map);
-  put(ends(state), ["from", "to"]);
-  return given.toString();
-}
-
 /** The window as texts. @param {State} state @returns {Texts} */
 export const ends = ({window: chosen}) => (chosen ? {from: String(chosen[0]), to: String(chosen[1])} : {});
 
@@ -71,5 +55,18 @@ let waiting = 0;
  * @param {State} state */
 export function writeAddress(state) {
   window.clearTimeout(waiting);
-  waiting = window.setTimeout(() => history.replaceState(null, "", `?${query(state)}`), 150);
+  waiting = window.setTimeout(() => {
+    const given = new URLSearchParams();
+    /** @param {Texts} texts @param {string[]} names @param {string} [prefix] */
+    const put = (texts, names, prefix = "") => { for (const name of names) if (texts[name]) given.set(prefix + name, texts[name]); };
+    if (state.view !== "response") given.set("view", state.view);
+    put(state.texts, namesOf());
+    if (state.view === "compare") {
+      given.set("compare", state.compare);
+      put(state.other, namesOf(), "other.");
+    }
+    if (state.view === "map") put(state.map, specification.map);
+    put(ends(state), ["from", "to"]);
+    history.replaceState(null, "", `?${given}`);
+  }, 150);
 }

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import BinaryIO, Final
 
 from rocking import checks
@@ -85,24 +86,21 @@ def read(
     >>> motion.duration, motion.pga
     (0.02, 4.903325)
     """
-    return read_as(path, channel, Request.checked(dt, units))
+    return read_as(path, Request.checked(dt, units, channel))
 
 
-def read_as(
-    path: str | os.PathLike[str] | BinaryIO, channel: int | str | None, request: Request, *, optional: bool = False
-) -> Motion:
-    """Read one channel as `read` does; an `optional` one is for files that have several."""
+def read_as(path: str | os.PathLike[str] | BinaryIO, request: Request) -> Motion:
+    """Read one channel as `read` does."""
     source = open_source(path)
-    found = _recognised(source).read(request)
-    return _choose(source, found, None if optional and len(found) == 1 else channel).motion()
+    return _choose(source, _recognised(source).read(request), request).motion()
 
 
-def read_vertical(path: str | os.PathLike[str], name: str, horizontal: int | str | None, request: Request) -> Motion:
-    """Read the channel of a record file that is the vertical motion beside another one, the `horizontal`."""
-    source = open_source(path)
+def read_vertical(path: str | os.PathLike[str], name: str, request: Request) -> Motion:
+    """Read the channel of a record file that is the vertical motion beside the one that is requested."""
+    source, horizontal = open_source(path), request.channel
     found = _recognised(source).read(request)
     if _matching(found, name):
-        return _choose(source, found, name).motion()
+        return _choose(source, found, replace(request, channel=name)).motion()
     taken = {one.number for one in (found if len(found) == 1 or horizontal is None else _matching(found, horizontal))}
     beside = [one for one in found if one.number not in taken]
     unknown = f"there is no channel, file or shipped record {name!r}"
@@ -113,16 +111,12 @@ def read_vertical(path: str | os.PathLike[str], name: str, horizontal: int | str
     raise source.error(f"{unknown}; {_hint(beside, name)}give one of {_listed(beside)}")
 
 
-def content(
-    path: str | os.PathLike[str] | BinaryIO, channel: int | str | None, request: Request, *, optional: bool = False
-) -> tuple[Identification, list[Channel]]:
+def content(path: str | os.PathLike[str] | BinaryIO, request: Request) -> tuple[Identification, list[Channel]]:
     """Return what format a file is taken for, and its acceleration channels, or the one that is named."""
     source = open_source(path)
     identification, read = _recognised(source)
     found = read(request)
-    if channel is None or (optional and len(found) == 1):
-        return identification, found
-    return identification, [_choose(source, found, channel)]
+    return identification, found if request.channel is None else [_choose(source, found, request)]
 
 
 def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: str | None = None) -> tuple[Channel, ...]:
@@ -143,7 +137,7 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     UnreadableRecord, InvalidMotion
         As for `read`.
     """
-    return tuple(content(path, None, Request.checked(dt, units))[1])
+    return tuple(content(path, Request.checked(dt, units))[1])
 
 
 def identify(path: str | os.PathLike[str]) -> Identification:
@@ -213,8 +207,8 @@ def _listed(found: Sequence[Channel]) -> str:
     return ", ".join(channel.label for channel in found[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _choose(source: Source, found: list[Channel], wanted: int | str | None) -> Channel:
-    listed = _listed(found)
+def _choose(source: Source, found: list[Channel], request: Request) -> Channel:
+    listed, wanted = _listed(found), None if request.several and len(found) == 1 else request.channel
     if wanted is None and len(found) > 1:
         raise source.error(f"the file holds {len(found)} channels; give {{}} as one of {listed}", None, "channel")
     matching = found if wanted is None else _matching(found, wanted)

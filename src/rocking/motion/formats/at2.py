@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, azimuth_of, to_acceleration
 from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.values import NUMBER, Layout, parse, read_count
+from rocking.motion.formats.values import NUMBER, Layout, Stated, parse, read_values
 
 NAME = "PEER AT2"
 
@@ -50,7 +50,8 @@ def _read(source: Source, header: _PeerHeader, other: tuple[str, int] | None, re
     spelling = next((found[1] for line in header.titles if (found := _UNITS.search(line.text))), "")
     unit = request.units(source, spelling, at)
     dt = request.step(source, header.dt, at)
-    values = read_count(source, at, header.sizes.next, len(source.data), header.points, _LAYOUT, said="NPTS")
+    stated = Stated(header.points, at, "NPTS")
+    values = read_values(source, header.sizes.next, len(source.data), _LAYOUT, stated)
     title = header.titles[1].text.strip() if len(header.titles) > 1 else ""
     event, station, name = _places(title)
     return [

@@ -15,7 +15,7 @@ from rocking.arrays import Floats
 from rocking.motion.formats import csmip
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
 from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.values import read_count
+from rocking.motion.formats.values import Stated, read_values
 
 NAME = "COSMOS"
 
@@ -93,8 +93,8 @@ def _numbers(source: Source, start: int, kind: str) -> tuple[Floats, int]:
     if stated is None or stated[2].lower() != kind:
         raise source.error(f"a line '... {kind}-header values follow' should stand here; get the file again", start)
     end = _after(source, line, int(stated[3]))
-    count = int(stated[1])
-    return read_count(source, start, line.next, end, count, csmip.layout_in(line.text)), end
+    layout = csmip.layout_in(line.text)
+    return read_values(source, line.next, end, layout, Stated(int(stated[1]), start)), end
 
 
 def _after_comments(source: Source, start: int) -> int:
@@ -113,7 +113,8 @@ def _channel(source: Source, request: Request, header: _CosmosHeader, end: int, 
     spelling = _UNITS.search(line.text)
     unit = request.units(source, spelling[1] if spelling else None, line.start)
     dt = request.step(source, _step(source, header), line.start)
-    values = read_count(source, line.start, line.next, end, header.points, csmip.layout_in(line.text))
+    layout, stated = csmip.layout_in(line.text), Stated(header.points, line.start)
+    values = read_values(source, line.next, end, layout, stated)
     _refuse_unknown(source, header, values)
     number, name, place = _name(header.text, ordinal)
     station = next((found[2] or found[1] for each in header.text if (found := _STATION.match(each.text))), "")

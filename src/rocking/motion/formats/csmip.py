@@ -18,7 +18,7 @@ from typing import NamedTuple
 from rocking.arrays import Floats
 from rocking.motion.formats.channel import Channel, Identification, Recognised, even_step, first_fault, to_acceleration
 from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.values import Layout, bad_number, numeric_end, parse, read_count
+from rocking.motion.formats.values import Layout, Stated, bad_number, numeric_end, parse, read_values
 from rocking.motion.units import Unit
 
 V1_TITLE = re.compile(r"^\s*uncorrected accelerogram", re.IGNORECASE)
@@ -164,8 +164,7 @@ def _v1_samples(
     unit = request.units(source, spelling[1] if spelling else None, line.start)
     dt = request.step(source, 1.0 / rate, line.start)
     end = data_end(source, line.next, V1_TITLE)
-    count, layout = int(stated[1]), layout_in(line.text)
-    values = read_count(source, line.start, line.next, end, count, layout)
+    values = read_values(source, line.next, end, layout_in(line.text), Stated(int(stated[1]), line.start))
     units, acceleration = spelling[1] if spelling else unit.name, to_acceleration(source, line.start, values, unit)
     return _v1_labelled(source, header, ordinal, units, acceleration, dt, None), end
 
@@ -174,7 +173,7 @@ def _v1_pairs(source: Source, request: Request, header: list[Line], ordinal: int
     points, spelling, unit = _v1_pair_header(source, request, header)
     start, at = header[-1].next, header[0].start
     end = data_end(source, start, V1_TITLE)
-    values = read_count(source, at, start, end, 2 * points, _V1_PAIRS)
+    values = read_values(source, start, end, _V1_PAIRS, Stated(2 * points, at))
     times, acceleration = values[0::2], to_acceleration(source, at, values[1::2], unit)
     if first_fault(times) is not None:
         raise source.error("the times of the points that follow do not increase throughout; correct the file", start)
@@ -261,8 +260,8 @@ def _v2_acceleration(
     unit = request.units(source, spelling[1] if spelling else None, line.start)
     dt = request.step(source, _v2_step(source, header, stated[2]), line.start)
     end = data_end(source, line.next, V2_TITLE, _V2_NEXT_QUANTITY)
-    count, layout = int(stated[1]), layout_in(line.text) or _V2_COLUMNS
-    values = read_count(source, line.start, line.next, end, count, layout)
+    layout = layout_in(line.text) or _V2_COLUMNS
+    values = read_values(source, line.next, end, layout, Stated(int(stated[1]), line.start))
     label = labels(header[:_V2_TEXT_LINES], ordinal)
     channel = Channel(
         name=label.name,

@@ -7,7 +7,7 @@ import re
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
 from rocking.motion.formats.source import Entry, Request, Source
-from rocking.motion.formats.values import positive_numbers, read_count
+from rocking.motion.formats.values import Stated, positive_numbers, read_values
 
 NAME = "ESM"
 
@@ -35,7 +35,7 @@ def _read(source: Source, entries: dict[str, Entry], start: int, request: Reques
     unit = request.units(source, spelling.value, spelling.at)
     (dt,), (count,) = (positive_numbers(source, key, entries[key]) for key in ("SAMPLING_INTERVAL_S", "NDATA"))
     dt = request.step(source, dt, entries["SAMPLING_INTERVAL_S"].at)
-    values = read_count(source, entries["NDATA"].at, start, len(source.data), count, said="NDATA")
+    values = read_values(source, start, len(source.data), stated=Stated(count, entries["NDATA"].at, "NDATA"))
     text = {key: entry.value for key, entry in entries.items() if entry.value}
     name = text.get("STREAM", "acceleration")
     processing = {"processing": text["PROCESSING"]} if "PROCESSING" in text else {}

@@ -50,7 +50,7 @@ def _read(source: Source, request: Request) -> list[Channel]:
     scale_at = entries["Scale Factor"].at
     unit = request.units(source, "gal", scale_at)
     dt = request.step(source, 1.0 / rate, entries["Sampling Freq"].at)
-    values = read_values(source, start, len(source.data), layout=_COUNTS)
+    values = read_values(source, start, len(source.data), _COUNTS)
     _check_duration(source, entries, rate, len(values))
     with np.errstate(over="ignore"):
         scaled = values * gal / counts

@@ -23,7 +23,7 @@ from rocking.motion.formats.channel import (
     to_acceleration,
 )
 from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.values import Layout, read_count
+from rocking.motion.formats.values import Layout, Stated, read_values
 
 NAME = "USGS SMC"
 
@@ -105,7 +105,7 @@ def _header(source: Source, title: Line) -> _SmcHeader:
 
 def _numbers(source: Source, lines: list[Line], layout: Layout) -> Floats:
     start, count = lines[0].start, layout.per_line * len(lines)
-    return read_count(source, start, start, lines[-1].next, count, layout)
+    return read_values(source, start, lines[-1].next, layout, Stated(count, start))
 
 
 def _series(source: Source, request: Request, header: _SmcHeader) -> tuple[float | None, Floats | None, Floats]:
@@ -129,7 +129,7 @@ def _series(source: Source, request: Request, header: _SmcHeader) -> tuple[float
 def _values(source: Source, header: _SmcHeader) -> Floats:
     count = header.integer(_VALUE_COUNT)
     layout = _PRECISE_VALUES if header.integer(_DIGITS) == _PRECISE_DIGITS else _VALUES
-    values = read_count(source, header.text[-1].next, header.data, len(source.data), count, layout)
+    values = read_values(source, header.data, len(source.data), layout, Stated(count, header.text[-1].next))
     if (np.abs(values) >= _UNKNOWN).any():
         raise source.error("some values are 1.7e38, which means 'unknown'; get a record without gaps", header.data)
     return values

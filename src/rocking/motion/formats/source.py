@@ -205,22 +205,26 @@ _SAME_STEP = 1e-6
 
 @dataclass(frozen=True)
 class Request:
-    """The arguments `dt` (s) and `units` of a read; None where the file should know.
+    """The arguments `dt` (s), `units` and `channel` of a read; None where the file should know.
 
-    Where they are given for several files at once they are for those that do not say; for one alone they must not
-    contradict it.
+    Where they are given for several files at once they are for those that do not say, or hold several channels; for one
+    alone they must not contradict it.
     """
 
     dt: float | None = None
     unit: Unit | None = None
+    channel: int | str | None = None
     several: bool = False
 
     @classmethod
-    def checked(cls, dt: float | None, units: str | None, *, several: bool = False) -> Request:
+    def checked(
+        cls, dt: float | None, units: str | None, channel: int | str | None = None, *, several: bool = False
+    ) -> Request:
         """Return the request."""
         return cls(
             None if dt is None else checks.positive(dt, "dt", InvalidMotion, "s"),
             None if units is None else choose_unit(units),
+            channel,
             several,
         )
 

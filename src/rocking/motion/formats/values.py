@@ -6,7 +6,7 @@ Numbers of one shape, which most are, take a short way, in columns of bytes, to 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -42,6 +42,14 @@ _TOKEN: Final = re.compile(rb"[^ ]+")
 _EXPONENT: Final = re.compile(rb"[EeDd][+-]\d{1,3}$")
 
 
+class Stated(NamedTuple):
+    """How many numbers a file says that it holds, the offset of the line that does, and what is said to do so."""
+
+    values: float
+    at: int
+    by: str = "the header"
+
+
 class Layout(NamedTuple):
     """Fortran columns such as 8F10.3: numbers per line and characters per number."""
 
@@ -56,9 +64,30 @@ def read_aligned(block: bytes, layout: Layout | None = None) -> Floats | None:
     they may touch if each has a decimal point, for what touches then is no number by itself.
     """
     body, newline, last = block.rstrip().rpartition(b"\n")
-    parts = [_alike(lines, layout) for lines in (body + newline, last + b"\n") if lines]
-    numbers = [part for part in parts if part is not None]
-    return np.concatenate(numbers) if len(numbers) == len(parts) else None
+    tokens = last.split() if layout is None else _columns(last, layout)
+    rest = convert(tokens) if tokens else None
+    if rest is None or not newline:
+        return rest
+    body += newline
+    length = body.find(newline) + 1
+    first = body[: length - 1].rstrip(b" ")
+    ends = [found.end() for found in _TOKEN.finditer(first)] if layout is None else _fixed_ends(first, layout)
+    if not ends or len(body) % length or max(np.diff(ends, prepend=0)) > _WIDEST:
+        return None
+    lines = np.frombuffer(body, dtype=np.uint8).reshape(-1, length)
+    starts = [0, *ends[:-1]]
+    gaps = [] if layout is not None else starts[1:]
+    if np.any(lines[:, -1] != _NEWLINE) or np.any(lines[:, [*gaps, *range(ends[-1], length - 1)]] != _BLANK):
+        return None
+    numbers = np.empty((len(lines), len(ends)))
+    for fields in _groups(starts, ends, first):
+        start, end = starts[fields[0]], ends[fields[0]]
+        rows = np.stack([lines[:, starts[k] : ends[k]] for k in fields], axis=1).reshape(-1, end - start)
+        values = _numbers(np.ascontiguousarray(rows.T), first[start:end])
+        if values is None:
+            return None
+        numbers[:, fields] = values.reshape(-1, len(fields))
+    return np.concatenate([numbers.ravel(), rest])
 
 
 def read_columns(block: bytes, count: int) -> Floats | None:
@@ -92,29 +121,6 @@ def _right_aligned(text: NDArray[np.uint8], starts: Integers, ends: Integers) ->
     field = np.ascontiguousarray(rows.T)
     field[np.arange(width)[:, np.newaxis] < width - lengths] = _BLANK
     return field
-
-
-def _alike(block: bytes, layout: Layout | None) -> Floats | None:
-    """Return the numbers on lines of equal length, or None if they are not written alike."""
-    length = block.find(b"\n") + 1
-    first = block[: length - 1].rstrip(b" ")
-    ends = [found.end() for found in _TOKEN.finditer(first)] if layout is None else _fixed_ends(first, layout)
-    if not ends or len(block) % length or max(np.diff(ends, prepend=0)) > _WIDEST:
-        return None
-    lines = np.frombuffer(block, dtype=np.uint8).reshape(-1, length)
-    starts = [0, *ends[:-1]]
-    gaps = [] if layout is not None else starts[1:]
-    if np.any(lines[:, -1] != _NEWLINE) or np.any(lines[:, [*gaps, *range(ends[-1], length - 1)]] != _BLANK):
-        return None
-    numbers = np.empty((len(lines), len(ends)))
-    for fields in _groups(starts, ends, first):
-        start, end = starts[fields[0]], ends[fields[0]]
-        rows = np.stack([lines[:, starts[k] : ends[k]] for k in fields], axis=1).reshape(-1, end - start)
-        values = _numbers(np.ascontiguousarray(rows.T), first[start:end])
-        if values is None:
-            return None
-        numbers[:, fields] = values.reshape(-1, len(fields))
-    return numbers.ravel()
 
 
 def _fixed_ends(first: bytes, layout: Layout) -> list[int]:
@@ -214,15 +220,6 @@ _TOKEN_LIMIT = 400
 _SHOWN = 40
 
 
-class _BadNumberError(Exception):
-    """A piece of text that is not a finite number, and where its line starts."""
-
-    def __init__(self, token: bytes, at: int) -> None:
-        super().__init__(token, at)
-        self.token = token
-        self.at = at
-
-
 def numeric_end(source: Source, start: int) -> int:
     """Return the offset of the first line from `start` on that holds more than numbers, or the file's end."""
     data = source.data
@@ -234,28 +231,32 @@ def numeric_end(source: Source, start: int) -> int:
 
 
 def read_values(
-    source: Source, start: int, end: int, *, count: float | None = None, layout: Layout | None = None
+    source: Source, start: int, end: int, layout: Layout | None = None, stated: Stated | None = None
 ) -> Floats:
-    """Return all numbers between the offsets `start` and `end`, which begin lines.
+    """Return all numbers between the offsets `start` and `end`, which begin lines; as many as are stated.
 
-    Numbers are taken as blank-separated; where that fails or does not give `count` of them, by the columns of
+    Numbers are taken as blank-separated; where that fails or does not give so many of them, by the columns of
     `layout`, so that numbers which touch are split where the Fortran program that wrote them meant it.
     """
+    count = None if stated is None else stated.values
     if layout is not None and count is not None:
-        aligned = _read_aligned(source, start, end, layout)
-        if aligned is not None and len(aligned) == count:
-            return aligned
-    try:
-        free = _read(source, start, end, None)
-    except _BadNumberError as bad:
-        return _read_columns(source, start, end, layout, bad)
-    if layout is None or count is None or len(free) == count:
-        return free
-    try:
-        columns = _read(source, start, end, layout)
-    except _BadNumberError:
-        return free
-    return columns if len(columns) == count else free
+        values, reached = _in_blocks(source, start, end, _LINE_END, lambda block: read_aligned(block, layout))
+        if reached == end and len(values) == count:
+            return values
+    values, reached = _in_blocks(source, start, end, _SPACE, _read_separated)
+    further = reached
+    if layout is not None and (reached < end or count not in (None, len(values))):
+        columns, further = _in_blocks(source, start, end, _LINE_END, lambda block: _read_columns(block, layout))
+        if further == end and (reached < end or len(columns) == count):
+            values, reached = columns, end
+    if reached < end:
+        # The reading that got further is the one that the file was written for: its complaint helps.
+        bad = [_first_bad(source, reached, None), *([_first_bad(source, further, layout)] if layout else [])]
+        raise not_a_number(source, *max(bad, key=lambda each: each[1]))
+    if stated is not None and len(values) != stated.values:
+        what = f"{stated.by} says {stated.values:.15g} values"
+        raise wrong_count(source, stated.at, what, len(values), more=len(values) > stated.values)
+    return values
 
 
 def rows_of_numbers(source: Source, start: int, columns: int, translation: bytes, longest: int) -> Floats | None:
@@ -263,25 +264,13 @@ def rows_of_numbers(source: Source, start: int, columns: int, translation: bytes
 
     `translation` turns delimiters into blanks and decimal signs into points; no row is longer than `longest`.
     """
-    parts = []
-    for begin, stop in _chunks(source.data, start, len(source.data), _LINE_END):
-        block = source.data[begin:stop]
+
+    def read(block: bytes) -> Floats | None:
         short = max(map(len, block.split(b"\n"))) <= longest
-        values = read_columns(block.translate(translation), columns) if short else None
-        if values is None:
-            return None
-        parts.append(values)
-    return np.concatenate(parts) if parts else None
+        return read_columns(block.translate(translation), columns) if short else None
 
-
-def read_count(
-    source: Source, at: int, start: int, end: int, count: float, layout: Layout | None = None, said: str = "the header"
-) -> Floats:
-    """Return the numbers between two offsets; what is said at the offset `at` states how many there are."""
-    values = read_values(source, start, end, count=count, layout=layout)
-    if len(values) != count:
-        raise wrong_count(source, at, f"{said} says {count:.15g} values", len(values), more=len(values) > count)
-    return values
+    values, reached = _in_blocks(source, start, len(source.data), _LINE_END, read)
+    return values if reached == len(source.data) else None
 
 
 def wrong_count(source: Source, at: int, stated: str, found: int, *, more: bool) -> UnreadableRecord:
@@ -341,81 +330,57 @@ def convert(tokens: list[bytes]) -> Floats | None:
     return values if np.isfinite(values).all() else None
 
 
-def _read_columns(source: Source, start: int, end: int, layout: Layout | None, free: _BadNumberError) -> Floats:
-    bad = free
-    if layout is not None:
-        try:
-            return _read(source, start, end, layout)
-        except _BadNumberError as columns:
-            # The reading that got further is the one that the file was written for: its complaint helps.
-            bad = max(free, columns, key=lambda each: each.at)
-    raise not_a_number(source, bad.token, bad.at) from None
-
-
-def _read(source: Source, start: int, end: int, layout: Layout | None) -> Floats:
-    parts = []
-    for begin, stop in _chunks(source.data, start, end, _SPACE if layout is None else _LINE_END):
-        block = source.data[begin:stop]
-        values = _convert_block(block, layout)
-        if values is None:
-            raise _first_bad(block, begin, layout)
-        parts.append(values)
-    return np.concatenate(parts) if parts else np.empty(0)
-
-
-def _read_aligned(source: Source, start: int, end: int, layout: Layout) -> Floats | None:
-    """Numbers in the columns of `layout`, all written alike; None if they are not."""
-    parts = []
-    for begin, stop in _chunks(source.data, start, end, _LINE_END):
-        values = read_aligned(source.data[begin:stop], layout)
-        if values is None:
-            return None
-        parts.append(values)
-    return np.concatenate(parts) if parts else None
-
-
-def _chunks(data: bytes, start: int, end: int, boundary: re.Pattern[bytes]) -> Iterator[tuple[int, int]]:
+def _in_blocks(
+    source: Source, start: int, end: int, boundary: re.Pattern[bytes], read: Callable[[bytes], Floats | None]
+) -> tuple[Floats, int]:
+    """Numbers of the blocks that `read` takes, up to the first that it does not, and where that begins; or the end."""
+    parts = [np.empty(0)]
     while start < end:
-        found = boundary.search(data, min(start + _CHUNK, end) - 1, end)
+        found = boundary.search(source.data, min(start + _CHUNK, end) - 1, end)
         stop = end if found is None else found.end()
-        yield start, stop
+        values = read(source.data[start:stop])
+        if values is None:
+            break
+        parts.append(values)
         start = stop
+    return np.concatenate(parts), start
 
 
-def _convert_block(block: bytes, layout: Layout | None) -> Floats | None:
-    if layout is None:
-        aligned = read_aligned(block)
-        return convert(block.split()) if aligned is None else aligned
-    tokens = _fields(block, layout)
-    return None if tokens is None else convert(tokens)
+def _read_separated(block: bytes) -> Floats | None:
+    aligned = read_aligned(block)
+    return convert(block.split()) if aligned is None else aligned
 
 
-def _fields(block: bytes, layout: Layout) -> list[bytes] | None:
-    """Cut all lines into columns, of which the last of a line may be missing; None if a line does not fit."""
+def _read_columns(block: bytes, layout: Layout) -> Floats | None:
+    """Numbers of lines cut into columns, of which the last of a line may be missing; None if a line does not fit."""
     lines = [line.rstrip() for line in block.split(b"\n")]
     if not all(_fits(line, layout) for line in lines):
         return None
     padded = b"".join([line.ljust(layout.per_line * layout.width, b"\0") for line in lines])
     fields = np.frombuffer(padded, dtype=f"S{layout.width}")
-    return list(fields[fields != b""].tolist())
+    return convert(list(fields[fields != b""].tolist()))
 
 
 def _fits(line: bytes, layout: Layout) -> bool:
     return len(line) <= layout.per_line * layout.width and b"\t" not in line
 
 
-def _first_bad(block: bytes, begin: int, layout: Layout | None) -> _BadNumberError:
-    at = begin
-    for line in block.split(b"\n"):
-        if layout is not None and not _fits(line.rstrip(), layout):
-            return _BadNumberError(line.strip(), at)
-        for token in line.split() if layout is None else _columns(line.rstrip(), layout.width):
+def _columns(line: bytes, layout: Layout) -> list[bytes]:
+    """Fields of a line; the line as it is where it does not fit."""
+    if not _fits(line, layout):
+        return [line.strip()]
+    return [line[i : i + layout.width] for i in range(0, len(line), layout.width)]
+
+
+def _first_bad(source: Source, at: int, layout: Layout | None) -> tuple[bytes, int]:
+    """Find the first piece of text from `at` on that is not a finite number, and where its line starts."""
+    while at < len(source.data):
+        end = source.data.find(b"\n", at) + 1 or len(source.data)
+        line = source.data[at:end].rstrip()
+        fits = layout is None or _fits(line, layout)
+        for token in line.split() if layout is None else _columns(line, layout):
             number = parse(token)
-            if number is None or not np.isfinite(number):
-                return _BadNumberError(token, at)
-        at += len(line) + 1
+            if not fits or number is None or not np.isfinite(number):
+                return token, at
+        at = end
     raise AssertionError("in a block that does not convert one number is bad")
-
-
-def _columns(line: bytes, width: int) -> list[bytes]:
-    return [line[i : i + width] for i in range(0, len(line), width)]
