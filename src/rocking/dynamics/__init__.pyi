@@ -1,6 +1,7 @@
 from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum, Law, LinearBodies
+from .comparison import SchemeComparison, SchemeOutcome
 from .maps import Fate, ImpactMap, StroboscopicMap, impact_map, stroboscopic_map
-from .schemes import SchemeComparison, SchemeOutcome, compare_schemes, scheme_of
+from .schemes import compare_schemes, scheme_of
 from .simulation import Response, simulate, simulate_many
 from .stepping import MoreauJean, SchatzmanPaoli, SteppedResponse, TimeStepping, integrate
 
