@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rocking
+from rocking import dynamics
 from rocking.chattering import chattering_time
 from rocking.dynamics.schemes import STEPPINGS, TREATMENTS, compare_schemes
 from rocking.errors import OutsideFit
@@ -216,6 +217,64 @@ def test_a_comparison_is_the_same_in_one_thread_and_in_several():
     assert repr(one) == repr(several)
     assert len(one["schemes"]) == len(TREATMENTS) + len(STEPPINGS)
     assert sum(not scheme["is_right"] for scheme in one["schemes"]) == 5
+
+
+def test_tables_have_a_row_for_each_scheme_and_each_rest():
+    found = compared(1.03, rocking.VelocityThreshold(1e-3), STEPPINGS[1], rocking.AsymptoticTime())
+    schemes, rests = found.to_dataframe(), found.to_dataframe("rests")
+    assert schemes["scheme"].tolist() == ["certified", "velocity", "moreau-jean", "time"]
+    assert schemes["parameter"].tolist() == [1e-12, 1e-3, 1e-3, "eq76"]
+    assert schemes["unit"].tolist() == ["s", "1", "s", ""]
+    assert schemes["cost_unit"].tolist() == ["arcs", "arcs", "steps", "arcs"]
+    assert schemes["position_error_rad"][0] == 0.0
+    assert (schemes["position_error_over_largest"][1:] > 0.0).all()
+    assert (schemes["impacts_to_first_rest"] < schemes["impacts"]).all()
+    assert rests["scheme"].value_counts().to_dict() == {"velocity": 5, "moreau-jean": 5, "time": 5}
+    assert (rests["error_s"] == rests["time_s"] - rests["certified_s"]).all()
+
+
+def test_a_ball_is_compared_as_a_block_is():
+    ball = dynamics.BouncingBall(0.8)
+    found = compare_schemes(ball, rocking.pulses.sine(12.0, 2.0, cycles=6), schemes=["velocity=1e-3", "interval=1e-6"])
+    coarse, fine = found.outcomes
+    assert coarse.false_rests.size == 5
+    assert fine.is_right
+    assert found.certified.position_error == 0.0
+    assert fine.position_error < 1e-8 * found.largest < coarse.position_error
+    assert found.certified.response.body == ball
+
+
+def test_between_two_stops_there_is_no_peak_to_compare():
+    pendulum = dynamics.InvertedPendulum(2.0, 0.05, 0.6)
+    motion = rocking.pulses.sine(1.5, 1.0, cycles=3)
+    found = compare_schemes(pendulum, motion, schemes=["bypass=1e-4", "moreau-jean=1e-4", "schatzman-paoli=1e-4"])
+    assert len(found.certified.rests) > 0
+    assert found.largest == pytest.approx(0.05)
+    for outcome in found.outcomes:
+        assert math.isnan(outcome.peak_error)
+        assert outcome.position_error < 0.1 * found.largest
+
+
+def test_the_processor_time_is_measured_where_it_is_asked_for():
+    schemes = ["velocity=1e-3", "moreau-jean=1e-3"]
+    found = compare_schemes(BLOCK, sine(1.05), schemes=schemes, model="linear", repetitions=2)
+    assert all(0.0 < outcome.processor_time < 1.0 for outcome in (found.certified, *found.outcomes))
+    assert "time, ms" in found.summary()
+    untimed = compare_schemes(BLOCK, sine(1.05), schemes=schemes, model="linear")
+    assert math.isnan(untimed.certified.processor_time)
+    assert "time, ms" not in untimed.summary()
+
+
+@pytest.mark.parametrize("timed", [0, 1])
+def test_the_figure_names_each_family_once(timed):
+    figure = compare_schemes(BLOCK, sine(1.05), model="linear", repetitions=timed).plot()
+    families = ["Moreau-Jean", "Schatzman-Paoli", "asymptotic time", "geometric bypass", "interval threshold"]
+    assert figure.axes[-1].get_xlabel() == ("processor time (s)" if timed else "arcs or steps")
+    assert len(figure.axes) == 2
+    for axes in figure.axes:
+        assert sorted(text.get_text() for text in axes.texts) == [*families, "velocity threshold"]
+        heights = sorted(text.xyann[1] for text in axes.texts)
+        assert min(np.diff(heights)) > 0.05
 
 
 def test_free_rocking_is_compared_too():

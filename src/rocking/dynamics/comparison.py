@@ -284,6 +284,7 @@ class SchemeComparison(DrawnResult, TableResult):
         shaken = "" if response.motion is None else f" under {response.motion.name}"
         return schemes_figure(
             curves=curves,
+            certified=self.certified.processor_time if self._is_timed else self.certified.cost,
             cost_label="processor time (s)" if self._is_timed else "arcs or steps",
             title=title or f"{response.body.description}{shaken}",
             ax=ax,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from rocking.arrays import Flags, Floats
-from rocking.plot.canvas import INK, add_labels, add_legend, figure_for, styles_of
+from rocking.plot.canvas import GROUND, INK, add_labels, add_legend, figure_for, styles_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 #: Marks of the families, which are told apart by them where there are no colours.
 _MARKS: Final = "osD^vPX"
+
+#: How the cost of the reference is drawn.
+_CERTIFIED: Final[dict[str, Any]] = {"color": GROUND, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
 #: Errors that are not known to be larger than nothing: rounding of a position, and the bracket of a time of rest, s.
 _ROUNDING: Final = 2.0**-52
@@ -43,29 +46,33 @@ class SchemeCurve(NamedTuple):
 def schemes_figure(
     *,
     curves: Sequence[SchemeCurve],
+    certified: float,
     cost_label: str,
     title: str = "",
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw the error of the position against the cost, and beside it that of the worst time of rest.
+    """Draw the error of the position against the cost, and below it that of the worst time of rest.
 
     With ``ax`` the position alone. Hollow marks: a rest is false or missing, or the verdict wrong. Errors that are not
-    known to be any are drawn at the lowest that would be.
+    known to be any are drawn at the lowest that would be. ``certified`` is the cost of the reference.
     """
     from matplotlib.lines import Line2D
 
-    with figure_for(ax, (7.2, 3.4), figsize, title) as figure:
-        left, right = (ax, None) if ax is not None else figure.subplots(1, 2)
-        _draw(left, curves, [np.maximum(curve.position, _ROUNDING) for curve in curves])
-        add_labels(left, cost_label, "largest error of the position, over the largest position")
-        if right is not None:
-            _draw(right, curves, [np.maximum(curve.rest, _BRACKET) for curve in curves])
-            add_labels(right, cost_label, "error of the worst time of rest (s)")
+    with figure_for(ax, (5.2, 5.4), figsize, title) as figure:
+        upper, lower = (ax, None) if ax is not None else figure.subplots(2, 1, sharex=True)
+        _draw(upper, curves, [np.maximum(curve.position, _ROUNDING) for curve in curves])
+        add_labels(upper, cost_label if lower is None else "", "error of the position over the largest one")
+        if lower is not None:
+            _draw(lower, curves, [np.maximum(curve.rest, _BRACKET) for curve in curves])
+            add_labels(lower, cost_label, "error of the worst time of rest (s)")
+        for axes in (upper,) if lower is None else (upper, lower):
+            axes.axvline(certified, **_CERTIFIED, zorder=0)
         look: dict[str, Any] = {"color": INK, "linestyle": "", "marker": "o", "markersize": 4.0}
         handles = [
             Line2D([], [], **look, label="every rest found, no other"),
             Line2D([], [], **look, markerfacecolor="white", label="a rest false or missed, or the wrong verdict"),
+            Line2D([], [], **_CERTIFIED, label="cost of the certified response"),
         ]
         add_legend(figure, ax, handles)
     return figure
