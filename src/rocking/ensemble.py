@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
@@ -219,7 +219,7 @@ def setup_of(product: Product, bodies: slice | None = None) -> Setup:
     return Setup(chosen, product.model, product.treatment, product.duration)
 
 
-def tasks_of(product: Product) -> Iterator[Task]:
+def _tasks(product: Product) -> Iterator[Task]:
     """Cut a product into tasks for the engine; their keys are (motion, scale, polarity)."""
     for m, motion in enumerate(product.motions):
         for s, factor in enumerate(product.scales.factors(motion).tolist()):
@@ -345,11 +345,18 @@ def simulate_many(
     [[True, False, True, False]]
     """
     product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
+    return dataset_of(product, outcomes_of(product, setup_of(product), threads, progress))
+
+
+def outcomes_of(
+    product: Product, setup: Setup, threads: int | None, progress: bool | None
+) -> dict[str, NDArray[np.generic]]:
+    """Simulate a whole product, and return arrays of its shape by the names of `VARIABLES`."""
     count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
-    results = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in VARIABLES}
+    results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in VARIABLES}
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:
-        for task, outcomes in simulate_tasks(setup_of(product), tasks_of(product), threads=count):
+        for task, outcomes in simulate_tasks(setup, _tasks(product), threads=count):
             for name, values in results.items():
                 values[(*task.key, task.bodies)] = outcomes[name]
             bar.advance(len(outcomes))
-    return dataset_of(product, results)
+    return results

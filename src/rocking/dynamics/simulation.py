@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 import rocking.response
 from rocking import checks
 from rocking.arrays import Floats, as_asked
 from rocking.dynamics.bodies import BouncingBall, LinearBodies, _LinearBody
-from rocking.engine import OUTCOME, cores, simulate_tasks
-from rocking.ensemble import VARIABLES, dataset_of, product_of, setup_of, tasks_of
+from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, one_motion
-from rocking.progress import Progress
 from rocking.simulation import simulate as simulate_body
 from rocking.treatment import Treatment
 
@@ -213,13 +209,7 @@ def simulate_many(
         )
         or None,
     )
-    count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
-    results = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in VARIABLES}
-    with Progress("simulating", math.prod(product.shape), show=progress) as bar:
-        for task, outcomes in simulate_tasks(setup, tasks_of(product), threads=count):
-            for name, values in results.items():
-                values[(*task.key, task.bodies)] = outcomes[name]
-            bar.advance(len(outcomes))
+    results = outcomes_of(product, setup, threads, progress)
     found = dataset_of(product, results).drop_vars("overturned").rename(peak_rotation="peak_position", block="body")
     found["peak_position"].attrs.update(units="m", long_name="highest position")
     return found
