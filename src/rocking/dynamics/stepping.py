@@ -255,7 +255,7 @@ def integrate(
     >>> ball = dynamics.BouncingBall(0.9, gravity=9.81)
     >>> found = dynamics.integrate(ball, None, dynamics.MoreauJean(0.005), 10.0, initial_position=1.0)
     >>> f"{found.rests[0, 0]:.3f} s, {found.position[-1]:.6f} m"
-    '8.255 s, -0.000023 m'
+    '8.485 s, -0.000023 m'
     """
     one, motion = one_body(body), one_motion(motion)
     alone, how = one.alone(), Certified()
