@@ -153,6 +153,21 @@ def test_with_impacts_the_order_is_one(kind):
     assert order == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.parametrize(("kind", "least", "most"), [(MoreauJean, -0.16, 0.05), (SchatzmanPaoli, -1.04, 0.84)])
+def test_the_speed_after_an_impact_is_off_by_the_acceleration_times_the_step(kind, least, most):
+    # From two heights of the parabola that follows, whatever the shift in time.
+    g, h, apart, errors = 9.81, 1e-3, 150, []
+    for height in np.linspace(0.9, 1.1, 200):
+        fall = math.sqrt(2.0 * height / g)
+        found = integrate(BouncingBall(0.9, gravity=g), None, kind(h), fall + 0.2, initial_position=height)
+        low, high = found.position[[-1 - apart, -1]]
+        middle = (high - low) / (apart * h)
+        energy = 0.5 * middle**2 + g * 0.5 * (low + high) + g * (g * (apart * h) ** 2 / 8.0)
+        errors.append((math.sqrt(2.0 * energy) - 0.9 * g * fall) / (g * h))
+    assert min(errors) == pytest.approx(least, abs=0.02)
+    assert max(errors) == pytest.approx(most, abs=0.02)
+
+
 @pytest.mark.parametrize("kind", BOTH)
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
