@@ -1,4 +1,4 @@
-"""Write the tables and images of docs/paper.md and docs/chattering-maps.md from computation.
+"""Write the tables and images of docs/paper.md, docs/chattering-maps.md and docs/howto/schemes.md from computation.
 
 Run ``python scripts/chattering_pages.py`` from the repository's root; a test compares the tables with what it makes.
 """
@@ -18,7 +18,8 @@ from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.maps import chattering_map
 from rocking.chattering.paper import FIGURES, paper_figure
 from rocking.chattering.paper.figure import BlockUnderSine
-from rocking.chattering.schemes import compare_schemes
+from rocking.dynamics import BouncingBall, compare_schemes
+from rocking.dynamics.schemes import STEPPINGS
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TABLES = DOCS / "_tables"
@@ -29,6 +30,10 @@ DOTS_PER_INCH = 110
 
 PAPER_BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
 STATUE = rocking.Block(half_width=0.12, half_height=0.55)
+
+#: The ball of Siconos' examples, which is dropped from 1 m; and one on a table that moves up and down.
+DROPPED_BALL = BouncingBall(0.9, gravity=9.81), None
+SHAKEN_BALL = BouncingBall(0.8), rocking.pulses.sine(12.0, 2.0, cycles=6)
 
 #: Pulses whose critical amplitude is compared with the sine's.
 PULSES = {
@@ -72,6 +77,8 @@ def tables():
     made["schemes-record.txt"] = table_of_comparison(
         compare_schemes(STATUE, rocking.records.load("ridgecrest-clc-090"))
     )
+    made["schemes-ball.txt"] = table_of_comparison(compare_schemes(*DROPPED_BALL, initial_position=1.0))
+    made["schemes-shaken-ball.txt"] = table_of_comparison(compare_schemes(*SHAKEN_BALL))
     made["paper-frequency.txt"] = frequency_table()
     made["paper-excess.txt"] = excess_table()
     made["paper-slow.txt"] = slow_table()
@@ -180,24 +187,34 @@ def schemes_table(a):
 
 
 def table_of_comparison(comparison):
-    """Rests, errors and verdict of each scheme."""
+    """Cost, rests, errors and verdict of each scheme."""
     certified = comparison.certified
-    rests = int(np.sum(certified.events["kind"] == "rest"))
-    rows: list[tuple[str | int, ...]] = [("certified", rests, "", "", "", "")]
+    rows: list[tuple[str | int, ...]] = [("certified", f"{certified.cost} arcs", len(certified.rests), *[""] * 7)]
     for outcome in comparison.outcomes:
         worst = outcome.largest_error
+        stepped = outcome.scheme in STEPPINGS
         rows.append(
             (
-                outcome.treatment.label,
+                outcome.scheme.label,
+                f"{outcome.cost} {'steps' if stepped else 'arcs'}",
                 len(outcome.rests),
                 outcome.false_rests.size,
                 outcome.missed.size,
                 "" if math.isnan(worst) else "0" if abs(worst) < 1e-11 else f"{worst:+.1e}",
+                share(outcome.position_error / comparison.largest),
+                share(abs(outcome.peak_error)),
+                share(outcome.penetration / comparison.largest) if stepped else "",
                 outcome.verdict,
             )
         )
-    rows += [(scheme.label, "", "", "", "", "not applicable") for scheme, _ in comparison.not_applicable]
-    return markdown(("scheme", "rests", "false", "missed", "worst error of a true rest, s", "verdict"), rows)
+    rows += [(scheme.label, *[""] * 8, "not applicable") for scheme, _ in comparison.not_applicable]
+    heading = ("scheme", "cost", "rests", "false", "missed", "worst error of a true rest, s")
+    return markdown((*heading, "position off by", "peak off by", "penetration", "verdict"), rows)
+
+
+def share(value):
+    """Write an error as a share of the largest position; what rounding makes is none."""
+    return "0" if value < 1e-13 else f"{value:.0e}"
 
 
 def pulses_table():
@@ -280,6 +297,8 @@ def images():
         yield f"paper-figure-{number}.png", figure.draw()
         for drawing in [*figure.drawings][1:]:
             yield f"paper-figure-{number}-{drawing}.png", figure.draw(drawing)
+    record = rocking.records.load("ridgecrest-clc-090")
+    yield "schemes.png", compare_schemes(STATUE, record, repetitions=5).plot()
     amplitude = np.linspace(0.98, 1.12, 71)
     omega = np.linspace(0.5, 8.0, 61)
     labels = {"a": "amplitude over the threshold, $a$", "omega": r"frequency over $p$, $\omega$"}

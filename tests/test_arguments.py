@@ -247,4 +247,4 @@ def test_forces_outside_the_response_are_not_numbers():
 @pytest.mark.parametrize("schemes", ["certified", 0.5, {"velocity": 1e-9}, None])
 def test_schemes_are_a_list(schemes):
     with pytest.raises(InvalidOption, match="schemes must be a list, not"):
-        rocking.chattering.compare_schemes(BLOCK, MOTION, schemes=schemes)
+        rocking.dynamics.compare_schemes(BLOCK, MOTION, schemes=schemes)

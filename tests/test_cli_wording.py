@@ -230,7 +230,7 @@ def test_messages_in_python_say_what_is_meant(tmp_path):
 
 def test_the_command_line_does_not_mention_what_only_python_can_give(run):
     _, _, err = run("simulate", RECORD, *SIZES, "--chattering", "foo")
-    assert err.strip().endswith("--chattering must be one of time, certified, velocity, interval, not 'foo'")
+    assert err.strip().endswith("--chattering must be one of time, certified, velocity, bypass, interval, not 'foo'")
     with pytest.raises(RockingError, match="interval or a treatment, not 3"):
         rocking.simulate(Block(width=0.24, height=1.1), None, initial_rotation=0.1, chattering=3)
 

@@ -14,6 +14,7 @@ from rocking.plot.ida import ScaledMotion, ida_figure, levels_reaching
 from rocking.plot.maps import outcome_figure, regions_figure
 from rocking.plot.response import DrawnSequence, response_figure
 from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
+from rocking.plot.schemes import SchemeCurve, schemes_figure
 from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
@@ -133,6 +134,15 @@ def survival_of(**options):
     return survival_figure(intensity=x, largest=1e-3 / x, hazard=hazard, **(texts | options))
 
 
+def schemes_of(**options):
+    cost = np.array([1e2, 1e3, 1e4])
+    names = ("velocity threshold", "interval threshold", "geometric bypass", "asymptotic time", "Moreau-Jean")
+    curves = [
+        SchemeCurve(name, (1 + k) * cost, 1.0 / cost**k, 2.0 / cost**k, cost > 1e2) for k, name in enumerate(names)
+    ]
+    return schemes_figure(curves=curves, certified=500.0, **({"cost_label": "processor time (s)"} | options))
+
+
 def measured_of(**options):
     time = np.linspace(0.0, 5.0, 101)
     fine = np.linspace(0.0, 5.0, 1001)
@@ -141,6 +151,7 @@ def measured_of(**options):
 
 
 FIGURES = {
+    "schemes": (schemes_of, 5.4),
     "intervals": (intervals_of, 4.2),
     "outcomes of tests": (trials_of, 4.8),
     "measured": (measured_of, 3.8),

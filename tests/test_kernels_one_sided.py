@@ -60,6 +60,29 @@ def test_a_ball_on_a_table_at_rest_stops_bouncing_at_zenos_time(e: float, v: flo
     assert found.at["peak_time"] == pytest.approx(v / G, rel=1e-14)
 
 
+@pytest.mark.parametrize("e", [0.1, 0.5, 0.9, 0.99])
+def test_a_geometric_bypass_is_exact_for_a_ball_on_a_table_at_rest(e: float) -> None:
+    made = ball(e)
+    made["limit"] = 0.05
+    found, zeno = thrown(NO_GROUND, made, 1.0, treatment=state.RestRule.BYPASS), 2.0 / (G * (1.0 - e))
+    assert found.impacts["speed_after"][-2] > 0.05 >= found.impacts["speed_after"][-1]
+    assert found.events["time"] == pytest.approx([zeno], rel=1e-13)
+    assert np.isnan(found.sequences["upper"]).all()
+
+
+def test_a_geometric_bypass_waits_until_the_motion_presses_the_ball_down() -> None:
+    made = ball(0.5)
+    made["limit"] = 1e9
+    table = in_units_of_g([0.0, 0.1], [[-1.5, 0.0]])
+    found = thrown(table, made, 0.0, treatment=state.RestRule.BYPASS)
+    start, v = 0.1, 0.5 * G * 0.1  # the table falls away and stops, and the ball comes down on it
+    u = 0.25 * G * 0.1 * 0.1
+    speed = 0.5 * math.sqrt(v * v + 2.0 * G * u)
+    struck = start + (v + 2.0 * speed) / G
+    assert found.impacts["time"] == pytest.approx([struck], rel=1e-13)
+    assert found.events["time"][1:] == pytest.approx([struck + 4.0 * speed / G], rel=1e-13)
+
+
 def test_a_ball_without_any_motion_of_the_table_needs_no_piece_of_it() -> None:
     for u in (0.0, 1.0):
         found = thrown(NO_GROUND, ball(0.5), 1.0, u)

@@ -13,7 +13,7 @@ from public_names import public_names
 from test_output_files import full_disk
 
 import rocking
-from rocking import chattering, engine
+from rocking import chattering, dynamics, engine
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.errors import Unfinished
 from rocking.result import DatasetResult
@@ -257,8 +257,8 @@ def _sine() -> rocking.Motion:
         lambda: chattering.sequence(1.2, 2.0, 0.92),
         lambda: chattering.chattering_report(1.03, 2.0, 0.92),
         lambda: chattering.critical_report(2.0, 0.92),
-        lambda: chattering.compare_schemes(BLOCK, _sine()),
-        lambda: chattering.compare_schemes(BLOCK, _sine()).outcomes[0],
+        lambda: dynamics.compare_schemes(BLOCK, _sine()),
+        lambda: dynamics.compare_schemes(BLOCK, _sine()).outcomes[0],
         lambda: chattering.chattering_episodes(rocking.simulate(BLOCK, _sine())),
         lambda: chattering.series_diagnosis(1.01, 2.0, 0.92),
     ],

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rocking
+from rocking import dynamics
 from rocking.chattering import chattering_time
-from rocking.chattering.schemes import SCHEMES, compare_schemes
+from rocking.dynamics.schemes import STEPPINGS, TREATMENTS, compare_schemes
 from rocking.errors import OutsideFit
 from rocking.treatment import treatment
 
@@ -23,20 +24,20 @@ def sine(a, omega=2.0, cycles=2.5, threshold=THRESHOLD):
 
 
 def compared(a, *schemes, omega=2.0, cycles=2.5):
-    return compare_schemes(BLOCK, sine(a, omega, cycles), schemes=schemes or SCHEMES, model="linear")
+    return compare_schemes(BLOCK, sine(a, omega, cycles), schemes=schemes or TREATMENTS, model="linear")
 
 
 def by_name(comparison):
-    return {repr(outcome.treatment): outcome for outcome in comparison.outcomes}
+    return {repr(outcome.scheme): outcome for outcome in comparison.outcomes}
 
 
-def test_below_the_critical_amplitude_every_scheme_finds_every_rest_and_none_too_late():
+def test_below_the_critical_amplitude_every_treatment_finds_every_rest_and_thresholds_none_too_late():
     comparison = compared(1.03)
-    assert len(comparison.outcomes) == len(SCHEMES)
+    assert len(comparison.outcomes) == len(TREATMENTS)
     for outcome in comparison.outcomes:
         assert outcome.is_right
         assert len(outcome.rests) == 5
-        assert np.all(outcome.rests["error"] < 0.0)
+        assert np.all(outcome.rests["error"] < 0.0) or outcome.scheme.name == "bypass"
 
 
 def test_a_threshold_is_early_by_what_the_geometric_series_still_adds():
@@ -50,14 +51,35 @@ def test_a_threshold_is_early_by_what_the_geometric_series_still_adds():
     assert -first["error"] == pytest.approx(arcs / (1.0 - 0.92**2), rel=1e-6)
 
 
+def test_a_geometric_bypass_is_off_by_the_square_of_its_threshold_where_a_threshold_is_off_by_itself():
+    thresholds = np.geomspace(1e-3, 1e-6, 7)
+    schemes = [
+        kind(threshold) for kind in (rocking.GeometricBypass, rocking.VelocityThreshold) for threshold in thresholds
+    ]
+    outcomes = compared(1.03, *schemes).outcomes
+    assert all(outcome.is_right for outcome in outcomes)
+    errors = np.array([outcome.rests["error"][0] for outcome in outcomes]).reshape(2, -1)
+    speeds = np.array([outcome.rests["speed"][0] for outcome in outcomes]).reshape(2, -1)
+    orders = [np.polyfit(np.log(v), np.log(-error), 1)[0] for v, error in zip(speeds, errors, strict=True)]
+    assert orders == pytest.approx([2.0, 1.0], abs=0.05)
+    np.testing.assert_array_less(-errors[0], -errors[1] / 50.0)
+
+
+def test_a_coarse_geometric_bypass_passes_over_the_motion_to_come():
+    coarse, fine = compared(1.05, rocking.GeometricBypass(5e-2), rocking.GeometricBypass(1e-3)).outcomes
+    assert coarse.false_rests == pytest.approx([2.741502, 5.883095], abs=1e-6)
+    assert fine.is_right
+
+
 def test_the_paper_s_figure_11_only_the_coarse_threshold_rests_wrongly():
     outcomes = by_name(compared(1.05))
     coarse = outcomes.pop("VelocityThreshold(threshold=0.05)")
+    assert outcomes.pop("GeometricBypass(threshold=0.05)").false_rests.size == 2
     assert all(outcome.is_right for outcome in outcomes.values())
     assert coarse.false_rests.size == 4
     assert coarse.false_rests[0] == pytest.approx(1.258442, abs=1e-6)
     assert np.all(coarse.rests["speed"] <= 0.05)
-    assert coarse.rotation_error > 0.01
+    assert coarse.position_error > 0.01 * 0.2
     assert "4 false rests" in coarse.verdict
 
 
@@ -123,7 +145,7 @@ def test_a_treatment_is_made_of_its_name_and_parameter():
 def test_a_coarse_threshold_hides_overturning():
     comparison = compared(1.05, rocking.VelocityThreshold(5e-2), omega=1.0, cycles=4.0)
     (outcome,) = comparison.outcomes
-    assert comparison.certified.overturned
+    assert comparison.certified.response.overturned
     assert not outcome.response.overturned
     assert outcome.overturns_wrongly
     assert not outcome.is_right
@@ -135,7 +157,7 @@ def test_a_rest_that_a_scheme_does_not_find_is_missed():
     motion = rocking.pulses.n_lobe([3.34, 2.59, 1.85, 1.98, 3.1, 2.34], 0.3045)
     comparison = compare_schemes(block, motion, schemes=[rocking.VelocityThreshold(0.3)], model="linear")
     (outcome,) = comparison.outcomes
-    rests = comparison.certified.events["time"][comparison.certified.events["kind"] == "rest"]
+    rests = comparison.certified.response.events["time"][comparison.certified.response.events["kind"] == "rest"]
     np.testing.assert_array_equal(outcome.missed, rests)
     assert "1 rest missed" in outcome.verdict
     assert "overturns, wrongly" in outcome.verdict
@@ -161,11 +183,11 @@ def test_blocks_that_rest_together_are_lifted_together(lobes, omega, eta, thresh
 
     true = outcome.rests[~np.isnan(outcome.rests["certified"])]
     for rest in true:
-        theirs, ours = lifted(outcome.response, rest["time"]), lifted(comparison.certified, rest["certified"])
+        theirs, ours = lifted(outcome.response, rest["time"]), lifted(comparison.certified.response, rest["certified"])
         assert theirs == pytest.approx(ours, abs=1e-12)
     # Each certified rest has exactly one counterpart, or is missed.
     assert len(np.unique(true["certified"])) == len(true)
-    assert len(true) + outcome.missed.size == len(comparison.certified.chattering)
+    assert len(true) + outcome.missed.size == len(comparison.certified.response.chattering)
 
 
 def test_schemes_that_do_not_apply_are_listed_with_the_reason():
@@ -185,7 +207,7 @@ def test_a_mistake_in_the_case_is_no_scheme_s_fault():
 
 def test_the_table_has_a_line_for_each_scheme():
     lines = str(compared(1.05)).splitlines()
-    assert len(lines) == 2 + len(SCHEMES)
+    assert len(lines) == 4 + len(TREATMENTS)
     assert lines[1].startswith("certified")
     assert any(line.startswith("velocity 0.05") and "false rest" in line for line in lines)
 
@@ -193,13 +215,71 @@ def test_the_table_has_a_line_for_each_scheme():
 def test_a_comparison_is_the_same_in_one_thread_and_in_several():
     one, several = (compare_schemes(BLOCK, sine(1.05), model="linear", threads=count).to_dict() for count in (1, 3))
     assert repr(one) == repr(several)
-    assert len(one["schemes"]) == len(SCHEMES)
-    assert sum(not scheme["is_right"] for scheme in one["schemes"]) == 1
+    assert len(one["schemes"]) == len(TREATMENTS) + len(STEPPINGS)
+    assert sum(not scheme["is_right"] for scheme in one["schemes"]) == 5
+
+
+def test_tables_have_a_row_for_each_scheme_and_each_rest():
+    found = compared(1.03, rocking.VelocityThreshold(1e-3), STEPPINGS[1], rocking.AsymptoticTime())
+    schemes, rests = found.to_dataframe(), found.to_dataframe("rests")
+    assert schemes["scheme"].tolist() == ["certified", "velocity", "moreau-jean", "time"]
+    assert schemes["parameter"].tolist() == [1e-12, 1e-3, 1e-3, "eq76"]
+    assert schemes["unit"].tolist() == ["s", "1", "s", ""]
+    assert schemes["cost_unit"].tolist() == ["arcs", "arcs", "steps", "arcs"]
+    assert schemes["position_error_rad"][0] == 0.0
+    assert (schemes["position_error_over_largest"][1:] > 0.0).all()
+    assert (schemes["impacts_to_first_rest"] < schemes["impacts"]).all()
+    assert rests["scheme"].value_counts().to_dict() == {"velocity": 5, "moreau-jean": 5, "time": 5}
+    assert (rests["error_s"] == rests["time_s"] - rests["certified_s"]).all()
+
+
+def test_a_ball_is_compared_as_a_block_is():
+    ball = dynamics.BouncingBall(0.8)
+    found = compare_schemes(ball, rocking.pulses.sine(12.0, 2.0, cycles=6), schemes=["velocity=1e-3", "interval=1e-6"])
+    coarse, fine = found.outcomes
+    assert coarse.false_rests.size == 5
+    assert fine.is_right
+    assert found.certified.position_error == 0.0
+    assert fine.position_error < 1e-8 * found.largest < coarse.position_error
+    assert found.certified.response.body == ball
+
+
+def test_between_two_stops_there_is_no_peak_to_compare():
+    pendulum = dynamics.InvertedPendulum(2.0, 0.05, 0.6)
+    motion = rocking.pulses.sine(1.5, 1.0, cycles=3)
+    found = compare_schemes(pendulum, motion, schemes=["bypass=1e-4", "moreau-jean=1e-4", "schatzman-paoli=1e-4"])
+    assert len(found.certified.rests) > 0
+    assert found.largest == pytest.approx(0.05)
+    for outcome in found.outcomes:
+        assert math.isnan(outcome.peak_error)
+        assert outcome.position_error < 0.1 * found.largest
+
+
+def test_the_processor_time_is_measured_where_it_is_asked_for():
+    schemes = ["velocity=1e-3", "moreau-jean=1e-3"]
+    found = compare_schemes(BLOCK, sine(1.05), schemes=schemes, model="linear", repetitions=2)
+    assert all(0.0 < outcome.processor_time < 1.0 for outcome in (found.certified, *found.outcomes))
+    assert "time, ms" in found.summary()
+    untimed = compare_schemes(BLOCK, sine(1.05), schemes=schemes, model="linear")
+    assert math.isnan(untimed.certified.processor_time)
+    assert "time, ms" not in untimed.summary()
+
+
+@pytest.mark.parametrize("timed", [0, 1])
+def test_the_figure_names_each_family_once(timed):
+    figure = compare_schemes(BLOCK, sine(1.05), model="linear", repetitions=timed).plot()
+    families = ["Moreau-Jean", "Schatzman-Paoli", "asymptotic time", "geometric bypass", "interval threshold"]
+    assert figure.axes[-1].get_xlabel() == ("processor time (s)" if timed else "arcs or steps")
+    assert len(figure.axes) == 2
+    for axes in figure.axes:
+        assert sorted(text.get_text() for text in axes.texts) == [*families, "velocity threshold"]
+        heights = sorted(text.xyann[1] for text in axes.texts)
+        assert min(np.diff(heights)) > 0.05
 
 
 def test_free_rocking_is_compared_too():
     comparison = compare_schemes(
-        BLOCK, None, schemes=[rocking.IntervalThreshold(1e-6)], model="linear", initial_rotation=0.02
+        BLOCK, None, schemes=[rocking.IntervalThreshold(1e-6)], model="linear", initial_position=0.02
     )
     (outcome,) = comparison.outcomes
     assert outcome.is_right

@@ -37,7 +37,7 @@ from .response import Response, Sensitivity
 from .result import DatasetResult, DrawnResult, Result, Row, TableResult
 from .simulation import simulate
 from .studies import Study, study
-from .treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment, VelocityThreshold
+from .treatment import AsymptoticTime, Certified, GeometricBypass, IntervalThreshold, Treatment, VelocityThreshold
 
 __version__: str
 
@@ -56,6 +56,7 @@ __all__ = [
     "DrawnResult",
     "Fragility",
     "Frame",
+    "GeometricBypass",
     "HazardCurve",
     "HistoryCalibration",
     "IntervalThreshold",

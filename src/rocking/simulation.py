@@ -57,8 +57,8 @@ def simulate(
     model : {"nonlinear", "linear"}
         Equation of motion: exact, or linearised for slender blocks (paper, Eqs 2 and 3).
     chattering : str or treatment
-        How sequences of impacts end: "certified" (default), "velocity", "interval" or "time", or the object with its
-        parameter (`Certified`, `VelocityThreshold`, `IntervalThreshold`, `AsymptoticTime`).
+        How sequences of impacts end: "certified" (default), "velocity", "bypass", "interval" or "time", or the object
+        with its parameter (`Certified`, `VelocityThreshold`, `GeometricBypass`, `IntervalThreshold`, `AsymptoticTime`).
     duration : float, optional
         Time to stop at, s. By default to the end of the motion, and on until rest or overturning. Where it ends the
         response while the block still moves or the motion goes on, the response is `stopped`, and has no verdict.
@@ -102,10 +102,7 @@ def simulate(
     rules = rules_of(alone, model, how, duration, record=True)
     records = alone.kernel_records(model, how.limits(alone, motion, model))
     trail = Trail(ground_of(motion, block.gravity), records[0], rules, NO_NODES)
-    states = state.new_states(1, 0)
-    _check_start(block, float(records["fallen"][0]), bool(records["facing"][0]), initial_rotation, initial_velocity)
-    set_start(states, records, alone, initial_rotation, initial_velocity)
-    start = states[0]
+    start = started(block, records, initial_rotation, initial_velocity)
     ending, table = _marched(trail, start)
     if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
@@ -148,6 +145,14 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     start["end"] = table["node"]["time"][start["nodes"] - 1]
     start["ending"] = state.Ending.UNFINISHED
     return state.Ending.UNFINISHED, table
+
+
+def started(body: Body, records: state.Records, rotation: float, velocity: float) -> state.Record:
+    """State of a body at time zero, of which ``records`` has the one record."""
+    _check_start(body, float(records["fallen"][0]), bool(records["facing"][0]), rotation, velocity)
+    states = state.new_states(1, 0)
+    set_start(states, records, body.alone(), rotation, velocity)
+    return states[0]
 
 
 def _check_start(body: Body, fallen: float, facing: bool, rotation: float, velocity: float) -> None:

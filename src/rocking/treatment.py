@@ -285,6 +285,41 @@ class VelocityThreshold(Treatment):
 
 
 @dataclass(frozen=True)
+class GeometricBypass(VelocityThreshold):
+    """Rest when the impacts would be over that an impact of less than a threshold of speed leaves.
+
+    The accelerations on both sides are taken to stay what they are at that impact. The rest of the sequence is then
+    geometric, and lasts 2 v (1/g + e/g')/(1 - e e') on sides with the restitutions e and e' and the accelerations g and
+    g' towards the ground. Where one of these is not positive, arcs are resolved on.
+
+    Parameters
+    ----------
+    threshold : float
+        As for `VelocityThreshold`, over the side's p and alpha.
+
+    Raises
+    ------
+    InvalidOption
+        If the threshold is not positive and finite.
+
+    Notes
+    -----
+    Source: Nordmark, A. B. and Piiroinen, P. T. (2009). Simulation and stability analysis of impacting systems with
+    complete chattering. Nonlinear Dynamics 58, 85-106; to first order in the speed.
+    """
+
+    name: ClassVar[str] = "bypass"
+    code: ClassVar[int] = state.RestRule.BYPASS
+
+    threshold: float = 1e-3
+
+    @property
+    def label(self) -> str:
+        """Name and threshold."""
+        return f"bypass {self.threshold:g}"
+
+
+@dataclass(frozen=True)
 class IntervalThreshold(Treatment):
     """Rest as soon as two impacts follow each other within a threshold of time.
 

@@ -13,7 +13,6 @@ from .expansions import (
 from .maps import ChatteringMap, Outcome, chattering_map
 from .paper import PaperFigure, Statement, paper_figure
 from .report import ChatteringReport, CriticalReport, chattering_report, critical_report
-from .schemes import SchemeComparison, SchemeOutcome, compare_schemes
 
 __all__ = [
     "ChatteringEpisodes",
@@ -23,8 +22,6 @@ __all__ = [
     "CriticalReport",
     "Outcome",
     "PaperFigure",
-    "SchemeComparison",
-    "SchemeOutcome",
     "SeriesDiagnosis",
     "Statement",
     "asymptotic_table",
@@ -32,7 +29,6 @@ __all__ = [
     "chattering_map",
     "chattering_report",
     "chattering_time",
-    "compare_schemes",
     "critical_amplitude",
     "critical_amplitude_nonlinear",
     "critical_report",

@@ -33,6 +33,7 @@ for _module, _commands in {
     "simulate": ("simulate", "check"),
     "records": ("records", "pulses"),
     "chattering": ("chatter", "critical", "paper"),
+    "schemes": ("schemes",),
     "analysis": ("spectrum", "map", "ida", "measures"),
     "fits": ("fragility", "calibrate"),
     "explore": ("explore",),

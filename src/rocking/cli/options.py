@@ -242,8 +242,8 @@ class TreatmentOptions(ModelOptions):
     chattering: Annotated[
         str,
         hint(
-            "How chattering ends: certified, velocity, interval, or (under a sine) time; with a limit, as "
-            "certified=1e-9 (s), velocity=5e-10 (over p alpha), interval=1e-9 (s)."
+            "How chattering ends: certified, velocity, bypass, interval, or (under a sine) time; with a limit, as "
+            "certified=1e-9 (s), velocity=5e-10 or bypass=1e-3 (over p alpha), interval=1e-9 (s)."
         ),
     ] = "certified"
 

@@ -131,7 +131,7 @@ def simulate(
     '1.800000000000'
     """
     body, motion = _one_body(body), _along_one_line(one_motion(motion))
-    start = _start_of(body) if initial_position is None else initial_position
+    start = start_of(body) if initial_position is None else initial_position
     found = simulate_body(
         body,
         motion,
@@ -198,7 +198,7 @@ def simulate_many(
     product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
     for motion in product.motions:
         _along_one_line(motion)
-    starts = {_start_of(each) for each in gathered.members} if initial_position is None else {initial_position}
+    starts = {start_of(each) for each in gathered.members} if initial_position is None else {initial_position}
     if len(starts) > 1:
         raise InvalidOption("the bodies start at different stops; give {}, one position for all", "initial_position")
     setup = replace(
@@ -232,7 +232,8 @@ def _along_one_line(motion: Motion | None) -> Motion | None:
     return motion
 
 
-def _start_of(body: _LinearBody) -> float:
+def start_of(body: _LinearBody) -> float:
+    """Position at which a body starts if none is given: zero, or the stop where that is behind it."""
     return max(0.0, body.law.low) if not isinstance(body, BouncingBall) else 0.0
 
 

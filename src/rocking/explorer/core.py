@@ -18,7 +18,7 @@ import numpy as np
 from rocking.arrays import Floats, Integers
 from rocking.block import Block
 from rocking.chattering.episodes import chattering_episodes
-from rocking.chattering.schemes import compare_schemes
+from rocking.dynamics.schemes import TREATMENTS, compare_schemes
 from rocking.errors import InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.inputs import Case, Texts, read_case
@@ -179,9 +179,9 @@ class Explorer:
     def schemes(self, texts: Texts) -> list[dict[str, Any]]:
         """Return what each treatment of chattering makes of a case, against the proven response."""
         case = self.show(texts).case
-        start: dict[str, Any] = {"initial_rotation": case.initial_rotation, "initial_velocity": case.initial_velocity}
-        found = compare_schemes(case.block, case.motion, model=case.model, **start)
-        rows = [(each.treatment, each.is_right, each.verdict, each.largest_error) for each in found.outcomes]
+        start: dict[str, Any] = {"initial_position": case.initial_rotation, "initial_velocity": case.initial_velocity}
+        found = compare_schemes(case.block, case.motion, schemes=TREATMENTS, model=case.model, **start)
+        rows = [(each.scheme, each.is_right, each.verdict, each.largest_error) for each in found.outcomes]
         unfit = [(scheme, None, reason, None) for scheme, reason in found.not_applicable]
         return [
             {"label": scheme.label, "text": str(scheme), "right": right, "verdict": words, "error": error}

@@ -104,6 +104,10 @@ def rest_after_impact(ground: Ground, block: Record, rules: Record, state: Recor
         good = max(rules.tolerance, 4.0 * allowance(time, proof.upper, state))
         if proof.upper - proof.lower <= good and proof.height <= state.peak:
             return Rest(proof.lower, proof.upper, proof.time, False)
+    elif rules.treatment == RestRule.BYPASS:
+        left = geometric_time(ground, block, state)
+        if state.v <= block.limit[state.side] and left >= 0.0:
+            return Rest(np.nan, np.nan, left, False)
     elif is_imposed(rules, block.limit[state.side], state.v, time - state.last_impact_time, time - state.uplifted):
         return Rest(np.nan, np.nan, 0.0, False)
     stalled = has_stalled(ground, block, state)
@@ -118,6 +122,21 @@ def is_imposed(rules: Record, limit: float, v: float, interval: float, since_upl
     if rules.treatment == RestRule.INTERVAL:
         return interval <= limit
     return rules.treatment == RestRule.TIME and since_uplift >= limit
+
+
+@inlined
+def geometric_time(ground: Ground, block: Record, state: Record) -> float:
+    """Time to rest after an impact as if the accelerations stayed what they are, NaN where one does not press down.
+
+    The sum of the paper's Eq. 75 without its remainder: arcs of 2 v/g, and speeds that fall by a factor at each impact.
+    """
+    i, j = state.side, block.entered[state.side]
+    g_i = restoring(ground, block, i, state.piece, state.offset)
+    g_j = restoring(ground, block, j, state.piece, state.offset)
+    e_i, e_j = block.restitution[i], block.restitution[j]
+    if not (g_i > 0.0 and g_j > 0.0 and e_i * e_j < 1.0):
+        return np.nan
+    return 2.0 * state.v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)
 
 
 @inlined

@@ -56,6 +56,8 @@ class RestRule(IntEnum):
     VELOCITY = 1
     INTERVAL = 2
     TIME = 3
+    #: As VELOCITY, and the time that all further impacts would take is added.
+    BYPASS = 4
 
 
 class Ending(IntEnum):

@@ -4,6 +4,7 @@ For the latter a quantity x is changed to x (1 + epsilon), and d/d epsilon at 0 
 linearised equation of motion, through an impact by the saltation that follows from its shift in time.
 """
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ import numpy as np
 from rocking.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of, weight_at
 from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.events import first_root
 from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, start_of, vertical_of
 from rocking.kernels.recurrences import INTEGRATED_TWICE, variation_coefficients
 from rocking.kernels.state import NODE_ROW, Record, Records, records
@@ -43,20 +45,28 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
     ground, block, rules, nodes = trail
     expanded = -1
     order = 0
+    landing = np.inf
     for k in range(times.shape[0]):
         row = rows[k]
         node = nodes[row]
         last = row + 1 == nodes.shape[0]
+        closes = last or nodes[row + 1].side < 0  # what follows its arc is not resolved
         if node.side < 0:
             out[k, _ROTATION] = out[k, _VELOCITY] = out[k, _ACCELERATION] = 0.0
             continue
         if row != expanded:
             left = np.inf if last else nodes[row + 1].time - node.time
-            order, _, _ = expand(ground, block, rules, scratch, node, left)
+            order, h, _ = expand(ground, block, rules, scratch, node, left)
+            landing = np.inf
+            if closes:
+                lead = 0 if node.u > 0.0 else (1 if node.v > 0.0 else 2)
+                landing = first_root(scratch.rotation, lead, order, h)
+                if math.isnan(landing):
+                    landing = h
             expanded = row
         elapsed = max(0.0, times[k] - start_of(ground, node.piece) - node.offset)
         u, v, w = evaluate(scratch.rotation, order, elapsed)
-        if u < 0.0 and (last or nodes[row + 1].side < 0):
+        if elapsed > landing or (closes and u < 0.0):
             u = v = w = 0.0
         sign = sign_of(node.side)
         out[k, _ROTATION] = sign * u

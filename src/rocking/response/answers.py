@@ -235,17 +235,24 @@ class Answers:
 
     @cached_property
     def _contact(self) -> Contact:
-        cut = bool(len(self.chattering)) and bool(self.chattering["end"][-1] >= self.duration) and self.moves_at_end
         law = self.body.contact
         if law is None:
             raise InvalidOption(f"the forces of the ground on a {type(self.body).__name__} are not known")
         until = self.duration if math.isnan(self.tipping_time) else self.tipping_time
-        return Contact(History(with_all_impacts(self._trail, cut=cut), self.duration, self.body.stops), law, until)
+        return Contact(with_unresolved_impacts(self), law, until)
 
 
 def trail_of(response: Answers) -> Trail:
     """Return the steps of the march that a response was made from."""
     return response._trail
+
+
+def with_unresolved_impacts(response: Answers) -> History:
+    """Return the history of a response with the impacts that follow the closing of each of its sequences."""
+    chattering = response.chattering
+    closed = bool(len(chattering)) and bool(chattering["end"][-1] >= response.duration)
+    trail = with_all_impacts(response._trail, cut=closed and response.moves_at_end)
+    return History(trail, response.duration, response.body.stops)
 
 
 def _pull(_: Floats, vertical: Floats) -> Floats:
