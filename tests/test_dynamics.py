@@ -203,3 +203,18 @@ def test_wrong_input_gets_one_sentence(make, error, words):
     with pytest.raises(error) as caught:
         make()
     assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_positions_are_right_between_the_proof_and_the_rest():
+    # The proof closes the sequence after a few impacts; the ball goes on bouncing until it rests.
+    e, height = 0.9, 1.0
+    found = dynamics.simulate(dynamics.BouncingBall(e, gravity=10.0), None, initial_position=height)
+    assert len(found.impacts) < 20
+    speed, time, judged = math.sqrt(2.0 * 10.0 * height), math.sqrt(2.0 * height / 10.0), 0
+    for _ in range(60):
+        speed *= e
+        flight = 2.0 * speed / 10.0
+        assert found.position(time + 0.5 * flight) == pytest.approx(speed**2 / 20.0, rel=1e-9, abs=1e-15)
+        time += flight
+        judged += time > found.impacts["time"][-1]
+    assert judged > 40

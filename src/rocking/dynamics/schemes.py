@@ -34,7 +34,7 @@ from rocking.kernels.march import march
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response, trail_of
-from rocking.response.answers import with_unresolved_impacts
+from rocking.response.answers import history_of
 from rocking.response.history import History
 from rocking.simulation import simulate
 from rocking.treatment import (
@@ -165,7 +165,7 @@ def compare_schemes(
         return found
 
     proof = marched(Certified())
-    exact = with_unresolved_impacts(proof)
+    exact = history_of(proof)
     until = proof.duration if proof.stopped or proof.overturned else _LONGER * proof.duration
     if again:
         _compile(proof)

@@ -66,7 +66,10 @@ class Answers:
 
     @cached_property
     def _history(self) -> History:
-        return History(self._trail, self.duration, self.body.stops)
+        """Its course, with the impacts that follow the closing of each of its sequences."""
+        closed = bool(len(self.chattering)) and bool(self.chattering["end"][-1] >= self.duration)
+        trail = with_all_impacts(self._trail, cut=closed and self.moves_at_end)
+        return History(trail, self.duration, self.body.stops)
 
     @cached_property
     def peak_over_slenderness(self) -> float:
@@ -239,7 +242,7 @@ class Answers:
         if law is None:
             raise InvalidOption(f"the forces of the ground on a {type(self.body).__name__} are not known")
         until = self.duration if math.isnan(self.tipping_time) else self.tipping_time
-        return Contact(with_unresolved_impacts(self), law, until)
+        return Contact(self._history, law, until)
 
 
 def trail_of(response: Answers) -> Trail:
@@ -247,12 +250,9 @@ def trail_of(response: Answers) -> Trail:
     return response._trail
 
 
-def with_unresolved_impacts(response: Answers) -> History:
-    """Return the history of a response with the impacts that follow the closing of each of its sequences."""
-    chattering = response.chattering
-    closed = bool(len(chattering)) and bool(chattering["end"][-1] >= response.duration)
-    trail = with_all_impacts(response._trail, cut=closed and response.moves_at_end)
-    return History(trail, response.duration, response.body.stops)
+def history_of(response: Answers) -> History:
+    """Return the course of a response in time."""
+    return response._history
 
 
 def _pull(_: Floats, vertical: Floats) -> Floats:

@@ -11,7 +11,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.plot.response import RotationUnits
-from rocking.response.answers import Answers, trail_of
+from rocking.response.answers import Answers, history_of
 from rocking.response.history import even_times
 from rocking.tables import named, rows_of
 
@@ -183,7 +183,7 @@ def active_span(response: Answers) -> tuple[float, float]:
 def drawing_times(response: Answers, start: float, end: float) -> Floats:
     """Return times dense enough for a smooth line: even ones, and those of steps that are long enough to see."""
     even = np.linspace(start, end, _EVEN_TIMES)
-    steps = _within(trail_of(response).nodes["time"], start, end)
+    steps = _within(history_of(response).trail.nodes["time"], start, end)
     visible = np.diff(np.floor(steps / max(even[1] - even[0], 1e-12)), prepend=-1.0) > 0.0
     return np.union1d(even, steps[visible])
 

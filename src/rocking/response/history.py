@@ -43,9 +43,11 @@ _REFINEMENTS: Final = 10
 _MOST_REFINED: Final = 64
 
 #: Impacts beyond the last resolved one are followed down to this speed, over p and in rad: what the motion changes and
-#: what their speed adds are then nothing. And so many of a sequence at most: all, up to a restitution of 0.998.
+#: what their speed adds are then nothing. So many of a sequence at most: all, up to a restitution of 0.998. And, of
+#: bodies without stiffness, down to this share of the speed at which the sequence was closed.
 _SLOWEST: Final = 1e-10
 _MOST_IMPACTS: Final = 10_000
+_LEAST_SHARE: Final = 1e-9
 
 #: Coefficients of friction beyond those of any two materials.
 _ROUGHEST: Final = 3.0
@@ -235,7 +237,6 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     if not len(closing):
         return trail
     body, rules, scratch = trail.block.copy(), trail.rules.copy(), state.new_scratch()
-    body["limit"] = slowest
     rules["treatment"], rules["endless"], rules["record"] = state.RestRule.VELOCITY, False, True
     table = state.new_table(1024)
     parts, done = [], 0
@@ -243,6 +244,7 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
         start = state.new_states(1, _MOST_IMPACTS)[0]
         for name in ("piece", "offset", "side", "u", "v"):
             start[name] = nodes[name][row]
+        body["limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
         start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
         rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
         while follow(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
