@@ -1,6 +1,8 @@
 """Bodies between stops against an independent integration with events, closed forms, and wrong input."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -218,3 +220,20 @@ def test_positions_are_right_between_the_proof_and_the_rest():
         time += flight
         judged += time > found.impacts["time"][-1]
     assert judged > 40
+
+
+def test_a_study_of_oscillators_is_taken_up_again_by_another_program(tmp_path):
+    bodies = dynamics.LinearBodies([dynamics.ImpactOscillator(1.0, e, stop=-0.01) for e in (0.3, 0.6, 0.9)])
+    motion = rocking.pulses.one_sine(15.0, 2.0)
+    study = rocking.study(tmp_path / "study", bodies, motion, model="linear", levels=[0.5, 1.0])
+    study.run(threads=1)
+    command = (
+        "import sys, rocking; study = rocking.study(sys.argv[1]);"
+        "print(study.product.bodies[1], study.results().peak_rotation.values.tolist())"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", command, str(tmp_path / "study")], capture_output=True, text=True, check=True
+    ).stdout
+    expected = rocking.simulate_many(bodies, motion, model="linear", levels=[0.5, 1.0]).peak_rotation.values
+    assert told == f"{bodies[1]} {expected.tolist()}\n"
+    assert expected.min() < expected.max()

@@ -71,15 +71,15 @@ class Setup:
         n bodies.
     model, treatment, duration
         As for `rocking.simulate`.
-    start : tuple of float
-        Coordinate of all bodies at time 0, and its rate.
+    start : tuple of float or None, float
+        Coordinate of all bodies at time 0, and its rate; None: zero, or the stop where zero is behind it.
     """
 
     bodies: Bodies
     model: Model
     treatment: Treatment
     duration: float | None = None
-    start: tuple[float, float] = (0.0, 0.0)
+    start: tuple[float | None, float] = (None, 0.0)
 
 
 @dataclass(frozen=True)

@@ -65,11 +65,16 @@ def one_body(body: Body) -> Body:
 
 
 def set_start(
-    states: state.Records, records: state.Records, bodies: Bodies, coordinate: float | Floats, rate: float | Floats
+    states: state.Records,
+    records: state.Records,
+    bodies: Bodies,
+    coordinate: float | Floats | None,
+    rate: float | Floats,
 ) -> None:
     """Set the states of bodies at time zero, which are at rest, to coordinates and their rates.
 
-    There is one body for each state, or one for all.
+    There is one body for each state, or one for all. Without a coordinate it is zero, or the stop where zero is behind
+    it.
 
     Raises
     ------
@@ -77,8 +82,10 @@ def set_start(
         If a body cannot be there.
     """
     stops, facing, one_sided = bodies.stops, records["facing"], records["entered"][:, 0] == 0
-    if np.all(coordinate == 0.0) and np.all(rate == 0.0) and not np.any(stops):
+    if not np.any(stops) and (coordinate is None or np.all(coordinate == 0.0)) and np.all(rate == 0.0):
         return
+    if coordinate is None:
+        coordinate = np.clip(0.0, stops[:, 0], np.where(facing, stops[:, 1], np.inf))
     at, speed = np.broadcast_arrays(np.asarray(coordinate, dtype=float), np.asarray(rate, dtype=float))
     from_plus = at - stops[:, 0]
     sign = np.where(one_sided, 1.0, np.sign(np.where(from_plus == 0.0, speed, from_plus)))

@@ -56,7 +56,7 @@ class _LinearBody:
     @property
     def description(self) -> str:
         """What it is, in words."""
-        return self.kind
+        return self.kind.replace("-", " ")
 
     @property
     def sides(self) -> Sequence[object]:
@@ -156,7 +156,7 @@ class BouncingBall(_LinearBody):
     '0.600000000000'
     """
 
-    kind: ClassVar[str] = "bouncing ball"
+    kind: ClassVar[str] = "bouncing-ball"
     units: ClassVar[Mapping[str, str]] = {"restitution": "", "gravity": "m/s^2"}
 
     restitution: float
@@ -212,7 +212,7 @@ class ImpactOscillator(_LinearBody):
     (17, True)
     """
 
-    kind: ClassVar[str] = "impact oscillator"
+    kind: ClassVar[str] = "impact-oscillator"
     units: ClassVar[Mapping[str, str]] = {
         "frequency": "Hz", "restitution": "", "damping_ratio": "", "stop": "m", "second_stop": "m",
     }  # fmt: skip
@@ -277,7 +277,7 @@ class InvertedPendulum(_LinearBody):
     (0.1, ['rest'])
     """
 
-    kind: ClassVar[str] = "inverted pendulum"
+    kind: ClassVar[str] = "inverted-pendulum"
     units: ClassVar[Mapping[str, str]] = {"p": "rad/s", "gap": "m", "restitution": ""}
 
     p: float
@@ -310,7 +310,7 @@ class LinearBodies:
     Examples
     --------
     >>> LinearBodies([BouncingBall(0.8), BouncingBall(0.9)])
-    <LinearBodies: 2 of kind bouncing ball>
+    <LinearBodies: 2 of kind bouncing-ball>
     """
 
     members: tuple[_LinearBody, ...]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 import rocking.response
 from rocking import checks
 from rocking.arrays import Floats, as_asked
-from rocking.dynamics.bodies import BouncingBall, LinearBodies, _LinearBody
+from rocking.dynamics.bodies import LinearBodies, _LinearBody
 from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
@@ -198,12 +198,9 @@ def simulate_many(
     product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
     for motion in product.motions:
         _along_one_line(motion)
-    starts = {start_of(each) for each in gathered.members} if initial_position is None else {initial_position}
-    if len(starts) > 1:
-        raise InvalidOption("the bodies start at different stops; give {}, one position for all", "initial_position")
     setup = replace(
         setup_of(product),
-        start=(starts.pop(), checks.finite(initial_velocity, "initial_velocity", InvalidOption)),
+        start=(initial_position, checks.finite(initial_velocity, "initial_velocity", InvalidOption)),
         duration=max(
             _duration(each, motion, duration) or 0.0 for each in gathered.members for motion in product.motions
         )
@@ -233,8 +230,8 @@ def _along_one_line(motion: Motion | None) -> Motion | None:
 
 
 def start_of(body: _LinearBody) -> float:
-    """Position at which a body starts if none is given: zero, or the stop where that is behind it."""
-    return max(0.0, body.law.low) if not isinstance(body, BouncingBall) else 0.0
+    """Return position zero, or the stop that zero is behind."""
+    return min(max(0.0, body.law.low), body.law.high)
 
 
 def _duration(body: _LinearBody, motion: Motion | None, duration: float | None) -> float | None:

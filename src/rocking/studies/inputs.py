@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+import rocking.dynamics.bodies  # noqa: F401 -- its kinds are known from then on
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import KINDS, Bodies

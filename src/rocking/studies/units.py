@@ -158,7 +158,7 @@ def fitting_unit(product: Product) -> tuple[int, int, int, int]:
     How long one simulation takes is measured with a group of blocks spread over all, under the longest motion.
     """
     motions, scales, polarities, count = product.shape
-    some = product.blocks.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
+    some = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
     motion = max(product.motions, key=lambda one: len(one.coefficients))
     factors = np.array([[[product.scales.factors(motion).max()]]])
     announce(SIMULATIONS)
