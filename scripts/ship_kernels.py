@@ -70,6 +70,7 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
 
     from rocking.kernels import ground, state
     from rocking.kernels.lanes import pool_of
+    from rocking.kernels.periodic import TRAP
     from rocking.kernels.sine import lanes, sequence
     from rocking.kernels.trace import Trail
 
@@ -98,6 +99,10 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
         "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
         "periodic.iterate": [(seen, block, rules, scratch, table, states, 1, reals(1, 1, 3), count)],
         "periodic.differentiate": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
+        "periodic.stretch": [
+            (trail, scratch, state.record(state.VARIATION), table, states[0], reals(3, 2), reals(1, 2))
+        ],
+        "periodic.settle": [(seen, block, rules, scratch, table, states, 1, reals(1, TRAP), count, count)],
         "periodic.to_next_impact": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
         "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
         "ground.fill": [(given(3), given(2, 2), 1.0, seen, reals())],

@@ -1,4 +1,5 @@
 from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum, Law, LinearBodies
+from .exponents import LyapunovExponents, lyapunov_exponents
 from .maps import Fate, ImpactMap, StroboscopicMap, impact_map, stroboscopic_map
 from .simulation import Response, simulate, simulate_many
 
@@ -10,9 +11,11 @@ __all__ = [
     "InvertedPendulum",
     "Law",
     "LinearBodies",
+    "LyapunovExponents",
     "Response",
     "StroboscopicMap",
     "impact_map",
+    "lyapunov_exponents",
     "simulate",
     "simulate_many",
     "stroboscopic_map",
