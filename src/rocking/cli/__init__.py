@@ -34,6 +34,7 @@ for _module, _commands in {
     "records": ("records", "pulses"),
     "chattering": ("chatter", "critical", "paper"),
     "analysis": ("spectrum", "map", "ida", "measures"),
+    "dynamics": ("bifurcation", "basin"),
     "fits": ("fragility", "calibrate"),
     "explore": ("explore",),
 }.items():
