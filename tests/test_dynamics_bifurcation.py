@@ -36,6 +36,17 @@ def test_the_period_of_a_ball_doubles_where_its_closed_form_says(e, about):
     assert parted[3] / parted[2] == pytest.approx(math.sqrt(2.0), rel=0.02)
 
 
+def test_an_orbit_that_is_still_settling_has_no_period():
+    """Near the doubling it comes nearer from both sides in turn, and every second state is almost the same."""
+    at = first_doubling(0.5)
+    found = dynamics.bifurcation_diagram(
+        ball_case(0.5), at - np.array([0.002, 0.0008]), start_of_one_bounce(0.5, at - 0.1)[0], transient=1500
+    )
+    states = found.velocity.values[0, 1, 0]
+    assert abs(states[-1] - states[-3]) < 1e-6 * abs(states[-1]) < abs(states[-1] - states[-2])
+    assert found.period.values[0, 1, 0] == 0
+
+
 def symmetric_states(p, alpha, e, amplitude, omega):
     """States at the start of a period on the linear block's two orbits of one impact in each half period.
 

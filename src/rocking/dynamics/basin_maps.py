@@ -202,8 +202,8 @@ def basins(
     Returns
     -------
     Basins
-        Attractors, basins and their measures. After an interrupt, of the cells that were reached: every eighth or so
-        of them comes first, then those between.
+        Attractors, basins and their measures; after an interrupt, of the cells that were reached. They come coarse to
+        fine.
 
     Raises
     ------
@@ -302,7 +302,8 @@ class _Work:
             stride //= 2
             level[(row % (2 * stride) != 0) | (column % (2 * stride) != 0)] += 1
         for pass_ in range(int(np.log2(first)) + 1):
-            cells = np.flatnonzero(level == pass_)
+            # Those of a pass in a mixed order: what an interrupt leaves out is then left out all over the grid.
+            cells = np.random.default_rng(pass_).permutation(np.flatnonzero(level == pass_))
             for start in range(0, len(cells), _BATCH):
                 batch = cells[start : start + _BATCH]
                 if self.outcome[batch[0]] == _NOT_REACHED:

@@ -36,6 +36,9 @@ Direction = Literal["up", "down", "both", "afresh"]
 #: How near an orbit comes back after its period, over the size of the states.
 _RETURN: Final = 1e-6
 
+#: An orbit is still settling if the distance between its states shrinks to less than this share while they are kept.
+_STILL: Final = 0.99
+
 #: Values of the parameter that are done between two looks at the progress bar.
 _PORTION: Final = 10
 
@@ -348,10 +351,20 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
 
 
 def _period_of(states: Floats) -> int:
-    """Period of an orbit from its kept states; 0 where none comes back for half of them."""
+    """Period of an orbit from its kept states; 0 where none comes back for half of them, or it is still settling."""
     size = np.abs(states).max(axis=0) + np.finfo(float).tiny
+
+    def apart(period: int) -> Floats:
+        distance: Floats = (np.abs(states[period:] - states[:-period]) / size).max(axis=1)
+        return distance
+
     for period in range(1, len(states) // 2 + 1):
-        if np.all(np.abs(states[period:] - states[:-period]) <= _RETURN * size):
+        if apart(period).max() <= _RETURN:
+            # An orbit that comes nearer to a shorter one from both sides in turn looks like one of twice its period.
+            for shorter in (each for each in range(1, period) if period % each == 0):
+                gaps = apart(shorter)
+                if gaps[-period:].max() < _STILL * gaps[:period].max():
+                    return 0
             return period
     return 0
 

@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Colour, mark and its area, points squared, of each way through the values; the first is the larger, so that the
-#: second is seen on it, and the first around it.
-_LOOKS: Final = ((INK, "o", 4.0), (ABOVE, "o", 0.9))
+#: Colour of each way through the values, and area of its marks, points squared; of two the first is the larger, so that
+#: the second is seen on it, and the first around it.
+_LOOKS: Final = ((INK, 4.0), (ABOVE, 0.9))
+_ALONE: Final = ((INK, 0.9),)
 
 _WORDS: Final = {"up": "values going up", "down": "values going down", "afresh": "each value afresh"}
 
@@ -42,11 +43,12 @@ def bifurcation_figure(
     with figure_for(ax, (5.6, 3.8), figsize, title) as figure:
         axes = ax or figure.add_subplot()
         handles: list[Artist] = []
-        for (way, kept), (colour, mark, area) in zip(states.items(), _LOOKS, strict=False):
+        looks = _ALONE if len(states) == 1 else _LOOKS
+        for (way, kept), (colour, area) in zip(states.items(), looks, strict=True):
             x = np.broadcast_to(value[:, None], kept.shape).ravel()
-            axes.scatter(x, kept.ravel(), s=area, marker=mark, color=colour, linewidths=0.0, rasterized=True)
+            axes.scatter(x, kept.ravel(), s=area, marker="o", color=colour, linewidths=0.0, rasterized=True)
             size = area**0.5 + 1.0
-            handles.append(Line2D([], [], linestyle="", marker=mark, color=colour, markersize=size, label=_WORDS[way]))
+            handles.append(Line2D([], [], linestyle="", marker="o", color=colour, markersize=size, label=_WORDS[way]))
         if overturned.any():
             places = value[overturned]
             look: dict[str, Any] = {"linestyle": "", "marker": "|", "color": GROUND}
