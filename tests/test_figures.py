@@ -7,6 +7,8 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from rocking.plot.basins import basins_figure, erosion_figure
+from rocking.plot.bifurcation import bifurcation_figure
 from rocking.plot.calibration import Parameter, measured_figure, outcomes_figure
 from rocking.plot.fragility import FragilityLine, fragility_figure
 from rocking.plot.histories import intervals_figure
@@ -150,8 +152,35 @@ def measured_of(**options):
     return measured_figure(**arrays, fitted_time=fine, fitted=np.sin(fine), **options)
 
 
+def basins_of(**options):
+    kinds = ["orbit"] * 4 + ["overturns"] * 2 + ["unsettled"]
+    orbits = np.full((7, 3, 2), np.nan)
+    orbits[:4] = np.linspace(0.0, 2.0, 24).reshape(4, 3, 2)
+    names = [f"what becomes of the block, number {k}" for k in range(7)]
+    texts = {"x_label": "rotation at the start of a period (rad)", "y_label": "angular velocity (rad/s)"}
+    outcome = np.arange(9).reshape(3, 3) % 8 - 1
+    arrays = {"x": np.arange(3.0), "y": np.arange(3.0), "outcome": outcome, "orbits": orbits}
+    return basins_figure(**arrays, names=names, kinds=kinds, **(texts | options))
+
+
+def erosion_of(**options):
+    factor = np.linspace(0.2, 3.0, 15)
+    texts = {"x_label": "factor on the motion"}
+    return erosion_figure(factor=factor, safe=1.0 / (1.0 + factor), error=0.02 / factor, **(texts | options))
+
+
+def bifurcation_of(**options):
+    value = np.linspace(1.0, 2.0, 30)
+    states = {way: np.sin(np.outer(value, np.arange(1.0, 9.0)) + k) for k, way in enumerate(("up", "down"))}
+    texts = {"x_label": "amplitude over the smallest that lifts the block", "y_label": "rotation (rad)"}
+    return bifurcation_figure(value=value, states=states, overturned=value > 1.9, **(texts | options))
+
+
 FIGURES = {
     "schemes": (schemes_of, 5.4),
+    "basins": (basins_of, 4.8),
+    "erosion": (erosion_of, 3.6),
+    "bifurcation": (bifurcation_of, 3.8),
     "intervals": (intervals_of, 4.2),
     "outcomes of tests": (trials_of, 4.8),
     "measured": (measured_of, 3.8),

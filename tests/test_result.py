@@ -21,6 +21,7 @@ from rocking.tables import write_netcdf
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE = rocking.pulses.one_sine(6.0, 1.0)
+ONE_PERIOD = rocking.pulses.sine(3.0, 1.0, cycles=1)
 RESTLESS = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=1.0 - 1e-9)
 
 
@@ -89,6 +90,11 @@ def results(spectrum, study):
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
         "StudySpectrum": study.spectrum().select(scale=3.0),
         "BlockFragilities": study.block_fragilities(),
+        "Basins": dynamics.basins(BLOCK, ONE_PERIOD, np.linspace(-0.2, 0.2, 5), np.linspace(-0.4, 0.4, 5)),
+        "BasinErosion": dynamics.safe_basin_erosion(BLOCK, ONE_PERIOD, [0.5, 1.0], [-0.1, 0.1], [0.0, 0.2]),
+        "BifurcationDiagram": dynamics.bifurcation_diagram(
+            lambda factor: (BLOCK, ONE_PERIOD.scaled(factor)), [0.5, 1.0], [0.01, 0.1], kept=4, direction="both"
+        ),
     }
 
 
@@ -147,6 +153,12 @@ def test_whatever_draws_itself_does_so_at_the_size_that_is_wanted(results):
 
 
 HEADERS = {
+    ("Basins", "attractors"): "attractor,share,standard_error,period,impacts,rests,multiplier",
+    ("Basins", "outcomes"): "angular_velocity_rad_s,rotation_rad,outcome,periods",
+    ("Basins", "orbits"): "attractor,phase,orbit_coordinate_rad,orbit_velocity_rad_s",
+    ("BasinErosion", "erosion"): "factor,safe,standard_error,to_plus,to_minus",
+    ("BifurcationDiagram", "states"): "direction,value,start,iterate,coordinate_rad,velocity_rad_s",
+    ("BifurcationDiagram", "orbits"): "direction,value,start,period,impacts",
     ("RockingSpectrum", "fractiles"): "fractile,alpha_rad,restitution,p_rad_s,period_s,size_m,"
     "fractile_over_alpha,overturned_share",
     ("RockingSpectrum", "peaks"): "motion,alpha_rad,restitution,p_rad_s,period_s,size_m,"

@@ -35,6 +35,7 @@ for _module, _commands in {
     "chattering": ("chatter", "critical", "paper"),
     "schemes": ("schemes",),
     "analysis": ("spectrum", "map", "ida", "measures"),
+    "dynamics": ("bifurcation", "basin"),
     "fits": ("fragility", "calibrate"),
     "explore": ("explore",),
 }.items():

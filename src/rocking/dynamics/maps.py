@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -18,7 +19,7 @@ from rocking.errors import InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
 from rocking.kernels.periodic import Fate as Fate
-from rocking.kernels.periodic import Setting, differentiate, iterate, step_rows, to_next_impact
+from rocking.kernels.periodic import Setting, differentiate, iterate, step_rows, stretch, to_next_impact
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
@@ -60,6 +61,9 @@ class _Repeated:
         rules = rules_of(self.bodies, self.model, self.treatment, self.period, record=record)
         rules["stop"], rules["endless"] = np.inf, True
         return rules
+
+    def _setting(self) -> Setting:
+        return Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
 
     def _states(self, states: ArrayLike) -> tuple[Floats, state.Records]:
         """States as given, flat, and as records."""
@@ -254,7 +258,7 @@ class StroboscopicMap(_Repeated):
 
     def _iterate(self, made: state.Records, periods: int, rows: Floats) -> None:
         announce(SIMULATIONS)
-        setting = Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
+        setting = self._setting()
         impacts = np.zeros(len(made), dtype=np.int64)
 
         def follow(part: slice) -> None:
@@ -269,6 +273,25 @@ class StroboscopicMap(_Repeated):
         change = np.empty((len(made), 2, 2))
         differentiate(trail, state.new_scratch(), state.record(state.VARIATION), state.new_table(_ROWS), made, change)
         return change
+
+    def _stretches(self, given: Floats, before: int, count: int) -> tuple[Floats, int, Fate]:
+        """Logarithms of the stretches of a frame in each of some periods, after others; impacts in them; the fate."""
+        _, made = self._states(given[None])
+        announce(SIMULATIONS)
+        trail = Trail(self._ground, self._records[0], self._rules(record=True), NO_NODES)
+        space = state.new_scratch(), state.record(state.VARIATION), state.new_table(_ROWS)
+        frame = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
+        logs, impacts = np.full((before + count, 2), np.nan), 0
+        edges = sorted({*range(0, before + count, _TOGETHER), before, before + count})
+        for start, stop in pairwise(edges):
+            here = stretch(trail, *space, made[0], frame, logs[start:stop])
+            impacts += here if start >= before else 0
+            if made["ending"][0] not in (Fate.MOVES, Fate.RESTS):
+                break
+        fate = Fate(int(made["ending"][0]))
+        if fate == Fate.RESTS_FOR_EVER:
+            logs[np.isnan(logs)] = -np.inf
+        return logs[before:], impacts, fate
 
 
 class ImpactMap(_Repeated):

@@ -5,6 +5,7 @@ after that which lift any body off either side: nothing is proven across them. A
 by as many pieces. What becomes of a state that is not a number is UNFINISHED.
 """
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -70,6 +71,45 @@ def iterate(setting: Setting, scratch: Record, states: Records, periods: int, or
                 write_state(orbit[k, n], state)
         state.ending = fate
         impacts[k] = state.impacts
+
+
+#: Columns of a trap: its side (negative at rest), its middle (u, v), and a, b, c of a du^2 + 2 b du dv + c dv^2 <= 1.
+TRAP = 6
+
+
+@kernel
+def settle(
+    setting: Setting, scratch: Record, states: Records, periods: int, traps: Floats, found: Integers, taken: Integers
+) -> None:
+    """Take each state through at most so many periods, until it is in one of the traps, overturns or rests for ever.
+
+    ``found[k]`` is the row of its trap in ``traps``, of shape (n, `TRAP`), or -1; ``taken[k]`` counts the periods and
+    ``ending`` is its `Fate`.
+    """
+    for k in range(states.shape[0]):
+        state = states[k]
+        fate = Fate.RESTS.value if state.side < 0 else Fate.MOVES.value
+        found[k] = -1
+        taken[k] = periods
+        for n in range(periods):
+            fate = pass_period(setting, scratch, state)
+            if fate != Fate.OVERTURNED and fate != Fate.UNFINISHED:
+                found[k] = trap_of(traps, state)
+            if found[k] >= 0 or (fate != Fate.MOVES and fate != Fate.RESTS):
+                taken[k] = n + 1
+                break
+        state.ending = fate
+
+
+@inlined
+def trap_of(traps: Floats, state: Record) -> int:
+    """Row of the first trap that a state is in, or -1."""
+    for j in range(traps.shape[0]):
+        row = traps[j]
+        du, dv = state.u - row[1], state.v - row[2]
+        if state.side == row[0] and row[3] * du * du + 2.0 * row[4] * du * dv + row[5] * dv * dv <= 1.0:
+            return j
+    return -1
 
 
 @inlined
@@ -207,25 +247,64 @@ def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, s
     It is exactly zero where the body has come to rest on the way. The rules of the trail have the march write its
     table, whose rows are used again and again. The states are those after the period; ``ending`` is their `Fate`.
     """
-    ground, block, rules, _ = trail
     for k in range(states.shape[0]):
-        state = states[k]
-        out[k, 0, 0], out[k, 0, 1], out[k, 1, 0], out[k, 1, 1] = 1.0, 0.0, 0.0, 1.0
-        state.until = pieces_of(ground)
-        state.budget = TURNS
-        ending = Ending.FULL.value
-        while ending == Ending.FULL:
-            state.nodes = state.impacts = state.events = state.sequences = 0
-            ending = march(ground, block, rules, table, scratch, state)
-            for n in range(state.nodes - 1):
-                carry_on(trail, scratch, work, table[n].node, table[n + 1].node, out[k])
-            if state.nodes > 0:
-                carry_on(trail, scratch, work, table[state.nodes - 1].node, state, out[k])
-        state.ending = put_back(ground, block, state, ending)
-        if state.ending == Fate.RESTS or state.ending == Fate.RESTS_FOR_EVER:
-            out[k, 0, 0] = out[k, 0, 1] = out[k, 1, 0] = out[k, 1, 1] = 0.0
-        elif state.ending != Fate.MOVES:
-            out[k, 0, 0] = out[k, 0, 1] = out[k, 1, 0] = out[k, 1, 1] = np.nan
+        differentiate_period(trail, scratch, work, table, states[k], out[k])
+
+
+@shared
+def differentiate_period(trail: Trail, scratch: Record, work: Record, table: Records, state: Record, M: Floats) -> int:
+    """Take one state through a period and write its derivative, as `differentiate`; returns the number of impacts."""
+    ground, block, rules, _ = trail
+    M[0, 0], M[0, 1], M[1, 0], M[1, 1] = 1.0, 0.0, 0.0, 1.0
+    state.until = pieces_of(ground)
+    state.budget = TURNS
+    ending = Ending.FULL.value
+    impacts = 0
+    while ending == Ending.FULL:
+        state.nodes = state.impacts = state.events = state.sequences = 0
+        ending = march(ground, block, rules, table, scratch, state)
+        impacts += state.impacts
+        for n in range(state.nodes - 1):
+            carry_on(trail, scratch, work, table[n].node, table[n + 1].node, M)
+        if state.nodes > 0:
+            carry_on(trail, scratch, work, table[state.nodes - 1].node, state, M)
+    state.ending = put_back(ground, block, state, ending)
+    if state.ending == Fate.RESTS or state.ending == Fate.RESTS_FOR_EVER:
+        M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
+    elif state.ending != Fate.MOVES:
+        M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = np.nan
+    return impacts
+
+
+@kernel
+def stretch(
+    trail: Trail, scratch: Record, work: Record, table: Records, state: Record, frame: Floats, logs: Floats
+) -> int:
+    """Take a state through as many periods as ``logs`` has rows, and write how each stretches a frame of directions.
+
+    A row is the logarithm of the stretch along a direction that follows the derivatives, and so becomes the one that
+    grows fastest, and of that across it: the diagonal of R where the derivative times Q is Q' R. Both are minus
+    infinity in a period with a rest, after which any direction is as good. From the period on in which the body
+    overturns or rests for ever no row is written; ``ending`` is the `Fate`. Row 2 of ``frame``, of shape (3, 2), is the
+    direction; the others are space. Returns the number of impacts.
+    """
+    M = frame[:2]
+    impacts = 0
+    for n in range(logs.shape[0]):
+        impacts += differentiate_period(trail, scratch, work, table, state, M)
+        if state.ending != Fate.MOVES and state.ending != Fate.RESTS:
+            break
+        c, s = frame[2, 0], frame[2, 1]
+        x, y = M[0, 0] * c + M[0, 1] * s, M[1, 0] * c + M[1, 1] * s
+        length = math.sqrt(x * x + y * y)
+        if length > 0.0:
+            across = abs(M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]) / length
+            logs[n, 0] = math.log(length)
+            logs[n, 1] = math.log(across) if across > 0.0 else -np.inf
+            frame[2, 0], frame[2, 1] = x / length, y / length
+        else:
+            logs[n, 0] = logs[n, 1] = -np.inf
+    return impacts
 
 
 @shared

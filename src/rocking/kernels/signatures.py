@@ -8,7 +8,7 @@ import numpy as np
 from rocking.kernels import ground, state
 from rocking.kernels.compiled import Kernel
 from rocking.kernels.lanes import pool_of
-from rocking.kernels.periodic import Setting
+from rocking.kernels.periodic import TRAP, Setting
 from rocking.kernels.sine import lanes, sequence
 from rocking.kernels.trace import Trail
 
@@ -48,6 +48,7 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
     blocks, states, table = state.records(1, state.BLOCK), state.new_states(1, 1), state.new_table(1)
     trail = Trail(seen, block, rules, state.records(1, state.NODE_ROW))
     pool = pool_of(blocks, states, 1, 1.0, 0)
+    setting = Setting(seen, block, rules, table, reals(2, 1, 10))
     sequences = (given(), given(), given())
     statuses = reals(1, kind=np.int8)
     shares = (reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), singles)
@@ -55,10 +56,12 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
         "march.march": [(seen, block, rules, table, scratch, states[0])],
         "trace.trace": [(trail, scratch, given(), count, reals(1, 3))],
         "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
-        "periodic.iterate": [
-            (Setting(seen, block, rules, table, reals(2, 1, 10)), scratch, states, 1, reals(1, 1, 3), count)
-        ],
+        "periodic.iterate": [(setting, scratch, states, 1, reals(1, 1, 3), count)],
+        "periodic.settle": [(setting, scratch, states, 1, reals(1, TRAP), count, count)],
         "periodic.differentiate": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
+        "periodic.stretch": [
+            (trail, scratch, state.record(state.VARIATION), table, states[0], reals(3, 2), reals(1, 2))
+        ],
         "periodic.to_next_impact": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
         "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
         "ground.fill": [(given(3), given(2, 2), 1.0, seen, reals())],

@@ -1,0 +1,271 @@
+"""Periodic attractors of a map, and a neighbourhood of each of their points that no state leaves.
+
+A neighbourhood is an ellipse in a norm in which the derivative contracts. Its size is checked: at samples of twice its
+size the derivative contracts in that norm and the impacts are as many as on the attractor, so that none grazes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.arrays import Flags, Floats, Integers, evenly
+from rocking.dynamics.maps import StroboscopicMap
+from rocking.kernels.periodic import TRAP
+from rocking.kernels.state import Records
+
+#: Longest period of an attractor, in periods of the motion, and how near a state must come back to be on one, over the
+#: size of the states.
+LONGEST: Final = 64
+_RETURN: Final = 1e-6
+
+#: Newton's method: most steps, and the distance at which it is done, over the size of the states.
+_STEPS: Final = 12
+_FIXED: Final = 1e-11
+
+#: Largest and smallest neighbourhood, over the size of the states, and how much larger the one is that is checked.
+_LARGEST: Final = 0.25
+_SMALLEST: Final = 1e-7
+_MARGIN: Final = 2.0
+
+#: Where it is checked: on so many rings, at so many angles; at few angles of the outermost first.
+_RINGS: Final = 4
+_ANGLES: Final = 24
+_FIRST: Final = 4
+
+#: Most points of an attractor that get a neighbourhood: a state passes all of them.
+_POINTS: Final = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """A periodic orbit that attracts what is near it.
+
+    Attributes
+    ----------
+    states : ndarray, shape (period, 2)
+        Coordinate and velocity at the starts of the periods of the motion.
+    multipliers : ndarray of complex, shape (2,)
+        Eigenvalues of the map's derivative over the orbit's period; zero where it holds a rest.
+    impacts : int
+        Impacts in one of its periods, those that were resolved.
+    rests : bool
+        Whether the body comes to rest on it.
+    """
+
+    states: Floats
+    multipliers: NDArray[np.complex128]
+    impacts: int
+    rests: bool
+
+    @property
+    def period(self) -> int:
+        """Its period, in periods of the motion."""
+        return len(self.states)
+
+    @property
+    def name(self) -> str:
+        """What it is, in words.
+
+        Examples
+        --------
+        >>> Attractor(np.zeros((2, 2)), np.zeros(2), 4, False).name
+        'period 2, 4 impacts'
+        """
+        if self.impacts == 0 and np.all(self.states[:, 1] == 0.0):
+            return "rest"
+        counted = "1 impact" if self.impacts == 1 else f"{self.impacts} impacts"
+        return f"period {self.period}, {'rest' if self.rests else counted}"
+
+
+def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attractor | None:
+    """Periodic attractor on which a state has settled; None where it does not come back, or the orbit is not stable.
+
+    ``size`` is that of the states, (coordinate, velocity).
+    """
+    orbit = strobe.orbit(state, 2 * LONGEST)
+    back = (np.abs(orbit[-1 - LONGEST : -1][::-1] - orbit[-1]) / size).max(axis=1)
+    returns = np.flatnonzero(back < _RETURN)
+    if returns.size == 0:
+        return None
+    period = int(returns[0]) + 1
+    fixed = _fixed_point(strobe, orbit[-1], period, size)
+    if fixed is None:
+        return None
+    at, change = fixed
+    for shorter in range(1, period):  # a slow approach may come near twice in a period only
+        if period % shorter == 0 and np.abs((strobe(at, shorter) - at) / size).max() < 1e-3 * _RETURN:
+            return None
+    multipliers = np.linalg.eigvals(change).astype(np.complex128)
+    if np.abs(multipliers).max() >= 1.0:
+        return None
+    _, _, impacts = strobe.followed(at, period)
+    return Attractor(strobe.orbit(at, period)[:-1], multipliers, int(impacts), not change.any())
+
+
+def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats) -> tuple[Floats, Floats] | None:
+    """Find the fixed point of some periods near a state by Newton's method, with the derivative there."""
+    start = at
+    for _ in range(_STEPS):
+        after, change = strobe.derivative(at, period)
+        if not np.isfinite(change).all():
+            return None
+        off = after - at
+        if np.abs(off / size).max() < _FIXED:
+            return at, change
+        at = at + np.linalg.solve(np.eye(2) - change, off) if change.any() else after
+        if np.abs((at - start) / size).max() > np.sqrt(_RETURN):
+            return None
+    return None
+
+
+def traps_of(strobe: StroboscopicMap, attractor: Attractor, size: Floats) -> Floats:
+    """Neighbourhoods of the points of an attractor that no state leaves, as rows for `kernels.periodic.settle`.
+
+    Of a long orbit some points have one. None has where the check fails however small it is.
+    """
+    points = attractor.states[evenly(attractor.period, _POINTS)]
+    _, made = strobe._states(points)
+    rows = [
+        trap
+        for point, record in zip(points, made, strict=True)
+        if (trap := _trap(strobe, attractor, point, record, size)) is not None
+    ]
+    return np.array(rows).reshape(-1, TRAP)
+
+
+def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats) -> Floats | None:
+    side, u, v = int(record["side"]), float(record["u"]), float(record["v"])
+    if side < 0:  # at rest, wherever it came from
+        return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
+    _, change = strobe.derivative(point, attractor.period)
+    shape, rate = _contracting_norm(change, size)
+    angles = 2.0 * np.pi * np.arange(_ANGLES) / _ANGLES
+    rings = np.arange(1, _RINGS + 1)[:, None, None] / _RINGS
+    disc = (rings * np.stack([np.cos(angles), np.sin(angles)], axis=-1)).reshape(-1, 2) @ np.linalg.inv(shape).T
+    radius = _LARGEST
+    while radius > _SMALLEST:
+        offsets = _MARGIN * radius * disc
+        few = offsets[-_ANGLES :: _ANGLES // _FIRST]
+        if all(
+            _stays(strobe, attractor, (side, u, v), each, shape, 0.5 * (1.0 + rate), size) for each in (few, offsets)
+        ):
+            form = shape.T @ shape / radius**2
+            return np.array([side, u, v, form[0, 0], form[0, 1], form[1, 1]])
+        radius *= 0.5
+    return None
+
+
+def _contracting_norm(change: Floats, size: Floats) -> tuple[Floats, float]:
+    """Matrix L and rate such that |L M x| <= rate |L x|: L x is at least as large as x over the size of the states."""
+    scale = np.diag(1.0 / size)
+    M = scale @ change @ np.diag(size)
+    rate = float(np.sqrt(np.abs(np.linalg.eigvals(M)).max()))
+    form, power = np.eye(2), np.eye(2)
+    if rate > 0.0:
+        for _ in range(100_000):
+            power = M @ power / rate
+            term = power.T @ power
+            form = form + term
+            if np.abs(term).max() < 1e-14 * np.abs(form).max():
+                break
+    return np.linalg.cholesky(form).T @ scale, rate
+
+
+def _stays(
+    strobe: StroboscopicMap,
+    attractor: Attractor,
+    middle: tuple[int, float, float],
+    offsets: Floats,
+    shape: Floats,
+    rate: float,
+    size: Floats,
+) -> bool:
+    """Whether states off the middle of a neighbourhood come nearer to it, on the same side and as it does itself."""
+    side, u, v = middle
+    if np.any(u + offsets[:, 0] >= strobe._records["fallen"][0]):
+        return False
+    here = offsets[u + offsets[:, 0] > 0.0]
+    samples = strobe._coordinates(u + here[:, 0], v + here[:, 1], np.full(len(here), side))
+    after, changes = strobe.derivative(samples, attractor.period)
+    if not np.isfinite(changes).all():
+        return False
+    _, made = strobe._states(after)
+    same_side = np.all(made["side"] == side)
+    if attractor.rests:
+        target = strobe._coordinates(np.array([u]), np.array([v]), np.array([side]))[0]
+        return bool(same_side and not changes.any() and np.abs((after - target) / size).max() < 1e-9)
+    _, _, impacts = strobe.followed(samples, attractor.period)
+    norms = np.linalg.norm(shape @ changes @ np.linalg.inv(shape), ord=2, axis=(1, 2))
+    return bool(same_side and np.all(impacts == attractor.impacts) and np.all(norms <= rate))
+
+
+class Known:
+    """Attractors that are known so far, and their traps.
+
+    Attributes
+    ----------
+    attractors : list of Attractor
+        In the order in which they were found.
+    traps : ndarray, shape (n, 6)
+        Their neighbourhoods, for the kernel.
+    owner : ndarray, shape (n,)
+        Which attractor each belongs to.
+    """
+
+    #: States from which attractors are sought among those that have settled on none, in one go.
+    MOST_TRIES: Final = 12
+
+    def __init__(self, strobe: StroboscopicMap, size: Floats, states: Sequence[Floats] = ()) -> None:
+        self.strobe, self.size = strobe, size
+        self.attractors: list[Attractor] = []
+        self.traps, self.owner = np.empty((0, TRAP)), np.empty(0, dtype=np.int64)
+        for state in states:
+            self._add(attractor_from(strobe, np.asarray(state), size))
+
+    def owners(self, states: Floats) -> Integers:
+        """Attractor of each of some states, -1 where it is in no trap."""
+        return self._owner_of(self.strobe._states(states)[1], slice(None))
+
+    def settle(self, states: Floats) -> Integers:
+        """Attractor of each of some states, -1 where it is in no trap; new attractors are sought on the way."""
+        _, made = self.strobe._states(states)
+        found = self._owner_of(made, slice(None))
+        for _ in range(self.MOST_TRIES):
+            unsettled = np.flatnonzero(found == -1)
+            if unsettled.size == 0:
+                break
+            first = unsettled[0]
+            known = len(self.traps)
+            self._add(attractor_from(self.strobe, states[first], self.size))
+            found[unsettled] = self._owner_of(made[unsettled], slice(known, None))
+            if found[first] == -1:
+                found[first] = -2
+        found[found == -2] = -1
+        return found
+
+    def _owner_of(self, made: Records, rows: slice) -> Integers:
+        found = np.full(len(made), -1)
+        for trap, owner in zip(self.traps[rows], self.owner[rows], strict=True):
+            du, dv = made["u"] - trap[1], made["v"] - trap[2]
+            inside: Flags = trap[3] * du * du + 2.0 * trap[4] * du * dv + trap[5] * dv * dv <= 1.0
+            found[(made["side"] == trap[0]) & inside & (found == -1)] = owner
+        return found
+
+    def _add(self, attractor: Attractor | None) -> None:
+        if attractor is None:
+            return
+        for known in self.attractors:
+            if known.period == attractor.period:
+                near = np.abs((known.states - attractor.states[0]) / self.size).max(axis=1)
+                if near.min() < _RETURN:
+                    return
+        traps = traps_of(self.strobe, attractor, self.size)
+        if len(traps):
+            self.owner = np.append(self.owner, np.full(len(traps), len(self.attractors)))
+            self.traps = np.concatenate([self.traps, traps])
+            self.attractors.append(attractor)

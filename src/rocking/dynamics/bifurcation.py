@@ -1,0 +1,379 @@
+"""Bifurcation diagrams of a body under periodic motion: where orbits settle as a parameter goes up or down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.block import Block
+from rocking.body import Body
+from rocking.constants import VERSION, Model
+from rocking.dynamics.basin_maps import told
+from rocking.dynamics.maps import StroboscopicMap, stroboscopic_map
+from rocking.engine import in_threads
+from rocking.errors import InvalidOption
+from rocking.motion.motion import Motion
+from rocking.progress import Progress
+from rocking.result import DatasetResult, table_of_some, variable
+from rocking.tables import counted
+from rocking.treatment import Treatment
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Ways to go through the values of the parameter.
+Direction = Literal["up", "down", "both", "afresh"]
+
+#: How near an orbit comes back after its period, over the size of the states.
+_RETURN: Final = 1e-6
+
+#: An orbit is still settling if the distance between its states shrinks to less than this share while they are kept.
+_STILL: Final = 0.99
+
+#: Values of the parameter that are done between two looks at the progress bar.
+_PORTION: Final = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BifurcationDiagram(DatasetResult):
+    """Where orbits settle, against a parameter; from `bifurcation_diagram`.
+
+    Its figure has every kept state, of each direction in its own colour.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Over (direction, value, start, iterate): coordinate and velocity at the starts of periods after the transient,
+        NaN where the body has overturned. Over (direction, value, start): period, in periods of the motion, 0 where the
+        orbit does not come back among the kept states, -1 where the body overturned; impacts in one such period, or -1.
+    """
+
+    TABLES = MappingProxyType({"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")})
+
+    def changes(self, direction: str | None = None, start: int = 0) -> list[tuple[float, float, int, int]]:
+        """List where the period changes: the values before and after, and the periods there.
+
+        Parameters
+        ----------
+        direction : str, optional
+            One of those that were gone through; by default the first.
+        start : int
+            Number of the initial state.
+
+        Returns
+        -------
+        list of (float, float, int, int)
+            In the order in which the values were gone through; a period is 0 where there is none, -1 of overturning.
+
+        Raises
+        ------
+        InvalidOption
+            If there is no such direction or start.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> from rocking import dynamics
+        >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
+        >>> def case(ratio):
+        ...     return ball, rocking.pulses.sine(10.0 * ratio, 5.0, cycles=1)
+        >>> found = dynamics.bifurcation_diagram(case, [1.4, 1.5, 1.55], [0.1, 0.5], transient=800)
+        >>> found.changes()
+        [(1.5, 1.55, 1, 2)]
+        """
+        ways = self.data.direction.values.tolist()
+        way = ways.index(checks.one_of(ways[0] if direction is None else direction, "direction", InvalidOption, ways))
+        number = checks.whole(start, "start", InvalidOption, least=0, most=self.data.sizes["start"] - 1)
+        values, periods = self.data.value.values, self.data.period.values[way, :, number]
+        if ways[way] == "down":
+            values, periods = values[::-1], periods[::-1]
+        return [
+            (float(values[k]), float(values[k + 1]), int(periods[k]), int(periods[k + 1]))
+            for k in np.flatnonzero(np.diff(periods) != 0)
+        ]
+
+    def summary(self) -> str:
+        data = self.data
+        head = f"bifurcation diagram over {data.parameter}: {counted(data.sizes['value'], 'value')}, {data.cases}"
+        parts = [head]
+        for way in data.direction.values.tolist():
+            for start in range(data.sizes["start"]):
+                rows = [
+                    [f"{before:.6g}", f"{after:.6g}", _in_words(old), _in_words(new)]
+                    for before, after, old, new in self.changes(way, start)
+                ]
+                which = f"{way}, start {start + 1}" if data.sizes["start"] > 1 else way
+                parts.append(
+                    f"{which}: changes of the period\n{table_of_some(['from', 'to', 'before', 'after'], rows)}"
+                    if rows
+                    else f"{which}: period {_in_words(int(data.period.sel(direction=way).values[0, start]))} throughout"
+                )
+        return "\n\n".join(parts)
+
+    def to_dict(self) -> dict[str, Any]:
+        data = self.data
+        return {
+            "parameter": data.parameter,
+            "cases": data.cases,
+            "transient": data.transient,
+            "kept": data.sizes["iterate"],
+            "direction": data.direction.values.tolist(),
+            "value": data.value.values,
+            "starts": np.stack([data.start_coordinate.values, data.start_velocity.values], axis=-1),
+            "period": data.period.values,
+            "impacts": data.impacts.values,
+            "changes": {
+                way: [self.changes(way, start) for start in range(data.sizes["start"])]
+                for way in data.direction.values.tolist()
+            },
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.bifurcation import bifurcation_figure
+
+        data = self.data
+        return bifurcation_figure(
+            value=data.value.values,
+            states={
+                way: data.coordinate.sel(direction=way).values.reshape(data.sizes["value"], -1)
+                for way in data.direction.values.tolist()
+            },
+            overturned=(data.period.values == -1).all(axis=(0, 2)),
+            x_label=data.parameter,
+            y_label=f"{data.coordinate.attrs['long_name']} ({data.coordinate.units})",
+            title=title or data.cases,
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+def bifurcation_diagram(
+    case: Callable[[float], tuple[Body, Motion]],
+    values: ArrayLike,
+    starts: ArrayLike,
+    *,
+    direction: Direction = "up",
+    transient: int = 200,
+    kept: int = 64,
+    parameter: str = "parameter",
+    model: Model | None = None,
+    chattering: str | Treatment = "certified",
+    progress: bool | None = None,
+) -> BifurcationDiagram:
+    """Follow orbits of a body under periodic motion as a parameter changes, and keep where they settle.
+
+    Parameters
+    ----------
+    case : callable
+        Takes a value of the parameter and returns the body and one period of the motion.
+    values : array_like, shape (n,)
+        Increasing values of the parameter.
+    starts : array_like, shape (2,) or (k, 2)
+        Coordinate and velocity, of one initial state or of several.
+    direction : {"up", "down", "both", "afresh"}
+        Up or down: at each value an orbit starts where it was at the value before, and after overturning again at its
+        initial state. Afresh: at each value from the initial states.
+    transient : int
+        Periods at each value before states are kept.
+    kept : int
+        Periods whose states are kept.
+    parameter : str
+        What the parameter is, with its unit, for tables and figures.
+    model : {"nonlinear", "linear"}, optional
+        As for `stroboscopic_map`.
+    chattering : str or treatment
+        As for `rocking.simulate`.
+    progress : bool, optional
+        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+
+    Returns
+    -------
+    BifurcationDiagram
+        States, periods and impacts.
+
+    Raises
+    ------
+    InvalidMotion, InvalidBlock
+        If the function returns something else than a body and a motion.
+    InvalidOption
+        If an argument is out of its range, or a state is behind a stop.
+
+    Notes
+    -----
+    Near a bifurcation orbits settle slowly: with a short transient the period is then not found, or that of the orbit
+    before.
+
+    Examples
+    --------
+    >>> import numpy as np, rocking
+    >>> from rocking import dynamics
+    >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
+    >>> def case(ratio):
+    ...     return ball, rocking.pulses.sine(10.0 * ratio, 5.0, cycles=1)
+    >>> found = dynamics.bifurcation_diagram(case, np.linspace(1.4, 1.6, 5), [0.1, 0.5], parameter="A w^2/g")
+    >>> found.period.values[0, :, 0].tolist()
+    [1, 1, 1, 2, 2]
+    """
+    if not callable(case):
+        raise InvalidOption("{} must be a function of the parameter that returns a body and one period", "case")
+    way = checks.one_of(direction, "direction", InvalidOption, get_args(Direction))
+    levels = np.atleast_1d(checks.numbers(values, "values", InvalidOption))
+    if levels.ndim != 1 or levels.size == 0 or np.any(np.diff(levels) <= 0.0):
+        raise InvalidOption("{} must be increasing numbers", "values")
+    first = checks.numbers(starts, "starts", InvalidOption)
+    if first.ndim not in (1, 2) or first.shape[-1] != 2 or first.size == 0:
+        raise InvalidOption("{} must be one pair (coordinate, velocity) or several", "starts")
+    first = first.reshape(-1, 2)
+    before = checks.whole(transient, "transient", InvalidOption, least=0)
+    count = checks.whole(kept, "kept", InvalidOption, least=2)
+    name = checks.text(parameter, "parameter", InvalidOption)
+    checks.grid_size({"values": levels.size, "starts": len(first), "kept": count}, InvalidOption)
+
+    work = _Work(case, levels, first, way, (before, count), model, chattering)
+    with Progress("bifurcation diagram", len(work.ways) * levels.size, show=progress) as bar:
+        for items in work.items():
+            for done in in_threads(work.follow, items):
+                bar.advance(done)
+    return BifurcationDiagram(work.dataset(name))
+
+
+class _Work:
+    """Orbits at all values of a parameter."""
+
+    def __init__(
+        self,
+        case: Callable[[float], tuple[Body, Motion]],
+        levels: Floats,
+        first: Floats,
+        direction: str,
+        counts: tuple[int, int],
+        model: Model | None,
+        chattering: str | Treatment,
+    ) -> None:
+        self.case, self.levels, self.first, self.model, self.chattering = case, levels, first, model, chattering
+        self.afresh = direction == "afresh"
+        self.ways = ("up", "down") if direction == "both" else (direction,)
+        self.transient, self.kept = counts
+        shape = len(self.ways), levels.size, len(first)
+        self.states = np.full((*shape, self.kept, 2), np.nan)
+        self.period, self.impacts = np.full(shape, -1), np.full(shape, -1)
+        self.now = np.tile(first, (len(self.ways), 1, 1))
+        self.ends = [self.mapped(0), self.mapped(levels.size - 1)]
+        for strobe in self.ends:
+            strobe._states(first)  # a start behind a stop is refused
+
+    def mapped(self, k: int) -> StroboscopicMap:
+        """Map at a value of the parameter."""
+        pair = self.case(float(self.levels[k]))
+        if not isinstance(pair, tuple) or len(pair) != 2:
+            raise InvalidOption("{} must return a body and one period of a motion", "case")
+        return stroboscopic_map(*pair, model=self.model, chattering=self.chattering)
+
+    def items(self) -> Iterator[list[tuple[int, Sequence[int]]]]:
+        """Values that may be done at once, each with the number of its direction."""
+        order = np.arange(self.levels.size)
+        for start in range(0, order.size, _PORTION):
+            if self.afresh:
+                yield [(0, [k]) for k in order[start : start + _PORTION].tolist()]
+            else:
+                yield [
+                    (w, (order if way == "up" else order[::-1])[start : start + _PORTION].tolist())
+                    for w, way in enumerate(self.ways)
+                ]
+
+    def follow(self, item: tuple[int, Sequence[int]]) -> int:
+        """Follow the orbits of one direction through some values; returns how many."""
+        w, values = item
+        for k in values:
+            strobe = self.mapped(k)
+            at = self.first if self.afresh else np.where(np.isnan(self.now[w]), self.first, self.now[w])
+            at = _in_front(strobe, at)
+            if self.transient:
+                at = strobe(at, self.transient)
+            moves = ~np.isnan(at[:, 0])
+            if moves.any():
+                self.states[w, k, moves] = strobe.orbit(at[moves], self.kept)[:, 1:]
+            self.now[w] = self.states[w, k, :, -1]
+            for s in np.flatnonzero(~np.isnan(self.now[w, :, 0])):
+                period = _period_of(self.states[w, k, s])
+                self.period[w, k, s] = period
+                if period:
+                    self.impacts[w, k, s] = strobe.followed(self.now[w, s], period)[2]
+        return len(values)
+
+    def dataset(self, parameter: str) -> xr.Dataset:
+        """Everything that was found."""
+        import xarray as xr
+
+        coordinate = self.ends[0].body.coordinate
+        orbits, over = ("direction", "value", "start"), ("direction", "value", "start", "iterate")
+        said = [
+            _common([told(strobe.body) for strobe in self.ends]),
+            _common([told(each.motion) for each in self.ends]),
+        ]
+        return xr.Dataset(
+            {
+                "coordinate": variable(over, self.states[..., 0], coordinate.name, coordinate.unit),
+                "velocity": variable(over, self.states[..., 1], coordinate.rate, f"{coordinate.unit}/s"),
+                "period": variable(orbits, self.period, "periods of the motion, 0: none found, -1: overturned"),
+                "impacts": variable(orbits, self.impacts, "impacts in one period of the orbit, -1: not known"),
+                "start_coordinate": variable("start", self.first[:, 0], "initial state", coordinate.unit),
+                "start_velocity": variable("start", self.first[:, 1], "initial state", f"{coordinate.unit}/s"),
+            },
+            {"direction": list(self.ways), "value": variable("value", self.levels, parameter, "1")},
+            {
+                "program": f"rocking {VERSION}",
+                "parameter": parameter,
+                "cases": " under ".join(said),
+                "model": self.ends[0].model,
+                "transient": self.transient,
+            },
+        )
+
+
+def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
+    """States put back to the stop where a parameter has moved it past them."""
+    low, high = strobe.body.stops
+    if isinstance(strobe.body, Block):
+        return states
+    inside = np.clip(states[:, 0], low, high if high > low else np.inf)
+    held = (inside != states[:, 0]) | ((inside == low) & (states[:, 1] < 0.0))
+    return np.stack([inside, np.where(held, 0.0, states[:, 1])], axis=-1)
+
+
+def _period_of(states: Floats) -> int:
+    """Period of an orbit from its kept states; 0 where none comes back for half of them, or it is still settling."""
+    size = np.abs(states).max(axis=0) + np.finfo(float).tiny
+
+    def apart(period: int) -> Floats:
+        distance: Floats = (np.abs(states[period:] - states[:-period]) / size).max(axis=1)
+        return distance
+
+    for period in range(1, len(states) // 2 + 1):
+        if apart(period).max() <= _RETURN:
+            # An orbit that comes nearer to a shorter one from both sides in turn looks like one of twice its period.
+            for shorter in (each for each in range(1, period) if period % each == 0):
+                gaps = apart(shorter)
+                if gaps[-period:].max() < _STILL * gaps[:period].max():
+                    return 0
+            return period
+    return 0
+
+
+def _common(texts: Sequence[str]) -> str:
+    """Return the parts, between commas, that two texts share."""
+    first, last = (text.split(", ") for text in texts)
+    return ", ".join(part for part in first if part in last)
+
+
+def _in_words(period: int) -> str:
+    return {0: "none found", -1: "overturned"}.get(period, str(period))

@@ -1,0 +1,187 @@
+"""Erosion of the safe basin: how the share of initial states that do not overturn shrinks as the motion grows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.body import Body
+from rocking.constants import VERSION, Model
+from rocking.dynamics.basin_maps import basins, told
+from rocking.errors import InvalidOption
+from rocking.motion.motion import Motion
+from rocking.motion.named import one_motion
+from rocking.progress import Progress
+from rocking.result import DatasetResult, table_of_some, variable
+from rocking.treatment import Treatment
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BasinErosion(DatasetResult):
+    """Share of initial states that do not overturn, against a factor on the motion; from `safe_basin_erosion`.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Over (factor): safe, the share of the states that do not overturn in so many periods, with its standard_error
+        as that of as many random states; to_plus and to_minus, the shares that overturn to either side.
+    """
+
+    TABLES = MappingProxyType({"erosion": ("safe", "standard_error", "to_plus", "to_minus")})
+
+    def summary(self) -> str:
+        data = self.data
+        rows = [
+            [f"{factor:.4g}", f"{100.0 * safe:.2f} %", f"{100.0 * error:.2f} %"]
+            for factor, safe, error in zip(
+                data.factor.values, data.safe.values, data.standard_error.values, strict=True
+            )
+        ]
+        head = f"safe basin of {data.body} under multiples of {data.motion}: {data.cells} states"
+        return "\n".join([head, "", table_of_some(["factor", "do not overturn", "standard error"], rows)])
+
+    def to_dict(self) -> dict[str, Any]:
+        data = self.data
+        return {
+            "body": data.body,
+            "motion": data.motion,
+            "model": data.model,
+            "periods": data.most_periods,
+            "states": data.cells,
+            "factor": data.factor.values,
+            **{name: data[name].values for name in self.TABLES["erosion"]},
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.basins import erosion_figure
+
+        data = self.data
+        return erosion_figure(
+            factor=data.factor.values,
+            safe=data.safe.values,
+            error=data.standard_error.values,
+            x_label="factor on the motion",
+            title=title or f"{data.body} under multiples of {data.motion}, {data.model} model",
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+def safe_basin_erosion(
+    body: Body,
+    motion: Motion,
+    factors: ArrayLike,
+    positions: ArrayLike,
+    velocities: ArrayLike,
+    periods: int = 200,
+    *,
+    model: Model | None = None,
+    chattering: str | Treatment = "certified",
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> BasinErosion:
+    """Find how the safe basin of a body shrinks as a periodic motion grows.
+
+    Parameters
+    ----------
+    body : Block, or a body of `rocking.dynamics`
+        What moves; those between stops do not overturn.
+    motion : Motion
+        One period, which repeats for ever.
+    factors : array_like, shape (k,)
+        Increasing factors on the motion.
+    positions, velocities : array_like
+        Initial states, as for `basins`: the share is that of this grid.
+    periods : int
+        Most periods that a state is followed for.
+    model : {"nonlinear", "linear"}, optional
+        As for `stroboscopic_map`.
+    chattering : str or treatment
+        As for `rocking.simulate`.
+    threads : int, optional
+        Number of threads; by default one for every core.
+    progress : bool, optional
+        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+
+    Returns
+    -------
+    BasinErosion
+        Shares of the states that do not overturn.
+
+    Raises
+    ------
+    InvalidMotion
+        If the motion is none, or has no length.
+    InvalidOption
+        If an argument is out of its range.
+
+    References
+    ----------
+    J. M. T. Thompson, "Chaotic phenomena triggering the escape from a potential well", Proceedings of the Royal Society
+    A 421 (1989). S. Lenci and G. Rega, "A dynamical systems approach to the overturning of rocking blocks", Chaos,
+    Solitons and Fractals 28 (2006).
+
+    Examples
+    --------
+    >>> import numpy as np, rocking
+    >>> from rocking import dynamics
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> shaking = rocking.pulses.sine(1.0, 1.2, cycles=1)
+    >>> grid = np.linspace(-0.19, 0.19, 15), np.linspace(-0.38, 0.38, 15)
+    >>> dynamics.safe_basin_erosion(block, shaking, [1.0, 3.0, 6.0], *grid, periods=50).safe.values.round(2)
+    array([0.59, 0.44, 0.05])
+    """
+    import xarray as xr
+
+    levels = checks.increasing_numbers(factors, "factors", InvalidOption)
+    unit = one_motion(motion)
+    shares, about, cells = np.empty((len(levels), 2)), {}, 0
+    with Progress("eroding", len(levels), show=progress) as bar:
+        for k, factor in enumerate(levels):
+            scaled = unit if unit is None else unit.scaled(float(factor))
+            found = basins(
+                body,
+                scaled,  # type: ignore[arg-type]
+                positions,
+                velocities,
+                periods,
+                model=model,
+                chattering=chattering,
+                threads=threads,
+                progress=False,
+            )
+            by_name = dict(zip(found.attractor.values.tolist(), found.share.values.tolist(), strict=True))
+            shares[k] = [by_name.get(f"overturns to side {sign}", 0.0) for sign in "+-"]
+            about, cells = found.data.attrs, found.outcome.size
+            bar.advance()
+    safe: Floats = 1.0 - shares.sum(axis=1)
+    error = np.sqrt(np.maximum(safe * (1.0 - safe), 0.0) / cells)
+    return BasinErosion(
+        xr.Dataset(
+            {
+                "safe": variable("factor", safe, "share of the states that do not overturn", "1"),
+                "standard_error": variable("factor", error, "of the share, as of random states", "1"),
+                "to_plus": variable("factor", shares[:, 0], "share that overturns to side +", "1"),
+                "to_minus": variable("factor", shares[:, 1], "share that overturns to side -", "1"),
+            },
+            {"factor": variable("factor", levels, "factor on the motion", "1")},
+            {
+                "program": f"rocking {VERSION}",
+                "body": about["body"],
+                "motion": told(unit),  # type: ignore[arg-type]
+                "model": about["model"],
+                "most_periods": about["most_periods"],
+                "cells": cells,
+            },
+        )
+    )

@@ -1,0 +1,196 @@
+"""Lyapunov exponents of a body under periodic motion, from the variational equation and the saltation of each impact.
+
+Each period's derivative is multiplied with a frame of two directions that is made orthonormal again; the logarithms of
+the stretches add up (Benettin and others 1980, Mueller 1995 through impacts). Means are weighted: the weights vanish at
+both ends of the orbit, so that a frame which turns (complex multipliers) leaves next to nothing in them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.body import Body
+from rocking.constants import Model
+from rocking.dynamics.maps import stroboscopic_map
+from rocking.errors import InvalidOption
+from rocking.kernels.periodic import Fate
+from rocking.motion.motion import Motion
+from rocking.result import Result
+from rocking.tables import counted
+from rocking.treatment import Treatment
+
+#: Parts of an orbit whose means give the standard error.
+_BATCHES: Final = 20
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LyapunovExponents(Result):
+    """Lyapunov exponents of one orbit; from `lyapunov_exponents`.
+
+    Attributes
+    ----------
+    largest, smallest : float
+        Weighted mean of the logarithm, per period, of the stretch along the direction that grows fastest and of that
+        across it: minus infinity where the body comes to rest in some of the periods, NaN where it overturns.
+    standard_error : float
+        Of both, from the means of 20 consecutive parts of the orbit.
+    period : float
+        Period of the motion, s.
+    periods : int
+        How many were averaged over.
+    impacts : float
+        Impacts per period.
+    resting : float
+        Share of the periods in which the body comes to rest.
+    fate : Fate
+        What the state is in the end.
+    stretches : ndarray, shape (periods, 2)
+        Logarithms of the stretches of each period.
+    """
+
+    largest: float
+    smallest: float
+    standard_error: float
+    period: float
+    periods: int
+    impacts: float
+    resting: float
+    fate: Fate
+    stretches: Floats
+
+    @property
+    def per_second(self) -> tuple[float, float]:
+        """Largest and smallest exponent, 1/s."""
+        return self.largest / self.period, self.smallest / self.period
+
+    def summary(self) -> str:
+        over = f"over {counted(self.periods, 'period')}"
+        if np.isnan(self.largest):
+            return f"no Lyapunov exponents: the body overturns or cannot be followed {over}"
+        if np.isneginf(self.largest):
+            return (
+                f"Lyapunov exponents: minus infinity; the body comes to rest in {100.0 * self.resting:.3g} % of the "
+                f"periods, {over}"
+            )
+        said = f"{self.largest:.6g} and {self.smallest:.6g} per period (standard error {self.standard_error:.1g})"
+        return f"Lyapunov exponents: {said}, {over}, {self.impacts:.4g} impacts in each"
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "largest_per_period": self.largest,
+            "smallest_per_period": self.smallest,
+            "standard_error": self.standard_error,
+            "period_s": self.period,
+            "periods": self.periods,
+            "impacts_per_period": self.impacts,
+            "share_of_periods_with_rest": self.resting,
+            "fate": self.fate.name,
+        }
+
+
+def lyapunov_exponents(
+    body: Body,
+    motion: Motion,
+    state: ArrayLike,
+    periods: int = 1000,
+    *,
+    transient: int = 200,
+    model: Model | None = None,
+    chattering: str | Treatment = "certified",
+) -> LyapunovExponents:
+    """Lyapunov exponents of a body under periodic motion, both of them, from one orbit.
+
+    Parameters
+    ----------
+    body : Block, or a body of `rocking.dynamics`
+        What moves.
+    motion : Motion
+        One period, which repeats for ever.
+    state : array_like, shape (2,)
+        Coordinate and velocity at the start of a period.
+    periods : int
+        Number of periods that are averaged over.
+    transient : int
+        Number of periods before these, in which the direction turns to the one that grows fastest.
+    model : {"nonlinear", "linear"}, optional
+        As for `stroboscopic_map`.
+    chattering : str or treatment
+        As for `rocking.simulate`.
+
+    Returns
+    -------
+    LyapunovExponents
+        Per period, with a standard error.
+
+    Raises
+    ------
+    InvalidMotion
+        If the motion is none, or has no length.
+    InvalidOption
+        If an argument is out of its range.
+
+    Notes
+    -----
+    On a stable periodic orbit they are the logarithms of the sizes of its multipliers over its period. Their sum is the
+    mean logarithm of the contraction of areas: twice ln(restitution) for each impact, less damping times the period.
+    After a rest nothing is left of a small difference, so that both are minus infinity however rarely one comes.
+
+    References
+    ----------
+    P. C. Mueller, "Calculation of Lyapunov exponents for dynamic systems with discontinuities", Chaos, Solitons and
+    Fractals 5 (1995). S. Das and others, "Measuring quasiperiodicity", Europhysics Letters 114 (2016).
+
+    Examples
+    --------
+    A ball that hits once a period, always at one phase: the product of its multipliers is e^2, and they are complex:
+
+    >>> import math, rocking
+    >>> from rocking import dynamics
+    >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
+    >>> shaking = rocking.pulses.sine(1.3 * 10.0, 5.0, cycles=1)
+    >>> found = dynamics.lyapunov_exponents(ball, shaking, [0.1, 0.5])
+    >>> f"{found.largest:.6f} {found.smallest:.6f}, ln 0.5 = {math.log(0.5):.6f}"
+    '-0.693147 -0.693147, ln 0.5 = -0.693147'
+    """
+    strobe = stroboscopic_map(body, motion, model=model, chattering=chattering)
+    given = checks.numbers(state, "state", InvalidOption)
+    if given.shape != (2,):
+        raise InvalidOption(f"{{}} must be one pair (coordinate, velocity), not of shape {given.shape}", "state")
+    count = checks.whole(periods, "periods", InvalidOption, least=_BATCHES)
+    before = checks.whole(transient, "transient", InvalidOption, least=0)
+    logs, impacts, fate = strobe._stretches(given, before, count)
+    weights = _weights(count)
+    mean = np.array([-np.inf if np.isneginf(each).any() else weights @ each for each in logs.T])
+    return LyapunovExponents(
+        largest=float(mean[0]),
+        smallest=float(mean[1]),
+        standard_error=_standard_error(logs[:, 0]) * float(np.sqrt(count * np.sum(weights**2))),
+        period=strobe.period,
+        periods=count,
+        impacts=impacts / count,
+        resting=float(np.mean(np.isneginf(logs[:, 0]))),
+        fate=fate,
+        stretches=logs,
+    )
+
+
+def _weights(count: int) -> Floats:
+    """Weights of a mean over so many periods, all of whose derivatives vanish at both ends (Das and others 2016)."""
+    at = (np.arange(count) + 0.5) / count
+    bump = np.exp(-1.0 / (at * (1.0 - at)))
+    weights: Floats = bump / bump.sum()
+    return weights
+
+
+def _standard_error(values: Floats) -> float:
+    """Return the standard error of a plain mean, from those of consecutive parts; NaN where there is none."""
+    if not np.isfinite(values).all():
+        return float("nan")
+    means = [part.mean() for part in np.array_split(values, _BATCHES)]
+    return float(np.std(means, ddof=1) / np.sqrt(_BATCHES))

@@ -1,0 +1,294 @@
+"""Basins against plain iteration and against an integration by SciPy; their measures against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.random import default_rng
+from scipy.integrate import solve_ivp
+
+from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
+from rocking.dynamics import basin_maps
+from rocking.dynamics.attractors import Known
+
+BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+SHAKING = pulses.sine(3.5, 1.2, cycles=1)
+
+
+def drawn(seed):
+    """A body, one period of a sine, and a grid of states, over wide ranges."""
+    rng = default_rng(seed)
+    kind = seed % 5
+    e = rng.uniform(0.3, 0.95)
+    if kind < 3:
+        p, alpha = rng.uniform(1.0, 4.0), rng.uniform(0.05, 0.4)
+        body = Block.from_parameters(p=p, alpha=alpha, restitution=e)
+        omega, amplitude = rng.uniform(1.0, 8.0), rng.uniform(0.8, 3.0) * np.tan(alpha) * 9.80665
+        motion = pulses.sine(amplitude, omega * p / (2.0 * np.pi), cycles=1, phase=rng.uniform(0.0, 6.0))
+        ranges = (-alpha, alpha), (-p * alpha, p * alpha)
+        return body, motion, ranges, "nonlinear" if kind else "linear"
+    motion = pulses.sine(rng.uniform(3.0, 30.0), rng.uniform(0.5, 3.0), cycles=1)
+    if kind == 3:
+        return dynamics.BouncingBall(e), motion, ((0.0, 0.5), (0.1, 2.0)), None
+    damping, stop = rng.uniform(0.0, 0.2), rng.uniform(0.0, 0.2)
+    return dynamics.ImpactOscillator(1.0, e, damping_ratio=damping, stop=stop), motion, ((0.01, 0.3), (-1.0, 1.0)), None
+
+
+def compared(seed, cells, periods=200):
+    """Cells judged, cells whose plain iteration contradicts the basins, and those of them that are ambiguous."""
+    body, motion, (low, high), model = drawn(seed)
+    x, v = np.linspace(*low, cells), np.linspace(*high, cells)
+    found = dynamics.basins(body, motion, x, v, periods, model=model)
+    strobe = dynamics.stroboscopic_map(body, motion, model=model)
+    states = np.stack(np.meshgrid(x, v), axis=-1).reshape(-1, 2)
+    plain, fates, _ = strobe.followed(states, periods)
+    names, outcome = found.attractor.values, found.outcome.values.ravel()
+    size = np.array([np.ptp(x), np.ptp(v)])
+    judged, wrong, ambiguous = 0, 0, 0
+    for k, name in enumerate(names):
+        here = outcome == k
+        if name == "not settled":
+            continue
+        judged += np.count_nonzero(here)
+        if name.startswith("overturns"):
+            off = here & (fates != dynamics.Fate.OVERTURNED)
+        else:
+            orbit = np.stack([found.orbit_coordinate.values[k], found.orbit_velocity.values[k]], axis=-1)
+            apart = np.nanmin(np.abs((plain[:, None] - orbit) / size).max(axis=2), axis=1, initial=9.0)
+            # A slow approach is still on its way.
+            late = found.multiplier.values[k] ** ((periods - found.periods.values.ravel()) / found.period.values[k])
+            off = here & ~(apart < 1e-6 + 0.1 * late)
+        wrong += np.count_nonzero(off)
+        for state in states[off]:
+            near, near_fates, _ = strobe.followed(state + 1e-9 * size * default_rng(1).normal(size=(40, 2)), periods)
+            ambiguous += len(set(near_fates.tolist())) > 1 or np.ptp(near, axis=0).max() > 0.01 * size.min()
+    return judged, wrong, ambiguous
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(5), pytest.param(range(5, 60), marks=pytest.mark.thorough)], ids=["some", "more"]
+)
+def test_a_state_goes_where_plain_iteration_takes_it(seeds):
+    found = np.array([compared(seed, 12) for seed in seeds])
+    judged, wrong, ambiguous = found.sum(axis=0)
+    assert judged > 100 * len(seeds)
+    assert wrong == ambiguous <= judged / 1000
+
+
+def arc(block, push, side, span, start):
+    """Time and state at the end of an arc of the nonlinear block by DOP853, and which event ended it: 0, 1 or None."""
+    p, alpha, g = block.p, block.alpha, block.gravity
+
+    def rates(t, y):
+        lean = alpha - side * y[0]
+        return [y[1], -p * p * (side * math.sin(lean) + push(t) / g * math.cos(lean))]
+
+    def impact(t, y):
+        return side * y[0]
+
+    def over(t, y):
+        return abs(y[0]) - 0.5 * math.pi
+
+    impact.terminal, impact.direction, over.terminal = True, -1, True
+    found = solve_ivp(rates, span, start, "DOP853", rtol=1e-11, atol=1e-13, events=[impact, over])
+    return found.t[-1], found.y[:, -1], next((k for k in (0, 1) if len(found.t_events[k])), None)
+
+
+def integrated(block, push, period, state, periods, orbits):
+    """What becomes of a state: the sign of the side it overturns to, 2 + the number of an orbit, or None.
+
+    It has reached an orbit, given by its points, when it is within 1e-5 of one of them at the start of a period.
+    """
+    time, at, side = 0.0, np.array(state), math.copysign(1.0, state[0] or state[1])
+    for n in range(1, periods + 1):
+        while time < n * period:
+            time, at, event = arc(block, push, side, (time, n * period), at)
+            if event == 1:
+                return int(side)
+            if event == 0:
+                at, side = np.array([0.0, block.restitution * at[1]]), -side
+                if abs(at[1]) < 1e-4:
+                    return None
+        for k, orbit in enumerate(orbits):
+            if np.abs(orbit - at).max(axis=1).min() < 1e-5:
+                return k + 2
+    return None
+
+
+@pytest.mark.parametrize("count", [5, pytest.param(100, marks=pytest.mark.thorough)])
+def test_cells_drawn_at_random_go_where_an_integration_by_scipy_goes(count):
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
+    shaking = pulses.sine(2.4, 1.2, cycles=1)
+    x, v = np.linspace(-0.2, 0.2, 400), np.linspace(-0.4, 0.4, 400)
+    rng = default_rng(7)
+    strobe = dynamics.stroboscopic_map(block, shaking)
+    known = dynamics.basins(block, shaking, x[::20], v[::20])
+    orbits = [
+        np.stack([known.orbit_coordinate.values[k], known.orbit_velocity.values[k]], axis=-1)
+        for k in range(known.sizes["attractor"])
+        if known.period.values[k] > 0
+    ]
+    orbits = [orbit[np.isfinite(orbit[:, 0])] for orbit in orbits]
+    assert [len(orbit) for orbit in orbits] == [1, 3]
+
+    def push(time):
+        return 2.4 * math.sin(2.0 * math.pi * 1.2 * time)
+
+    judged = ambiguous = 0
+    for position, velocity in zip(rng.choice(x, count), rng.choice(v, count), strict=True):
+        cell = dynamics.basins(block, shaking, [position], [velocity])
+        name = str(cell.attractor.values[int(cell.outcome.values[0, 0])])
+        wanted = {
+            "overturns to side +": 1,
+            "overturns to side -": -1,
+            "period 1, 2 impacts": 2,
+            "period 3, 2 impacts": 3,
+        }
+        found = integrated(block, push, 1.0 / 1.2, (position, velocity), 200, orbits)
+        if found != wanted[name]:  # then a change by 1e-9 decides
+            near = np.array([position, velocity]) + 1e-9 * rng.normal(size=(60, 2))
+            assert len(set(strobe.followed(near, 200)[1].tolist())) > 1
+            ambiguous += 1
+        judged += 1
+    assert judged == count and ambiguous <= count / 50
+
+
+def test_the_order_of_work_and_threads_do_not_count():
+    x, v = np.linspace(-0.2, 0.2, 70), np.linspace(-0.4, 0.4, 61)
+    one, two = (dynamics.basins(BLOCK, SHAKING, x, v, threads=count) for count in (1, 3))
+    assert one.data.identical(two.data)
+    assert one.share.values.sum() == pytest.approx(1.0)
+    assert one.standard_error.values == pytest.approx(np.sqrt(one.share * (1.0 - one.share) / (70 * 61)))
+    assert np.count_nonzero(one.outcome.values < 0) == 0
+
+
+def test_an_interrupt_keeps_what_was_computed_and_a_folder_goes_on(tmp_path, monkeypatch):
+    x, v = np.linspace(-0.2, 0.2, 90), np.linspace(-0.4, 0.4, 90)
+    whole = dynamics.basins(BLOCK, SHAKING, x, v)
+    follow, calls = basin_maps._Work._follow, []
+
+    def interrupted(self, cells):
+        calls.append(len(cells))
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        follow(self, cells)
+
+    monkeypatch.setattr(basin_maps._Work, "_follow", interrupted)
+    part = dynamics.basins(BLOCK, SHAKING, x, v, folder=tmp_path / "kept")
+    reached = part.outcome.values >= 0
+    assert 1500 < np.count_nonzero(reached) == sum(calls[:2]) < reached.size
+    assert np.all(np.any(reached.reshape(45, 2, 45, 2), axis=(1, 3)))  # coarse to fine: one of each four cells
+    assert "not reached" in part.summary() and part.to_dict()["complete"] is False
+    names = part.attractor.values[part.outcome.values[reached]]
+    assert np.array_equal(names, whole.attractor.values[whole.outcome.values[reached]])
+    calls.clear()
+    again = dynamics.basins(BLOCK, SHAKING, x, v, folder=tmp_path / "kept")
+    assert sum(calls) == reached.size - np.count_nonzero(reached) and again.data.identical(whole.data)
+    calls.clear()
+    assert dynamics.basins(BLOCK, SHAKING, x, v, folder=tmp_path / "kept").data.identical(whole.data) and not calls
+    with pytest.raises(InvalidOption, match="something else"):
+        dynamics.basins(BLOCK, SHAKING, x, v, 100, folder=tmp_path / "kept")
+
+
+def test_what_rests_is_an_attractor_and_a_chaotic_state_has_not_settled():
+    still = dynamics.basins(BLOCK, pulses.sine(1.0, 1.0, cycles=1), np.linspace(-1e-3, 1e-3, 9), [0.0])
+    assert still.attractor.values.tolist() == ["rest"] and still.share.values == [1.0]
+    assert still.rests.values.tolist() == [True] and still.multiplier.values == [0.0]
+    ball = dynamics.BouncingBall(0.8, gravity=10.0)
+    chaos = dynamics.basins(ball, pulses.sine(30.0, 5.0, cycles=1), np.linspace(0.0, 0.5, 9), [0.0, 0.5])
+    assert chaos.attractor.values.tolist() == ["not settled"]
+    assert np.all(chaos.periods.values == 200) and math.isnan(chaos.multiplier.values[0])
+
+
+def test_a_neighbourhood_holds_what_enters_it():
+    judged = 0
+    for seed in (0, 2, 3, 4):
+        body, motion, (low, high), model = drawn(seed)
+        strobe = dynamics.stroboscopic_map(body, motion, model=model)
+        known = Known(strobe, np.array([np.ptp(low), np.ptp(high)]))
+        ends, fates, _ = strobe.followed(default_rng(seed).uniform(*np.transpose([low, high]), (20, 2)), 300)
+        known.settle(ends[fates != dynamics.Fate.OVERTURNED])
+        for trap, owner in zip(known.traps, known.owner, strict=True):
+            if trap[0] < 0:
+                continue
+            shape = np.linalg.cholesky(np.array([[trap[3], trap[4]], [trap[4], trap[5]]]))
+            disc = default_rng(seed).normal(size=(200, 2))
+            disc *= np.sqrt(default_rng(seed + 1).uniform(size=(200, 1))) / np.linalg.norm(disc, axis=1, keepdims=True)
+            uv = trap[1:3] + disc @ np.linalg.inv(shape)
+            states = strobe._coordinates(*uv[uv[:, 0] > 0.0].T, np.full(np.count_nonzero(uv[:, 0] > 0.0), int(trap[0])))
+            attractor = known.attractors[owner]
+            for _ in range(3):
+                states = strobe(states, attractor.period)
+                assert np.all(known.owners(states) == owner)
+            judged += len(states)
+    assert judged > 500
+
+
+def test_measures_of_a_straight_boundary_of_random_outcomes_and_of_a_cantor_set():
+    half = np.zeros((100, 100), dtype=int)
+    half[:, 52:] = 1  # two of five columns of one box in twenty
+    mixed = -(0.4 * math.log(0.4) + 0.6 * math.log(0.6))
+    assert dynamics.basin_entropy(half) == pytest.approx((mixed / 20.0, mixed), abs=1e-12)
+    assert dynamics.basin_entropy(np.ones((5, 5), dtype=int)) == (0.0, 0.0)
+    noise = default_rng(1).integers(0, 3, (500, 500))
+    whole, boundary = dynamics.basin_entropy(noise, box=20)
+    assert whole == boundary == pytest.approx(math.log(3.0) - 2.0 / (2.0 * 400.0), abs=1e-3)  # bias of 400 draws
+    assert dynamics.uncertainty_exponent(noise)[0] == pytest.approx(0.0, abs=0.01)
+    rows = np.arange(1024)
+    disc = (np.add.outer((rows - 511.5) ** 2, (rows - 511.5) ** 2) < 300.0**2).astype(int)
+    assert dynamics.uncertainty_exponent(disc)[0] == pytest.approx(1.0, abs=0.02)
+    # Gaps of the middle-third Cantor set, in three colours by turns: a boundary of dimension 1 + ln 2/ln 3.
+    cells = (np.arange(3**7) + 0.5) / 3**7
+    colour = np.zeros(cells.size, dtype=int)
+    open_ = np.ones(cells.size, dtype=bool)
+    for level in range(1, 8):
+        digit = (cells * 3**level).astype(int) % 3
+        colour[open_ & (digit == 1)] = 1 + level % 3
+        open_ &= digit != 1
+    exponent, _ = dynamics.uncertainty_exponent(np.tile(colour, (400, 1)))
+    assert exponent == pytest.approx(1.0 - math.log(2.0) / math.log(3.0), abs=0.04)
+    assert math.isnan(dynamics.uncertainty_exponent(np.ones((40, 40), dtype=int))[0])
+
+
+def test_a_safe_basin_shrinks_by_the_states_that_overturn():
+    x, v = np.linspace(-0.19, 0.19, 20), np.linspace(-0.38, 0.38, 20)
+    factors = [0.3, 1.0, 1.5]
+    found = dynamics.safe_basin_erosion(BLOCK, SHAKING, factors, x, v, 60)
+    states = np.stack(np.meshgrid(x, v), axis=-1).reshape(-1, 2)
+    for k, factor in enumerate(factors):
+        _, fates, _ = dynamics.stroboscopic_map(BLOCK, SHAKING.scaled(factor)).followed(states, 60)
+        assert found.safe.values[k] == pytest.approx(np.mean(fates != dynamics.Fate.OVERTURNED), abs=1e-12)
+    assert np.all(np.diff(found.safe.values) < 0.0)
+    assert (found.safe + found.to_plus + found.to_minus).values == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: dynamics.basins(BLOCK, None, [0.1], [0.0]), InvalidMotion, "one period"),
+        (lambda: dynamics.basins(BLOCK, SHAKING, [0.1, 0.0], [0.0]), InvalidOption, "positions must be increasing"),
+        (lambda: dynamics.basins(BLOCK, SHAKING, [0.1], []), InvalidOption, "velocities"),
+        (lambda: dynamics.basins(BLOCK, SHAKING, [0.1], [0.0], 0), InvalidOption, "periods"),
+        (lambda: dynamics.basins(dynamics.BouncingBall(0.5), SHAKING, [-1.0, 1.0], [0.0]), InvalidOption, "in front"),
+        (lambda: dynamics.basin_entropy([0, 1]), InvalidOption, "outcomes"),
+        (lambda: dynamics.basin_entropy(np.zeros((3, 3), dtype=int)), InvalidOption, "at least one box"),
+        (lambda: dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.0], [0.1], [0.0]), InvalidOption, "factors"),
+        (lambda: dynamics.safe_basin_erosion(BLOCK, None, [1.0], [0.1], [0.0]), InvalidMotion, "one period"),
+    ],
+)
+def test_wrong_input_gets_one_sentence(make, error, words):
+    with pytest.raises(error) as caught:
+        make()
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+if __name__ == "__main__":
+    import sys
+
+    total = np.zeros(3, dtype=int)
+    for number in range(int(sys.argv[1]), int(sys.argv[2])):
+        these = np.array(compared(number, 24))
+        total += these
+        if these[1]:
+            print(number, *these, flush=True)
+    print("cells", total[0], "contradicted", total[1], "ambiguous", total[2])

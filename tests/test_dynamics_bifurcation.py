@@ -1,0 +1,162 @@
+"""Bifurcation diagrams against closed forms of the ball's and the linear block's orbits, and against their own maps."""
+
+import math
+
+import numpy as np
+import pytest
+from test_dynamics_exponents import start_of_one_bounce
+
+from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
+
+G = 9.80665
+
+
+def ball_case(e):
+    return lambda ratio: (dynamics.BouncingBall(e, gravity=10.0), pulses.sine(10.0 * ratio, 5.0, cycles=1))
+
+
+def first_doubling(e, n=1):
+    """A w^2/g at which the orbit of one bounce in n periods loses its stability (Luck and Mehta 1993)."""
+    return math.hypot(n * math.pi * (1.0 - e) / (1.0 + e), 2.0 * (1.0 + e * e) / (1.0 + e) ** 2)
+
+
+@pytest.mark.parametrize(("e", "about"), [(0.5, 1.5268), (0.8, 1.0708)])
+def test_the_period_of_a_ball_doubles_where_its_closed_form_says(e, about):
+    at = first_doubling(e)
+    assert at == pytest.approx(about, abs=5e-5)
+    values = at + np.array([-0.02, -0.002, 0.002, 0.004])
+    found = dynamics.bifurcation_diagram(
+        ball_case(e), values, start_of_one_bounce(e, values[0])[0], transient=6000, kept=16
+    )
+    assert found.period.values[0, :, 0].tolist() == [1, 1, 2, 2]
+    assert found.impacts.values[0, :, 0].tolist() == [1, 1, 2, 2]
+    assert found.changes() == [(values[1], values[2], 1, 2)]
+    # The two states part as the square root of the distance from the bifurcation.
+    parted = np.ptp(found.velocity.values[0, :, 0], axis=-1)
+    assert parted[3] / parted[2] == pytest.approx(math.sqrt(2.0), rel=0.02)
+
+
+def test_an_orbit_that_is_still_settling_has_no_period():
+    """Near the doubling it comes nearer from both sides in turn, and every second state is almost the same."""
+    at = first_doubling(0.5)
+    found = dynamics.bifurcation_diagram(
+        ball_case(0.5), at - np.array([0.002, 0.0008]), start_of_one_bounce(0.5, at - 0.1)[0], transient=1500
+    )
+    states = found.velocity.values[0, 1, 0]
+    assert abs(states[-1] - states[-3]) < 1e-6 * abs(states[-1]) < abs(states[-1] - states[-2])
+    assert found.period.values[0, 1, 0] == 0
+
+
+def symmetric_states(p, alpha, e, amplitude, omega):
+    """States at the start of a period on the linear block's two orbits of one impact in each half period.
+
+    On side + it is alpha + C cosh(p s) + D sinh(p s) + K sin(omega t), s since the impact at the phase phi; half a
+    period later it is on side - and the same with other signs. Both conditions there are linear in X = K sin(phi) and
+    Y = K omega cos(phi), which lie on an ellipse.
+    """
+    K = p * p * amplitude / G / (p * p + omega * omega)
+    S = math.pi / omega
+    ch, sh = math.cosh(p * S), math.sinh(p * S)
+    # D = (X (1 + ch) + alpha (ch - 1))/sh; (1 - e) Y = e p (alpha + X) sh - p D (1 + e ch)
+    slope = (e * p * sh - p * (1.0 + ch) / sh * (1.0 + e * ch)) / (1.0 - e)
+    offset = (e * p * alpha * sh - p * alpha * (ch - 1.0) / sh * (1.0 + e * ch)) / (1.0 - e)
+    roots = np.roots([slope**2 + omega**2, 2.0 * slope * offset, offset**2 - (K * omega) ** 2])
+    states = []
+    for X in roots[np.isreal(roots)].real:
+        Y = slope * X + offset
+        start = (math.atan2(X, Y / omega) % (2.0 * math.pi)) / omega
+        D = (X * (1.0 + ch) + alpha * (ch - 1.0)) / sh
+        s, t, sign = 2.0 * S - start, 2.0 * S, 1.0
+        if s > S:
+            s, t, sign = s - S, t - S, -1.0
+        C = -alpha - X
+        theta = alpha + C * math.cosh(p * s) + D * math.sinh(p * s) + K * math.sin(omega * t)
+        rate = p * (C * math.sinh(p * s) + D * math.cosh(p * s)) + K * omega * math.cos(omega * t)
+        states.append((sign * theta, sign * rate))
+    return np.array(states)
+
+
+def test_a_linear_block_follows_its_symmetric_orbit():
+    p, alpha, e, omega = 2.0, 0.2, 0.9, 7.5
+    block = Block.from_parameters(p=p, alpha=alpha, restitution=e)
+    values = np.linspace(0.5, 6.0, 40)
+    found = dynamics.bifurcation_diagram(
+        lambda ratio: (block, pulses.sine(ratio * G * alpha, omega / (2.0 * math.pi), cycles=1)),
+        values, [0.02, 0.1], transient=400, kept=4, model="linear", direction="both",
+    )  # fmt: skip
+    judged = 0
+    for way in range(2):
+        for k, ratio in enumerate(values):
+            if found.period.values[way, k, 0] != 1 or found.impacts.values[way, k, 0] != 2:
+                continue
+            state = [found.coordinate.values[way, k, 0, -1], found.velocity.values[way, k, 0, -1]]
+            closed = symmetric_states(p, alpha, e, ratio * G * alpha, omega)
+            assert np.abs(closed - state).max(axis=1).min() < 1e-10
+            judged += 1
+    assert judged > 50
+
+
+def test_going_up_and_down_keep_what_they_are_on():
+    """Under a weak motion a ball that rests goes on resting, and one that bounces goes on bouncing."""
+    values = np.linspace(0.5, 0.98, 13)
+    for direction, first in (("up", values[0]), ("down", values[-1])):
+        starts = [[0.0, 0.0], start_of_one_bounce(0.8, first)[0]]
+        found = dynamics.bifurcation_diagram(ball_case(0.8), values, starts, direction=direction)
+        assert np.all(found.coordinate.values[0, :, 0] == 0.0) and np.all(found.impacts.values[0, :, 0] == 0)
+        assert np.all(found.impacts.values[0, :, 1] == 1)
+        expected = np.array([start_of_one_bounce(0.8, value)[0] for value in values])
+        assert found.coordinate.values[0, :, 1, -1] == pytest.approx(expected[:, 0], abs=1e-9)
+        assert found.velocity.values[0, :, 1, -1] == pytest.approx(expected[:, 1], abs=1e-8)
+
+
+def test_kept_states_are_those_of_the_map_after_its_transient():
+    values = [1.2, 1.7, 2.5]
+    afresh = dynamics.bifurcation_diagram(ball_case(0.5), values, [0.1, 0.5], direction="afresh", transient=30, kept=7)
+    up = dynamics.bifurcation_diagram(ball_case(0.5), values, [0.1, 0.5], transient=30, kept=7)
+    state = np.array([0.1, 0.5])
+    for k, value in enumerate(values):
+        strobe = dynamics.stroboscopic_map(*ball_case(0.5)(value))
+        kept = strobe.orbit(strobe([0.1, 0.5], 30), 7)[1:]
+        assert np.array_equal(np.stack([afresh.coordinate[0, k, 0], afresh.velocity[0, k, 0]], axis=-1), kept)
+        going = strobe.orbit(strobe(state, 30), 7)[1:]
+        assert np.array_equal(np.stack([up.coordinate[0, k, 0], up.velocity[0, k, 0]], axis=-1), going)
+        state = going[-1]
+
+
+def test_a_block_that_overturns_leaves_a_gap_and_starts_again():
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    found = dynamics.bifurcation_diagram(
+        lambda a: (block, pulses.sine(a, 0.8, cycles=1)), [1.0, 9.0, 30.0], [0.0, 0.0], direction="down"
+    )
+    assert found.period.values[0, :, 0].tolist() == [1, -1, -1]
+    assert np.isnan(found.coordinate.values[0, 1:]).all() and "overturned" in found.summary()
+    assert found.changes() == [(9.0, 1.0, -1, 1)]
+
+
+def test_a_stop_that_moves_takes_the_body_with_it():
+    found = dynamics.bifurcation_diagram(
+        lambda stop: (dynamics.ImpactOscillator(1.0, 0.7, stop=stop), pulses.sine(1.0, 0.7, cycles=1)),
+        [-0.3, -0.2, 0.0], [0.4, 0.0], direction="down", transient=50,
+    )  # fmt: skip
+    assert np.all(found.coordinate.values[0, :, 0].min(axis=-1) >= np.array([0.3, 0.2, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"case": 3}, InvalidOption, "function of the parameter"),
+        ({"case": lambda value: value}, InvalidOption, "must return a body"),
+        ({"case": lambda value: (dynamics.BouncingBall(0.5), None)}, InvalidMotion, "one period"),
+        ({"values": [2.0, 1.0]}, InvalidOption, "increasing"),
+        ({"starts": [0.1]}, InvalidOption, "pair"),
+        ({"starts": [-0.1, 0.0]}, InvalidOption, "in front"),
+        ({"direction": "sideways"}, InvalidOption, "direction"),
+        ({"kept": 1}, InvalidOption, "kept"),
+        ({"transient": -1}, InvalidOption, "transient"),
+    ],
+)
+def test_wrong_input_gets_one_sentence(change, error, words):
+    given = {"case": ball_case(0.5), "values": [1.0, 2.0], "starts": [0.1, 0.5]} | change
+    with pytest.raises(error, match=words) as caught:
+        dynamics.bifurcation_diagram(given.pop("case"), given.pop("values"), given.pop("starts"), **given)
+    assert "\n" not in str(caught.value)
