@@ -36,6 +36,7 @@ for _module, _commands in {
     "analysis": ("spectrum", "map", "ida", "measures"),
     "fits": ("fragility", "calibrate"),
     "explore": ("explore",),
+    "orbits": ("orbits",),
 }.items():
     _lines = _lines_of(_module)
     for _command in _commands:
