@@ -271,6 +271,20 @@ def test_grazing_is_found_from_both_sides():
     assert judged == 2
 
 
+def test_orbits_with_an_impact_more_begin_where_those_with_one_less_end():
+    family = table_of(dynamics.BouncingBall(0.5, gravity=G))
+    found = {}
+    for orbit in dynamics.periodic_orbits(*family(1.6)):
+        if orbit.impacts in (1.0, 2.0) and orbit.multipliers[0].real > 0.0:
+            branch = dynamics.continue_orbit(orbit, family, 1.6, (1.0, 3.0))
+            found[orbit.impacts] = [(each.kind, each.value) for each in branch.bifurcations]
+    # A multiplier changes its sign through infinity there: no bifurcation of another name is found.
+    assert sorted(kind for kind, _ in found[1.0]) == ["flip", "fold", "grazing"]
+    assert sorted(kind for kind, _ in found[2.0]) == ["flip", "fold", "grazing", "grazing"]
+    once, twice = (max(value for kind, value in found[k] if kind == "grazing") for k in (1.0, 2.0))
+    assert once == pytest.approx(twice, abs=1e-9)
+
+
 def test_chattering_ceases_to_be_complete_at_the_critical_amplitude_and_rest_ends_at_uplift():
     body, shaking = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), 0.8
     lifts = body.uplift_thresholds("linear")[0]

@@ -92,9 +92,6 @@ _LOOKS: Final = 64
 _REFINED: Final = 40
 _GRAZES: Final = 1e-4
 
-#: Sum of multipliers that changes its sign through infinity, at an impact without speed, where it is that large.
-_POLE: Final = 100.0
-
 #: Speed of the slowest impact, over the scale, from which grazing is extrapolated, and points for that.
 _SLOW: Final = 2e-3
 _EXTRAPOLATED: Final = 6
@@ -651,9 +648,9 @@ class _Tracer:
         # Far from the prediction it is another branch.
         if np.linalg.norm(new - z) > 2.0 * step or _tangent(jacobian, tangent) @ tangent < _COSINE:
             return None
-        sums = before.minus - before.plus, 2.0 * float(np.trace(change))
-        if sums[0] * sums[1] < 0.0 and min(map(abs, sums)) > _POLE:
-            return None
+        after = self.tests(change, tangent)
+        if before.plus * after.plus < 0.0 and before.minus * after.minus < 0.0:
+            return None  # A multiplier passes 1 and -1, or changes its sign through infinity, where an impact grazes.
         state, value = new[:2] * self.sizes[:2], float(new[2] * self.sizes[2])
         if self._kind_of(self.strobe(value, turn), state) != self.kind:
             return None
