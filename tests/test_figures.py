@@ -14,6 +14,7 @@ from rocking.plot.fragility import FragilityLine, fragility_figure
 from rocking.plot.histories import intervals_figure
 from rocking.plot.ida import ScaledMotion, ida_figure, levels_reaching
 from rocking.plot.maps import outcome_figure, regions_figure
+from rocking.plot.orbits import branch_figure, orbit_figure
 from rocking.plot.response import DrawnSequence, response_figure
 from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
 from rocking.plot.schemes import SchemeCurve, schemes_figure
@@ -176,6 +177,20 @@ def bifurcation_of(**options):
     return bifurcation_figure(value=value, states=states, overturned=value > 1.9, **(texts | options))
 
 
+def orbit_of(**options):
+    time = np.linspace(0.0, 2.0, 400)
+    arrays = {"coordinate": 0.1 * np.sin(np.pi * time), "velocity": 0.3 * np.cos(np.pi * time)}
+    texts = {"labels": ("rotation (rad)", "velocity (rad/s)"), "states": np.array([[0.0, 0.3], [0.0, -0.3]])}
+    return orbit_figure(time=time, impact_times=time[[100, 300]], **arrays, **(texts | options))
+
+
+def branch_of(**options):
+    s = np.linspace(-1.0, 1.0, 60)
+    marks = [("fold", 3.0, 0.2), ("symmetry breaking", 3.6, 0.31), ("loss of complete chattering", 3.9, 0.02)]
+    texts = {"marks": marks, "labels": ("peak ground acceleration (m/s²)", "largest rotation (rad)")}
+    return branch_figure(values=3.0 + s * s, peaks=0.2 + 0.18 * s, stable=s > 0.0, **(texts | options))
+
+
 FIGURES = {
     "schemes": (schemes_of, 5.4),
     "basins": (basins_of, 4.8),
@@ -195,6 +210,8 @@ FIGURES = {
     "survival": (survival_of, 3.6),
     "map": (map_of, 3.8),
     "outcomes": (outcomes_of, 3.8),
+    "orbit": (orbit_of, 3.8),
+    "branch": (branch_of, 3.8),
 }
 
 

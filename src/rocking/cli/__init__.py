@@ -38,6 +38,7 @@ for _module, _commands in {
     "dynamics": ("bifurcation", "basin"),
     "fits": ("fragility", "calibrate"),
     "explore": ("explore",),
+    "orbits": ("orbits",),
 }.items():
     _lines = _lines_of(_module)
     for _command in _commands:

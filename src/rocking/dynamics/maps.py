@@ -90,8 +90,42 @@ class _Repeated:
         found[side < 0] = np.stack([stops, np.zeros_like(stops)], axis=-1)[side < 0]
         return found + 0.0
 
+    def _known(self, made: state.Records) -> Floats:
+        """Coordinates and velocities of states; NaN of those that are not known."""
+        found = self._coordinates(made["u"], made["v"], made["side"])
+        found[np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))] = np.nan
+        return found
+
     def _signs(self, side: Integers) -> Floats:
         return np.where(side > 0, -1.0, 1.0)
+
+    @property
+    def _is_two_sided(self) -> bool:
+        """Whether the coordinate passes zero, or there is a second stop."""
+        record = self._records[0]
+        return bool(record["facing"] or record["entered"][0] == 1)
+
+    def _pairs_of_impacts(self, impacts: ArrayLike) -> Floats:
+        given = checks.numbers(impacts, "impacts", InvalidOption)
+        if given.ndim == 0 or given.shape[-1] != 2:
+            raise InvalidOption("{} must hold pairs (phase in s, velocity) along the last axis", "impacts")
+        return given
+
+    def _after_impacts(self, flat: Floats) -> state.Records:
+        record, made = self._records[0], state.new_states(len(flat), 0)
+        phase = np.mod(flat[:, 0], self.period)
+        starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
+        made["piece"] = np.searchsorted(starts, phase, side="right") - 1
+        made["offset"] = phase - starts[made["piece"]]
+        made["side"] = np.where(self._directions(flat[:, 1]) < 0.0, 1, 0)
+        made["v"] = np.abs(flat[:, 1])
+        if np.any(flat[:, 1] == 0.0) or (not self._is_two_sided and np.any(flat[:, 1] < 0.0)):
+            raise InvalidOption("every velocity in {} must lead away from the stop that was hit", "impacts")
+        made["peak"] = record["fallen"] if np.isinf(record["fallen"]) else record["fallen"] * _ALMOST
+        return made
+
+    def _directions(self, velocity: Floats) -> Floats:
+        return np.where(velocity < 0.0, -1.0, 1.0)
 
 
 class StroboscopicMap(_Repeated):
@@ -202,10 +236,8 @@ class StroboscopicMap(_Repeated):
         given, made = self._states(states)
         shape = given.shape[:-1]
         self._iterate(made, checks.whole(periods, "periods", InvalidOption, least=1), np.empty((len(made), 0, 3)))
-        found = self._coordinates(made["u"], made["v"], made["side"])
-        found[np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))] = np.nan
         return (
-            found.reshape(given.shape),
+            self._known(made).reshape(given.shape),
             np.array(made["ending"]).reshape(shape),
             np.array(made["impacts"]).reshape(shape),
         )
@@ -255,6 +287,37 @@ class StroboscopicMap(_Repeated):
         found = self._coordinates(made["u"], made["v"], made["side"])
         found[ended > 0] = total[ended > 0] = np.nan
         return found.reshape(given.shape), total.reshape(*given.shape, 2)
+
+    def from_impacts(self, impacts: ArrayLike) -> Floats:
+        """Return the states at the end of the period in which bodies leave impacts.
+
+        Parameters
+        ----------
+        impacts : array_like, shape (..., 2)
+            Time since the start of the period, s, and velocity just after the impact, as for an `ImpactMap`.
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            States at the start of the next period; NaN where the body overturns before.
+
+        Raises
+        ------
+        InvalidOption
+            If the impacts have another shape, or a velocity does not lead away from its stop.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> from rocking import dynamics
+        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), rocking.pulses.sine(15.0, 5.0, cycles=1)
+        >>> dynamics.stroboscopic_map(ball, table).from_impacts([0.05, 1.0]).shape
+        (2,)
+        """
+        given = self._pairs_of_impacts(impacts)
+        made = self._after_impacts(given.reshape(-1, 2))
+        self._iterate(made, 1, np.empty((len(made), 0, 3)))
+        return self._known(made).reshape(given.shape)
 
     def _iterate(self, made: state.Records, periods: int, rows: Floats) -> None:
         announce(SIMULATIONS)
@@ -346,9 +409,7 @@ class ImpactMap(_Repeated):
         >>> change.shape
         (2, 2)
         """
-        given = checks.numbers(impacts, "impacts", InvalidOption)
-        if given.ndim == 0 or given.shape[-1] != 2:
-            raise InvalidOption("{} must hold pairs (phase in s, velocity) along the last axis", "impacts")
+        given = self._pairs_of_impacts(impacts)
         flat = given.reshape(-1, 2)
         made = self._after_impacts(flat)
         start = self._rates(made)
@@ -370,23 +431,6 @@ class ImpactMap(_Repeated):
         total *= ends[:, :, None] * signs[:, None, :]
         found[lost] = total[lost] = np.nan
         return found.reshape(given.shape), total.reshape(*given.shape, 2)
-
-    def _after_impacts(self, flat: Floats) -> state.Records:
-        record, made = self._records[0], state.new_states(len(flat), 0)
-        phase = np.mod(flat[:, 0], self.period)
-        starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
-        made["piece"] = np.searchsorted(starts, phase, side="right") - 1
-        made["offset"] = phase - starts[made["piece"]]
-        made["side"] = np.where(self._directions(flat[:, 1]) < 0.0, 1, 0)
-        made["v"] = np.abs(flat[:, 1])
-        one_stop = record["entered"][0] == 0 and not record["facing"]
-        if np.any(flat[:, 1] == 0.0) or (one_stop and np.any(flat[:, 1] < 0.0)):
-            raise InvalidOption("every velocity in {} must lead away from the stop that was hit", "impacts")
-        made["peak"] = record["fallen"] if np.isinf(record["fallen"]) else record["fallen"] * _ALMOST
-        return made
-
-    def _directions(self, velocity: Floats) -> Floats:
-        return np.where(velocity < 0.0, -1.0, 1.0)
 
     def _velocities(self, made: state.Records) -> Floats:
         velocities: Floats = self._signs(made["side"]) * made["v"]
@@ -492,14 +536,14 @@ def model_of(body: Body, model: Model | None) -> Model:
     return model if model is not None else ("nonlinear" if isinstance(body, Block) else "linear")
 
 
-def repeated(motion: Motion, gravity: float) -> Ground:
-    """Ground of a motion that repeats for ever: twice, and behind that what lifts any body off either side."""
+def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
+    """Ground of a motion that repeats for ever, with this sign: twice, and behind that what lifts any body."""
     breaks = motion.breakpoints - motion.breakpoints[0]
     period, columns = breaks[-1], motion.coefficients.shape[1]
     beyond = np.zeros((2, columns))
     beyond[:, 0] = _BEYOND_ALL * gravity, -_BEYOND_ALL * gravity
     breakpoints = np.concatenate([breaks, period + breaks[1:], [3.0 * period, 4.0 * period]])
-    coefficients = np.concatenate([motion.coefficients, motion.coefficients, beyond])
+    coefficients = np.concatenate([motion.coefficients, sign * motion.coefficients, beyond])
     return ground_of(breakpoints, coefficients, 1.0 / gravity, motion.error)
 
 

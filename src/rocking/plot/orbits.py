@@ -1,0 +1,107 @@
+"""Periodic orbits in the phase plane and over time, and branches of them along a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from rocking.arrays import Flags, Floats
+from rocking.plot.canvas import ABOVE, GROUND, INK, add_labels, add_legend, figure_for, handles_of, write
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: How stable and unstable orbits are drawn.
+_STABLE: Final[dict[str, Any]] = {"color": INK, "linewidth": 1.4, "linestyle": "-"}
+_UNSTABLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (4, 2))}
+
+#: Room above a branch for the words at its marks, over its height.
+_ROOM: Final = 0.12
+
+
+def orbit_figure(
+    *,
+    time: Floats,
+    coordinate: Floats,
+    velocity: Floats,
+    impact_times: Floats,
+    states: Floats,
+    labels: tuple[str, str],
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw a periodic orbit: velocity against coordinate with its impacts, and the coordinate over time.
+
+    Times are in periods of the motion, with one just before and one at each impact; `states` are those at the starts of
+    periods; `labels` name coordinate and velocity. In `ax`, the phase plane is drawn alone.
+    """
+    with figure_for(ax, (7.0, 3.2), figsize, title) as figure:
+        plane, history = (ax, None) if ax is not None else figure.subplots(1, 2)
+        # Arcs end at impacts: a jump of the velocity is no part of the course.
+        at = np.searchsorted(time, impact_times)
+        x, v = (np.insert(each, at, np.nan) for each in (coordinate, velocity))
+        plane.plot(x, v, label="orbit", **_STABLE)
+        before = np.maximum(at - 1, 0)
+        for k, (first, second) in enumerate(zip(before, np.minimum(at, len(time) - 1), strict=True)):
+            look: dict[str, Any] = {
+                "color": ABOVE,
+                "linewidth": 0.8,
+                "linestyle": (0, (1, 1.5)),
+                "label": "impact" if k == 0 else None,
+            }
+            plane.plot(coordinate[[first, second]], velocity[[first, second]], **look)
+        start: dict[str, Any] = {
+            "color": INK,
+            "markersize": 5.0,
+            "markerfacecolor": "white",
+            "label": "start of a period",
+        }
+        plane.plot(states[:, 0], states[:, 1], "o", zorder=4, **start)
+        add_labels(plane, *labels)
+        if history is not None:
+            history.plot(time, coordinate, **_STABLE)
+            heights = np.interp(impact_times, time, coordinate)
+            history.plot(impact_times, heights, "|", color=ABOVE, markersize=8.0, markeredgewidth=1.0)
+            history.set_xlim(time[0], time[-1])
+            add_labels(history, "time (periods of the motion)", labels[0])
+        add_legend(figure, ax, handles_of(plane))
+    return figure
+
+
+def branch_figure(
+    *,
+    values: Floats,
+    peaks: Floats,
+    stable: Flags,
+    marks: Sequence[tuple[str, float, float]],
+    labels: tuple[str, str],
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw a branch of periodic orbits: stable ones as full lines, unstable ones dashed, bifurcations with their names.
+
+    `marks` are names of bifurcations, with the parameter and the peak there.
+    """
+    with figure_for(ax, (5.2, 3.6), figsize, title) as figure:
+        axes = figure.add_subplot() if ax is None else ax
+        for chosen, name, style in ((stable, "stable", _STABLE), (~stable, "unstable", _UNSTABLE)):
+            # Dashes reach to the points where full lines begin.
+            joined = chosen | np.append(chosen[1:], False) | np.insert(chosen[:-1], 0, False)
+            shown = chosen if name == "stable" else joined
+            if np.any(chosen):
+                axes.plot(np.where(shown, values, np.nan), np.where(shown, peaks, np.nan), label=name, **style)
+        low, high = float(values.min()), float(values.max())
+        for k, (name, value, peak) in enumerate(marks):
+            axes.plot([value], [peak], "o", color=INK, markersize=4.0, markerfacecolor=GROUND, zorder=4)
+            left = value > 0.5 * (low + high)
+            up = 4 if k % 2 == 0 else -10
+            write(axes, name, (value, peak), (-5 if left else 5, up), ha="right" if left else "left", fontsize=7.5)
+        axes.margins(x=0.04, y=_ROOM)
+        add_labels(axes, *labels)
+        add_legend(figure, ax, handles_of(axes))
+    return figure

@@ -1,0 +1,62 @@
+"""`rocking orbits`: the same numbers as the functions, files for every orbit, and one line for every mistake."""
+
+import json
+
+import pytest
+
+from rocking import dynamics, pulses
+
+SINE = "sine:amplitude=12,frequency=5Hz"
+
+
+def test_orbits_are_those_of_the_functions_and_one_is_followed(run, tmp_path):
+    code, out, err = run("orbits", "--ball", 0.5, "--pulse", SINE, "--along", "amplitude:9:16", "--json",
+                         "--out", tmp_path)  # fmt: skip
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    expected = dynamics.periodic_orbits(dynamics.BouncingBall(0.5), pulses.sine(12.0, 5.0, cycles=1))
+    assert [each["position_m"] for each in result["orbits"]] == [each.state[0] for each in expected]
+    assert [each["stable"] for each in result["orbits"]] == [each.is_stable for each in expected]
+    assert result["orbits"][-1]["complete_chattering"] is True
+    kinds = [each["kind"] for each in result["branch"]["bifurcations"]]
+    assert sorted(kinds) == ["flip", "fold"]
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"branch.png", "points.csv", "bifurcations.csv", "result.json"} <= names
+    assert {f"orbit-{k}.pdf" for k in range(1, len(expected) + 1)} <= names
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        ("--oscillator", "frequency=1,restitution=0.8,stop=0.01,damping-ratio=0.05"),
+        ("--pendulum", "p=3,gap=0.1,restitution=0.6"),
+        ("--width", 0.8, "--height", 2.0, "--model", "linear"),
+    ],
+)
+def test_every_body_is_shown_in_a_table(run, body):
+    code, out, _ = run("orbits", *body, "--pulse", "sine:amplitude=3,frequency=1.3Hz")
+    assert code == 0
+    assert out.splitlines()[0].endswith(("periodic orbit", "periodic orbits"))
+    assert "largest multiplier" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--ball", 0.5, "--width", 1.0), "leave --width out"),
+        (("--ball", 0.5, "--oscillator", "frequency=1", "--restitution", 0.5), "leave --oscillator and --restitution"),
+        (("--oscillator", "frequency=1"), "--oscillator needs restitution"),
+        (("--oscillator", "frequency=1,mass=3"), "--oscillator takes NAME=VALUE"),
+        (("--pendulum", "p=many,gap=1,restitution=0.5"), "--pendulum"),
+        (("--ball", 0.5, "--along", "amplitude:1"), "--along takes a parameter"),
+        (("--ball", 0.5, "--along", "phase:0:1"), "--along takes a parameter"),
+        (("--ball", 0.5, "--along", "amplitude:9:16", "--orbit", 9), "--orbit must be from 1 to 3"),
+        (("--ball", 0.5, "--along", "amplitude:13:16"), "12"),
+        (("--ball", 0.5, "--period", 0), "--period"),
+        ((), "a block is needed"),
+    ],
+)
+def test_a_mistake_is_one_line(run, arguments, words):
+    code, out, err = run("orbits", "--pulse", SINE, *arguments)
+    assert (code, out) == (2, "")
+    assert words in err and len(err.splitlines()) == 1

@@ -1,0 +1,416 @@
+"""Periodic orbits and branches of them, against closed forms, 40 digits, and independent simulations."""
+
+import json
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from oracles import closed_orbits, exact_arcs
+
+from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
+from rocking.chattering import critical_amplitude
+
+G = 10.0
+TABLE = 5.0  # Hz
+
+BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
+OSCILLATOR = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.04, second_stop=0.04)
+
+CASES = {
+    "ball": (dynamics.BouncingBall(0.5, gravity=G), (16.0, TABLE), {}),
+    "oscillator": (dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01), (3.0, 1.3), {}),
+    "oscillator between stops": (OSCILLATOR, (5.0, 0.9), {}),
+    "pendulum": (dynamics.InvertedPendulum(3.0, 0.1, 0.7), (6.0, 0.8), {}),
+    "linear block": (BLOCK, (2.4, 1.2), {"model": "linear", "period": 3}),
+    "nonlinear block": (BLOCK, (2.4, 1.2), {}),
+}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return {
+        name: dynamics.periodic_orbits(body, pulses.sine(*motion, cycles=1), **options)
+        for name, (body, motion, options) in CASES.items()
+    }
+
+
+def test_every_orbit_comes_back_and_none_is_there_twice(found):
+    judged = 0
+    for name, orbits in found.items():
+        assert orbits, name
+        for orbit in orbits:
+            strobe = dynamics.stroboscopic_map(orbit.body, orbit.motion, model=orbit.model)
+            size = 1.0 + abs(orbit.multipliers[0])
+            assert strobe(orbit.state, orbit.period) == pytest.approx(orbit.state, abs=1e-12 * size)
+            for shorter in range(1, orbit.period):
+                assert np.max(np.abs(strobe(orbit.state, shorter) - orbit.state)) > 1e-6
+            judged += 1
+        for k, one in enumerate(orbits):
+            for other in orbits[:k]:
+                if one.period == other.period:
+                    assert all(np.max(np.abs(state - one.state)) > 1e-9 for state in other.states)
+    assert judged >= 30
+
+
+def test_multipliers_and_impacts_are_those_of_forty_digits(found):
+    judged = 0
+    for name, orbits in found.items():
+        if name == "nonlinear block":
+            continue
+        body, motion, _ = CASES[name]
+        is_block = isinstance(body, Block)
+        law = (2.0, 0.2, 0.8) if is_block else (body.law, body.restitution)
+        gravity = body.gravity if is_block else None
+        sine = exact_arcs.Sine(*motion)
+        for orbit in [each for each in orbits if not each.rests and abs(each.multipliers[0]) < 30.0][:3]:
+            end, impacts = exact_arcs.followed(law, sine, orbit.state, orbit.period, gravity)
+            assert [float(each) for each in end] == pytest.approx(orbit.state, abs=1e-12)
+            assert impacts == orbit.impacts
+            change = exact_arcs.derivative(law, sine, orbit.state, orbit.period, gravity)
+            total, product = change[0, 0] + change[1, 1], mp.det(change)
+            assert complex(orbit.multipliers.sum()) == pytest.approx(float(total), rel=1e-10, abs=1e-10)
+            assert complex(orbit.multipliers.prod()) == pytest.approx(float(product), rel=1e-9, abs=1e-12)
+            judged += 1
+    assert judged >= 10
+
+
+def test_areas_shrink_by_restitution_and_damping_alone(found):
+    judged = 0
+    for name, orbits in found.items():
+        body, _, _ = CASES[name]
+        damping = body.law.damping if not isinstance(body, Block) else 0.0
+        e = body.restitution
+        for orbit in orbits:
+            if not orbit.rests and abs(orbit.multipliers[0]) < 1e3:
+                expected = e ** (2.0 * orbit.impacts) * math.exp(-damping * orbit.duration)
+                assert complex(orbit.multipliers.prod()) == pytest.approx(expected, rel=1e-8)
+                judged += 1
+    assert judged >= 20
+
+
+def test_a_symmetric_orbit_is_its_mirror_image_half_a_period_later(found):
+    symmetric = asymmetric = 0
+    for orbits in found.values():
+        for orbit in orbits:
+            times = orbit.duration * np.linspace(0.01, 0.49, 7)
+            now, later = (orbit.response.states(times + shift)[:, 0] for shift in (0.0, 0.5 * orbit.duration))
+            assert orbit.symmetric == bool(np.all(np.abs(now + later) < 1e-7))
+            symmetric, asymmetric = symmetric + orbit.symmetric, asymmetric + (not orbit.symmetric)
+    assert symmetric >= 6 and asymmetric >= 10
+    # Where there is one side, or another restitution on each, no orbit is.
+    assert not any(orbit.symmetric for orbit in found["ball"])
+    leaning = Block.from_parameters(p=2.0, alpha=0.2, restitution=(0.8, 0.82))
+    assert not any(each.symmetric for each in dynamics.periodic_orbits(leaning, pulses.sine(2.4, 1.2, cycles=1)))
+
+
+def test_a_stable_orbit_attracts_and_an_unstable_one_repels(found):
+    stable = unstable = 0
+    for orbits in found.values():
+        for orbit in orbits:
+            largest = abs(orbit.multipliers[0])
+            if 0.9 < largest < 1.1 or orbit.rests or not 0 < orbit.impacts < 5 or largest > 50.0:
+                continue
+            strobe = dynamics.stroboscopic_map(orbit.body, orbit.motion, model=orbit.model)
+            near = orbit.state * (1.0 + 1e-7)
+            distances = np.max(np.abs(strobe.orbit(near, 12 * orbit.period)[:: orbit.period] - orbit.state), axis=1)
+            if orbit.is_stable:
+                assert distances[-1] < 0.1 * distances[0]
+                stable += 1
+            else:
+                assert np.nanmax(distances) > 5.0 * distances[0] or np.isnan(distances[-1])
+                unstable += 1
+    assert stable >= 5 and unstable >= 10
+
+
+def test_an_orbit_with_a_rest_has_multipliers_zero():
+    ball, table = dynamics.BouncingBall(0.5, gravity=G), pulses.sine(12.0, TABLE, cycles=1)
+    (rest,) = [each for each in dynamics.periodic_orbits(ball, table) if each.rests]
+    assert rest.impacts == math.inf and rest.is_stable
+    assert rest.multipliers.tolist() == [0.0, 0.0]
+    assert rest.response.events["kind"].tolist() == ["rest", "uplift"]
+    (still,) = [each for each in dynamics.periodic_orbits(ball, 0.5 * table) if each.rests]
+    assert still.state.tolist() == [0.0, 0.0] and still.impacts == 0.0
+    assert "always at rest" in still.summary()
+    # A wall on either side holds the pendulum.
+    walls = dynamics.periodic_orbits(dynamics.InvertedPendulum(3.0, 0.1, 0.5), pulses.sine(0.3, 0.8, cycles=1))
+    assert sorted(each.state[0] for each in walls if each.rests) == [-0.1, 0.1]
+
+
+def test_the_linear_response_of_an_oscillator_that_misses_its_stop_is_an_orbit():
+    body, motion = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.05), pulses.sine(1.0, 1.3, cycles=1)
+    (free,) = [each for each in dynamics.periodic_orbits(body, motion) if each.impacts == 0.0]
+    w0, w = 2.0 * math.pi, 2.6 * math.pi
+    transfer = -1.0 / complex(w0 * w0 - w * w, 2.0 * 0.05 * w0 * w)
+    assert free.state == pytest.approx([transfer.imag, w * transfer.real], abs=1e-15)
+    decay, turn = math.exp(-0.05 * w0 / 1.3), w0 * math.sqrt(1.0 - 0.05**2) / 1.3
+    expected = decay * np.exp([1j * turn, -1j * turn])
+    assert sorted(free.multipliers, key=lambda each: each.imag) == pytest.approx(
+        sorted(expected, key=lambda each: each.imag), abs=1e-13
+    )
+
+
+def test_orbits_of_a_shorter_period_are_listed_with_their_own():
+    ball, table = dynamics.BouncingBall(0.5, gravity=G), pulses.sine(15.5, TABLE, cycles=1)
+    once, twice = (dynamics.periodic_orbits(ball, table, period=period) for period in (1, 2))
+    assert {each.period for each in once} == {1} and {each.period for each in twice} == {1, 2}
+    known = [each for each in twice if each.period == 1 and each.impacts == 1.0]
+    for each in known:
+        twin = min(once, key=lambda other: np.max(np.abs(other.state - each.state)))
+        assert twin.state == pytest.approx(each.state, abs=1e-12)
+        assert twin.multipliers == pytest.approx(each.multipliers, rel=1e-10)
+    assert len(known) == 2
+
+
+def table_of(ball):
+    return lambda level: (ball, pulses.sine(level * G, TABLE, cycles=1))
+
+
+@pytest.mark.parametrize(
+    ("restitution", "n"),
+    [
+        pytest.param(e, n, marks=() if (e, n) in ((0.5, 1), (0.8, 2)) else pytest.mark.thorough)
+        for e in (0.3, 0.5, 0.8)
+        for n in (1, 2, 3)
+    ],
+)
+def test_a_ball_bounces_once_every_n_periods_between_the_levels_of_luck_and_mehta(restitution, n):
+    exact = closed_orbits.Ball(restitution, n)
+    family = table_of(dynamics.BouncingBall(restitution, gravity=G))
+    level = exact.fold + 0.6 * (exact.flip - exact.fold)
+    orbits = dynamics.periodic_orbits(*family(level), period=n)
+    once = [each for each in orbits if each.period == n and each.impacts == 1.0]
+    assert [each.is_stable for each in once].count(True) == 1
+    for each in once:
+        assert complex(each.multipliers.sum()) == pytest.approx(exact.trace(level, stable=each.is_stable), abs=1e-9)
+        assert complex(each.multipliers.prod()) == pytest.approx(restitution**2, abs=1e-9)
+    start = next(each for each in once if each.is_stable)
+    span = exact.flip - exact.fold
+    branch = dynamics.continue_orbit(start, family, level, (exact.fold - 0.1 * span, exact.flip + 0.1 * span))
+    kinds = {each.kind: each.value for each in branch.bifurcations}
+    assert kinds["fold"] == pytest.approx(exact.fold, abs=1e-10)
+    assert kinds["flip"] == pytest.approx(exact.flip, abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind"),
+    [((1.0, 0.8, 0.05, 0.01, 1.3), "fold"), ((1.0, 0.8, 0.02, 0.02, 2.2), "flip"),
+     pytest.param((1.0, 0.8, 0.05, -0.02, 2.4), "fold", marks=pytest.mark.thorough)],
+)  # fmt: skip
+def test_orbits_of_an_oscillator_that_hits_once_are_those_of_shaw_and_holmes(shape, kind):
+    frequency, e, damping, stop, shaking = shape
+    exact = closed_orbits.Oscillator(*shape)
+    k = getattr(exact, kind)
+    body = dynamics.ImpactOscillator(frequency, e, damping_ratio=damping, stop=stop)
+    assert exact.speed(k) > 0.0
+    value = exact.amplitude(k)
+    near = exact.amplitude(1.1 * k if kind == "fold" else 0.98 * k)
+
+    def family(amplitude):
+        return body, pulses.sine(amplitude, shaking, cycles=1)
+
+    once = [each for each in dynamics.periodic_orbits(*family(near)) if each.impacts == 1.0]
+    expected = [1.1 * k] if kind == "fold" else [0.98 * k]
+    for orbit in once:
+        speed = orbit.response.impacts["speed_after"][0]
+        assert exact.amplitude(speed / exact.beta) == pytest.approx(near, rel=1e-11)
+        assert complex(orbit.multipliers.sum()) == pytest.approx(exact.trace(speed / exact.beta), abs=1e-9)
+        assert complex(orbit.multipliers.prod()) == pytest.approx(exact.determinant, abs=1e-10)
+    start = min(once, key=lambda each: abs(each.response.impacts["speed_after"][0] - exact.speed(expected[0])))
+    branch = dynamics.continue_orbit(start, family, near, (0.8 * value, 1.3 * value))
+    found = [each.value for each in branch.bifurcations if each.kind == kind]
+    assert found == pytest.approx([value], abs=1e-10)
+
+
+def test_a_linear_block_that_hits_once_every_half_period_loses_stability_where_hogans_orbits_do():
+    judged = 0
+    for e, shaking, m in ((0.5, 0.8, 1), (0.8, 1.2, 3)):
+        exact = closed_orbits.Block(2.0, 0.2, e, shaking, BLOCK.gravity, m)
+        body = Block.from_parameters(p=2.0, alpha=0.2, restitution=e)
+        fold, breaking = exact.amplitude(exact.fold), exact.amplitude(exact.breaking)
+
+        def family(amplitude, body=body, shaking=shaking):
+            return body, pulses.sine(amplitude, shaking, cycles=1)
+
+        near = 0.5 * (fold + breaking)
+        orbits = dynamics.periodic_orbits(*family(near), period=m, model="linear")
+        (start,) = [each for each in orbits if each.period == m and each.symmetric and each.is_stable]
+        assert start.impacts == 2.0
+        speed = start.response.impacts["speed_after"][0]
+        assert exact.amplitude(speed) == pytest.approx(near, rel=1e-11)
+        trace = exact.trace(speed)
+        assert complex(start.multipliers.sum()) == pytest.approx(trace**2 - 2.0 * e * e, abs=1e-9)
+        branch = dynamics.continue_orbit(start, family, near, (0.9 * fold, 1.1 * breaking))
+        kinds = {each.kind: each for each in branch.bifurcations}
+        assert kinds["fold"].value == pytest.approx(fold, abs=1e-10)
+        assert kinds["symmetry breaking"].value == pytest.approx(breaking, abs=1e-10)
+        assert kinds["symmetry breaking"].orbit.symmetric
+        judged += 1
+    assert judged == 2
+
+
+def test_grazing_is_found_from_both_sides():
+    """The linear response touches the stop at a known amplitude; orbits with an impact begin there, too."""
+    body = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)
+    w0, w = 2.0 * math.pi, 2.6 * math.pi
+    exact = 0.01 * math.hypot(w0 * w0 - w * w, 2.0 * 0.05 * w0 * w)
+
+    def family(amplitude):
+        return body, pulses.sine(amplitude, 1.3, cycles=1)
+
+    start = 0.9 * exact
+    judged = 0
+    for orbit in dynamics.periodic_orbits(*family(start)):
+        if orbit.impacts == 0.0 or not orbit.is_stable:
+            branch = dynamics.continue_orbit(orbit, family, start, (0.5 * exact, 1.2 * exact))
+            (grazing,) = [each for each in branch.bifurcations if each.kind == "grazing"]
+            assert grazing.value == pytest.approx(exact, abs=1e-10 if orbit.impacts else 1e-11)
+            assert "grazing" in branch.ends
+            judged += 1
+    assert judged == 2
+
+
+def test_orbits_with_an_impact_more_begin_where_those_with_one_less_end():
+    family = table_of(dynamics.BouncingBall(0.5, gravity=G))
+    found = {}
+    for orbit in dynamics.periodic_orbits(*family(1.6)):
+        if orbit.impacts in (1.0, 2.0) and orbit.multipliers[0].real > 0.0:
+            branch = dynamics.continue_orbit(orbit, family, 1.6, (1.0, 3.0))
+            found[orbit.impacts] = [(each.kind, each.value) for each in branch.bifurcations]
+    # A multiplier changes its sign through infinity there: no bifurcation of another name is found.
+    assert sorted(kind for kind, _ in found[1.0]) == ["flip", "fold", "grazing"]
+    assert sorted(kind for kind, _ in found[2.0]) == ["flip", "fold", "grazing", "grazing"]
+    once, twice = (max(value for kind, value in found[k] if kind == "grazing") for k in (1.0, 2.0))
+    assert once == pytest.approx(twice, abs=1e-9)
+
+
+def test_chattering_ceases_to_be_complete_at_the_critical_amplitude_and_rest_ends_at_uplift():
+    body, shaking = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), 0.8
+    lifts = body.uplift_thresholds("linear")[0]
+    critical = float(critical_amplitude(2.0 * math.pi * shaking / 2.0, 0.9)) * lifts
+
+    def family(amplitude):
+        return body, pulses.sine(amplitude, shaking, cycles=1)
+
+    found = {}
+    for level in (0.95, 1.01):
+        (rest,) = [each for each in dynamics.periodic_orbits(*family(level * lifts), model="linear") if each.rests]
+        branch = dynamics.continue_orbit(rest, family, level * lifts, (0.9 * lifts, 1.5 * lifts))
+        found[level] = {each.kind: each.value for each in branch.bifurcations}
+        assert np.all(branch.is_stable)
+    assert found[0.95] == {"uplift": pytest.approx(lifts, abs=1e-11)}
+    assert found[1.01] == {
+        "uplift": pytest.approx(lifts, abs=1e-10), "loss of complete chattering": pytest.approx(critical, abs=1e-10),
+    }  # fmt: skip
+
+
+def test_a_doubled_branch_ends_at_the_flip_and_an_asymmetric_one_where_symmetry_breaks():
+    exact = closed_orbits.Ball(0.5, 1)
+    family = table_of(dynamics.BouncingBall(0.5, gravity=G))
+    orbits = dynamics.periodic_orbits(*family(1.55), period=2)
+    (twice,) = [each for each in orbits if each.period == 2 and each.is_stable]
+    doubled = dynamics.continue_orbit(twice, family, 1.55, (1.5, 1.6))
+    assert doubled.ends[0] == "flip"
+    assert doubled.bifurcations[0].value == pytest.approx(exact.flip, abs=1e-10)
+    block = closed_orbits.Block(2.0, 0.2, 0.8, 1.2, BLOCK.gravity, 3)
+    breaking = block.amplitude(block.breaking)
+
+    def rocked(amplitude):
+        return BLOCK, pulses.sine(amplitude, 1.2, cycles=1)
+
+    orbits = dynamics.periodic_orbits(*rocked(3.15), period=3, model="linear")
+    one_sided = [each for each in orbits if each.period == 3 and not each.symmetric and each.is_stable]
+    branch = dynamics.continue_orbit(one_sided[0], rocked, 3.15, (2.9, 3.2))
+    assert branch.ends[0] == "symmetry breaking"
+    assert branch.bifurcations[0].value == pytest.approx(breaking, abs=1e-9)
+    assert len(one_sided) == 2  # and its mirror image
+
+
+@pytest.fixture(scope="module")
+def branch():
+    family = table_of(dynamics.BouncingBall(0.5, gravity=G))
+    stable = next(each for each in dynamics.periodic_orbits(*family(1.2)) if each.is_stable)
+    return dynamics.continue_orbit(stable, family, 1.2, (1.0, 1.6), name="level")
+
+
+def test_points_of_a_branch_are_orbits_and_stability_changes_at_its_bifurcations(branch):
+    e, exact = 0.5, closed_orbits.Ball(0.5, 1)
+    stable = branch.is_stable
+    judged = 0
+    for k in range(0, len(branch), 7):
+        orbit = branch.orbit(k)
+        strobe = dynamics.stroboscopic_map(orbit.body, orbit.motion)
+        assert strobe(branch.states[k]) == pytest.approx(branch.states[k], abs=1e-11)
+        assert orbit.multipliers == pytest.approx(branch.multipliers[k], abs=1e-9)
+        moving = orbit.response.states(np.linspace(0.0, orbit.duration, 4001))[:, 0]
+        assert branch.peaks[k] == pytest.approx(moving.max(), rel=1e-6)
+        judged += 1
+    assert judged >= 8
+    assert np.all(branch.multipliers.prod(axis=1) == pytest.approx(e * e, abs=1e-8))
+    on_stable = (branch.values < exact.flip) & (branch.multipliers.sum(axis=1).real < 1.0 + e * e)
+    assert np.array_equal(stable, on_stable)
+    steps = np.diff(branch.values)
+    assert np.any(steps > 0.0) and np.any(steps < 0.0)  # it passes the fold
+    with pytest.raises(InvalidOption, match="one of"):
+        branch.orbit(len(branch))
+
+
+def test_results_are_written_and_drawn(branch, tmp_path):
+    orbit = branch.orbit(3)
+    for found in (orbit, branch):
+        for table in found.TABLES:
+            found.to_csv(tmp_path / "table.csv", table)
+            rows = (tmp_path / "table.csv").read_text().splitlines()
+            assert len(rows) == len(found.to_dataframe(table)) + 1 > 1
+        found.to_json(tmp_path / "result.json")
+        assert json.loads((tmp_path / "result.json").read_text())["period"] == 1
+        figure = Figure()
+        ax, other = figure.subplots(1, 2)
+        assert found.plot(ax) is figure and ax.has_data() and not other.has_data()
+        assert found.plot(figsize=(3.4, 2.7)).get_size_inches().tolist() == [3.4, 2.7]
+        assert repr(found).startswith(f"<{type(found).__name__}: ")
+        assert found.summary()
+    texts = [text.get_text() for text in branch.plot().axes[0].texts]
+    assert texts == ["fold", "flip"] or texts == ["flip", "fold"]
+    header = branch.to_dataframe("points").columns.tolist()
+    assert header[:4] == ["level", "position_m", "velocity_m_s", "peak_m"]
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: dynamics.periodic_orbits(BLOCK, None), InvalidMotion, "one period"),
+        (lambda: dynamics.periodic_orbits(BLOCK, pulses.sine(1.0, 1.0, cycles=1), period=0), InvalidOption, "period"),
+        (lambda: dynamics.periodic_orbits(BLOCK, pulses.sine(1.0, 1.0, cycles=1), starts=0), InvalidOption, "starts"),
+        (
+            lambda: dynamics.periodic_orbits(CASES["ball"][0], pulses.sine(1.0, 1.0, cycles=1), starts=[[-1.0, 0.0]]),
+            InvalidOption,
+            "in front of",
+        ),
+    ],
+)
+def test_wrong_input_gets_one_sentence(make, error, words):
+    with pytest.raises(error) as caught:
+        make()
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"value": 2.0}, "within|from|must"),
+        ({"limits": (2.0, 1.0)}, "lower, higher"),
+        ({"limits": (1.0, 1.2, 3.0)}, "lower, higher"),
+        ({"value": 1.3}, "none of what"),
+        ({"step": 0.0}, "step"),
+        ({"most": 0}, "most"),
+    ],
+)
+def test_a_branch_is_refused_in_one_sentence(branch, changes, words):
+    orbit = branch.orbit(0)
+    family = table_of(orbit.body)
+    given = {"value": float(branch.values[0]), "limits": (1.0, 1.7), "step": 0.05, "most": 5} | changes
+    with pytest.raises(InvalidOption, match=words) as caught:
+        dynamics.continue_orbit(orbit, family, given.pop("value"), given.pop("limits"), **given)
+    assert "\n" not in str(caught.value)
