@@ -206,6 +206,13 @@ def test_what_rests_is_an_attractor_and_a_chaotic_state_has_not_settled():
     assert np.all(chaos.periods.values == 200) and math.isnan(chaos.multiplier.values[0])
 
 
+def test_an_orbit_that_neither_attracts_nor_repels_is_no_attractor():
+    """Without damping and impacts every state comes back after two periods of a motion twice as fast."""
+    free = dynamics.ImpactOscillator(1.0, 0.5, stop=1.0)
+    found = dynamics.basins(free, pulses.sine(0.1, 2.0, cycles=1), np.linspace(-0.1, 0.1, 5), [0.0, 0.1], 50)
+    assert found.attractor.values.tolist() == ["not settled"]
+
+
 def test_a_neighbourhood_holds_what_enters_it():
     judged = 0
     for seed in (0, 2, 3, 4):
