@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers, evenly
 from rocking.dynamics.maps import StroboscopicMap
+from rocking.errors import InvalidOption
 from rocking.kernels.periodic import TRAP
 from rocking.kernels.state import Records
 
@@ -27,10 +28,18 @@ _RETURN: Final = 1e-6
 _STEPS: Final = 12
 _FIXED: Final = 1e-11
 
+#: Size of a multiplier that rounding may have made of 1.
+_NEUTRAL: Final = 1.0 - 1e-9
+
 #: Largest and smallest neighbourhood, over the size of the states, and how much larger the one is that is checked.
 _LARGEST: Final = 0.25
 _SMALLEST: Final = 1e-7
 _MARGIN: Final = 2.0
+
+#: Least rate of contraction that a norm is made for; most terms of its sum, and the largest of them.
+_LEAST_RATE: Final = 0.01
+_TERMS: Final = 100_000
+_LARGEST_TERM: Final = 1e12
 
 #: Where it is checked: on so many rings, at so many angles; at few angles of the outermost first.
 _RINGS: Final = 4
@@ -93,7 +102,10 @@ def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
     if returns.size == 0:
         return None
     period = int(returns[0]) + 1
-    fixed = _fixed_point(strobe, orbit[-1], period, size)
+    try:
+        fixed = _fixed_point(strobe, orbit[-1], period, size)
+    except (np.linalg.LinAlgError, InvalidOption):  # a multiplier of exactly 1; a step that leads behind a stop
+        return None
     if fixed is None:
         return None
     at, change = fixed
@@ -101,7 +113,7 @@ def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
         if period % shorter == 0 and np.abs((strobe(at, shorter) - at) / size).max() < 1e-3 * _RETURN:
             return None
     multipliers = np.linalg.eigvals(change).astype(np.complex128)
-    if np.abs(multipliers).max() >= 1.0:
+    if np.abs(multipliers).max() >= _NEUTRAL:
         return None
     _, _, impacts = strobe.followed(at, period)
     return Attractor(strobe.orbit(at, period)[:-1], multipliers, int(impacts), not change.any())
@@ -144,6 +156,8 @@ def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: 
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
     _, change = strobe.derivative(point, attractor.period)
     shape, rate = _contracting_norm(change, size)
+    if not np.isfinite(shape).all():
+        return None
     angles = 2.0 * np.pi * np.arange(_ANGLES) / _ANGLES
     rings = np.arange(1, _RINGS + 1)[:, None, None] / _RINGS
     disc = (rings * np.stack([np.cos(angles), np.sin(angles)], axis=-1)).reshape(-1, 2) @ np.linalg.inv(shape).T
@@ -161,19 +175,23 @@ def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: 
 
 
 def _contracting_norm(change: Floats, size: Floats) -> tuple[Floats, float]:
-    """Matrix L and rate such that |L M x| <= rate |L x|: L x is at least as large as x over the size of the states."""
+    """Matrix L and rate such that |L M x| <= rate |L x|: L x is at least as large as x over the size of the states.
+
+    L is not a number where the derivative is so far from its eigenvalues that rounding hides these.
+    """
     scale = np.diag(1.0 / size)
     M = scale @ change @ np.diag(size)
-    rate = float(np.sqrt(np.abs(np.linalg.eigvals(M)).max()))
+    rate = max(float(np.sqrt(np.abs(np.linalg.eigvals(M)).max())), _LEAST_RATE)
     form, power = np.eye(2), np.eye(2)
-    if rate > 0.0:
-        for _ in range(100_000):
-            power = M @ power / rate
-            term = power.T @ power
-            form = form + term
-            if np.abs(term).max() < 1e-14 * np.abs(form).max():
-                break
-    return np.linalg.cholesky(form).T @ scale, rate
+    for _ in range(_TERMS):
+        power = M @ power / rate
+        term = power.T @ power
+        form = form + term
+        if np.abs(term).max() < 1e-14 * np.abs(form).max():
+            return np.linalg.cholesky(form).T @ scale, rate
+        if np.abs(term).max() > _LARGEST_TERM:
+            break
+    return np.full((2, 2), np.nan), rate
 
 
 def _stays(
@@ -190,6 +208,8 @@ def _stays(
     if np.any(u + offsets[:, 0] >= strobe._records["fallen"][0]):
         return False
     here = offsets[u + offsets[:, 0] > 0.0]
+    if len(here) == 0:
+        return False
     samples = strobe._coordinates(u + here[:, 0], v + here[:, 1], np.full(len(here), side))
     after, changes = strobe.derivative(samples, attractor.period)
     if not np.isfinite(changes).all():
