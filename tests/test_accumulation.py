@@ -1,0 +1,123 @@
+"""The accumulation benchmark: its cases against 50 digits, its scorer, its page against the answers that are kept."""
+
+import importlib.util
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from mpmath import mp
+from oracles.accumulation import Followed
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / "benchmarks" / "accumulation"
+CASES = {case["name"]: case for case in json.loads((FOLDER / "cases.json").read_text("utf-8"))}
+ANSWERS = sorted((FOLDER / "answers").glob("*.json"))
+
+#: Followed by every run of the tests: those of which few impacts have to be followed.
+QUICK = [name for name, case in CASES.items() if case["restitution"] < 0.6][2::4]
+
+
+def loaded(name):
+    specification = importlib.util.spec_from_file_location(f"accumulation_{name}", FOLDER / f"{name}.py")
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def score():
+    return loaded("score")
+
+
+def judged(names):
+    """Compare cases with 50 digits; returns how many rests and impacts were compared."""
+    rests = impacts = 0
+    with mp.workdps(50):
+        for name in names:
+            case, known = CASES[name], Followed(CASES[name])
+            assert len(known.rests) == len(case["rests"]), name
+            for row, time in zip(case["rests"], known.rests, strict=True):
+                assert row["lower"] <= time <= row["upper"], name
+                assert row["upper"] - row["lower"] < 1e-10
+                assert abs(row["time"] - time) < 2e-12, name
+                rests += 1
+            assert case["count"] in (None, len(known.impacts)), name
+            for time, exact in zip(case["impacts"], known.impacts, strict=False):
+                # Rounding grows from impact to impact: most in pendulum-never-1, to 3.1e-9 s.
+                assert abs(time - exact) < 4e-9, name
+                impacts += 1
+    return rests, impacts
+
+
+def test_brackets_hold_the_rests_of_50_digits():
+    rests, impacts = judged(QUICK)
+    assert len(QUICK) >= 11 and rests > 25 and impacts > 80
+
+
+@pytest.mark.slow
+def test_all_brackets_hold_the_rests_of_50_digits():
+    rests, impacts = judged(CASES)
+    assert rests == sum(len(case["rests"]) for case in CASES.values()) > 200 and impacts > 1500
+
+
+def test_there_are_a_hundred_cases_from_easy_to_cruel():
+    assert len(CASES) == 100
+    counts = {(case["body"], case["family"]) for case in CASES.values()}
+    assert len(counts) == 4 * 7
+    assert max(case["restitution"] for case in CASES.values()) == 0.99
+    assert sum(not case["rests"] for case in CASES.values()) >= 4
+    assert sum(len(case["rests"]) > 1 for case in CASES.values()) >= 20
+
+
+def test_the_cases_are_what_is_computed_today():
+    made = loaded("make_cases")
+    for case in CASES.values():
+        found, rests = made.solved(case), made.bracketed(case)
+        assert found["impacts"] == pytest.approx(case["impacts"], abs=1e-8)
+        assert (found["count"], len(rests)) == (case["count"], len(case["rests"]))
+        assert [row["time"] for row in rests] == pytest.approx([row["time"] for row in case["rests"]], abs=1e-10)
+
+
+def test_the_scorer_tells_right_from_wrong(score):
+    case = {
+        "impacts": [1.0, 1.5, 1.75],
+        "rests": [{"time": 2.0, "lower": 2.0 - 1e-12, "upper": 2.0 + 1e-12}],
+    }
+    right = {"impacts": [1.0, 1.5, 1.75, 1.9], "rests": [2.0], "penetration": 0.0, "seconds": 1.0}
+    assert score.scored(case, None).verdict == "no answer"
+    assert score.scored(case, right)[:3] == (0.0, 0, 0)
+    late = score.scored(case, right | {"rests": [2.02], "impacts": [1.0, 1.2, 1.75]})
+    assert (late.verdict, late.missed, late.extra) == ("wrong", 1, 1)
+    assert late.error == pytest.approx(0.02, rel=1e-6)
+    assert score.scored(case, right | {"rests": [2.0, 3.0]}).verdict == "wrong"
+    assert score.scored(case, right | {"rests": []}).verdict == "wrong"
+    never = case | {"rests": []}
+    assert score.scored(never, right | {"rests": []}).verdict == "right"
+    assert score.scored(never, right | {"rests": [], "impacts": [1.0]}).verdict == "wrong"
+
+
+def test_the_page_shows_what_the_answers_are_worth(score):
+    programs, cases = score.read([])
+    assert len(programs) == len(ANSWERS) >= 2
+    tables = ROOT / "docs" / "_tables"
+    assert (tables / "accumulation.txt").read_text("utf-8") == score.main_table(programs, cases)
+    assert (tables / "accumulation-families.txt").read_text("utf-8") == score.family_table(programs, cases)
+    page = (ROOT / "docs" / "accumulation.md").read_text("utf-8")
+    assert set(re.findall(r"_tables/(\S+)", page)) == {"accumulation.txt", "accumulation-families.txt"}
+    assert (ROOT / "docs" / "_static" / "accumulation.png").is_file()
+    for program in programs:
+        assert program["settings"] in " ".join(page.split()) or program["program"] == "rocking"
+
+
+def test_a_program_of_any_name_can_be_scored(score, tmp_path, monkeypatch, capsys):
+    own = {"program": "own", "version": "1", "answers": {name: {"impacts": [], "rests": []} for name in [*CASES][:2]}}
+    path = tmp_path / "own.json"
+    path.write_text(json.dumps(own), "utf-8")
+    monkeypatch.setattr(sys, "argv", ["score.py", str(path)])
+    score.main()
+    assert "| own 1 | 2 | 0 | 0 | 0 | wrong |" in capsys.readouterr().out
+    path.write_text(json.dumps(own | {"answers": {"nothing": {"impacts": [], "rests": []}}}), "utf-8")
+    with pytest.raises(SystemExit, match="there are not: nothing"):
+        score.main()
