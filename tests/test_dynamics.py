@@ -131,6 +131,7 @@ def test_a_body_rests_at_the_stop_where_it_came_to_rest():
     for start, wall in ((0.02, 0.1), (-0.02, -0.1)):
         found = dynamics.simulate(pendulum, None, initial_position=start)
         assert found.position(found.duration) == wall
+        assert not found.ambiguous
         assert found.velocity(found.duration) == 0.0
     # The support pulls it off one wall, and only off that one.
     push = rocking.pulses.one_sine(1.2 * 9.0 * 0.1, 0.3)

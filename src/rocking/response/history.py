@@ -172,7 +172,8 @@ def ambiguities(found: Sensitivity, peak_rotation: float, near_ties: int) -> tup
     """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly."""
     peak, *times = (_ULP * _total(values, QUANTITIES) for values in (found.peak, found.events, found.impacts))
     known = {
-        "peak": bool(np.all(peak <= AMBIGUITY * max(peak_rotation, 1e-300))),
+        # A body between two stops has no peak that could be unknown.
+        "peak": math.isnan(peak_rotation) or bool(np.all(peak <= AMBIGUITY * max(peak_rotation, 1e-300))),
         "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
         "touch": near_ties == 0,
     }
