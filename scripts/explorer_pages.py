@@ -23,10 +23,16 @@ IMAGES = Path(__file__).resolve().parents[1] / "docs" / "_static"
 
 STATUE = "width=0.24&height=1.1&motion=ridgecrest-clc-090&pga=0.4g"
 SINE = "width=0.24&height=1.1&motion=sine:amplitude%3D0.2247g,frequency%3D1.15,cycles%3D2.5"
+#: Near an orbit of two periods; from rest the block overturns.
+DOUBLED = (
+    "width=0.24&height=1.1&restitution=0.5&motion=sine:amplitude%3D1.48g,frequency%3D2,cycles%3D10"
+    "&initial_rotation=-0.0872&initial_velocity=1.06"
+)
 VIEWS = {
     "response": STATUE,
     "block": f"view=block&{STATUE}&from=230.6&to=236",
     "map": f"view=map&{SINE}",
+    "periodic": f"view=periodic&{DOUBLED}",
     "compare": f"view=compare&{STATUE}",
 }
 WIDTHS = {"wide": (1280, 1000), "narrow": (390, 844)}
@@ -63,7 +69,11 @@ def main() -> None:
 def visit(page: Page, link: str, view: str) -> None:
     """Open a view and wait until all of it is drawn."""
     page.goto(link)
-    ready = {"map": "document.body.dataset.map === 'complete'", "compare": "document.querySelector('#schemes td')"}
+    ready = {
+        "map": "document.body.dataset.map === 'complete'",
+        "periodic": "document.body.dataset.sweep === 'complete'",
+        "compare": "document.querySelector('#schemes td')",
+    }
     wait(page, f"document.body.dataset.rested && {ready.get(view, 'true')}")
     if view == "block":
         scrub(page, 0.38)

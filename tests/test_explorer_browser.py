@@ -3,6 +3,7 @@
 import http.server
 import json
 import math
+import runpy
 import shlex
 import subprocess
 import sys
@@ -28,7 +29,7 @@ SINE = "p=2&alpha=0.2&restitution=0.92&motion=sine:amplitude%3D2.02,frequency%3D
 DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
 #: All models of the plotting library on the page.
 MODELS = "Bokeh.documents.flatMap((each) => [...each._all_models.values()])"
-VIEWS = ("response", "block", "map", "compare")
+VIEWS = ("response", "block", "map", "periodic", "compare")
 #: Fields that are marked as wrong.
 MARKED = "Array.from(document.querySelectorAll('[aria-invalid=true]'), (each) => each.id)"
 
@@ -636,6 +637,121 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
     running.server.should_exit = True
 
 
+# Periodic motion
+
+CASCADE = "width=0.24&height=1.1&restitution=0.5&motion=sine:amplitude%3D0.8g,frequency%3D2,cycles%3D5"
+
+
+def periodic(opened, query, **options):
+    """Open the view with a sweep of few values, and wait for it."""
+    page = opened(f"view=periodic&{query}", **options)
+    page.until("document.body.dataset.sweep === 'complete'", "the diagram is complete")
+    return page
+
+
+def settles(page, act):
+    """Do something, and wait until the phase plane is that of another case."""
+    before = page.js("Number(document.body.dataset.settled ?? 0)")
+    act()
+    page.until(f"Number(document.body.dataset.settled ?? 0) > {before}", "the phase plane is drawn again")
+    return query_of(page)
+
+
+def test_a_click_on_a_diagram_opens_the_case_at_that_amplitude(opened):
+    page = periodic(opened, f"{CASCADE}&sweep_from=2&sweep_to=7.1&sweep_points=100")
+    assert page.text("#orbit-verdict") == "It overturns in period 5."
+    box = page.page.locator("#diagram").bounding_box()
+    # The upper one of the two branches near the right end: the sweep upwards has followed its period doubled.
+    place = (box["x"] + 0.935 * box["width"], box["y"] + 0.64 * box["height"])
+    page.page.mouse.move(*place)
+    page.until(
+        "/swept upwards: period 2; swept downwards: overturns/.test(document.getElementById('sweep-at').textContent)"
+    )
+    found = settles(page, lambda: page.page.mouse.click(*place))
+    assert page.text("#orbit-verdict") == "It repeats every 2 periods, with 4 impacts in each repetition."
+    assert page.js("document.body.dataset.sweep") == "complete"
+    numbers = dict(part.split("=") for part in found["motion"].split(":")[1].split(","))
+    block = rocking.Block(width=0.24, height=1.1, restitution=0.5)
+    a = float(numbers["amplitude"]) / (9.80665 * math.tan(block.alpha))
+    assert 6.7 < a < 7.1
+    start = (float(found["initial_rotation"]), float(found["initial_velocity"]))
+    rock = rocking.dynamics.stroboscopic_map(block, rocking.pulses.sine(float(numbers["amplitude"]), 2.0, cycles=1))
+    assert rock(start, 2) == pytest.approx(start, abs=1e-6)
+    shown = page.js(f"""() => {MODELS}
+        .filter((each) => each.type === 'Scatter' && each.size.value === 8).length""")
+    assert shown == 1
+    page.page.click("[data-view=response]")
+    page.until("document.getElementById('python-title').textContent === 'This case as Python'")
+    assert query_of(page)["initial_rotation"] == found["initial_rotation"]
+
+
+def test_a_diagram_is_read_by_keys_and_swept_over_the_frequency(opened):
+    page = periodic(opened, f"{CASCADE}&sweep_points=100&sweep_from=1&sweep_to=3")
+    diagram = page.page.locator("#diagram")
+    diagram.focus()
+    before = page.text("#sweep-at")
+    page.page.keyboard.press("Shift+ArrowLeft")
+    page.page.keyboard.press("ArrowLeft")
+    page.page.keyboard.press("ArrowUp")
+    assert page.text("#sweep-at") != before
+    found = settles(page, lambda: page.page.keyboard.press("Enter"))
+    assert "initial_rotation" in found
+    page.js("document.body.dataset.sweep = 'waits'")
+    page.page.select_option("#sweep", "omega")
+    page.until("document.body.dataset.sweep === 'complete'")
+    found = query_of(page)
+    assert found["sweep"] == "omega" and "sweep_from" not in found
+    assert page.text("#sweep-at").startswith("Frequency of the pulse")
+    assert "omega_values = np.linspace(0.5, 8.0, 100)" in page.text("#python")
+
+
+def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
+    page = periodic(opened, f"{CASCADE}&sweep_points=100&sweep_from=1&sweep_to=7.2")
+    assert page.text("#python-title") == "This diagram as Python"
+    saved = {}
+    for name, label in (("svg", "Figure, SVG"), ("png", "Figure, PNG"), ("csv", "Numbers, CSV")):
+        with page.page.expect_download() as download:
+            page.page.get_by_role("button", name=label).click()
+        assert download.value.suggested_filename == f"rocking-diagram.{name}"
+        saved[name] = Path(download.value.path()).read_bytes()
+    assert saved["png"].startswith(b"\x89PNG") and b"<svg" in saved["svg"][:200]
+    rows = [line.split(",") for line in saved["csv"].decode().splitlines()]
+    assert rows[0] == ["a", "sweep", "rotation_rad", "velocity_rad_per_s"]
+    script = tmp_path / "diagram.py"
+    script.write_text(page.text("#python"), "utf-8")
+    ran = runpy.run_path(str(script))["found"]
+    judged = 0
+    for a, direction, rotation, velocity in rows[1:]:
+        states = ran[direction, float(a)]
+        if rotation:
+            assert [float(rotation), float(velocity)] in states.tolist()
+        else:
+            assert np.isnan(states[-1]).all()
+        judged += 1
+    assert judged >= 200 and {direction for direction, _ in ran} == {row[1] for row in rows[1:]} == {"up", "down"}
+
+
+def test_a_mistake_in_a_sweep_is_marked_there(opened):
+    page = periodic(opened, f"{CASCADE}&sweep_points=100", allowed=["422"])
+    end = page.page.locator("#sweep_to")
+    end.fill("nothing")
+    end.press("Enter")
+    page.until("!document.getElementById('problem').hidden")
+    assert page.js(MARKED) == ["sweep_to"]
+    page.page.click("[data-view=response]")
+    page.until("document.getElementById('problem').hidden")
+
+
+def test_a_record_is_answered_with_the_nearest_sine(opened):
+    page = opened(f"view=periodic&{STATUE}&sweep_points=100")
+    page.until("/needs a sine/.test(document.getElementById('orbit-verdict').textContent)")
+    assert not page.page.locator("#orbit").is_visible() and not page.page.locator("#save").is_visible()
+    found = settles(page, lambda: page.page.click("#orbit-sine"))
+    assert found["motion"].startswith("sine:") and "pga" not in found and found["width"] == "0.24"
+    page.until("document.body.dataset.sweep === 'complete'")
+    assert page.page.locator("#save").is_visible()
+
+
 # Comparing
 
 
@@ -680,6 +796,8 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
         page.page.click(f"[data-view={view}]")
         if view == "map":
             complete(page)
+        if view == "periodic":
+            page.until("document.body.dataset.sweep === 'complete'")
         if view == "compare":
             page.until("document.querySelectorAll('#schemes tbody tr').length > 5")
         page.page.wait_for_timeout(300)
@@ -711,6 +829,7 @@ def test_everything_can_be_reached_by_keyboard(opened):
         "response",
         "block",
         "map",
+        "periodic",
         "compare",
         "width",
         "width-slider",

@@ -137,6 +137,41 @@ def test_the_case_at_a_point_of_a_map(page):
     assert header["motion"]["pga_g"] == pytest.approx(1.03 * math.tan(0.2), rel=1e-9)
 
 
+def test_what_a_case_settles_on_comes_as_header_and_arrays(page):
+    texts = {**SINE, "motion": "sine:amplitude=3,frequency=0.5,cycles=2"}
+    header, arrays = unpacked(page.get("/api/orbit", params=texts).content)
+    assert header["offer"] is None and header["sentence"].startswith("It ")
+    assert len(arrays["rotation"]) == len(arrays["velocity"]) > 1000
+    header, arrays = unpacked(page.get("/api/orbit", params=STATUE).content)
+    assert header["offer"]["motion"].startswith("sine:") and not arrays
+    assert page.get("/api/sweep", params=STATUE).status_code == 422
+
+
+def test_a_sweep_comes_coarse_to_fine_and_whole(page):
+    texts = {**SINE, "motion": "sine:amplitude=3,frequency=0.5,cycles=2", "sweep_points": "24"}
+    first, *parts = frames(page.get("/api/sweep", params=texts).content)
+    about = json.loads(first)
+    assert about["name"] == "a" and len(about["values"]) == 24 and about["problem"] is None
+    assert "dynamics.stroboscopic_map" in about["python"]
+    seen, share, stride = {"up": [], "down": []}, 0.0, 8
+    for part in parts:
+        header, arrays = unpacked(part)
+        assert header["share"] > share and header["stride"] <= stride
+        share, stride = header["share"], header["stride"]
+        if stride == 1:
+            seen[header["direction"]] += header["indices"]
+        assert 2 * len(arrays["drawn"]) == len(arrays["states"])
+    assert share == 1.0 and seen == {"up": [*range(24)], "down": [*range(23, -1, -1)]}
+
+
+def test_the_case_at_a_point_of_a_sweep(page):
+    params = {**SINE, "sweep": "a", "at": "1.5", "u": "0.01", "v": "-0.2"}
+    texts = page.get("/api/sweep/point", params=params).json()
+    assert (texts["initial_rotation"], texts["initial_velocity"]) == ("0.01", "-0.2")
+    header, _ = unpacked(page.get("/api/orbit", params=texts).content)
+    assert header["at"]["a"] == pytest.approx(1.5, rel=1e-12)
+
+
 def test_a_comparison_takes_what_is_other_under_a_prefix(page):
     header, arrays = unpacked(page.get("/api/compare", params={**STATUE, "other.chattering": "velocity=0.05"}).content)
     assert header["cases"][1]["treatment"] == "velocity 0.05"
@@ -453,11 +488,15 @@ def test_the_server_answers_over_a_socket_and_compiles_ahead(running, browser):
     assert start["compilation"]["done"]
 
 
-def test_a_map_that_nobody_reads_any_more_stops(running, browser):
+@pytest.mark.parametrize(
+    ("path", "axes"),
+    [("map", {"x": "omega", "y": "a", "points": "400"}), ("sweep", {"sweep": "a", "sweep_points": "400"})],
+)
+def test_a_map_that_nobody_reads_any_more_stops(running, browser, path, axes):
     base = f"http://127.0.0.1:{running.port}"
-    params = urlencode({**SINE, "x": "omega", "y": "a", "points": "400"})
+    params = urlencode({**SINE, **axes})
     for _ in range(3):
-        with browser.stream("GET", f"{base}/api/map?{params}") as answer:
+        with browser.stream("GET", f"{base}/api/{path}?{params}") as answer:
             next(answer.iter_bytes())
     deadline = time.monotonic() + 120.0
     while time.monotonic() < deadline:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import rocking
+from rocking.dynamics import stroboscopic_map
 from rocking.explorer import background
 from rocking.kernels import compiled, ground
 from rocking.kernels import interpreted as reading
@@ -214,6 +215,8 @@ def test_the_explorer_compiles_what_responses_and_maps_call_and_for_those_types(
         response.summary()
         for model in ("linear", "nonlinear"):
             rocking.simulate_many(rocking.Blocks(p=[3.0, 4.0], alpha=0.2), motion, model=model)
+    for model in ("linear", "nonlinear"):
+        stroboscopic_map(BLOCK, MOTION, model=model).derivative([0.01, 0.0])
     assert called == {*kernels}
     assert {name: [*each.compiled.overloads] for name, each in kernels.items()} == prepared
 

@@ -544,6 +544,7 @@ def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
     beyond[:, 0] = _BEYOND_ALL * gravity, -_BEYOND_ALL * gravity
     breakpoints = np.concatenate([breaks, period + breaks[1:], [3.0 * period, 4.0 * period]])
     coefficients = np.concatenate([motion.coefficients, sign * motion.coefficients, beyond])
+    breakpoints.flags.writeable = coefficients.flags.writeable = False  # as a motion's: a kernel is compiled for these
     return ground_of(breakpoints, coefficients, 1.0 / gravity, motion.error)
 
 

@@ -13,10 +13,10 @@ from typing import Any, Final
 
 from rocking.kernels import signatures
 
-#: What responses and maps need.
+#: What responses, maps and periodic motion need.
 _KERNELS: Final = (
     "ground.fill", "march.march", "trace.trace", "trace.vary", "uplift.note_complete", "lanes.run_lanes",
-    "lanes.march_each",
+    "lanes.march_each", "periodic.iterate", "periodic.differentiate",
 )  # fmt: skip
 
 #: Lowest priority of all: such a thread takes what others leave, and all of it where they leave everything.

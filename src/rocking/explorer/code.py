@@ -10,6 +10,8 @@ from rocking.analysis.overturning import PULSES
 from rocking.constants import STANDARD_GRAVITY
 from rocking.explorer.inputs import BLOCK_NAMES, NAMES, Case, arguments_of, is_pulse, pulse_call
 from rocking.explorer.maps import QUANTITIES, Axis, MapGrid
+from rocking.explorer.periodic import KEPT, PASSED
+from rocking.explorer.sweeps import Sweep, call_at
 from rocking.named_pulses import pulse_values
 
 #: Quantities of a map of overturning.
@@ -55,6 +57,33 @@ import rocking
 block = rocking.{block}
 found = rocking.overturning_map({arguments})
 print(found.summary())
+"""
+
+_SWEEP: Final = """\
+{imports}import numpy as np
+
+import rocking
+from rocking import dynamics
+
+block = rocking.{block}
+
+
+def settled(start, {name}):
+    \"\"\"States at the starts of {kept} periods, after {passed} others; NaN after an overturning.\"\"\"
+    motion = {motion}
+    rock = dynamics.stroboscopic_map(block, motion{options})
+    return rock.orbit(start, {last})[-{kept}:]
+
+
+print(settled(({rotation!r}, {velocity!r}), {at!r}))
+
+{name}_values = {values}
+found = {{}}
+for direction, order in (("up", 1), ("down", -1)):
+    start = (0.0, 0.0)
+    for {name} in {name}_values[::order]:
+        states = found[direction, {name}] = settled(start, {name})
+        start = (0.0, 0.0) if np.isnan(states[-1, 0]) else states[-1]
 """
 
 
@@ -163,6 +192,26 @@ def map_as_code(grid: MapGrid) -> dict[str, Any]:
         "python": {each: map_as_python(grid, each) for each in QUANTITIES},
         "command": dict.fromkeys(_OVERTURNING, command),
     }
+
+
+def sweep_as_python(sweep: Sweep) -> str:
+    """Write a script that computes what a case settles on, and a sweep; it runs as it stands."""
+    case, name = sweep.case, sweep.axis.name
+    given = {"model": case.model, "chattering": case.texts.get("chattering")}
+    return _SWEEP.format(
+        block=case.block_call,
+        motion=call_at(sweep),
+        options="".join(f", {option}={value!r}" for option, value in given.items() if value is not None),
+        imports="import math\n\n" if name == "omega" else "",
+        name=name,
+        at=sweep.value,
+        values=_values(sweep.axis),
+        rotation=case.initial_rotation,
+        velocity=case.initial_velocity,
+        kept=KEPT,
+        passed=PASSED,
+        last=PASSED + KEPT - 1,
+    )
 
 
 def _is_overturning_map(grid: MapGrid) -> bool:

@@ -9,7 +9,7 @@ import tempfile
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,6 +23,7 @@ from rocking.errors import InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.inputs import Case, Texts, read_case
 from rocking.explorer.parameters import names_of
+from rocking.explorer.payload import Payload
 from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
@@ -59,14 +60,6 @@ EXPORTS: Final[Mapping[str, str]] = {
     "nc": "application/x-netcdf",
 }
 _TABLES: Final[Mapping[str, Any]] = {"csv": "histories", "events.csv": "events", "impacts.csv": "impacts"}
-
-
-@dataclass(frozen=True)
-class Payload:
-    """What is sent: plain values, and arrays of floats by name."""
-
-    header: dict[str, Any]
-    arrays: dict[str, Floats] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

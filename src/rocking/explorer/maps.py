@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -134,7 +134,7 @@ def grid_of(case: Case, texts: Texts) -> MapGrid:
     return MapGrid(case, case.motion, x, y)
 
 
-def parts(grid: MapGrid, threads: int | None = None) -> Iterator[Part]:
+def parts(grid: MapGrid, threads: int | None = None) -> Generator[Part]:
     """Simulate the points of a grid, coarse to fine, and give them as they come."""
     blocks, factors, scale = _points(grid)
     setup = Setup(blocks, grid.case.model, Certified())
@@ -204,7 +204,7 @@ def texts_at(grid: MapGrid, x: float, y: float) -> dict[str, str]:
             _change_block(texts, grid, name, at[name])
     if "omega" in at:
         p = min(side.p for side in grid.case.block.sides)
-        _change_pulse(texts, frequency=at["omega"] * p / (2.0 * math.pi))
+        change_pulse(texts, frequency=at["omega"] * p / (2.0 * math.pi))
     if "a" in at:
         _change_amplitude(texts, at["a"] * _lifting(grid, math.radians(at["alpha"]) if "alpha" in at else None))
     if "pga" in at:
@@ -323,7 +323,8 @@ def _both(pair: list[float]) -> str:
     return ",".join(map(repr, pair if pair[0] != pair[1] else pair[:1]))
 
 
-def _change_pulse(texts: dict[str, str], **numbers: float) -> None:
+def change_pulse(texts: dict[str, str], **numbers: float) -> None:
+    """Change some parameters of the pulse in the texts of a case."""
     family, _, given = texts["motion"].partition(":")
     parts = dict(part.split("=", 1) for part in given.split(","))
     parts |= {name: repr(value) for name, value in numbers.items()}
@@ -336,6 +337,6 @@ def _change_amplitude(texts: dict[str, str], peak: float) -> None:
         texts.pop(name, None)
     if is_pulse(texts["motion"]):
         amplitude = arguments_of(texts["motion"])["amplitude"]
-        _change_pulse(texts, amplitude=amplitude * peak / pulse_of(texts["motion"]).pga)
+        change_pulse(texts, amplitude=amplitude * peak / pulse_of(texts["motion"]).pga)
     else:
         texts["pga"] = repr(peak)

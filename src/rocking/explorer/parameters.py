@@ -18,7 +18,7 @@ from rocking.motion.units import CHOICES
 from rocking.quantities import Quantity, acceleration, angle, length, number, sides
 
 #: Parameters that one form sets together, and that a comparison replaces together.
-Group = Literal["block", "motion", "start", "model", "map", "pulse", "treatment"]
+Group = Literal["block", "motion", "start", "model", "map", "sweep", "pulse", "treatment"]
 
 Kind = Literal["text", "number", "length", "angle", "acceleration", "acceleration at a period"]
 
@@ -176,6 +176,14 @@ MAP: Final = _by_name(
     *(Parameter(f"fix_{name}", name, "map") for name in ("p", "alpha", "restitution", "block")),
 )
 
+#: What an address says about a sweep under periodic motion.
+SWEEP: Final = _by_name(
+    Parameter("sweep", "Diagram over", "sweep", "text", default="a"),
+    Parameter("sweep_from", "Diagram from", "sweep"),
+    Parameter("sweep_to", "Diagram to", "sweep"),
+    Parameter("sweep_points", "Values", "sweep", default="200"),
+)
+
 #: The case that is shown when nothing is asked for: it chatters, rests and rocks on several times.
 DEFAULT: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
 
@@ -298,7 +306,7 @@ def field_label(name: str, motion: str = "") -> str:
     ('“Amplitude”', '“Velocity amplitude”')
     """
     shown = PULSES.get(motion.partition(":")[0])
-    known = PARAMETERS | MAP | _by_name(_PERIOD)
+    known = PARAMETERS | MAP | SWEEP | _by_name(_PERIOD)
     labels = {
         each.label
         for pulse in (PULSES.values() if shown is None else [shown])
@@ -318,6 +326,7 @@ def specification() -> dict[str, Any]:
         "default": DEFAULT,
         "parameters": [parameter.described() for parameter in PARAMETERS.values()],
         "map": list(MAP),
+        "sweep": list(SWEEP),
         "shapes": [shape._asdict() for shape in SHAPES],
         "scalings": [["", "as it is"], *SCALINGS.items()],
         "period": _PERIOD.described(),

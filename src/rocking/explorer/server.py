@@ -7,30 +7,30 @@ import json
 import math
 import secrets
 import struct
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import asdict
 from functools import cached_property
 from importlib import metadata, resources, util
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 from urllib.parse import quote
 
 import anyio
 import anyio.to_thread
-import numpy as np
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer import maps
+from rocking.explorer import maps, periodic, sweeps
 from rocking.explorer.background import Compilation, low_priority
-from rocking.explorer.code import map_as_code
-from rocking.explorer.core import EXPORTS, Explorer, Payload
-from rocking.explorer.inputs import read_case
+from rocking.explorer.code import map_as_code, sweep_as_python
+from rocking.explorer.core import EXPORTS, Explorer
+from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.parameters import PARAMETERS, field_label, specification
+from rocking.explorer.payload import Payload, pack
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST
 from rocking.quantities import number
@@ -153,6 +153,8 @@ class App:
             "/api/schemes": lambda query: explorer.schemes(query.texts()),
             "/api/compare": lambda query: explorer.compare(query.texts(), query.texts(OTHER), query.window),
             "/api/map/point": lambda query: maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y")),
+            "/api/orbit": lambda query: periodic.orbit(self._case(query)),
+            "/api/sweep/point": self._point_of_sweep,
             "/api/study": lambda query: self._study().slice(query.others),
             "/api/study/point": lambda query: self._study().texts_at(query.others, explorer.uploads),
         }
@@ -163,6 +165,7 @@ class App:
                 Route("/library/{name}", self.script),
                 *(Route(path, self._answering(work)) for path, work in answers.items()),
                 Route("/api/map", self.map),
+                Route("/api/sweep", self.sweep),
                 Route("/api/export", self.export),
                 Route("/api/records", self.upload, methods=["POST"]),
                 Route("/api/records/{key}", self.record),
@@ -224,8 +227,17 @@ class App:
         points, ground = int(query.number("points") or 3000), query.given.get("ground") == "1"
         return self.explorer.window(query.texts(), query.numbers("from", "to"), ground=ground, points=points)
 
+    def _case(self, query: Query) -> Case:
+        return read_case(query.texts(), self.explorer.uploads)
+
     def _grid(self, query: Query) -> maps.MapGrid:
-        return maps.grid_of(read_case(query.texts(), self.explorer.uploads), query.others)
+        return maps.grid_of(self._case(query), query.others)
+
+    def _point_of_sweep(self, query: Query) -> dict[str, str]:
+        """Return the texts of the case at a value of the parameter, released from a state where one is given."""
+        sweep = sweeps.sweep_of(self._case(query), query.others)
+        value, _ = query.numbers("at", "at")
+        return sweeps.texts_at(sweep, value, query.numbers("u", "v") if query.given.get("u") else None)
 
     def _study(self) -> StudyView:
         if self.study is None:
@@ -235,27 +247,39 @@ class App:
     async def map(self, request: Request) -> Response:
         """Stream a map, coarse to fine: what it shows, then parts of it."""
 
-        def described() -> tuple[maps.MapGrid, dict[str, Any]]:
-            grid = self._grid(Query(request.query_params))
-            return grid, {**maps.described(grid), **map_as_code(grid)}
+        def begun(query: Query) -> _Stream:
+            grid = self._grid(query)
+            return _Stream({**maps.described(grid), **map_as_code(grid)}, maps.parts(grid), _part_of_map)
 
-        grid, about = await self._in_thread(described)
+        return await self._streamed(request, begun)
+
+    async def sweep(self, request: Request) -> Response:
+        """Stream a sweep under periodic motion, coarse to fine: what is swept, then parts of it, each a payload."""
+
+        def begun(query: Query) -> _Stream:
+            sweep = sweeps.sweep_of(self._case(query), query.others)
+            about = {**sweeps.described(sweep), "python": sweep_as_python(sweep), "command": None}
+            return _Stream(about, sweeps.parts(sweep), lambda part: pack(sweeps.part_payload(sweep, part)))
+
+        return await self._streamed(request, begun)
+
+    async def _streamed(self, request: Request, begin: Callable[[Query], _Stream]) -> Response:
+        stream = await self._in_thread(lambda: begin(Query(request.query_params)))
         return StreamingResponse(
-            self._parts(grid, about, _motion_of(request)), media_type="application/octet-stream", headers=_FRESH
+            self._parts(stream, _motion_of(request)), media_type="application/octet-stream", headers=_FRESH
         )
 
-    async def _parts(self, grid: maps.MapGrid, about: dict[str, Any], motion: str) -> AsyncIterator[bytes]:
-        """Parts of a map as bytes; the work ends with the reader."""
-        yield _framed(json.dumps({**about, "problem": None}).encode())
+    async def _parts(self, stream: _Stream, motion: str) -> AsyncIterator[bytes]:
+        """Parts of a stream as bytes; the work ends with the reader."""
+        yield _framed(json.dumps({**stream.about, "problem": None}).encode())
         async with self._maps:
             with low_priority() as executor:
-                found = maps.parts(grid)
                 try:
-                    while (part := await asyncio.wrap_future(executor.submit(_next, found, motion))) is not None:
+                    while (part := await asyncio.wrap_future(executor.submit(_next, stream, motion))) is not None:
                         yield part
                 finally:
                     with anyio.CancelScope(shield=True):
-                        await asyncio.wrap_future(executor.submit(found.close))  # type: ignore[attr-defined]
+                        await asyncio.wrap_future(executor.submit(stream.parts.close))
 
     async def export(self, request: Request) -> Response:
         """Return a figure or a table of a case as a file."""
@@ -290,33 +314,26 @@ class App:
         return JSONResponse(found, headers=_FRESH)
 
 
-def pack(payload: Payload) -> bytes:
-    """Return a payload as bytes: length of the header (4 bytes), header as JSON, arrays of doubles from multiples of 8.
+class _Stream(NamedTuple):
+    """What comes in parts: what is said of it first, the parts, and how one is written."""
 
-    Examples
-    --------
-    >>> import numpy as np
-    >>> packed = pack(Payload({"a": 1}, {"b": np.array([1.0])}))
-    >>> len(packed) % 8, packed[4:20]
-    (0, b'{"a":1,"arrays":')
-    """
-    lengths = {name: values.size for name, values in payload.arrays.items()}
-    header = json.dumps({**plain(payload.header), "arrays": lengths}, separators=(",", ":"), allow_nan=False).encode()
-    header += b" " * (-(4 + len(header)) % 8)
-    arrays = (np.ascontiguousarray(values, "<f8").tobytes() for values in payload.arrays.values())
-    return b"".join([struct.pack("<I", len(header)), header, *arrays])
+    about: dict[str, Any]
+    parts: Generator[Any]
+    written: Callable[[Any], bytes]
 
 
-def _next(found: Iterator[maps.Part], motion: str) -> bytes | None:
-    """Return the next part of a map as bytes, or what went wrong; None when it is complete."""
+def _next(stream: _Stream, motion: str) -> bytes | None:
+    """Return the next part as bytes, or what went wrong; None when all have come."""
     try:
-        part = next(found, None)
+        part = next(stream.parts, None)
     except RockingError as error:
         return _framed(json.dumps(_problem(error, motion)).encode())
-    if part is None:
-        return None
+    return None if part is None else _framed(stream.written(part))
+
+
+def _part_of_map(part: maps.Part) -> bytes:
     head = struct.pack("<II", part.stride, len(part.points))
-    return _framed(head + part.points.astype("<u4").tobytes() + part.values.astype("<f4").tobytes())
+    return head + part.points.astype("<u4").tobytes() + part.values.astype("<f4").tobytes()
 
 
 def _framed(data: bytes) -> bytes:

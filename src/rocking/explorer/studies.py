@@ -15,9 +15,9 @@ import rocking
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption, StudyError
-from rocking.explorer.core import Payload
 from rocking.explorer.inputs import texts_of_motion
 from rocking.explorer.parameters import PARAMETERS
+from rocking.explorer.payload import Payload
 from rocking.explorer.uploads import UploadStore
 from rocking.motion.scaling import FACTOR
 from rocking.quantities import number

@@ -41,7 +41,11 @@ export async function json(path, texts, options) {
 /** Header and arrays; the arrays are views of what came, not copies.
  * @param {string} path @param {Texts} texts @param {RequestInit} [options] @returns {Promise<Payload>} */
 export async function payload(path, texts, options) {
-  const buffer = await (await answer(path, texts, options)).arrayBuffer();
+  return unpacked(await (await answer(path, texts, options)).arrayBuffer());
+}
+
+/** @param {ArrayBuffer} buffer @returns {Payload} */
+export function unpacked(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   /** @type {Record<string, Float64Array>} */
@@ -54,7 +58,10 @@ export async function payload(path, texts, options) {
   return {header, arrays};
 }
 
-/** Parts of a stream, each behind its length in 4 bytes.
+/** The first byte of what is written as JSON. */
+const BRACE = 123;
+
+/** Parts of a stream, each behind its length in 4 bytes: the first says what it is, and any may say what went wrong.
  * @param {string} path @param {Texts} texts @param {AbortSignal} signal */
 export async function* frames(path, texts, signal) {
   const response = await answer(path, texts, {signal});
@@ -65,7 +72,12 @@ export async function* frames(path, texts, signal) {
     while (held.length >= 4) {
       const size = new DataView(held.buffer, held.byteOffset).getUint32(0, true);
       if (held.length < 4 + size) break;
-      yield held.slice(4, 4 + size);
+      const part = held.slice(4, 4 + size);
+      if (part[0] === BRACE) {
+        const {problem, argument} = JSON.parse(new TextDecoder().decode(part));
+        if (problem) throw new Problem(problem, argument);
+      }
+      yield part;
       held = held.subarray(4 + size);
     }
     const {done, value} = await reader.read();

@@ -16,11 +16,11 @@ export function showFiles(state) {
   }, [label])));
 }
 
-/** Files of a map, which the page makes of what it has. @param {string} python @param {string | null} command
+/** Files of a map or a diagram, which the page makes of what it has. @param {string} what @param {string} python @param {string | null} command
  * @param {[string, string, () => Promise<Blob>][]} files names, labels, and what makes them */
-export function showMapExports(python, command, files) {
+export function showExports(what, python, command, files) {
   one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => save(name, await content())}}, [label])));
-  showCode("map", python, command);
+  showCode(what, python, command);
 }
 
 /** @param {string} what @param {string} python @param {string | null} command */

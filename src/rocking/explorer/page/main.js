@@ -1,4 +1,4 @@
-// The page: one state, in its address; forms that change it, and four views that show it.
+// The page: one state, in its address; forms that change it, and five views that show it.
 
 import {ends, readAddress, specification, writeAddress} from "./parameters.js";
 import {Latest, Problem, json, payload} from "./api.js";
@@ -75,10 +75,10 @@ const afterPause = new Latest(async () => {
   showLegend(header.motion?.vertical);
   chattering.window(header.window);
   if (state.view === "response") chattering.draw(page.shown, texts);
-  if (state.view !== "map") {
+  if (!ofOwn(state.view)) {
     showFiles(state);
     const {python, command} = await json("/api/code", texts);
-    if (state.texts === texts && state.view !== "map") showCode("case", python, command);
+    if (state.texts === texts && !ofOwn(state.view)) showCode("case", python, command);
   }
   counted("rested");
 }, problem);
@@ -109,7 +109,7 @@ function changed(texts, replaced) {
   const kept = Object.entries(state.texts).filter(([name]) => !replaced.includes(name));
   state.texts = {...Object.fromEntries(kept), ...texts};
   writeAddress(state);
-  if (state.view === "map" || state.view === "compare") views[state.view].update();
+  views[state.view]?.update?.();
   void load.ask();
 }
 
@@ -120,6 +120,9 @@ function restate(texts) {
   changed(texts, Object.keys(state.texts));
 }
 
+/** Whether a view shows something else than a response, with files and code of its own. @param {string} name */
+const ofOwn = (name) => name === "map" || name === "periodic";
+
 /** Show another view. @param {string} name */
 async function go(name) {
   state.view = name;
@@ -128,8 +131,9 @@ async function go(name) {
     else button.removeAttribute("aria-current");
   }
   const parts = {
-    summary: name !== "map", "view-histories": name === "response" || name === "block", "view-response": name === "response",
-    "view-block": name === "block", "view-map": name === "map", "view-compare": name === "compare",
+    summary: !ofOwn(name), "view-histories": name === "response" || name === "block", "view-response": name === "response",
+    "view-block": name === "block", "view-map": name === "map", "view-periodic": name === "periodic",
+    "view-compare": name === "compare",
   };
   for (const [id, shown] of Object.entries(parts)) one(id).hidden = !shown;
   one("figures").hidden = name === "block";

@@ -1,7 +1,7 @@
 // A map of the case over two of its parameters, coarse to fine; or of a study.
 
-import {Latest, Problem, frames, json, payload} from "./api.js";
-import {showMapExports, withLegend} from "./exports.js";
+import {Latest, frames, json, payload} from "./api.js";
+import {showExports, withLegend} from "./exports.js";
 import {namesOf, specification} from "./parameters.js";
 import {bokeh, colour, figure, themed} from "./theme.js";
 import {make, one, short} from "./words.js";
@@ -175,10 +175,6 @@ export class View {
         done = 1;
         continue;
       }
-      if (frame[0] === 123) {
-        const {problem, argument} = JSON.parse(new TextDecoder().decode(frame));
-        throw new Problem(problem, argument);
-      }
       done += this.take(frame);
       const [rows, columns] = this.about.shape;
       /** @type {HTMLProgressElement} */ (one("map-progress")).value = done / (rows * columns);
@@ -226,7 +222,7 @@ export class View {
     const {python, command} = this.about;
     const name = this.study ? "rocking-study" : "rocking-map";
     const {quantity} = this.page.state.map;
-    showMapExports(this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
+    showExports("map", this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
       [`${name}.svg`, "Figure, SVG", () => this.picture("svg")], [`${name}.png`, "Figure, PNG", () => this.picture("png")],
       [`${name}.csv`, "Numbers, CSV", async () => new Blob([this.table()], {type: "text/csv"})],
     ]);

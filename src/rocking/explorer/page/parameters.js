@@ -4,7 +4,7 @@
 import {json} from "./api.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts}} State */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts, sweep: Texts}} State */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
 
 /** @type {any} */
@@ -17,7 +17,7 @@ export const parameter = (name) => specification.parameters.find((/** @type {Par
 export const namesOf = (...groups) =>
   specification.parameters.filter((/** @type {Parameter} */ each) => !groups.length || groups.includes(each.group)).map((/** @type {Parameter} */ each) => each.name);
 
-const VIEWS = ["response", "block", "map", "compare"];
+const VIEWS = ["response", "block", "map", "periodic", "compare"];
 
 /** @returns {State} */
 export function readAddress() {
@@ -36,6 +36,7 @@ export function readAddress() {
     compare: given.get("compare") ?? "treatment",
     window: from < to ? [from, to] : null,
     map: those(specification.map),
+    sweep: those(specification.sweep),
   };
 }
 
@@ -66,6 +67,7 @@ export function writeAddress(state) {
       put(state.other, namesOf(), "other.");
     }
     if (state.view === "map") put(state.map, specification.map);
+    if (state.view === "periodic") put(state.sweep, specification.sweep);
     put(ends(state), ["from", "to"]);
     history.replaceState(null, "", `?${given}`);
   }, 150);

@@ -1,0 +1,266 @@
+"""A case under a sine that never ends: its phase plane, and what it settles on. It knows no web."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking.arrays import Floats
+from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
+from rocking.explorer.inputs import Case, arguments_of, is_pulse, pulse_of
+from rocking.explorer.payload import Payload
+from rocking.motion import pulses
+from rocking.motion.motion import Motion
+from rocking.response import Response
+from rocking.simulation import simulate
+
+#: Periods that a sweep lets pass at each value, and states after them that it keeps.
+PASSED: Final = 300
+KEPT: Final = 64
+
+#: Longest period that is looked for; states that differ by less than this over slenderness are the same.
+LONGEST: Final = KEPT // 2
+_SAME: Final = 1e-6
+
+#: Periods after which a case is said to have none, and states of it that are drawn then.
+_PATIENCE: Final = 8000
+_CLOUD: Final = 1024
+
+#: Rotation over slenderness at which the trajectory of an overturning is drawn no further.
+_FALLEN: Final = 1.5
+
+#: Points of a trajectory; an impact of less speed than this part of the greatest leaves no gap in it.
+_POINTS: Final = 6000
+_SEEN: Final = 2e-3
+
+
+class Sine(NamedTuple):
+    """A sine by its parameters in SI units: ``cycles`` of it, of which a single one repeats for ever."""
+
+    amplitude: float
+    frequency: float
+    phase: float
+    cycles: float
+
+    def motion(self, cycles: float = 1.0) -> Motion:
+        """Return so many cycles of it."""
+        return pulses.sine(self.amplitude, self.frequency, cycles=cycles, phase=self.phase)
+
+    @property
+    def text(self) -> str:
+        """The text of a case that names it."""
+        given = {name: value for name, value in self._asdict().items() if value or name != "phase"}
+        return "sine:" + ",".join(f"{name}={value!r}" for name, value in given.items())
+
+
+class Settled(NamedTuple):
+    """What a state becomes: the states of one period, or the last ones where none was found; and what ended it.
+
+    ``after`` is the number of periods; where the body overturned, the one in which it did. ``rests`` says whether there
+    is a rest in each repetition.
+    """
+
+    states: Floats
+    period: int
+    rests: bool
+    fate: Fate
+    after: int
+
+
+def lifting(case: Case) -> float:
+    """Smallest ground acceleration, m/s^2, that lifts the block."""
+    return min(case.block.uplift_thresholds(case.model))
+
+
+def slowest(case: Case) -> float:
+    """Frequency parameter of the block, rad/s; the smaller one of two."""
+    return min(side.p for side in case.block.sides)
+
+
+def values_of(case: Case, sine: Sine) -> dict[str, float]:
+    """Return the parameters that may be swept by name: amplitude over the uplift threshold, and frequency 2 pi f/p."""
+    return {"a": sine.amplitude / lifting(case), "omega": 2.0 * math.pi * sine.frequency / slowest(case)}
+
+
+def sine_of(case: Case) -> Sine | None:
+    """Return the sine of a case, scaled as its motion is; None where something else shakes it."""
+    text = case.texts.get("motion", "")
+    if case.motion is None or text.partition(":")[0] != "sine":
+        return None
+    given, as_it_is = arguments_of(text), pulse_of(text).coefficients
+    largest = np.unravel_index(np.argmax(np.abs(as_it_is)), as_it_is.shape)
+    factor = float(case.motion.coefficients[largest] / as_it_is[largest])
+    amplitude, phase = given["amplitude"] * factor, given.get("phase", 0.0)
+    return Sine(abs(amplitude), given["frequency"], phase + (math.pi if amplitude < 0.0 else 0.0), given["cycles"])
+
+
+def nearest_sine(case: Case) -> Sine:
+    """Return the sine of the same peak acceleration, and of the pulse's frequency or else the same peak velocity.
+
+    Without any motion it is one half above the threshold of uplift.
+    """
+    if case.motion is None or case.motion.pga == 0.0:
+        return Sine(1.5 * lifting(case), 1.5 * slowest(case) / math.pi, 0.0, 10.0)
+    text, pga = case.texts.get("motion", ""), case.motion.pga
+    given = arguments_of(text) if is_pulse(text) else {}
+    frequency = given.get("frequency") or pga / (2.0 * math.pi * case.motion.pgv)
+    return Sine(float(f"{pga:.6g}"), float(f"{frequency:.6g}"), 0.0, 10.0)
+
+
+def map_of(case: Case, sine: Sine) -> StroboscopicMap:
+    """Return the map of the case's block from period to period of a sine."""
+    return stroboscopic_map(case.block, sine.motion(), model=case.model, chattering=case.treatment)
+
+
+def settled(rock: StroboscopicMap, start: ArrayLike, periods: int, kept: int = KEPT) -> Settled:
+    """Return what a state becomes within so many periods."""
+    orbit = rock.orbit(start, periods)
+    if np.isnan(orbit[-1, 0]):
+        after = int(np.argmax(np.isnan(orbit[:, 0])))
+        _, fate, _ = rock.followed(orbit[after - 1])
+        return Settled(np.empty((0, 2)), 0, False, Fate(int(fate)), after)
+    last = orbit[-kept:]
+    period = _period_of(last, rock)
+    _, fate, _ = rock.followed(last[-1])
+    rests = period > 0 and not np.any(rock.derivative(last[-1], period)[1])
+    return Settled(last[-period:] if period else last, period, rests, Fate(int(fate)), periods)
+
+
+def _period_of(states: Floats, rock: StroboscopicMap) -> int:
+    """Return after how many periods the last states come again; 0 where that is not seen."""
+    sides = rock.body.sides
+    alpha, p = min(side.alpha for side in sides), min(side.p for side in sides)  # type: ignore[attr-defined]
+    relative = states / [alpha, alpha * p]
+    for period in range(1, len(states) // 2 + 1):
+        if period <= LONGEST and np.abs(relative[-period:] - relative[-2 * period : -period]).max() <= _SAME:
+            return period
+    return 0
+
+
+def settled_case(case: Case, sine: Sine) -> tuple[Settled, StroboscopicMap]:
+    """Return what a case settles on, if need be after thousands of periods, and the map that says so."""
+    rock = map_of(case, sine)
+    start: Floats = np.array([case.initial_rotation, case.initial_velocity])
+    passed = 0
+    while True:
+        periods = min(max(2 * KEPT, passed), _PATIENCE - passed)
+        found = settled(rock, start, periods, _CLOUD)
+        passed += periods
+        found = found._replace(after=found.after + passed - periods)
+        if found.period or not len(found.states) or passed >= _PATIENCE:
+            return found, rock
+        start = found.states[-1]
+
+
+def orbit(case: Case) -> Payload:
+    """Return the phase plane of a case whose sine never ends, in units of slenderness, and what it settles on in words.
+
+    For another motion the header has nothing but ``offer``: the text of the nearest sine, and that in words.
+    """
+    sine = sine_of(case)
+    if sine is None:
+        near = nearest_sine(case)
+        words = f"{near.amplitude / case.block.gravity:.3g} g at {near.frequency:.3g} Hz"
+        return Payload({"offer": {"motion": near.text, "words": words}})
+    found, rock = settled_case(case, sine)
+    count = found.period or min(LONGEST, found.after)
+    at = found.states[-count] if len(found.states) else _before_the_end(case, rock, found.after - 1, count - 1)
+    response = _followed(case, sine, at, count)
+    header = {
+        "offer": None,
+        "sentence": sentence(found, response),
+        "about": _about(case, sine, found, rock),
+        "at": values_of(case, sine),
+        "period": found.period,
+    }
+    states = scaled(case, found.states)
+    return Payload(header, {**_trajectory(case, response), "x": states[:, 0], "y": states[:, 1]})
+
+
+def _before_the_end(case: Case, rock: StroboscopicMap, whole: int, back: int) -> Floats:
+    """Return the state some periods before the last whole one."""
+    start = np.array([case.initial_rotation, case.initial_velocity])
+    passed = whole - min(back, whole)
+    return rock(start, passed) if passed else start
+
+
+def _followed(case: Case, sine: Sine, start: Floats, periods: int) -> Response:
+    return simulate(
+        case.block,
+        sine.motion(periods + 1.0),
+        model=case.model,
+        chattering=case.treatment,
+        duration=periods / sine.frequency,
+        initial_rotation=float(start[0]),
+        initial_velocity=float(start[1]),
+    )
+
+
+def sentence(found: Settled, response: Response) -> str:
+    """Say what a case settles on; the response is that of one period of it."""
+    if found.fate == Fate.OVERTURNED:
+        return f"It overturns in period {found.after}."
+    if found.fate == Fate.UNFINISHED:
+        return f"It was given up in period {found.after}, after too many steps."
+    if found.fate == Fate.RESTS_FOR_EVER:
+        return "It stays at rest: the sine never lifts it."
+    if not found.period:
+        return f"No period up to {LONGEST} was found within {found.after} periods."
+    every = "every period" if found.period == 1 else f"every {found.period} periods"
+    times = {1: "once", 2: "twice"}
+    rests = int(np.sum(response.events["kind"] == "rest"))
+    if rests:
+        return f"It repeats {every}, and rests {times.get(rests, f'{rests} times')} in each repetition."
+    impacts = len(response.impacts)
+    return f"It repeats {every}, with {impacts} impact{'' if impacts == 1 else 's'} in each repetition."
+
+
+def _about(case: Case, sine: Sine, found: Settled, rock: StroboscopicMap) -> str:
+    """Say how stable that is, and how it began."""
+    released = case.initial_rotation or case.initial_velocity
+    start = f"{case.initial_rotation:.4g} rad and {case.initial_velocity:.4g} rad/s" if released else "rest"
+    words = f"One period of the sine lasts {1.0 / sine.frequency:.4g} s and repeats for ever, from {start}"
+    if not found.period or found.fate == Fate.RESTS_FOR_EVER:
+        return f"{words}."
+    if found.rests:
+        return f"{words}. A rest forgets what was before it: both multipliers are zero."
+    _, change = rock.derivative(found.states[-1], found.period)
+    first, second = sorted(np.linalg.eigvals(change), key=abs, reverse=True)
+    pair = f"{first.real:.4g} ± {abs(first.imag):.4g}i" if first.imag else f"{first.real:.4g} and {second.real:.4g}"
+    return f"{words}. The multipliers of a small departure in one repetition are {pair}."
+
+
+def scaled(case: Case, states: Floats) -> Floats:
+    """Return rotations over slenderness and velocities over p times slenderness, of the sides that they are on."""
+    plus, minus = case.block.sides
+    side = np.where((states[..., 0] < 0.0) | ((states[..., 0] == 0.0) & (states[..., 1] < 0.0)), -1, 1)
+    units = np.where((side > 0)[..., None], [plus.alpha, plus.alpha * plus.p], [minus.alpha, minus.alpha * minus.p])
+    relative: Floats = states / units
+    return relative
+
+
+def _states(case: Case, response: Response, end: float) -> tuple[Floats, Floats]:
+    """Return times up to an end, and the states at them."""
+    times = np.linspace(0.0, end, _POINTS)
+    return times, scaled(case, np.stack([response.rotation(times), response.angular_velocity(times)], axis=-1))
+
+
+def _trajectory(case: Case, response: Response) -> dict[str, Floats]:
+    """Return a response in the phase plane, with a gap at each impact, and what is across the gaps."""
+    end = response.duration
+    if response.overturned:
+        fallen = np.abs(_states(case, response, end)[1][:, 0]) > _FALLEN
+        end *= np.argmax(fallen) / (_POINTS - 1) if fallen.any() else 1.0
+    times, states = _states(case, response, end)
+    impacts = response.impacts[response.impacts["time"] <= end]
+    seen = impacts[impacts["speed_before"] > _SEEN * impacts["speed_before"].max(initial=0.0)]
+    jumps = [np.stack([np.zeros(len(seen)), seen["side"] * seen[f"speed_{when}"]], -1) for when in ("before", "after")]
+    # The velocity before an impact belongs to the side that is left, the one after it to the side that is entered.
+    before, after = scaled(case, jumps[0] * [1.0, -1.0]) * [1.0, -1.0], scaled(case, jumps[1])
+    gaps = np.stack([before, np.full_like(before, np.nan), after], axis=1).reshape(-1, 2)
+    order = np.argsort(np.concatenate([times, np.repeat(seen["time"], 3)]), kind="stable")
+    line = np.concatenate([states, gaps])[order]
+    return {"rotation": line[:, 0], "velocity": line[:, 1], "before": before[:, 1], "after": after[:, 1]}

@@ -1,0 +1,270 @@
+"""The explorer's periodic view: what a case settles on and its sweeps, against long simulations and its own script."""
+
+import math
+import re
+import runpy
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.errors import InvalidOption
+from rocking.explorer.code import sweep_as_python
+from rocking.explorer.inputs import read_case
+from rocking.explorer.periodic import KEPT, LONGEST, nearest_sine, orbit, sine_of
+from rocking.explorer.sweeps import part_payload, parts, sweep_of, texts_at
+from rocking.explorer.uploads import UploadStore
+
+BLOCK = {"width": "0.24", "height": "1.1", "restitution": "0.5"}
+ECCENTRIC = {"width": "0.24", "height": "1.1", "offset": "0.02"}
+
+#: A state near the orbit of two periods under a sine of 14.5 m/s^2.
+ON_TWO = {"initial_rotation": "-0.0872", "initial_velocity": "1.06"}
+
+
+def case_of(motion, **texts):
+    return read_case({**BLOCK, "motion": motion, **texts}, UploadStore())
+
+
+def sine(amplitude, frequency=2.0):
+    return f"sine:amplitude={amplitude!r},frequency={frequency!r},cycles=5"
+
+
+def long_simulation(case, periods):
+    """Response over some periods of the case's sine, and the states at their starts in units of slenderness."""
+    given = sine_of(case)
+    motion = rocking.pulses.sine(given.amplitude, given.frequency, cycles=periods + 1, phase=given.phase)
+    response = rocking.simulate(
+        case.block,
+        motion,
+        model=case.model,
+        chattering=case.treatment,
+        duration=periods / given.frequency,
+        initial_rotation=case.initial_rotation,
+        initial_velocity=case.initial_velocity,
+    )
+    times = np.arange(periods) / given.frequency
+    rotation, velocity = response.rotation(times), response.angular_velocity(times)
+    plus, minus = case.block.sides
+    on_plus = np.where(rotation == 0.0, velocity >= 0.0, rotation > 0.0)
+    alpha, p = (np.where(on_plus, getattr(plus, name), getattr(minus, name)) for name in ("alpha", "p"))
+    return response, np.stack([rotation / alpha, velocity / (p * alpha)], axis=-1)
+
+
+@pytest.mark.parametrize(
+    ("case", "period", "impacts", "rests", "words"),
+    [
+        (case_of(sine(6.0)), 1, 2, 0, "every period, with 2 impacts"),
+        (case_of(sine(14.5), **ON_TWO), 2, 4, 0, "every 2 periods, with 4 impacts"),
+        (case_of(sine(2.4516625)), 3, None, 1, "every 3 periods, and rests once"),
+        (case_of(sine(2.3)), 1, None, 2, "every period, and rests twice"),
+        (case_of(sine(3.0), model="linear"), 1, 2, 0, "every period, with 2 impacts"),
+        (case_of(sine(3.0), **ECCENTRIC), 1, 2, 0, "every period, with 2 impacts"),
+    ],
+)
+def test_what_a_case_settles_on_is_where_a_long_simulation_ends(case, period, impacts, rests, words):
+    found = orbit(case)
+    assert found.header["sentence"] == f"It repeats {words} in each repetition."
+    assert found.header["period"] == period
+    response, states = long_simulation(case, 400 + period)
+    shown = np.stack([found.arrays["x"], found.arrays["y"]], axis=-1)
+    assert len(shown) == period
+    apart = np.abs(states[-period:, None] - shown[None]).max(axis=-1)
+    assert apart.min(axis=1).max() < 2e-6 and apart.min(axis=0).max() < 2e-6
+    for shorter in range(1, period):
+        assert np.abs(states[-1] - states[-1 - shorter]).max() > 1e-5
+    start = response.duration - period / sine_of(case).frequency
+    assert impacts is None or np.sum(response.impacts["time"] >= start) == impacts
+    kinds, times = response.events["kind"], response.events["time"]
+    assert np.sum((kinds == "rest") & (times >= start) & (times < response.duration)) == rests
+
+
+def test_multipliers_are_those_of_the_impacts():
+    # An arc keeps areas; an impact takes eta^2 of them.
+    case = case_of(sine(6.0))
+    about = orbit(case).header["about"]
+    numbers = [float(each) for each in re.search(r"are (\S+) (?:and|±) ([^i\s]+?)i?\.$", about).groups()]
+    product = numbers[0] * numbers[1] if " and " in about.split("are")[1] else numbers[0] ** 2 + numbers[1] ** 2
+    assert product == pytest.approx(0.5 ** (2 * 2), rel=1e-3)
+
+
+@pytest.mark.parametrize("texts", [{}, {**ECCENTRIC, "restitution": "0.5,0.6"}])
+def test_the_trajectory_passes_through_the_starts_of_the_periods_and_jumps_at_impacts(texts):
+    case = case_of(sine(6.0), **texts)
+    arrays = orbit(case).arrays
+    line = np.stack([arrays["rotation"], arrays["velocity"]], axis=-1)
+    gaps = np.isnan(line[:, 0])
+    assert np.array_equal(gaps, np.isnan(line[:, 1])) and gaps.sum() == len(arrays["before"]) == 2
+    for x, y in zip(arrays["x"], arrays["y"], strict=True):
+        assert np.nanmin(np.abs(line - [x, y]).max(axis=1)) < 2e-6
+    plus, minus = case.block.sides
+    for before, after in zip(arrays["before"], arrays["after"], strict=True):
+        left, entered = (minus, plus) if after > 0.0 else (plus, minus)
+        ratio = after * entered.p * entered.alpha / (before * left.p * left.alpha)
+        assert ratio == pytest.approx(left.restitution, rel=1e-6) or ratio == pytest.approx(
+            entered.restitution, rel=1e-6
+        )
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "frequency", "eta"), [(2.45, 0.7, "0.5"), (2.26, 1.3, "0.93"), (13.0, 2.0, "0.5")]
+)
+def test_an_overturning_is_told_with_its_period(amplitude, frequency, eta):
+    case = case_of(sine(amplitude, frequency), restitution=eta)
+    found = orbit(case)
+    response, _ = long_simulation(case, 40)
+    assert response.overturned
+    period = math.ceil(response.overturn_time * frequency)
+    assert found.header["sentence"] == f"It overturns in period {period}."
+    assert 1.45 < np.nanmax(np.abs(found.arrays["rotation"])) < 1.55
+    assert not len(found.arrays["x"])
+
+
+def test_a_sine_that_does_not_lift_leaves_the_block_at_rest():
+    assert orbit(case_of(sine(1.0))).header["sentence"] == "It stays at rest: the sine never lifts it."
+    assert orbit(case_of(sine(1.0), initial_rotation="0.1")).header["sentence"].startswith("It stays at rest")
+
+
+def test_a_case_without_a_period_is_said_to_have_none():
+    case = case_of(sine(15.847), initial_rotation="0.0359", initial_velocity="1.216")
+    found = orbit(case)
+    assert found.header["sentence"].startswith(f"No period up to {LONGEST} was found")
+    assert found.header["period"] == 0 and len(found.arrays["x"]) == 1024
+
+
+def test_a_scaled_sine_is_the_sine_of_that_amplitude():
+    case = case_of("sine:amplitude=2,frequency=2,cycles=2.5,phase=30deg", scale="-3")
+    given = sine_of(case)
+    times = np.linspace(0.0, 1.2, 200)
+    assert given.amplitude > 0.0
+    assert given.motion(2.5).acceleration(times) == pytest.approx(case.motion.acceleration(times), abs=1e-12)
+
+
+def test_the_nearest_sine_has_the_peaks_of_the_motion():
+    half = "half-sine:amplitude=3,frequency=2"
+    for motion in ("ridgecrest-clc-090", "rectangular:amplitude=0.3g,duration=0.5", half):
+        case = case_of(motion)
+        near = nearest_sine(case).motion(2.0)
+        assert near.pga == pytest.approx(case.motion.pga, rel=1e-5)
+        if motion != half:
+            # From rest its velocity goes from zero to twice the amplitude of the velocity.
+            assert np.ptp(near.velocity(np.linspace(0.0, near.duration, 4001))) / 2.0 == pytest.approx(
+                case.motion.pgv, rel=1e-4
+            )
+        offer = orbit(case).header["offer"]
+        assert sine_of(case_of(offer["motion"])) == nearest_sine(case)
+    assert nearest_sine(case_of(half)).frequency == 2.0
+    assert orbit(case_of(orbit(case_of("none")).header["offer"]["motion"])).header["offer"] is None
+
+
+# Sweeps
+
+
+def swept(sweep):
+    """What the finest level of a sweep finds, by direction and number of the value."""
+    found, shares, strides = {}, [], []
+    for part in parts(sweep):
+        shares.append(part.share)
+        strides.append(part.stride)
+        if part.stride == 1:
+            found |= {(part.direction, index): each for index, each in zip(part.indices, part.found, strict=True)}
+    assert np.all(np.diff(shares) > 0.0) and shares[-1] == 1.0
+    assert strides[0] == 8 and np.all(np.diff(strides) <= 0)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("texts", "asked"),
+    [
+        ({}, {"sweep": "a", "sweep_from": "0.9", "sweep_to": "8.7"}),
+        ({"scale": "-1.1"}, {"sweep": "omega", "sweep_from": "2.5", "sweep_to": "5"}),
+        ({**ECCENTRIC, "model": "linear", "chattering": "velocity=0.01"}, {"sweep": "a"}),
+    ],
+)
+def test_a_sweep_is_what_its_script_computes(texts, asked, tmp_path):
+    case = case_of("sine:amplitude=0.9g,frequency=2,cycles=3,phase=20deg", **texts)
+    sweep = sweep_of(case, {**asked, "sweep_points": "24"})
+    found = swept(sweep)
+    script = tmp_path / "sweep.py"
+    script.write_text(sweep_as_python(sweep), "utf-8")
+    ran = runpy.run_path(str(script))["found"]
+    assert len(found) == len(ran) == 48
+    overturned = periodic = 0
+    for (direction, index), each in found.items():
+        states = ran[direction, sweep.axis.values[index]]
+        assert states.shape == (KEPT, 2)
+        overturned += not len(each.states)
+        periodic += each.period > 0
+        assert np.isnan(states[-1]).all() == (not len(each.states))
+        assert np.array_equal(states[KEPT - len(each.states) :], each.states)
+    assert periodic >= 15 and periodic + overturned >= 24
+    assert overturned >= 3 or "model" in texts or "scale" in texts
+
+
+def test_a_sweep_depends_on_its_direction():
+    sweep = sweep_of(case_of(sine(9.0)), {"sweep_from": "0.9", "sweep_to": "6", "sweep_points": "40"})
+    found = swept(sweep)
+    up, down = ([len(found[each, index].states) for index in range(40)] for each in ("up", "down"))
+    # Amplitudes at which a block that rocks goes on, and one from rest overturns; the other way there is none.
+    assert sum(a > 0 and not b for a, b in zip(up, down, strict=True)) >= 10
+    assert not any(b > 0 and not a for a, b in zip(up, down, strict=True))
+
+
+@pytest.mark.parametrize("name", ["a", "omega"])
+@pytest.mark.parametrize("texts", [{}, {"pga": "0.8g"}, {"scale": "-0.9"}])
+def test_the_case_at_a_point_of_a_sweep_settles_on_that_point(name, texts):
+    ends = {"a": ("1.2", "3"), "omega": ("3", "5")}[name]
+    case = case_of("sine:amplitude=0.7g,frequency=2,cycles=3", **texts)
+    sweep = sweep_of(case, {"sweep": name, "sweep_from": ends[0], "sweep_to": ends[1], "sweep_points": "8"})
+    judged = 0
+    for (_, index), each in swept(sweep).items():
+        if not each.period:
+            continue
+        value = float(sweep.axis.values[index])
+        u, v = map(float, each.states[-1])
+        opened = read_case(texts_at(sweep, value, (u, v)), UploadStore())
+        assert (opened.initial_rotation, opened.initial_velocity) == (u, v)
+        header = orbit(opened).header
+        assert header["at"][name] == pytest.approx(value, rel=1e-12)
+        assert header["period"] == each.period
+        again = sweep_of(opened, {"sweep": name})
+        assert again.sine_at(1.0).text.partition("cycles")[0] == sweep.sine_at(1.0).text.partition("cycles")[0]
+        judged += 1
+    assert judged >= 10
+    assert "initial_rotation" not in texts_at(sweep, 2.0, None)
+
+
+def test_a_part_of_a_sweep_is_sent_with_rotations_over_slenderness():
+    sweep = sweep_of(case_of(sine(6.0)), {"sweep_points": "16", "sweep_to": "8.7"})
+    words = set()
+    for part in parts(sweep):
+        payload = part_payload(sweep, part)
+        states = payload.arrays["states"].reshape(-1, 2)
+        assert sum(payload.header["counts"]) == len(states) == len(payload.arrays["drawn"])
+        assert payload.arrays["drawn"] == pytest.approx(states[:, 0] / sweep.case.block.alpha)
+        assert [count == 0 for count in payload.header["counts"]] == payload.header["overturned"]
+        words |= set(payload.header["words"])
+    assert {"stays at rest", "period 1", "overturns in period 2"} <= words
+
+
+@pytest.mark.parametrize(
+    ("motion", "asked", "words"),
+    [
+        ("ridgecrest-clc-090", {}, "needs a sine"),
+        (sine(3.0), {"sweep": "mass"}, "over a or omega"),
+        (sine(3.0), {"sweep_points": "7"}, "from 8 to 400"),
+        (sine(3.0), {"sweep_from": "3", "sweep_to": "2"}, "positive start below its end"),
+        (sine(3.0), {"sweep_from": "0"}, "positive start below its end"),
+    ],
+)
+def test_a_sweep_that_is_none_is_refused(motion, asked, words):
+    with pytest.raises(InvalidOption, match=words):
+        sweep_of(case_of(motion), asked)
+
+
+def test_a_sweep_that_is_not_read_on_stops():
+    found = parts(sweep_of(case_of(sine(3.0)), {"sweep_points": "400"}))
+    next(found)
+    found.close()
+    with pytest.raises(StopIteration):
+        next(found)
