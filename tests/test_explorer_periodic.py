@@ -120,6 +120,17 @@ def test_an_overturning_is_told_with_its_period(amplitude, frequency, eta):
     assert not len(found.arrays["x"])
 
 
+def test_an_overturning_after_hundreds_of_periods_is_drawn_from_shortly_before():
+    # Just beyond the end of the cascade a block moves without a period for long, and falls in the end.
+    late = []
+    for amplitude in (17.345, 17.35, 17.355, 17.36):
+        found = orbit(case_of(sine(amplitude), initial_rotation="0.1", initial_velocity="1.06"))
+        late.append(int(re.fullmatch(r"It overturns in period (\d+)\.", found.header["sentence"])[1]))
+        assert 1.45 < np.abs(found.arrays["rotation"][-1]) < 1.55
+        assert 2 <= len(found.arrays["before"]) <= 2 * LONGEST
+    assert sum(each > 128 for each in late) >= 2
+
+
 def test_a_sine_that_does_not_lift_leaves_the_block_at_rest():
     assert orbit(case_of(sine(1.0))).header["sentence"] == "It stays at rest: the sine never lifts it."
     assert orbit(case_of(sine(1.0), initial_rotation="0.1")).header["sentence"].startswith("It stays at rest")

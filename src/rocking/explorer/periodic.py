@@ -60,7 +60,7 @@ class Settled(NamedTuple):
     """What a state becomes: the states of one period, or the last ones where none was found; and what ended it.
 
     ``after`` is the number of periods; where the body overturned, the one in which it did. ``rests`` says whether there
-    is a rest in each repetition.
+    is a rest in each repetition. ``course`` is where the trajectory that is drawn begins, and over how many periods.
     """
 
     states: Floats
@@ -68,6 +68,7 @@ class Settled(NamedTuple):
     rests: bool
     fate: Fate
     after: int
+    course: tuple[Floats, int]
 
 
 def lifting(case: Case) -> float:
@@ -121,12 +122,15 @@ def settled(rock: StroboscopicMap, start: ArrayLike, periods: int, kept: int = K
     if np.isnan(orbit[-1, 0]):
         after = int(np.argmax(np.isnan(orbit[:, 0])))
         _, fate, _ = rock.followed(orbit[after - 1])
-        return Settled(np.empty((0, 2)), 0, False, Fate(int(fate)), after)
+        first = max(0, after - LONGEST)
+        return Settled(np.empty((0, 2)), 0, False, Fate(int(fate)), after, (orbit[first], after - first))
     last = orbit[-kept:]
     period = _period_of(last, rock)
     _, fate, _ = rock.followed(last[-1])
     rests = period > 0 and not np.any(rock.derivative(last[-1], period)[1])
-    return Settled(last[-period:] if period else last, period, rests, Fate(int(fate)), periods)
+    count = period or LONGEST
+    states = last[-period:] if period else last
+    return Settled(states, period, rests, Fate(int(fate)), periods, (last[-count], count))
 
 
 def _period_of(states: Floats, rock: StroboscopicMap) -> int:
@@ -166,9 +170,7 @@ def orbit(case: Case) -> Payload:
         words = f"{near.amplitude / case.block.gravity:.3g} g at {near.frequency:.3g} Hz"
         return Payload({"offer": {"motion": near.text, "words": words}})
     found, rock = settled_case(case, sine)
-    count = found.period or min(LONGEST, found.after)
-    at = found.states[-count] if len(found.states) else _before_the_end(case, rock, found.after - 1, count - 1)
-    response = _followed(case, sine, at, count)
+    response = _followed(case, sine, *found.course)
     header = {
         "offer": None,
         "sentence": sentence(found, response),
@@ -178,13 +180,6 @@ def orbit(case: Case) -> Payload:
     }
     states = scaled(case, found.states)
     return Payload(header, {**_trajectory(case, response), "x": states[:, 0], "y": states[:, 1]})
-
-
-def _before_the_end(case: Case, rock: StroboscopicMap, whole: int, back: int) -> Floats:
-    """Return the state some periods before the last whole one."""
-    start = np.array([case.initial_rotation, case.initial_velocity])
-    passed = whole - min(back, whole)
-    return rock(start, passed) if passed else start
 
 
 def _followed(case: Case, sine: Sine, start: Floats, periods: int) -> Response:
