@@ -14,8 +14,10 @@ from rocking.body import Body
 from rocking.cli.options import BLOCK, MODEL, BlockOptions, ModelOptions
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
 from rocking.dynamics.bodies import BouncingBall, ImpactOscillator, InvertedPendulum
-from rocking.dynamics.continuation import Branch, continue_orbit
-from rocking.dynamics.orbits import PeriodicOrbit, periodic_orbits
+from rocking.dynamics.branches import Branch
+from rocking.dynamics.continuation import continue_orbit
+from rocking.dynamics.orbit_search import periodic_orbits
+from rocking.dynamics.orbits import PeriodicOrbit
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.named_pulses import PulseFamily, pulse_values

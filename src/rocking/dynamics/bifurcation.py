@@ -15,8 +15,8 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import VERSION, Model
-from rocking.dynamics.basin_maps import told
 from rocking.dynamics.maps import StroboscopicMap, stroboscopic_map
+from rocking.dynamics.repeated import told
 from rocking.engine import in_threads
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion

@@ -13,7 +13,8 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import VERSION, Model
-from rocking.dynamics.basin_maps import basins, told
+from rocking.dynamics.basin_maps import basins
+from rocking.dynamics.repeated import told
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion

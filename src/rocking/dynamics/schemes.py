@@ -15,8 +15,8 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import Model
-from rocking.dynamics.bodies import _LinearBody
 from rocking.dynamics.comparison import FAMILIES, REST, Scheme, SchemeComparison, SchemeOutcome
+from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.simulation import simulate as simulate_between_stops
 from rocking.dynamics.stepping import (
     MoreauJean,
@@ -153,7 +153,7 @@ def compare_schemes(
 
     def marched(how: Treatment) -> Response:
         found: Response
-        if isinstance(body, _LinearBody):
+        if isinstance(body, LinearBody):
             found = simulate_between_stops(
                 body, motion, chattering=how, duration=duration, initial_position=position, **shared
             )

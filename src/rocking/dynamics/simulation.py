@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 import rocking.response
 from rocking import checks
 from rocking.arrays import Floats, as_asked
-from rocking.dynamics.bodies import LinearBodies, _LinearBody
+from rocking.dynamics.linear_bodies import LinearBodies, LinearBody
 from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
@@ -82,7 +82,7 @@ class Response(rocking.response.Response):
 
 
 def simulate(
-    body: _LinearBody,
+    body: LinearBody,
     motion: Motion | None,
     *,
     chattering: str | Treatment = "certified",
@@ -145,7 +145,7 @@ def simulate(
 
 
 def simulate_many(
-    bodies: _LinearBody | Sequence[_LinearBody] | LinearBodies,
+    bodies: LinearBody | Sequence[LinearBody] | LinearBodies,
     motions: Motions,
     *,
     chattering: str | Treatment = "certified",
@@ -193,7 +193,7 @@ def simulate_many(
     >>> found.restitution.values.tolist(), bool((found.peak_position > 0.0).all())
     ([0.3, 0.6, 0.9], True)
     """
-    given = [bodies] if isinstance(bodies, _LinearBody) else bodies
+    given = [bodies] if isinstance(bodies, LinearBody) else bodies
     gathered = given if isinstance(given, LinearBodies) else LinearBodies([_one_body(each) for each in given])
     product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
     for motion in product.motions:
@@ -212,8 +212,8 @@ def simulate_many(
     return found
 
 
-def _one_body(body: object) -> _LinearBody:
-    if not isinstance(body, _LinearBody):
+def _one_body(body: object) -> LinearBody:
+    if not isinstance(body, LinearBody):
         raise InvalidBlock(
             "a BouncingBall, ImpactOscillator or InvertedPendulum of rocking.dynamics is needed, not "
             f"{type(body).__name__}; blocks go to rocking.simulate"
@@ -229,12 +229,12 @@ def _along_one_line(motion: Motion | None) -> Motion | None:
     return motion
 
 
-def start_of(body: _LinearBody) -> float:
+def start_of(body: LinearBody) -> float:
     """Return position zero, or the stop that zero is behind."""
     return min(max(0.0, body.law.low), body.law.high)
 
 
-def _duration(body: _LinearBody, motion: Motion | None, duration: float | None) -> float | None:
+def _duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:
     """Return the given duration, or that of the motion for a body that nothing presses against its stop."""
     if duration is not None or min(body.thresholds) > 0.0:
         return duration

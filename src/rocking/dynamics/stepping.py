@@ -14,7 +14,7 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import Model
-from rocking.dynamics.bodies import _LinearBody
+from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.simulation import start_of
 from rocking.errors import InvalidOption
 from rocking.kernels import state, stepping
@@ -311,7 +311,7 @@ def position_at_start(body: Body, position: float | None) -> float:
     """Return the position at time 0: as it is given, else zero, or the stop where that is behind it."""
     if position is not None:
         return position
-    return start_of(body) if isinstance(body, _LinearBody) else 0.0
+    return start_of(body) if isinstance(body, LinearBody) else 0.0
 
 
 def _contacts(times: Floats, pushes: Any) -> tuple[Floats, Floats]:
