@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,9 @@ from rocking.treatment import Treatment
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+#: Cells along each side of a box for the basin entropy.
+_BOX: Final = 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,8 +58,9 @@ class Basins(DatasetResult):
 
     @property
     def entropy(self) -> tuple[float, float]:
-        """Basin entropy and boundary basin entropy of boxes of 5 by 5 cells; see `basin_entropy`."""
-        return basin_entropy(self.data.outcome.values)
+        """Basin entropy and boundary basin entropy of boxes of 5 by 5 cells; see `basin_entropy`. NaN without one."""
+        grid = self.data.outcome.values
+        return basin_entropy(grid, _BOX) if min(grid.shape) >= _BOX else (np.nan, np.nan)
 
     @property
     def uncertainty(self) -> tuple[float, float]:
@@ -81,8 +85,9 @@ class Basins(DatasetResult):
         if missing:
             return "\n".join([*text, f"not reached before an interrupt: {missing} cells"])
         whole, boundary = self.entropy
-        said = "above ln 2, so that it is fractal" if boundary > np.log(2.0) else "not above ln 2"
-        text.append(f"basin entropy {whole:.4f}, of the boundary {boundary:.4f} ({said})")
+        if np.isfinite(whole):
+            said = "above ln 2, so that it is fractal" if boundary > np.log(2.0) else "not above ln 2"
+            text.append(f"basin entropy {whole:.4f}, of the boundary {boundary:.4f} ({said})")
         exponent, error = self.uncertainty
         if np.isfinite(exponent):
             dimension = f"dimension of the boundary {2.0 - exponent:.3f}"
