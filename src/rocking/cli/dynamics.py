@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
+from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.body import Body
@@ -113,9 +114,7 @@ def bifurcation(
         raise InvalidOption("{} takes a coordinate and a velocity, as 0.01,0", "start")
     name, quantity, rest = shaking.parameter(along, "amplitude:0.1g:0.5g:101")
     unit = shaking.family.unit(name).replace("^2", "²")
-    levels = values(rest, "along", quantity)
-    if np.any(np.diff(levels) <= 0.0):
-        raise InvalidOption(f"the values of {{}} must be increasing, not {rest}", "along")
+    levels = checks.axis(values(rest, "along", quantity), "along", InvalidOption)
     with output.folder() as folder:
         found = bifurcation_diagram(
             lambda value: (moving, shaking.motion(**{name: value})),

@@ -16,7 +16,7 @@ from rocking.arrays import Floats, Integers
 from rocking.constants import VERSION
 from rocking.dynamics.attractors import Known
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.repeated import parts_of, told
+from rocking.dynamics.repeated import described, parts_of
 from rocking.engine import in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels import state
@@ -210,8 +210,8 @@ class Grid:
             },
             {
                 "program": f"rocking {VERSION}",
-                "body": told(self.strobe.body),
-                "motion": told(self.strobe.motion),
+                "body": described(self.strobe.body),
+                "motion": described(self.strobe.motion),
                 "model": self.strobe.model,
                 "most_periods": self.periods,
                 "period_s": self.strobe.period,
@@ -227,12 +227,12 @@ def _extent(values: NDArray[np.float64]) -> float:
 def _distinct(names: list[str]) -> list[str]:
     """Return names of which no two are equal: a letter behind each of those that were."""
     seen: dict[str, int] = {}
-    told = []
+    found = []
     for name in names:
         seen[name] = seen.get(name, 0) + 1
         several = names.count(name) > 1
-        told.append(f"{name} ({_letter(seen[name])})" if several else name)
-    return told
+        found.append(f"{name} ({_letter(seen[name])})" if several else name)
+    return found
 
 
 def _letter(number: int) -> str:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.basin_grid import NAMES, NOT_REACHED, Grid
@@ -223,7 +222,7 @@ def basins(
     overturns to side +: 0.12
     """
     strobe = stroboscopic_map(body, motion, model=model, chattering=chattering)
-    x, v = _axis(positions, "positions"), _axis(velocities, "velocities")
+    x, v = checks.axis(positions, "positions", InvalidOption), checks.axis(velocities, "velocities", InvalidOption)
     checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
     most = checks.whole(periods, "periods", InvalidOption, least=1)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
@@ -232,10 +231,3 @@ def basins(
         work.keep_in(checks.path(folder, "folder", InvalidOption))
     work.run(progress)
     return Basins(work.dataset())
-
-
-def _axis(values: ArrayLike, name: str) -> Floats:
-    axis = np.atleast_1d(checks.numbers(values, name, InvalidOption))
-    if axis.ndim != 1 or axis.size == 0 or np.any(np.diff(axis) <= 0.0):
-        raise InvalidOption("{} must be increasing numbers", name)
-    return axis

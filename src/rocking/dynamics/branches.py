@@ -1,4 +1,4 @@
-"""Branches of periodic orbits along a parameter: points and bifurcations, and how they are told and drawn."""
+"""Branches of periodic orbits along a parameter: points and bifurcations, in words, as tables and as a figure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rocking.arrays import Flags, Floats
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.orbits import PeriodicOrbit, orbit_at
+from rocking.dynamics.orbits import NEUTRAL, PeriodicOrbit, orbit_at
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.result import DrawnResult, TableResult
@@ -121,7 +121,7 @@ class Branch(DrawnResult, TableResult):
     @property
     def is_stable(self) -> Flags:
         """Whether the orbit at each point is stable, shape (n,)."""
-        return np.asarray(np.all(np.abs(self.multipliers) < 1.0, axis=1))
+        return np.asarray(np.all(np.abs(self.multipliers) < NEUTRAL, axis=1))
 
     def __len__(self) -> int:
         return len(self.values)

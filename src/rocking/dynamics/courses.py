@@ -8,12 +8,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from rocking.arrays import Flags, Floats
-from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.simulation import simulate as simulate_between_stops
+from rocking.dynamics.simulation import simulate_any
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.simulation import simulate as simulate_body
 
 #: Points at which a period is looked at for extremes, and bisections by which these are found.
 _LOOKS: Final = 64
@@ -38,14 +36,9 @@ def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Respons
     many = Motion(
         breakpoints, np.tile(motion.coefficients, (periods + 1, 1)), motion.name, motion.description, error=motion.error
     )
-    x, v = float(state[0]), float(state[1])
-    if isinstance(strobe.body, LinearBody):
-        return simulate_between_stops(
-            strobe.body, many, chattering=strobe.treatment, duration=duration, initial_position=x, initial_velocity=v
-        )
-    return simulate_body(
+    return simulate_any(
         strobe.body, many, model=strobe.model, chattering=strobe.treatment, duration=duration,
-        initial_rotation=x, initial_velocity=v,
+        initial_position=float(state[0]), initial_velocity=float(state[1]),
     )  # fmt: skip
 
 

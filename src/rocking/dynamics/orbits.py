@@ -1,4 +1,4 @@
-"""Periodic orbits of a body under periodic motion: what one is, and how it is told and drawn."""
+"""Periodic orbits of a body under periodic motion: in words, as tables and as a figure."""
 
 from __future__ import annotations
 
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 #: Distance, over the scale of the states, within which two orbits are the same.
 SAME: Final = 1e-7
+
+#: Size of a multiplier that rounding may have made of 1.
+NEUTRAL: Final = 1.0 - 1e-9
 
 #: Points of a figure for each period, and letters of the column of names in a summary.
 _DRAWN: Final = 400
@@ -73,8 +76,8 @@ class PeriodicOrbit(DrawnResult, TableResult):
 
     @property
     def is_stable(self) -> bool:
-        """Whether what is near it comes nearer: all multipliers are within the unit circle."""
-        return bool(np.all(np.abs(self.multipliers) < 1.0))
+        """Whether what is near it comes nearer: all multipliers are within the unit circle, by more than rounding."""
+        return bool(np.all(np.abs(self.multipliers) < NEUTRAL))
 
     @property
     def duration(self) -> float:

@@ -1,4 +1,4 @@
-"""A body under a motion that repeats for ever, as kernels take both, and what sizes its states have."""
+"""A body under a motion that repeats for ever, as kernels take both, and the natural sizes of its states."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from rocking.arrays import Floats, Integers
 from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import Model
+from rocking.dynamics.simulation import model_of
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
@@ -147,13 +148,6 @@ def mean_size(motion: Motion) -> float:
     return float(np.mean(np.abs(motion.acceleration(times))))
 
 
-def model_of(body: Body, model: Model | None) -> Model:
-    """Return the model asked for; by default the nonlinear one, or the only one of a body."""
-    from rocking.block import Block
-
-    return model if model is not None else ("nonlinear" if isinstance(body, Block) else "linear")
-
-
 def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
     """Ground of a motion that repeats for ever, with this sign: twice, and behind that what lifts any body."""
     breaks = motion.breakpoints - motion.breakpoints[0]
@@ -170,7 +164,7 @@ def parts_of(count: int) -> Sequence[slice]:
     return [slice(start, min(start + TOGETHER, count)) for start in range(0, count, TOGETHER)]
 
 
-def told(what: Body | Motion) -> str:
+def described(what: Body | Motion) -> str:
     """Return what moves, or what shakes it, with its parameters in one line."""
     if isinstance(what, Motion):
         return ", ".join(part for part in (what.label, what.description.numbers) if part)

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 import rocking.response
 from rocking import checks
 from rocking.arrays import Floats, as_asked
+from rocking.block import Block
+from rocking.body import Body
+from rocking.constants import Model
 from rocking.dynamics.linear_bodies import LinearBodies, LinearBody
 from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
@@ -131,14 +134,13 @@ def simulate(
     '1.800000000000'
     """
     body, motion = _one_body(body), _along_one_line(one_motion(motion))
-    start = start_of(body) if initial_position is None else initial_position
     found = simulate_body(
         body,
         motion,
         model="linear",
         chattering=chattering,
         duration=_duration(body, motion, duration),
-        initial_rotation=start,
+        initial_rotation=position_at_start(body, initial_position),
         initial_velocity=initial_velocity,
     )
     return Response(**{entry.name: getattr(found, entry.name) for entry in fields(found)})
@@ -212,6 +214,42 @@ def simulate_many(
     return found
 
 
+def simulate_any(
+    body: Body,
+    motion: Motion | None,
+    *,
+    model: Model,
+    chattering: str | Treatment,
+    duration: float | None,
+    initial_position: float,
+    initial_velocity: float,
+) -> rocking.response.Response:
+    """Response of a body of any kind; the position of a block is its rotation."""
+    if isinstance(body, LinearBody):
+        return simulate(
+            body, motion, chattering=chattering, duration=duration,
+            initial_position=initial_position, initial_velocity=initial_velocity,
+        )  # fmt: skip
+    return simulate_body(
+        body, motion, model=model, chattering=chattering, duration=duration,
+        initial_rotation=initial_position, initial_velocity=initial_velocity,
+    )  # fmt: skip
+
+
+def model_of(body: Body, model: Model | None) -> Model:
+    """Return the equation of motion: as it is given, else nonlinear for a block and linear for other bodies."""
+    if model is not None:
+        return model
+    return "nonlinear" if isinstance(body, Block) else "linear"
+
+
+def position_at_start(body: Body, position: float | None) -> float:
+    """Return the position at time 0: as it is given, else zero, or the stop where that is behind it."""
+    if position is not None:
+        return position
+    return _start_of(body) if isinstance(body, LinearBody) else 0.0
+
+
 def _one_body(body: object) -> LinearBody:
     if not isinstance(body, LinearBody):
         raise InvalidBlock(
@@ -229,7 +267,7 @@ def _along_one_line(motion: Motion | None) -> Motion | None:
     return motion
 
 
-def start_of(body: LinearBody) -> float:
+def _start_of(body: LinearBody) -> float:
     """Return position zero, or the stop that zero is behind."""
     return min(max(0.0, body.law.low), body.law.high)
 
