@@ -20,8 +20,8 @@ from rocking.dynamics.orbits import PeriodicOrbit
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 
-#: Steps along a branch, over the scales of state and parameter: the first one, and how one grows after that many
-#: Newton steps or fewer.
+#: Steps along a branch, over the scales of state and parameter: the first one, and the factor by which one grows after
+#: so few Newton steps.
 _FIRST_STEP: Final = 0.005
 _LONGER: Final = 1.4
 _QUICK: Final = 4
@@ -172,7 +172,7 @@ def _followed(
     for _ in range(_TRIALS * most):
         if len(path.points) >= most:
             break
-        end = walk.go_on(path, first=found.z)
+        end = walk.advance(path, first=found.z)
         walk.equations.for_step(walk.step)
         if end:
             return path._replace(end=end)
@@ -193,7 +193,7 @@ class _Walk(Location):
     def __post_init__(self) -> None:
         self.written = self.z
 
-    def go_on(self, path: _Path, first: Floats) -> str:
+    def advance(self, path: _Path, first: Floats) -> str:
         """Take a step along the branch, or find that it is too long; returns why the branch ends, if it does."""
         equations = self.equations
         if self.ahead < LEAST_STEP:
@@ -208,8 +208,8 @@ class _Walk(Location):
         solved, at_limit = found
         new, tangent = solved.z, solved.tangent(self.tangent)
         tests = solved.tests(tangent)
-        # The parameter turns, but no multiplier passes 1: this is the branch from which the orbits came off. They go
-        # back along it as others, or as the same ones.
+        # The parameter turns, but no multiplier passes 1: this is where the branch bifurcates from orbits of half
+        # the period, or symmetric ones. Beyond it are the same orbits again, shifted or mirrored.
         turns = self.tests.onwards * tests.onwards < 0.0 < self.tests.at_one * tests.at_one
         if turns or equations.is_parent(new):
             path.bifurcations.append(joined(self, new))
@@ -221,7 +221,7 @@ class _Walk(Location):
         else:
             self.written = new
         path.points.append(_point(equations, new, course.peak))
-        self.be_at(new, tangent, tests)
+        self.go_to(new, tangent, tests)
         self.course, self.successes = course, self.successes + 1
         self.ahead = math.inf if self.successes > _SUCCESSES else self.ahead - self.step
         if at_limit:
@@ -238,8 +238,8 @@ class _Walk(Location):
             self.step = min(self.step * _LONGER, self.longest)
         return ""
 
-    def be_at(self, z: Floats, tangent: Floats, tests: Tests) -> None:
-        """Be at another point."""
+    def go_to(self, z: Floats, tangent: Floats, tests: Tests) -> None:
+        """Go to another point."""
         self.z, self.tangent, self.tests = z, tangent, tests
 
     def next(self) -> tuple[Solved, bool] | None:
@@ -276,7 +276,7 @@ class _Walk(Location):
         if found is not None:
             tangent = found.tangent(self.tangent[2] * AT_VALUE)
             self.equations = equations
-            self.be_at(found.z, tangent, found.tests(tangent))
+            self.go_to(found.z, tangent, found.tests(tangent))
 
 
 def _point(equations: OrbitEquations, z: Floats, peak: float) -> _Point:

@@ -41,7 +41,7 @@ _BEYOND: Final = (0.0, *np.geomspace(1e-12, 1e-4, 9).tolist())
 #: Points from which grazing is extrapolated.
 _EXTRAPOLATED: Final = 6
 
-#: Shares of the range of the parameter within which the orbits are looked for from which others came off.
+#: Shares of the range of the parameter within which the orbits are sought from which a branch bifurcates.
 _WIDER: Final = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 
@@ -88,7 +88,7 @@ def _located(kind: str, here: Location, new: Floats, value_of: Callable[[Tests],
 
 
 def joined(here: Location, new: Floats) -> Bifurcation:
-    """Bifurcation between two points, of the orbits of half the period, or symmetric ones, that are between."""
+    """Bifurcation at which a branch meets, between two points, orbits of half the period, or symmetric ones."""
     equations, middle = here.equations, 0.5 * (here.z + new)
     even = equations.period % 2 == 0
     parent = replace(equations, period=equations.period // 2 if even else equations.period, by_half=not even)
@@ -107,7 +107,7 @@ def joined(here: Location, new: Floats) -> Bifurcation:
 
 
 def vanishing(here: Location, before: Course, length: float) -> Bifurcation:
-    """Grazing, where the speed of the slowest impact vanishes: extrapolated, for it is hard to come near."""
+    """Grazing, where the speed of the slowest impact vanishes: extrapolated, as the equations are singular there."""
     equations, z, tangent = here.equations, here.z, here.tangent
     speeds, values = [here.course.slowest], [z[2]]
     back = length * here.course.slowest / (before.slowest - here.course.slowest)
@@ -121,7 +121,7 @@ def vanishing(here: Location, before: Course, length: float) -> Bifurcation:
 
 
 def ending(here: Location, ahead: float) -> tuple[str, list[Bifurcation]]:
-    """Why a branch ends here, and the bifurcation there, if one is; so far ahead it does not go on."""
+    """Why a branch ends between here and a distance ahead, and the bifurcation there, if there is one."""
     reason = _reason(here, here.z + 8.0 * LEAST_STEP * here.tangent)
     values = [(here.z + step * here.tangent)[2] for step in (0.0, ahead)]
     return reason, [] if reason == LOST else [here.bifurcation(reason, here.z, values)]

@@ -50,7 +50,7 @@ _KEPT: Final = 64
 
 
 class Kind(NamedTuple):
-    """What must stay as it is along a branch: whether a body rests or overturns, and its impacts."""
+    """What does not change along a branch: whether a body rests (for ever) or overturns, and its impacts."""
 
     rests: bool
     for_ever: bool
@@ -186,7 +186,7 @@ class OrbitEquations:
         return course_of(self.strobe(value), state, self.period)
 
     def is_parent(self, z: Floats) -> bool:
-        """Whether a point is of orbits from which this branch came off: of half the period, or symmetric."""
+        """Whether a point is of orbits from which this branch bifurcates: of half the period, or symmetric."""
         state, value = self.physical(z)
         if self.kind.rests or self.by_half:
             return False

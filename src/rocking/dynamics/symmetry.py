@@ -1,4 +1,4 @@
-"""Mirror images: where every course has one half a period later, and which orbits are their own."""
+"""Mirror images: bodies and motions whose courses have one half a period later, and orbits that are their own."""
 
 from __future__ import annotations
 
