@@ -8,12 +8,13 @@ import pytest
 from rocking import Block, dynamics, pulses
 
 BLOCK = ["--p", "2", "--alpha", "0.2", "--restitution", "0.9"]
+SINE = ["--pulse", "sine:amplitude=3.5,frequency=1.2Hz"]
 
 
 def test_basin_json_is_the_basins(run, tmp_path):
-    arguments = ["--rotations", "-0.2:0.2:12", "--velocities", "-0.4:0.4:11", "--folder", tmp_path / "kept"]
+    arguments = ["--positions", "-0.2:0.2:12", "--velocities", "-0.4:0.4:11", "--folder", tmp_path / "kept"]
     for _ in range(2):  # the second time from the folder
-        code, out, err = run("basin", "--amplitude", "3.5", "--frequency", "1.2Hz", *BLOCK, *arguments, "--json")
+        code, out, err = run("basin", *SINE, *BLOCK, *arguments, "--json")
         assert (code, err) == (0, "")
         result = json.loads(out)
         block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -25,19 +26,22 @@ def test_basin_json_is_the_basins(run, tmp_path):
 
 
 def test_basin_prints_shares_and_writes_what_it_says(run, tmp_path):
-    grid = ["--rotations", "-0.2:0.2:9", "--velocities", "-0.4:0.4:9"]
-    code, out, _ = run("basin", "--amplitude", "0.35g", "--frequency", "1.2", *BLOCK, *grid, "--out", tmp_path)
+    grid = ["--positions", "-0.2:0.2:9", "--velocities", "-0.4:0.4:9"]
+    code, out, _ = run("basin", *SINE, *BLOCK, *grid, "--out", tmp_path)
     assert code == 0 and "overturns to side -" in out
     tables = {"attractors.csv", "outcomes.csv", "orbits.csv"}
     assert {path.name for path in tmp_path.iterdir()} == tables | {"basin.nc", "basin.pdf", "basin.png", "result.json"}
 
 
 @pytest.mark.parametrize(
-    ("amplitude", "frequency", "parameter"),
-    [("0.1g:0.4g:5", "1.2", "amplitude (m/s²)"), ("2.5", "1:2:5", "frequency (Hz)")],
+    ("pulse", "along", "parameter"),
+    [
+        ("sine:frequency=1.2", "amplitude:0.1g:0.4g:5", "amplitude (m/s²)"),
+        ("sine:amplitude=2.5,frequency=1", "frequency:1:2:5", "frequency (Hz)"),
+    ],
 )
-def test_bifurcation_json_is_the_diagram(run, amplitude, frequency, parameter):
-    arguments = ["--amplitude", amplitude, "--frequency", frequency, "--start", "0.02,0.1", "--kept", "8", "--json"]
+def test_bifurcation_json_is_the_diagram(run, pulse, along, parameter):
+    arguments = ["--pulse", pulse, "--along", along, "--start", "0.02,0.1", "--kept", "8", "--json"]
     code, out, err = run("bifurcation", *arguments, *BLOCK, "--direction", "up")
     assert (code, err) == (0, "")
     result = json.loads(out)
@@ -52,7 +56,7 @@ def test_bifurcation_json_is_the_diagram(run, amplitude, frequency, parameter):
 
 
 def test_bifurcation_writes_what_it_says(run, tmp_path):
-    arguments = ["--amplitude", "1:3:4", "--frequency", "1.2", "--kept", "4", "--out", tmp_path]
+    arguments = ["--pulse", "sine:frequency=1.2", "--along", "amplitude:1:3:4", "--kept", "4", "--out", tmp_path]
     code, out, _ = run("bifurcation", *arguments, *BLOCK)
     assert code == 0 and "up: " in out
     names = {f"bifurcation.{kind}" for kind in ("nc", "pdf", "png")} | {"states.csv", "orbits.csv", "result.json"}
@@ -60,16 +64,43 @@ def test_bifurcation_writes_what_it_says(run, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("options", "body"),
+    [
+        (["--ball", "0.5"], dynamics.BouncingBall(0.5)),
+        (["--oscillator", "frequency=1,restitution=0.8,stop=0.01"], dynamics.ImpactOscillator(1.0, 0.8, stop=0.01)),
+        (["--pendulum", "p=3,gap=0.1,restitution=0.6"], dynamics.InvertedPendulum(3.0, 0.1, 0.6)),
+    ],
+)
+def test_every_body_has_a_basin_and_a_diagram(run, options, body):
+    pulse = ["--pulse", "sine:amplitude=3,frequency=1.3Hz"]
+    code, out, err = run("basin", *pulse, *options, "--periods", "60", "--json")
+    assert (code, err) == (0, "")
+    assert body.description in (result := json.loads(out))["body"] and result["complete"] is True
+    assert sum(each["share"] for each in result["attractors"]) == pytest.approx(1.0)
+    grid = ["--positions", "0:1cm:3", "--velocities", "0,0.1"]
+    _, out, _ = run("basin", *pulse, *options, *grid, "--json")
+    expected = dynamics.basins(body, pulses.sine(3.0, 1.3, cycles=1), [0.0, 0.005, 0.01], [0.0, 0.1])
+    assert [each["share"] for each in json.loads(out)["attractors"]] == expected.share.values.tolist()
+    code, out, err = run("bifurcation", *pulse, *options, "--along", "amplitude:2,3", "--kept", "8", "--json")
+    assert (code, err) == (0, "")
+    found = dynamics.bifurcation_diagram(
+        lambda value: (body, pulses.sine(value, 1.3, cycles=1)), [2.0, 3.0], [0.01, 0.0], direction="both", kept=8
+    )
+    assert json.loads(out)["period"] == found.period.values.tolist()
+
+
+@pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["bifurcation", "--amplitude", "1", "--frequency", "2"], "one of --amplitude and --frequency must be a list"),
-        (
-            ["bifurcation", "--amplitude", "1:2:3", "--frequency", "1", "--start", "0.1"],
-            "--start takes a rotation and a velocity",
-        ),
-        (["basin", "--amplitude", "1", "--frequency", "1", "--rotations", "0.1,0"], "--rotations must be increasing"),
-        (["basin", "--amplitude", "1", "--frequency", "1", "--velocities", "1,0"], "--velocities must be increasing"),
-        (["basin", "--amplitude", "1kg", "--frequency", "1"], "--amplitude takes an acceleration"),
+        (["bifurcation", *SINE, "--along", "amplitude"], "--along takes a parameter of the pulse with its values"),
+        (["bifurcation", *SINE, "--along", "amplitude:1:2"], "--along takes numbers, 1,2,5, or a range"),
+        (["bifurcation", *SINE, "--along", "height:1:2:3"], "the pulse sine has no height"),
+        (["bifurcation", *SINE, "--along", "amplitude:3,2"], "--along must be increasing numbers"),
+        (["bifurcation", "--pulse", "sine:frequency=1", "--along", "phase:0:1:3"], "the pulse sine needs amplitude"),
+        (["bifurcation", *SINE, "--along", "phase:0:1:3", "--start", "0.1"], "--start takes a coordinate and a veloc"),
+        (["basin", *SINE, "--positions", "0.1,0"], "--positions must be increasing"),
+        (["basin", *SINE, "--velocities", "1,0"], "--velocities must be increasing"),
+        (["basin", "--pulse", "sine:amplitude=1kg,frequency=1"], "amplitude of a sine pulse takes an acceleration"),
     ],
 )
 def test_a_mistake_gets_one_line_with_the_options_in_it(run, arguments, words):

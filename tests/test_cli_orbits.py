@@ -45,6 +45,7 @@ def test_every_body_is_shown_in_a_table(run, body):
     [
         (("--ball", 0.5, "--width", 1.0), "leave --width out"),
         (("--ball", 0.5, "--oscillator", "frequency=1", "--restitution", 0.5), "leave --oscillator and --restitution"),
+        (("--ball", 0.5, "--along", ":1:2"), "--along takes a parameter"),
         (("--oscillator", "frequency=1"), "--oscillator needs restitution"),
         (("--oscillator", "frequency=1,mass=3"), "--oscillator takes NAME=VALUE"),
         (("--pendulum", "p=many,gap=1,restitution=0.5"), "--pendulum"),

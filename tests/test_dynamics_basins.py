@@ -8,7 +8,7 @@ from numpy.random import default_rng
 from scipy.integrate import solve_ivp
 
 from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
-from rocking.dynamics import basin_maps
+from rocking.dynamics import basin_grid
 from rocking.dynamics.attractors import Known
 
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -171,7 +171,7 @@ def test_the_order_of_work_and_threads_do_not_count():
 def test_an_interrupt_keeps_what_was_computed_and_a_folder_goes_on(tmp_path, monkeypatch):
     x, v = np.linspace(-0.2, 0.2, 90), np.linspace(-0.4, 0.4, 90)
     whole = dynamics.basins(BLOCK, SHAKING, x, v)
-    follow, calls = basin_maps._Work._follow, []
+    follow, calls = basin_grid.Grid._follow, []
 
     def interrupted(self, cells):
         calls.append(len(cells))
@@ -179,7 +179,7 @@ def test_an_interrupt_keeps_what_was_computed_and_a_folder_goes_on(tmp_path, mon
             raise KeyboardInterrupt
         follow(self, cells)
 
-    monkeypatch.setattr(basin_maps._Work, "_follow", interrupted)
+    monkeypatch.setattr(basin_grid.Grid, "_follow", interrupted)
     part = dynamics.basins(BLOCK, SHAKING, x, v, folder=tmp_path / "kept")
     reached = part.outcome.values >= 0
     assert 1500 < np.count_nonzero(reached) == sum(calls[:2]) < reached.size

@@ -164,6 +164,14 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     return axis
 
 
+def axis(values: ArrayLike, name: str, error: Error) -> Floats:
+    """Return finite numbers of an axis, of any sign, in increasing order, or raise `error`; one number is an axis."""
+    found = np.atleast_1d(numbers(values, name, error))
+    if found.ndim != 1 or found.size == 0 or np.any(np.diff(found) <= 0.0):
+        raise error("{} must be increasing numbers", name, value=values)
+    return found
+
+
 def shown(value: object) -> str:
     """Return a value as a message shows it: in one line that is not too long."""
     text = " ".join((f"{value:g}" if isinstance(value, float) else repr(value)).split())

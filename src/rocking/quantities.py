@@ -80,6 +80,11 @@ def length(text: str, name: str) -> float:
     return value
 
 
+def position(text: str, name: str) -> float:
+    """Return a position, m, from "-0.2m", "20cm" or "0.2" (m)."""
+    return _in_units(_LENGTHS, text, name, "a position as 0.2, 0.2m or 20cm")
+
+
 def tilt(text: str, name: str) -> float:
     """Return an angle, rad, as `angle`, of a block that stands: below pi/2, and no degrees without their unit."""
     value = angle(text, name)

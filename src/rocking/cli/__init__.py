@@ -35,10 +35,9 @@ for _module, _commands in {
     "chattering": ("chatter", "critical", "paper"),
     "schemes": ("schemes",),
     "analysis": ("spectrum", "map", "ida", "measures"),
-    "dynamics": ("bifurcation", "basin"),
+    "dynamics": ("orbits", "bifurcation", "basin"),
     "fits": ("fragility", "calibrate"),
     "explore": ("explore",),
-    "orbits": ("orbits",),
 }.items():
     _lines = _lines_of(_module)
     for _command in _commands:

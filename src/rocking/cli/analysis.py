@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,7 +23,7 @@ from rocking.cli.options import (
     TreatmentOptions,
     ensemble_of,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.cli.output import OUTPUT, OutputOptions, deliver
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, UnscaledOptions
 from rocking.errors import InvalidOption
 from rocking.quantities import angle, tilt, values
@@ -221,17 +220,9 @@ def measures(
 def _deliver(
     found: DatasetResult, stem: str, read: ReadRecords | None, *, folder: Path | None, as_json: bool, **figure: Any
 ) -> None:
-    """Write an analysis into a folder where there is one (figure, tables, dataset, result), and print it.
-
-    Its tables name each motion by the record that was read, too, as those of other commands do.
-    """
+    """Write and print an analysis, whose tables name each motion by the record that was read, too."""
     result = found.to_dict()
     if read is not None:
         result |= read.to_dict()
         found = replace(found, data=found.data.assign_coords(record=("motion", [*read.motions])))
-    if folder is not None:
-        for table in found.TABLES:
-            found.to_csv(folder / f"{table}.csv", table)
-        found.to_netcdf(folder / f"{stem}.nc")
-        write_results(folder, figures={stem: functools.partial(found.plot, **figure)}, result=result)
-    print_result(result, found.summary(), as_json=as_json, folder=folder)
+    deliver(found, stem, folder=folder, as_json=as_json, result=result, **figure)

@@ -1,54 +1,107 @@
-"""`rocking bifurcation`, `basin`: what becomes of a block under a sine that never ends."""
+"""`rocking orbits`, `bifurcation`, `basin`: what becomes of a body under a pulse that repeats for ever."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
 
-from rocking import quantities
+from rocking import checks
 from rocking.arrays import Floats
-from rocking.cli.options import BLOCK, MODEL, BlockOptions, ModelOptions, written
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.block import Block
+from rocking.body import Body
+from rocking.cli.options import BLOCK, MODEL, BodyOptions, ModelOptions, written
+from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results, write_tables
 from rocking.dynamics.basin_maps import basins
 from rocking.dynamics.bifurcation import Direction, bifurcation_diagram
+from rocking.dynamics.branches import Branch
+from rocking.dynamics.continuation import continue_orbit
+from rocking.dynamics.maps import stroboscopic_map
+from rocking.dynamics.orbit_search import periodic_orbits
+from rocking.dynamics.orbits import PeriodicOrbit
+from rocking.dynamics.repeated import scale_of
 from rocking.errors import InvalidOption
-from rocking.motion.pulses import sine
-from rocking.quantities import values
-from rocking.result import DatasetResult
+from rocking.motion.motion import Motion
+from rocking.named_pulses import PulseFamily, pulse_values
+from rocking.quantities import Quantity, number, position, tilt, values
+from rocking.tables import cell, counted, text_table
 
 #: Cells of a basin along each axis.
 _CELLS = 200
 
 
-def bifurcation(
+def orbits(
     *,
-    amplitude: str,
-    frequency: str,
-    phase: str = "0",
-    start: Annotated[str, written("Initial rotation and velocity, rad and rad/s, with a comma between.")] = "0.01,0",
-    direction: Direction = "both",
-    transient: int = 200,
-    kept: int = 64,
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
+    pulse: str,
+    period: int = 1,
+    along: str | None = None,
+    orbit: int | None = None,
+    body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Follow a block under a sine without end as its amplitude or its frequency changes, and keep where it settles.
+    """Find periodic orbits of a body under a pulse that repeats for ever, and follow one along a parameter.
 
-    One of the two is a list: 0.1g,0.2g or START:STOP:COUNT, with :log at the end for equal ratios. --out holds
+    The body is a block (--width, --height, or --p, --alpha), or --ball, --oscillator or --pendulum. --out holds
+    orbit-1.png, .pdf, orbit-1-histories.csv, ... of every orbit and result.json; with --along, branch.png, .pdf,
+    points.csv and bifurcations.csv.
+
+    Parameters
+    ----------
+    pulse
+        One period, sine:amplitude=0.3g,frequency=1.2Hz or any of rocking pulses; a sine has one cycle unless it is
+        said.
+    period
+        Periods of the motion after which orbits repeat.
+    along
+        Parameter of the pulse with its range, amplitude:0.1g:0.5g: an orbit is followed through folds, and where it
+        bifurcates is located.
+    orbit
+        Number of the orbit that is followed; by default the first stable one.
+    """
+    moving, shaking = body.body(), _Repeating(pulse)
+    follow = None if along is None else _follower(moving, shaking, along)
+    with output.folder() as folder:
+        found = periodic_orbits(moving, shaking.motion(), period=period, model=model.equation)
+        branch = None if follow is None else follow(_chosen(found, orbit))
+        result: dict[str, Any] = {"orbits": [each.to_dict() for each in found]}
+        if branch is not None:
+            result["branch"] = branch.to_dict()
+        if folder is not None:
+            _write(folder, found, branch, result)
+        text = _text(found) if branch is None else f"{_text(found)}\n\n{branch.summary()}"
+        print_result(result, text, as_json=output.as_json, folder=folder)
+
+
+def bifurcation(
+    *,
+    pulse: str,
+    along: str,
+    start: Annotated[str, written("Initial coordinate and velocity, with a comma between (rad, m; rad/s, m/s).")] = (
+        "0.01,0"
+    ),
+    direction: Direction = "both",
+    transient: int = 200,
+    kept: int = 64,
+    body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
+    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Follow a body under a pulse that repeats for ever as a parameter changes, and keep where it settles.
+
+    The body is a block (--width, --height, or --p, --alpha), or --ball, --oscillator or --pendulum. --out holds
     bifurcation.png, .pdf, .nc, states.csv (at the starts of periods), orbits.csv (periods, impacts) and result.json.
 
     Parameters
     ----------
-    amplitude
-        Amplitude of the ground acceleration, 0.3g or 2.9 (m/s^2), or a list of them.
-    frequency
-        Frequency of the sine, 1.2Hz or 1.2, or a list of them.
-    phase
-        Phase of the sine at the start of a period, 90deg or 1.57 (rad).
+    pulse
+        One period, sine:frequency=1.2Hz or any of rocking pulses; a sine has one cycle unless it is said.
+    along
+        Parameter of the pulse with its values, amplitude:0.1g:0.5g:101 (START:STOP:COUNT, with :log at the end for
+        equal ratios) or amplitude:0.1g,0.2g.
     direction
         up or down: from each value to the next; both of them; afresh: each value from the initial state.
     transient
@@ -56,105 +109,165 @@ def bifurcation(
     kept
         Periods whose states are kept.
     """
-    levels, frequencies = (
-        values(amplitude, "amplitude", quantities.acceleration),
-        values(frequency, "frequency", quantities.frequency),
-    )
-    if (levels.size > 1) == (frequencies.size > 1):
-        raise InvalidOption(
-            "one of {} and {} must be a list, as 0.1g:1g:91 or 0.5:3:126, and the other not", "amplitude", "frequency"
-        )
-    body, shift, first = block.block(), quantities.angle(phase, "phase"), values(start, "start")
+    moving, shaking, first = body.body(), _Repeating(pulse), values(start, "start")
     if first.size != 2:
-        raise InvalidOption("{} takes a rotation and a velocity, as 0.01,0", "start")
-    over_amplitude = levels.size > 1
+        raise InvalidOption("{} takes a coordinate and a velocity, as 0.01,0", "start")
+    name, quantity, rest = shaking.parameter(along, "amplitude:0.1g:0.5g:101")
+    unit = shaking.family.unit(name).replace("^2", "²")
+    levels = checks.axis(values(rest, "along", quantity), "along", InvalidOption)
     with output.folder() as folder:
         found = bifurcation_diagram(
-            lambda value: (
-                body,
-                sine(
-                    value if over_amplitude else float(levels[0]),
-                    float(frequencies[0]) if over_amplitude else value,
-                    cycles=1,
-                    phase=shift,
-                ),
-            ),
-            levels if over_amplitude else frequencies,
+            lambda value: (moving, shaking.motion(**{name: value})),
+            levels,
             first,
             direction=direction,
             transient=transient,
             kept=kept,
-            parameter="amplitude (m/s²)" if over_amplitude else "frequency (Hz)",
-            model=model.model,
+            parameter=f"{name} ({unit})" if unit else name,
+            model=model.equation,
         )
-        _deliver(found, "bifurcation", folder=folder, as_json=output.as_json)
+        deliver(found, "bifurcation", folder=folder, as_json=output.as_json)
 
 
 def basin(
     *,
-    amplitude: str,
-    frequency: str,
-    phase: str = "0",
-    rotations: Annotated[str | None, written("Rotations, rad; by default up to the slenderness on both sides.")] = None,
+    pulse: str,
+    positions: Annotated[
+        str | None,
+        written("Rotations of a block, rad, or positions, m; by default up to its slenderness, or between the stops."),
+    ] = None,
     velocities: Annotated[
-        str | None, written("Angular velocities, rad/s; by default up to p times the slenderness.")
+        str | None, written("Velocities, rad/s or m/s; by default up to p times the slenderness, or what is natural.")
     ] = None,
     periods: int = 200,
     folder: Annotated[
         Path | None, Parameter(help="Where to keep what was computed, again and again; the same call goes on there.")
     ] = None,
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
+    body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Find what becomes of a block under a sine without end, for every initial state of a grid.
+    """Find what becomes of a body under a pulse that repeats for ever, for every initial state of a grid.
 
-    Lists of numbers are 1,2,5 or START:STOP:COUNT. An interrupt (Ctrl-C) ends it with what was computed so far, coarse
-    to fine. --out holds basin.png, .pdf, .nc, attractors.csv, outcomes.csv, orbits.csv and result.json.
+    The body is a block (--width, --height, or --p, --alpha), or --ball, --oscillator or --pendulum. Lists of numbers
+    are 1,2,5 or START:STOP:COUNT. An interrupt (Ctrl-C) ends it with what was computed so far, coarse to fine. --out
+    holds basin.png, .pdf, .nc, attractors.csv, outcomes.csv, orbits.csv and result.json.
 
     Parameters
     ----------
-    amplitude
-        Amplitude of the ground acceleration, 0.3g or 2.9 (m/s^2).
-    frequency
-        Frequency of the sine, 1.2Hz or 1.2.
-    phase
-        Phase of the sine at the start of a period, 90deg or 1.57 (rad).
+    pulse
+        One period, sine:amplitude=0.3g,frequency=1.2Hz or any of rocking pulses; a sine has one cycle unless it is
+        said.
     periods
         Most periods that a state is followed for.
     """
-    body = block.block()
-    pushed, shaken = quantities.acceleration(amplitude, "amplitude"), quantities.frequency(frequency, "frequency")
-    motion = sine(pushed, shaken, cycles=1, phase=quantities.angle(phase, "phase"))
-    lean, rate = max(side.alpha for side in body.sides), max(side.p * side.alpha for side in body.sides)
+    moving, motion = body.body(), _Repeating(pulse).motion()
+    read = tilt if isinstance(moving, Block) else position
+    at, rates = _natural_axes(moving, motion)
     with output.folder() as place:
         found = basins(
-            body,
+            moving,
             motion,
-            _axis(rotations, "rotations", lean, quantities.tilt),
-            _axis(velocities, "velocities", rate, quantities.number),
+            at if positions is None else values(positions, "positions", read),
+            rates if velocities is None else values(velocities, "velocities", number),
             periods,
-            model=model.model,
+            model=model.equation,
             folder=folder,
         )
-        _deliver(found, "basin", folder=place, as_json=output.as_json)
+        deliver(found, "basin", folder=place, as_json=output.as_json)
 
 
-def _axis(text: str | None, name: str, extent: float, quantity: quantities.Quantity) -> Floats:
-    if text is None:
-        return np.linspace(-extent, extent, _CELLS)
-    axis = values(text, name, quantity)
-    if np.any(np.diff(axis) <= 0.0):
-        raise InvalidOption("{} must be increasing numbers", name)
-    return axis
+class _Repeating:
+    """A pulse that repeats for ever; of a sine one cycle unless it is said."""
+
+    def __init__(self, text: str) -> None:
+        self.family: PulseFamily
+        self.family, given = pulse_values(text)
+        self.given = {"cycles": 1.0} | given if "cycles" in self.family.needed else given
+
+    def motion(self, **others: float) -> Motion:
+        """Return one period, with other values of some parameters."""
+        return self.family.motion(self.given | others)
+
+    def parameter(self, along: str, example: str) -> tuple[str, Quantity, str]:
+        """Return the parameter that changes, what reads its values, and the text of these."""
+        name, colon, rest = (each.strip() for each in along.partition(":"))
+        if not colon or not name:
+            raise InvalidOption(f"{{}} takes a parameter of the pulse with its values, as {example}", "along")
+        quantity = self.family.quantity(name)
+        if quantity is None:
+            raise InvalidOption(f"{{}} takes a number of the pulse, and {name} is a word", "along")
+        return name, quantity, rest
 
 
-def _deliver(found: DatasetResult, stem: str, *, folder: Path | None, as_json: bool) -> None:
-    """Write a result into a folder where there is one, and print it."""
-    result = found.to_dict()
-    if folder is not None:
-        for table in found.TABLES:
-            found.to_csv(folder / f"{table}.csv", table)
-        found.to_netcdf(folder / f"{stem}.nc")
-        write_results(folder, figures={stem: found.plot}, result=result)
-    print_result(result, found.summary(), as_json=as_json, folder=folder)
+def _follower(body: Body, shaking: _Repeating, along: str) -> Callable[[PeriodicOrbit], Branch]:
+    """Return what follows an orbit along a parameter of the pulse."""
+    example = "amplitude:0.1g:0.5g"
+    name, quantity, rest = shaking.parameter(along, example)
+    ends = rest.split(":")
+    if name not in shaking.given or len(ends) != 2:
+        raise InvalidOption(f"{{}} takes a parameter that the pulse gives, with its range, as {example}", "along")
+    low, high = (quantity(end, "along") for end in ends)
+    value, unit = float(shaking.given[name]), shaking.family.unit(name) or "1"
+
+    def follow(orbit: PeriodicOrbit) -> Branch:
+        return continue_orbit(
+            orbit, lambda at: (body, shaking.motion(**{name: at})), value, (low, high), name=name, unit=unit
+        )
+
+    return follow
+
+
+def _chosen(found: list[PeriodicOrbit], number_of: int | None) -> PeriodicOrbit:
+    """Return the orbit that is followed."""
+    if number_of is None:
+        stable = [each for each in found if each.is_stable] or found
+        if not stable:
+            raise InvalidOption("no orbit was found, so that none can be followed {}", "along")
+        return stable[0]
+    if not 1 <= number_of <= len(found):
+        raise InvalidOption(f"{{}} must be from 1 to {len(found)}, the orbits that were found", "orbit")
+    return found[number_of - 1]
+
+
+def _text(found: list[PeriodicOrbit]) -> str:
+    """Return a table of orbits."""
+    if not found:
+        return "no periodic orbit was found"
+    coordinate = found[0].body.coordinate
+    rows = [
+        [
+            k, each.period, "infinite" if each.rests and each.impacts else int(each.impacts),
+            "yes" if each.is_stable else "no", "yes" if each.symmetric else "no",
+            f"{each.state[0]:.9g}", f"{each.state[1]:.9g}", cell(float(abs(each.multipliers[0]))),
+        ]
+        for k, each in enumerate(found, 1)
+    ]  # fmt: skip
+    unit = coordinate.unit
+    header = [
+        "orbit", "periods", "impacts", "stable", "symmetric", f"{coordinate.name} ({unit})", f"velocity ({unit}/s)",
+        "largest multiplier",
+    ]  # fmt: skip
+    return f"{counted(len(found), 'periodic orbit')}\n\n{text_table(header, rows)}"
+
+
+def _write(folder: Path, found: list[PeriodicOrbit], branch: Branch | None, result: dict[str, Any]) -> None:
+    """Write figures, tables and the result."""
+    for k, each in enumerate(found, 1):
+        each.to_csv(folder / f"orbit-{k}-histories.csv", "histories")
+    figures = {f"orbit-{k}": each.plot for k, each in enumerate(found, 1)}
+    if branch is not None:
+        write_tables(folder, branch)
+        figures["branch"] = branch.plot
+    write_results(folder, figures=figures, result=result)
+
+
+def _natural_axes(body: Body, motion: Motion) -> tuple[Floats, Floats]:
+    """Return coordinates and velocities that are natural to a body under a motion."""
+    if isinstance(body, Block):
+        lean, rate = max(side.alpha for side in body.sides), max(side.p * side.alpha for side in body.sides)
+        return np.linspace(-lean, lean, _CELLS), np.linspace(-rate, rate, _CELLS)
+    (low, high), scale = body.stops, scale_of(stroboscopic_map(body, motion))
+    width = high - low or scale.coordinate
+    middles = (np.arange(_CELLS) + 0.5) / _CELLS
+    return low + width * middles, scale.velocity * (2.0 * middles - 1.0)

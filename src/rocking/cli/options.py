@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -19,6 +20,7 @@ from rocking.quantities import Quantity, acceleration, length, number, sides, ti
 
 if TYPE_CHECKING:
     from rocking.block import Block
+    from rocking.body import Body
 
 #: What describes a block, together, and what may go with it.
 _Descriptions = Mapping[tuple[str, ...], tuple[str, ...]]
@@ -151,6 +153,60 @@ def _all_of(names: Sequence[str]) -> str:
 
 def _one_of(descriptions: Iterable[Sequence[str]]) -> str:
     return ", or ".join(map(_all_of, descriptions))
+
+
+@dataclass(frozen=True)
+class BodyOptions(BlockOptions):
+    """A block, or another body in its place."""
+
+    ball: Annotated[
+        float | None,
+        hint("In place of a block a ball on a table, by its coefficient of restitution; the motion is up."),
+    ] = None
+    oscillator: Annotated[
+        str | None,
+        hint(
+            "In place of a block an oscillator that hits a stop, as frequency=1,restitution=0.8,stop=0.01 (Hz, m), "
+            "with damping_ratio and second_stop."
+        ),
+    ] = None
+    pendulum: Annotated[
+        str | None,
+        hint("In place of a block a pendulum between walls, as p=3,gap=0.1,restitution=0.6 (rad/s, m)."),
+    ] = None
+
+    def body(self) -> Body:
+        """Return the other body that is given, or where there is none the block."""
+        from rocking.dynamics.bodies import BouncingBall, ImpactOscillator, InvertedPendulum
+
+        names = ("ball", "oscillator", "pendulum", "restitution")
+        first, *others = [name for name in names if getattr(self, name) is not None] or ["restitution"]
+        if first == "restitution":
+            return self.block()
+        others = [*others, *self.given()]
+        if others:
+            raise InvalidBlock(f"{{}} is a body of its own: leave {_all_of(others)} out", first, *others)
+        if self.ball is not None:
+            return BouncingBall(self.ball)
+        if self.oscillator is not None:
+            return ImpactOscillator(**_parameters(self.oscillator, "oscillator", ImpactOscillator))
+        return InvertedPendulum(**_parameters(self.pendulum or "", "pendulum", InvertedPendulum))
+
+
+def _parameters(text: str, option: str, made: type) -> dict[str, float]:
+    """Return the parameters of a body that a text gives, by name."""
+    known = inspect.signature(made).parameters
+    given = {}
+    for part in text.split(","):
+        name, equals, value = (each.strip() for each in part.partition("="))
+        name = name.replace("-", "_")
+        if not equals or name not in known:
+            raise InvalidOption(f"{{}} takes NAME=VALUE with {', '.join(known)}, not {part.strip()!r}", option)
+        given[name] = number(value, option)
+    missing = [name for name, each in known.items() if each.default is each.empty and name not in given]
+    if missing:
+        raise InvalidOption(f"{{}} needs {' and '.join(missing)} as well", option)
+    return given
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
@@ -16,6 +17,8 @@ from rocking.tables import to_json, write_figure, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from rocking.result import DatasetResult, TableResult
 
 
 #: Resolution of figures as PNG.
@@ -66,6 +69,12 @@ def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], 
     write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
 
 
+def write_tables(folder: Path, found: TableResult) -> None:
+    """Write every table of a result into a folder, each into a file of its name."""
+    for table in found.TABLES:
+        found.to_csv(folder / f"{table}.csv", table)
+
+
 @contextmanager
 def left_out(files: str) -> Iterator[None]:
     """Go on without files whose content is refused, with a note why: what was computed is not lost for them."""
@@ -73,6 +82,24 @@ def left_out(files: str) -> Iterator[None]:
         yield
     except InvalidOption as error:
         note(Message(f"{literal(files)} left out: {error.message.template}", error.message.arguments))
+
+
+def deliver(
+    found: DatasetResult,
+    stem: str,
+    *,
+    folder: Path | None,
+    as_json: bool,
+    result: Mapping[str, Any] | None = None,
+    **figure: Any,
+) -> None:
+    """Write a result into a folder where there is one (figure, tables, dataset, result), and print it."""
+    result = found.to_dict() if result is None else result
+    if folder is not None:
+        write_tables(folder, found)
+        found.to_netcdf(folder / f"{stem}.nc")
+        write_results(folder, figures={stem: functools.partial(found.plot, **figure)}, result=result)
+    print_result(result, found.summary(), as_json=as_json, folder=folder)
 
 
 def print_result(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | None) -> None:

@@ -9,34 +9,15 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from rocking.block import Block
-from rocking.cli.options import BLOCK, MODEL, BlockOptions, ModelOptions
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.cli.options import BLOCK, MODEL, BodyOptions, ModelOptions
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.cli.records import RECORDS, MotionOptions, Names
-from rocking.dynamics import BouncingBall, compare_schemes, scheme_of
+from rocking.dynamics import compare_schemes, scheme_of
 from rocking.dynamics.comparison import Scheme
 from rocking.dynamics.schemes import STEPPINGS, TREATMENTS
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.quantities import length, tilt
-
-
-@dataclass(frozen=True)
-class _Ball:
-    """A ball on a table in place of a block."""
-
-    ball: Annotated[
-        float | None,
-        Parameter(help="In place of a block a ball on a table, by its coefficient of restitution; the motion is up."),
-    ] = None
-
-    def or_block(self, block: BlockOptions) -> Block | BouncingBall:
-        """Return the ball, or where there is none the block."""
-        if self.ball is None:
-            return block.block()
-        if given := block.given():
-            others = " and ".join(["{}"] * len(given))
-            raise InvalidBlock(f"{{}} is a body of its own: leave {others} out", "ball", *given)
-        return BouncingBall(self.ball)
+from rocking.quantities import position, tilt
 
 
 @dataclass(frozen=True)
@@ -48,7 +29,9 @@ class _Start:
     ] = None
     initial_position: Annotated[
         str | None,
-        Parameter(help="Rotation at the start, 2deg or 0.03 (rad); height of a ball, 1m.", allow_leading_hyphen=True),
+        Parameter(
+            help="Rotation at the start, 2deg or 0.03 (rad); position of another body, 1m.", allow_leading_hyphen=True
+        ),
     ] = None
     initial_velocity: Annotated[float, Parameter(help="Velocity at the start, rad/s or m/s.")] = 0.0
 
@@ -58,8 +41,7 @@ def schemes(
     schemes: str | None = None,
     repetitions: int = 3,
     start: Annotated[_Start, MODEL] = _Start(),
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
-    ball: Annotated[_Ball, BLOCK] = _Ball(),
+    body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -73,30 +55,29 @@ def schemes(
     ----------
     schemes
         What to compare, as velocity=5e-2,bypass=1e-3,interval=1e-6,time,moreau-jean=1e-3,schatzman-paoli=1e-3 (over
-        p alpha, of a ball in m/s; s; steps in s); by default several of each.
+        p alpha, of other bodies in m/s; s; steps in s); by default several of each.
     repetitions
         Runs from which the processor time is taken; 0: it is not measured.
     """
     chosen: Sequence[Scheme] = (
         (*TREATMENTS, *STEPPINGS) if schemes is None else [scheme_of(text) for text in schemes.split(",")]
     )
-    what = ball.or_block(block)
-    read_position = tilt if isinstance(what, Block) else length
-    position = None if start.initial_position is None else read_position(start.initial_position, "initial_position")
+    what = body.body()
+    read_position = tilt if isinstance(what, Block) else position
+    at = None if start.initial_position is None else read_position(start.initial_position, "initial_position")
     with output.folder() as folder:
         found = compare_schemes(
             what,
-            _one_motion(names, motion, free=position is not None or start.initial_velocity != 0.0),
+            _one_motion(names, motion, free=at is not None or start.initial_velocity != 0.0),
             schemes=chosen,
             model=model.equation,
             duration=start.duration,
-            initial_position=position,
+            initial_position=at,
             initial_velocity=start.initial_velocity,
             repetitions=repetitions,
         )
         if folder is not None:
-            for table in found.TABLES:
-                found.to_csv(folder / f"{table}.csv", table)
+            write_tables(folder, found)
             write_results(folder, figures={"schemes": found.plot}, result=found.to_dict())
         print_result(found.to_dict(), found.summary(), as_json=output.as_json, folder=folder)
 

@@ -1,13 +1,16 @@
 from .basin_maps import Basins, basins
 from .basin_measures import basin_entropy, uncertainty_exponent
 from .bifurcation import BifurcationDiagram, bifurcation_diagram
-from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum, Law, LinearBodies
+from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum
+from .branches import Bifurcation, Branch
 from .comparison import SchemeComparison, SchemeOutcome
-from .continuation import Bifurcation, Branch, continue_orbit
+from .continuation import continue_orbit
 from .erosion import BasinErosion, safe_basin_erosion
 from .exponents import LyapunovExponents, lyapunov_exponents
+from .linear_bodies import Law, LinearBodies
 from .maps import Fate, ImpactMap, StroboscopicMap, impact_map, stroboscopic_map
-from .orbits import PeriodicOrbit, periodic_orbits
+from .orbit_search import periodic_orbits
+from .orbits import PeriodicOrbit
 from .schemes import compare_schemes, scheme_of
 from .simulation import Response, simulate, simulate_many
 from .stepping import MoreauJean, SchatzmanPaoli, SteppedResponse, TimeStepping, integrate

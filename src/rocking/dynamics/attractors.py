@@ -15,21 +15,20 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers, evenly
 from rocking.dynamics.maps import StroboscopicMap
+from rocking.dynamics.orbits import NEUTRAL, multipliers_of
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import TRAP
 from rocking.kernels.state import Records
+from rocking.tables import counted
 
 #: Longest period of an attractor, in periods of the motion, and how near a state must come back to be on one, over the
 #: size of the states.
 LONGEST: Final = 64
-_RETURN: Final = 1e-6
+RETURN: Final = 1e-6
 
 #: Newton's method: most steps, and the distance at which it is done, over the size of the states.
 _STEPS: Final = 12
 _FIXED: Final = 1e-11
-
-#: Size of a multiplier that rounding may have made of 1.
-_NEUTRAL: Final = 1.0 - 1e-9
 
 #: Largest and smallest neighbourhood, over the size of the states, and how much larger the one is that is checked.
 _LARGEST: Final = 0.25
@@ -87,8 +86,7 @@ class Attractor:
         """
         if self.impacts == 0 and np.all(self.states[:, 1] == 0.0):
             return "rest"
-        counted = "1 impact" if self.impacts == 1 else f"{self.impacts} impacts"
-        return f"period {self.period}, {'rest' if self.rests else counted}"
+        return f"period {self.period}, {'rest' if self.rests else counted(self.impacts, 'impact')}"
 
 
 def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attractor | None:
@@ -98,7 +96,7 @@ def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
     """
     orbit = strobe.orbit(state, 2 * LONGEST)
     back = (np.abs(orbit[-1 - LONGEST : -1][::-1] - orbit[-1]) / size).max(axis=1)
-    returns = np.flatnonzero(back < _RETURN)
+    returns = np.flatnonzero(back < RETURN)
     if returns.size == 0:
         return None
     period = int(returns[0]) + 1
@@ -110,10 +108,10 @@ def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
         return None
     at, change = fixed
     for shorter in range(1, period):  # a slow approach may come near twice in a period only
-        if period % shorter == 0 and np.abs((strobe(at, shorter) - at) / size).max() < 1e-3 * _RETURN:
+        if period % shorter == 0 and np.abs((strobe(at, shorter) - at) / size).max() < 1e-3 * RETURN:
             return None
-    multipliers = np.linalg.eigvals(change).astype(np.complex128)
-    if np.abs(multipliers).max() >= _NEUTRAL:
+    multipliers = multipliers_of(change)
+    if np.abs(multipliers).max() >= NEUTRAL:
         return None
     _, _, impacts = strobe.followed(at, period)
     return Attractor(strobe.orbit(at, period)[:-1], multipliers, int(impacts), not change.any())
@@ -130,7 +128,7 @@ def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats)
         if np.abs(off / size).max() < _FIXED:
             return at, change
         at = at + np.linalg.solve(np.eye(2) - change, off) if change.any() else after
-        if np.abs((at - start) / size).max() > np.sqrt(_RETURN):
+        if np.abs((at - start) / size).max() > np.sqrt(RETURN):
             return None
     return None
 
@@ -282,7 +280,7 @@ class Known:
         for known in self.attractors:
             if known.period == attractor.period:
                 near = np.abs((known.states - attractor.states[0]) / self.size).max(axis=1)
-                if near.min() < _RETURN:
+                if near.min() < RETURN:
                     return
         traps = traps_of(self.strobe, attractor, self.size)
         if len(traps):

@@ -1,4 +1,4 @@
-"""How entangled basins are: basin entropy, and the uncertainty exponent, from which the boundary has its dimension."""
+"""Measures of basins: basin entropy, and the uncertainty exponent, from which the boundary has its dimension."""
 
 from __future__ import annotations
 

@@ -15,8 +15,9 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import VERSION, Model
-from rocking.dynamics.basin_maps import told
+from rocking.dynamics.attractors import RETURN
 from rocking.dynamics.maps import StroboscopicMap, stroboscopic_map
+from rocking.dynamics.repeated import described
 from rocking.engine import in_threads
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -32,9 +33,6 @@ if TYPE_CHECKING:
 
 #: Ways to go through the values of the parameter.
 Direction = Literal["up", "down", "both", "afresh"]
-
-#: How near an orbit comes back after its period, over the size of the states.
-_RETURN: Final = 1e-6
 
 #: An orbit is still settling if the distance between its states shrinks to less than this share while they are kept.
 _STILL: Final = 0.99
@@ -226,9 +224,7 @@ def bifurcation_diagram(
     if not callable(case):
         raise InvalidOption("{} must be a function of the parameter that returns a body and one period", "case")
     way = checks.one_of(direction, "direction", InvalidOption, get_args(Direction))
-    levels = np.atleast_1d(checks.numbers(values, "values", InvalidOption))
-    if levels.ndim != 1 or levels.size == 0 or np.any(np.diff(levels) <= 0.0):
-        raise InvalidOption("{} must be increasing numbers", "values")
+    levels = checks.axis(values, "values", InvalidOption)
     first = checks.numbers(starts, "starts", InvalidOption)
     if first.ndim not in (1, 2) or first.shape[-1] != 2 or first.size == 0:
         raise InvalidOption("{} must be one pair (coordinate, velocity) or several", "starts")
@@ -317,8 +313,8 @@ class _Work:
         coordinate = self.ends[0].body.coordinate
         orbits, over = ("direction", "value", "start"), ("direction", "value", "start", "iterate")
         said = [
-            _common([told(strobe.body) for strobe in self.ends]),
-            _common([told(each.motion) for each in self.ends]),
+            _common([described(strobe.body) for strobe in self.ends]),
+            _common([described(each.motion) for each in self.ends]),
         ]
         return xr.Dataset(
             {
@@ -359,7 +355,7 @@ def _period_of(states: Floats) -> int:
         return distance
 
     for period in range(1, len(states) // 2 + 1):
-        if apart(period).max() <= _RETURN:
+        if apart(period).max() <= RETURN:
             # An orbit that comes nearer to a shorter one from both sides in turn looks like one of twice its period.
             for shorter in (each for each in range(1, period) if period % each == 0):
                 gaps = apart(shorter)

@@ -13,7 +13,8 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import VERSION, Model
-from rocking.dynamics.basin_maps import basins, told
+from rocking.dynamics.basin_maps import basins
+from rocking.dynamics.repeated import described
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
@@ -178,7 +179,7 @@ def safe_basin_erosion(
             {
                 "program": f"rocking {VERSION}",
                 "body": about["body"],
-                "motion": told(unit),  # type: ignore[arg-type]
+                "motion": described(unit),  # type: ignore[arg-type]
                 "model": about["model"],
                 "most_periods": about["most_periods"],
                 "cells": cells,

@@ -15,17 +15,14 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import Model
-from rocking.dynamics.bodies import _LinearBody
 from rocking.dynamics.comparison import FAMILIES, REST, Scheme, SchemeComparison, SchemeOutcome
-from rocking.dynamics.simulation import simulate as simulate_between_stops
+from rocking.dynamics.simulation import model_of, position_at_start, simulate_any
 from rocking.dynamics.stepping import (
     MoreauJean,
     SchatzmanPaoli,
     SteppedResponse,
     TimeStepping,
-    equation_of,
     integrate,
-    position_at_start,
 )
 from rocking.engine import in_threads, require_finished
 from rocking.errors import InvalidOption
@@ -36,7 +33,6 @@ from rocking.progress import Progress
 from rocking.response import Response, trail_of
 from rocking.response.answers import history_of
 from rocking.response.history import History
-from rocking.simulation import simulate
 from rocking.treatment import (
     AsymptoticTime,
     Certified,
@@ -148,19 +144,13 @@ def compare_schemes(
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     chosen = [scheme_of(scheme) for scheme in checks.several(schemes, "schemes", InvalidOption)]
 
-    equation, position = equation_of(body, model), position_at_start(body, initial_position)
+    equation, position = model_of(body, model), position_at_start(body, initial_position)
     shared: dict[str, Any] = {"initial_velocity": initial_velocity}
 
     def marched(how: Treatment) -> Response:
-        found: Response
-        if isinstance(body, _LinearBody):
-            found = simulate_between_stops(
-                body, motion, chattering=how, duration=duration, initial_position=position, **shared
-            )
-        else:
-            found = simulate(
-                body, motion, model=equation, chattering=how, duration=duration, initial_rotation=position, **shared
-            )
+        found = simulate_any(
+            body, motion, model=equation, chattering=how, duration=duration, initial_position=position, **shared
+        )
         require_finished(np.array([found.unfinished]))
         return found
 

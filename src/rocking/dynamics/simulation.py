@@ -11,7 +11,10 @@ from numpy.typing import ArrayLike
 import rocking.response
 from rocking import checks
 from rocking.arrays import Floats, as_asked
-from rocking.dynamics.bodies import LinearBodies, _LinearBody
+from rocking.block import Block
+from rocking.body import Body
+from rocking.constants import Model
+from rocking.dynamics.linear_bodies import LinearBodies, LinearBody
 from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
@@ -82,7 +85,7 @@ class Response(rocking.response.Response):
 
 
 def simulate(
-    body: _LinearBody,
+    body: LinearBody,
     motion: Motion | None,
     *,
     chattering: str | Treatment = "certified",
@@ -131,21 +134,20 @@ def simulate(
     '1.800000000000'
     """
     body, motion = _one_body(body), _along_one_line(one_motion(motion))
-    start = start_of(body) if initial_position is None else initial_position
     found = simulate_body(
         body,
         motion,
         model="linear",
         chattering=chattering,
         duration=_duration(body, motion, duration),
-        initial_rotation=start,
+        initial_rotation=position_at_start(body, initial_position),
         initial_velocity=initial_velocity,
     )
     return Response(**{entry.name: getattr(found, entry.name) for entry in fields(found)})
 
 
 def simulate_many(
-    bodies: _LinearBody | Sequence[_LinearBody] | LinearBodies,
+    bodies: LinearBody | Sequence[LinearBody] | LinearBodies,
     motions: Motions,
     *,
     chattering: str | Treatment = "certified",
@@ -193,7 +195,7 @@ def simulate_many(
     >>> found.restitution.values.tolist(), bool((found.peak_position > 0.0).all())
     ([0.3, 0.6, 0.9], True)
     """
-    given = [bodies] if isinstance(bodies, _LinearBody) else bodies
+    given = [bodies] if isinstance(bodies, LinearBody) else bodies
     gathered = given if isinstance(given, LinearBodies) else LinearBodies([_one_body(each) for each in given])
     product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
     for motion in product.motions:
@@ -212,8 +214,44 @@ def simulate_many(
     return found
 
 
-def _one_body(body: object) -> _LinearBody:
-    if not isinstance(body, _LinearBody):
+def simulate_any(
+    body: Body,
+    motion: Motion | None,
+    *,
+    model: Model,
+    chattering: str | Treatment,
+    duration: float | None,
+    initial_position: float,
+    initial_velocity: float,
+) -> rocking.response.Response:
+    """Response of a body of any kind; the position of a block is its rotation."""
+    if isinstance(body, LinearBody):
+        return simulate(
+            body, motion, chattering=chattering, duration=duration,
+            initial_position=initial_position, initial_velocity=initial_velocity,
+        )  # fmt: skip
+    return simulate_body(
+        body, motion, model=model, chattering=chattering, duration=duration,
+        initial_rotation=initial_position, initial_velocity=initial_velocity,
+    )  # fmt: skip
+
+
+def model_of(body: Body, model: Model | None) -> Model:
+    """Return the equation of motion: as it is given, else nonlinear for a block and linear for other bodies."""
+    if model is not None:
+        return model
+    return "nonlinear" if isinstance(body, Block) else "linear"
+
+
+def position_at_start(body: Body, position: float | None) -> float:
+    """Return the position at time 0: as it is given, else zero, or the stop where that is behind it."""
+    if position is not None:
+        return position
+    return _start_of(body) if isinstance(body, LinearBody) else 0.0
+
+
+def _one_body(body: object) -> LinearBody:
+    if not isinstance(body, LinearBody):
         raise InvalidBlock(
             "a BouncingBall, ImpactOscillator or InvertedPendulum of rocking.dynamics is needed, not "
             f"{type(body).__name__}; blocks go to rocking.simulate"
@@ -229,12 +267,12 @@ def _along_one_line(motion: Motion | None) -> Motion | None:
     return motion
 
 
-def start_of(body: _LinearBody) -> float:
+def _start_of(body: LinearBody) -> float:
     """Return position zero, or the stop that zero is behind."""
     return min(max(0.0, body.law.low), body.law.high)
 
 
-def _duration(body: _LinearBody, motion: Motion | None, duration: float | None) -> float | None:
+def _duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:
     """Return the given duration, or that of the motion for a body that nothing presses against its stop."""
     if duration is not None or min(body.thresholds) > 0.0:
         return duration

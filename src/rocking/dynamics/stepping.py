@@ -11,11 +11,9 @@ import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import Model
-from rocking.dynamics.bodies import _LinearBody
-from rocking.dynamics.simulation import start_of
+from rocking.dynamics.simulation import model_of, position_at_start
 from rocking.errors import InvalidOption
 from rocking.kernels import state, stepping
 from rocking.motion.motion import Motion
@@ -260,7 +258,7 @@ def integrate(
     one, motion = one_body(body), one_motion(motion)
     alone, how = one.alone(), Certified()
     stop = checks.positive(duration, "duration", InvalidOption, "s")
-    equation = equation_of(one, model)
+    equation = model_of(one, model)
     rules = rules_of(alone, equation, how, stop, record=True)
     records = alone.kernel_records(equation, how.limits(alone, motion, equation))
     record = records[0]
@@ -298,20 +296,6 @@ def integrate(
         peak=math.nan if record["facing"] else float(u.max()) + one.stops[0],
         penetration=max(0.0, -float(u.min()), float(u.max() - record["fallen"]) if record["facing"] else 0.0),
     )
-
-
-def equation_of(body: Body, model: Model | None) -> Model:
-    """Return the equation of motion: as it is given, else nonlinear for a block and linear for other bodies."""
-    if model is not None:
-        return model
-    return "nonlinear" if isinstance(body, Block) else "linear"
-
-
-def position_at_start(body: Body, position: float | None) -> float:
-    """Return the position at time 0: as it is given, else zero, or the stop where that is behind it."""
-    if position is not None:
-        return position
-    return start_of(body) if isinstance(body, _LinearBody) else 0.0
 
 
 def _contacts(times: Floats, pushes: Any) -> tuple[Floats, Floats]:

@@ -1,0 +1,243 @@
+"""Branches of periodic orbits along a parameter: points and bifurcations, in words, as tables and as a figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.arrays import Flags, Floats
+from rocking.body import Body
+from rocking.constants import Model
+from rocking.dynamics.maps import StroboscopicMap
+from rocking.dynamics.orbits import NEUTRAL, PeriodicOrbit, orbit_at
+from rocking.errors import InvalidOption
+from rocking.motion.motion import Motion
+from rocking.result import DrawnResult, TableResult
+from rocking.tables import cell, counted, named, text_table
+from rocking.treatment import Treatment
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Names of bifurcations.
+FOLD: Final = "fold"
+FLIP: Final = "flip"
+SYMMETRY: Final = "symmetry breaking"
+BRANCHES: Final = "branch point"
+GRAZING: Final = "grazing"
+CHATTERING: Final = "loss of complete chattering"
+REST: Final = "start of complete chattering"
+UPLIFT: Final = "uplift"
+OVERTURNING: Final = "overturning"
+
+#: How a branch may end without one.
+LIMIT: Final = "limit of the parameter"
+CLOSED: Final = "where it began"
+SHORT: Final = "too many points"
+LOST: Final = "lost"
+
+
+class Bifurcation(NamedTuple):
+    """Where a branch of periodic orbits changes.
+
+    Attributes
+    ----------
+    kind : str
+        "fold", "flip", "symmetry breaking", "branch point", "grazing", "loss of complete chattering", "start of
+        complete chattering", "uplift" or "overturning".
+    value : float
+        The parameter there.
+    bracket : (float, float)
+        Values of the parameter between which it lies; where the speed of an impact vanishes, the lowest and highest of
+        three extrapolations.
+    orbit : PeriodicOrbit
+        The orbit there: the last one on the branch where that ends.
+
+    Examples
+    --------
+    >>> from rocking.dynamics import Bifurcation
+    >>> Bifurcation._fields
+    ('kind', 'value', 'bracket', 'orbit')
+    """
+
+    kind: str
+    value: float
+    bracket: tuple[float, float]
+    orbit: PeriodicOrbit
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Branch(DrawnResult, TableResult):
+    """Periodic orbits along a parameter, made by `continue_orbit`.
+
+    Attributes
+    ----------
+    family : callable
+        Makes body and motion of the parameter.
+    name, unit : str
+        What the parameter is.
+    period : int
+        Period of the orbits, in periods of the motion.
+    values : ndarray, shape (n,)
+        The parameter, in the order along the branch.
+    states : ndarray, shape (n, 2)
+        Coordinate and velocity at the start of a period.
+    multipliers : ndarray of complex, shape (n, 2)
+        Floquet multipliers, the largest first.
+    impacts : float
+        Impacts in the period of the orbits, which are as many all along the branch; infinity with complete chattering.
+    peaks : ndarray, shape (n,)
+        Greatest size of the coordinate.
+    bifurcations : tuple of Bifurcation
+        In the order along the branch.
+    ends : (str, str)
+        Why the branch ends where it does: a kind of bifurcation, "limit of the parameter", "where it began", "too many
+        points", or "lost".
+    """
+
+    TABLES: ClassVar[tuple[str, ...]] = ("points", "bifurcations")
+
+    family: Callable[[float], tuple[Body, Motion]]
+    name: str
+    unit: str
+    model: Model
+    treatment: Treatment
+    period: int
+    values: Floats
+    states: Floats
+    multipliers: NDArray[np.complex128]
+    impacts: float
+    peaks: Floats
+    bifurcations: tuple[Bifurcation, ...]
+    ends: tuple[str, str]
+
+    @property
+    def is_stable(self) -> Flags:
+        """Whether the orbit at each point is stable, shape (n,)."""
+        return np.asarray(np.all(np.abs(self.multipliers) < NEUTRAL, axis=1))
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def orbit(self, index: int) -> PeriodicOrbit:
+        """Return the orbit at a point of the branch.
+
+        Parameters
+        ----------
+        index : int
+            Number of the point.
+
+        Returns
+        -------
+        PeriodicOrbit
+            With its multipliers and its course.
+
+        Raises
+        ------
+        InvalidOption
+            If there is no such point.
+
+        Examples
+        --------
+        >>> from rocking import dynamics, pulses
+        >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
+        >>> def family(amplitude):
+        ...     return ball, pulses.sine(amplitude, 5.0, cycles=1)
+        >>> stable = next(each for each in dynamics.periodic_orbits(*family(12.0)) if each.is_stable)
+        >>> branch = dynamics.continue_orbit(stable, family, 12.0, (11.0, 13.0))
+        >>> branch.orbit(0).impacts
+        1.0
+        """
+        if not -len(self) <= index < len(self):
+            raise InvalidOption(f"{{}} must be that of one of {len(self)} points, not {index}", "index", value=index)
+        body, motion = self.family(float(self.values[index]))
+        return orbit_at(StroboscopicMap(body, motion, self.model, self.treatment), self.states[index], self.period)
+
+    def _headline(self) -> str:
+        impacts = "complete chattering" if math.isinf(self.impacts) else counted(int(self.impacts), "impact")
+        low, high = float(self.values.min()), float(self.values.max())
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return (
+            f"orbits of {counted(self.period, 'period')} with {impacts}, {self.name} from {low:.6g} to {high:.6g}{unit}"
+        )
+
+    def summary(self) -> str:
+        stable = self.is_stable
+        lines = [self._headline(), f"{len(self)} points, {int(np.sum(stable))} of them stable"]
+        if self.bifurcations:
+            header = ["bifurcation", named(self.name, self.unit), "multipliers"]
+            rows = [[each.kind, f"{each.value:.12g}", _written(each.orbit.multipliers)] for each in self.bifurcations]
+            lines += ["", text_table(header, rows)]
+        return "\n".join([*lines, "", f"ends: {self.ends[0]}; {self.ends[1]}"])
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "parameter": self.name,
+            "unit": self.unit,
+            "period": self.period,
+            "impacts": self.impacts,
+            "complete_chattering": math.isinf(self.impacts),
+            "values": self.values,
+            "states": self.states,
+            "stable": self.is_stable,
+            "peaks": self.peaks,
+            "bifurcations": [
+                {"kind": each.kind, "value": each.value, "bracket": [*each.bracket]} for each in self.bifurcations
+            ],
+            "ends": [*self.ends],
+        }
+
+    def _frame(self, table: str) -> pd.DataFrame:
+        import pandas as pd
+
+        parameter = named(self.name, self.unit)
+        if table == "bifurcations":
+            rows = [(each.kind, each.value, *each.bracket) for each in self.bifurcations]
+            return pd.DataFrame(rows, columns=["kind", parameter, f"{parameter}_lower", f"{parameter}_upper"])
+        coordinate = self.family(float(self.values[0]))[0].coordinate
+        columns = {
+            parameter: self.values,
+            named(coordinate.name, coordinate.unit): self.states[:, 0],
+            named("velocity", f"{coordinate.unit}/s"): self.states[:, 1],
+            named("peak", coordinate.unit): self.peaks,
+            "first_multiplier": np.abs(self.multipliers[:, 0]),
+            "second_multiplier": np.abs(self.multipliers[:, 1]),
+            "stable": self.is_stable,
+        }
+        return pd.DataFrame(columns)
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.orbits import branch_figure
+
+        body, _ = self.family(float(self.values[0]))
+        coordinate = body.coordinate
+        unit = "" if self.unit == "1" else f" ({self.unit})"
+        return branch_figure(
+            values=self.values,
+            peaks=self.peaks,
+            stable=self.is_stable,
+            marks=[(each.kind, each.value, _peak_at(self, each)) for each in self.bifurcations],
+            labels=(f"{self.name}{unit}", f"largest {coordinate.name} ({coordinate.unit})"),
+            title=title or f"{body.description}, {self._headline()}",
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+def _peak_at(branch: Branch, bifurcation: Bifurcation) -> float:
+    """Greatest coordinate of an orbit at a bifurcation: that of the nearest point."""
+    away = np.abs(branch.values - bifurcation.value) / max(np.ptp(branch.values), 1e-300)
+    size = np.max(np.abs(branch.states), axis=0)
+    away = away + np.max(np.abs(branch.states - bifurcation.orbit.state) / np.where(size > 0.0, size, 1.0), axis=1)
+    return float(branch.peaks[np.argmin(away)])
+
+
+def _written(multipliers: NDArray[np.complex128]) -> str:
+    return ", ".join(cell(float(each.real)) if each.imag == 0.0 else f"{each:.5g}" for each in multipliers)

@@ -1,0 +1,180 @@
+"""Bifurcations on a branch of periodic orbits: roots of test functions between two points, and what ends a branch."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from rocking.arrays import Floats
+from rocking.dynamics.branches import (
+    BRANCHES,
+    CHATTERING,
+    FLIP,
+    FOLD,
+    GRAZING,
+    LOST,
+    OVERTURNING,
+    REST,
+    SYMMETRY,
+    UPLIFT,
+    Bifurcation,
+)
+from rocking.dynamics.courses import Course
+from rocking.dynamics.orbit_equations import AT_VALUE, OrbitEquations, Solved, Tests
+from rocking.dynamics.symmetry import is_mirrored
+from rocking.errors import RockingError
+
+#: Step along a branch below which it has come to its end.
+LEAST_STEP: Final = 1e-13
+
+#: Gap and speed, over their scales, below which a branch that ends has come to grazing.
+_GRAZES: Final = 1e-4
+
+#: Steps beyond the end of a branch at which the kind of its orbits is looked at.
+_BEYOND: Final = (0.0, *np.geomspace(1e-12, 1e-4, 9).tolist())
+
+#: Points from which grazing is extrapolated.
+_EXTRAPOLATED: Final = 6
+
+#: Shares of the range of the parameter within which the orbits are sought from which a branch bifurcates.
+_WIDER: Final = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+
+
+@dataclass
+class Location:
+    """Where a branch has been followed to: the equations there, a point, its tangent, test functions and course."""
+
+    equations: OrbitEquations
+    z: Floats
+    tangent: Floats
+    tests: Tests
+    course: Course
+
+    def bifurcation(self, kind: str, z: Floats, values: Sequence[float]) -> Bifurcation:
+        """Bifurcation at a point near this one, between values of the parameter over its size."""
+        ends = sorted(float(each * self.equations.sizes[2]) for each in values)
+        return Bifurcation(kind, self.equations.physical(z)[1], (ends[0], ends[-1]), self.equations.orbit(z))
+
+
+def passed(here: Location, new: Floats, after: Tests) -> Iterator[Bifurcation]:
+    """Bifurcations between a point and the next one at which the branch goes on."""
+    before = here.tests
+    if before.at_one * after.at_one < 0.0:
+        kind = FOLD if before.onwards * after.onwards < 0.0 else BRANCHES
+        yield from _located(kind, here, new, lambda tests: tests.at_one)
+    if before.at_minus_one * after.at_minus_one < 0.0:
+        kind = SYMMETRY if here.equations.by_half else FLIP
+        yield from _located(kind, here, new, lambda tests: tests.at_minus_one)
+
+
+def _located(kind: str, here: Location, new: Floats, value_of: Callable[[Tests], float]) -> Iterator[Bifurcation]:
+    """Root of a test function between two points."""
+    z, tangent = here.z, here.tangent
+
+    def solve(length: float) -> Solved | None:
+        return here.equations.solved(z + length * tangent, tangent)
+
+    def test(solved: Solved) -> float:
+        return value_of(solved.tests(solved.tangent(tangent)))
+
+    with contextlib.suppress(_Missed, ValueError):
+        near = _root(solve, test, 0.0, float(tangent @ (new - z)))
+        yield here.bifurcation(kind, near[0].z, [each.z[2] for each in near])
+
+
+def joined(here: Location, new: Floats) -> Bifurcation:
+    """Bifurcation at which a branch meets, between two points, orbits of half the period, or symmetric ones."""
+    equations, middle = here.equations, 0.5 * (here.z + new)
+    even = equations.period % 2 == 0
+    parent = replace(equations, period=equations.period // 2 if even else equations.period, by_half=not even)
+
+    def solve(value: float) -> Solved | None:
+        return parent.solved(np.append(middle[:2], value), AT_VALUE)
+
+    def test(solved: Solved) -> float:
+        return solved.tests(AT_VALUE).at_minus_one
+
+    for share in _WIDER if even or is_mirrored(equations.strobe(equations.physical(middle)[1])) else ():
+        with contextlib.suppress(_Missed, ValueError):
+            near = _root(solve, test, middle[2] - share, middle[2] + share)
+            return here.bifurcation(FLIP if even else SYMMETRY, near[0].z, [each.z[2] for each in near])
+    return here.bifurcation(BRANCHES, middle, [here.z[2], new[2]])
+
+
+def vanishing(here: Location, before: Course, length: float) -> Bifurcation:
+    """Grazing, where the speed of the slowest impact vanishes: extrapolated, as the equations are singular there."""
+    equations, z, tangent = here.equations, here.z, here.tangent
+    speeds, values = [here.course.slowest], [z[2]]
+    back = length * here.course.slowest / (before.slowest - here.course.slowest)
+    for count in range(1, _EXTRAPOLATED):
+        found = equations.solved(z - count * back * tangent, tangent)
+        if found is not None:
+            speeds.append(equations.course(found.z).slowest)
+            values.append(found.z[2])
+    estimates = [_at_zero(speeds[:most], values[:most]) for most in range(max(1, len(speeds) - 2), len(speeds) + 1)]
+    return here.bifurcation(GRAZING, z, estimates)._replace(value=float(estimates[-1] * equations.sizes[2]))
+
+
+def ending(here: Location, ahead: float) -> tuple[str, list[Bifurcation]]:
+    """Why a branch ends between here and a distance ahead, and the bifurcation there, if there is one."""
+    reason = _reason(here, here.z + 8.0 * LEAST_STEP * here.tangent)
+    values = [(here.z + step * here.tangent)[2] for step in (0.0, ahead)]
+    return reason, [] if reason == LOST else [here.bifurcation(reason, here.z, values)]
+
+
+def _reason(here: Location, beyond: Floats) -> str:
+    """Name what ends a branch just beyond its last point."""
+    equations, course = here.equations, here.course
+    kind, sizes = equations.kind, equations.sizes
+    if not kind.rests and (course.slowest < _GRAZES * sizes[1] or course.gap < _GRAZES * sizes[0]):
+        return GRAZING
+    for step in _BEYOND:
+        try:
+            found = equations.kind_at(beyond + step * here.tangent)
+        except RockingError:
+            continue
+        if found.overturns:
+            return OVERTURNING
+        if found.for_ever != kind.for_ever:
+            return UPLIFT
+        if found.rests != kind.rests:
+            return REST if found.rests else CHATTERING
+        if found != kind:
+            return GRAZING
+    # A body that rests as before, but not in the same way, has touched or missed something since it lifted.
+    return GRAZING if kind.rests else LOST
+
+
+class _Missed(Exception):
+    """There is no point of the branch where one was looked for."""
+
+
+def _root(
+    solve: Callable[[float], Solved | None], test: Callable[[Solved], float], low: float, high: float
+) -> tuple[Solved, Solved]:
+    """Return the two points of a branch that are nearest to a root of a test function, the nearest first."""
+    from scipy.optimize import brentq
+
+    found: dict[float, Solved] = {}
+
+    def tested(at: float) -> float:
+        solved = solve(at)
+        if solved is None:
+            raise _Missed
+        found[at] = solved
+        return test(solved)
+
+    root = brentq(tested, low, high, xtol=1e-16, rtol=1e-15)
+    nearest, next_ = sorted(found, key=lambda at: abs(at - root))[:2]
+    return found[nearest], found[next_]
+
+
+def _at_zero(x: Sequence[float], y: Sequence[float]) -> float:
+    """Value at zero of the polynomial through points."""
+    weights = [math.prod(b / (b - a) for b in x if b != a) for a in x]
+    return float(np.dot(weights, y))

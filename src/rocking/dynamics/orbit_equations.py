@@ -1,0 +1,263 @@
+"""Equations that a family of periodic orbits solves, and Newton's method on them.
+
+Numbers z are coordinate, velocity and parameter over their sizes. A period may start later than that of the motion as
+it was given, by a shift of some pieces: where an impact falls on the start, the equations are not smooth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.arrays import Floats
+from rocking.body import Body
+from rocking.constants import Model
+from rocking.dynamics.courses import Course, course_of, response_of
+from rocking.dynamics.maps import Fate, StroboscopicMap
+from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_of, orbit_at
+from rocking.dynamics.repeated import scale_of
+from rocking.dynamics.symmetry import HalfMap, is_mirrored
+from rocking.errors import InvalidOption, RockingError
+from rocking.motion.motion import Motion
+from rocking.treatment import Treatment
+
+#: Makes body and motion of a parameter.
+Family = Callable[[float], tuple[Body, Motion]]
+
+#: The plane of one parameter, by its normal.
+AT_VALUE: Final = np.array([0.0, 0.0, 1.0])
+
+#: Newton steps to a branch, and its residual over the scale and the size of the derivative.
+_CORRECTIONS: Final = 10
+_RESIDUAL: Final = 1e-12
+
+#: Step of differences by the parameter, over its range: least and greatest, and over the step along the branch, so that
+#: near the end of a branch few of them reach across it.
+_LEAST_DIFFERENCE: Final = 1e-13
+_DIFFERENCE: Final = 1e-6
+_OF_STEP: Final = 1e-3
+
+#: An impact nearer to the start of a period than this share of it moves that start.
+_TOO_NEAR: Final = 0.03
+
+#: Maps that are kept, by the parameter.
+_KEPT: Final = 64
+
+
+class Kind(NamedTuple):
+    """What does not change along a branch: whether a body rests (for ever) or overturns, and its impacts."""
+
+    rests: bool
+    for_ever: bool
+    impacts: int
+    overturns: bool
+
+
+class Tests(NamedTuple):
+    """Functions that change their signs at bifurcations: det(R' - 1), det(R' + 1), and the tangent's parameter."""
+
+    at_one: float
+    at_minus_one: float
+    onwards: float
+
+
+class Solved(NamedTuple):
+    """A point of a branch, the derivative of its equations and that of the map, and the Newton steps to it."""
+
+    z: Floats
+    jacobian: Floats
+    change: Floats
+    steps: int
+
+    def tangent(self, like: Floats) -> Floats:
+        """Return the unit tangent of the branch, in the direction of another."""
+        return tangent_of(self.jacobian, like)
+
+    def tests(self, tangent: Floats) -> Tests:
+        """Return the test functions."""
+        less, plus = (float(np.linalg.det(self.change + sign * np.eye(2))) for sign in (-1.0, 1.0))
+        return Tests(less, plus, float(tangent[2]))
+
+
+@dataclass(eq=False)
+class OrbitEquations:
+    """Equations of the orbits of a family that are of the kind of a given one."""
+
+    family: Family
+    model: Model
+    treatment: Treatment
+    period: int
+    #: Whether they are those of the map to the mirror image half a period later.
+    by_half: bool
+    sizes: Floats
+    kind: Kind
+    shift: int = 0
+    difference: float = _DIFFERENCE
+
+    def __post_init__(self) -> None:
+        self.strobe = lru_cache(maxsize=_KEPT)(self._strobe)
+        self.half = lru_cache(maxsize=_KEPT)(self._half)
+
+    @classmethod
+    def of(cls, orbit: PeriodicOrbit, family: Family, value: float, limits: tuple[float, float]) -> OrbitEquations:
+        """Return the equations that an orbit solves at a value of the parameter."""
+        strobe = StroboscopicMap(*family(value), orbit.model, orbit.treatment)
+        scale = scale_of(strobe)
+        if not np.all(np.abs(strobe(orbit.state, orbit.period) - orbit.state) / scale < 1e-8):
+            raise InvalidOption(
+                f"the orbit is none of what {{}} makes at {{}} = {value:g}", "family", "value", value=value
+            )
+        by_half = orbit.symmetric and not orbit.rests and is_mirrored(strobe)
+        sizes = np.array([*scale, limits[1] - limits[0]])
+        kind = _kind_of(strobe, orbit.state, orbit.period)
+        return cls(family, orbit.model, orbit.treatment, orbit.period, by_half, sizes, kind)
+
+    def _strobe(self, value: float) -> StroboscopicMap:
+        """Map of the body and the motion at a value, with the start of the period shifted."""
+        body, motion = self.family(value)
+        return StroboscopicMap(body, _shifted(motion, self.shift), self.model, self.treatment)
+
+    def _half(self, value: float) -> HalfMap:
+        return HalfMap(self.strobe(value))
+
+    def physical(self, z: Floats) -> tuple[Floats, float]:
+        """State and parameter of numbers z."""
+        return z[:2] * self.sizes[:2], float(z[2] * self.sizes[2])
+
+    def for_step(self, step: float) -> None:
+        """Choose the differences by the parameter for steps of some length along the branch."""
+        self.difference = min(max(_OF_STEP * step, _LEAST_DIFFERENCE), _DIFFERENCE)
+
+    def returned(self, state: Floats, value: float) -> tuple[Floats, Floats]:
+        """State, or its mirror image, after the period or half of it, and the derivative; NaN where there is none."""
+        try:
+            if self.by_half:
+                return self.half(value).mirrored(state, self.period)
+            return self.strobe(value).derivative(state, self.period)
+        except RockingError:  # behind a stop, or a parameter that makes no body or motion
+            return np.full(2, np.nan), np.full((2, 2), np.nan)
+
+    def at(self, z: Floats) -> tuple[Floats, Floats, Floats]:
+        """Residual, its derivative by z, and the derivative of the map."""
+        state, value = self.physical(z)
+        after, change = self.returned(state, value)
+        h = self.difference * self.sizes[2]
+        ahead, _ = self.returned(state, value + h)
+        behind, _ = self.returned(state, value - h)
+        scaled = change / self.sizes[:2, None] * self.sizes[:2]
+        by_value = (ahead - behind) / (2.0 * h) * self.sizes[2] / self.sizes[:2]
+        return (after - state) / self.sizes[:2], np.column_stack([scaled - np.eye(2), by_value]), change
+
+    def solved(self, guess: Floats, normal: Floats) -> Solved | None:
+        """Return the point of the branch in the plane through a guess; None where Newton's method finds none."""
+        z = guess.copy()
+        for count in range(_CORRECTIONS):
+            residual, jacobian, change = self.at(z)
+            if not np.all(np.isfinite(jacobian)):
+                return None
+            sharp = np.max(np.abs(residual)) < _RESIDUAL * max(1.0, float(np.max(np.abs(jacobian[:, :2]))))
+            try:
+                step = np.linalg.solve(np.vstack([jacobian, normal]), -np.append(residual, normal @ (z - guess)))
+            except np.linalg.LinAlgError:
+                return None
+            z = z + step
+            if sharp:
+                return Solved(z, jacobian, change, count)
+        return None
+
+    def tangent(self, z: Floats, like: Floats) -> Floats:
+        """Tangent at a point, in the direction of another; that one where there is none."""
+        _, jacobian, _ = self.at(z)
+        return tangent_of(jacobian, like) if np.all(np.isfinite(jacobian)) else like
+
+    def kind_at(self, z: Floats) -> Kind:
+        """Kind of the course from a state."""
+        state, value = self.physical(z)
+        return _kind_of(self.strobe(value), state, self.period)
+
+    def course(self, z: Floats) -> Course:
+        """Course of the orbit at a point."""
+        state, value = self.physical(z)
+        return course_of(self.strobe(value), state, self.period)
+
+    def is_parent(self, z: Floats) -> bool:
+        """Whether a point is of orbits from which this branch bifurcates: of half the period, or symmetric."""
+        state, value = self.physical(z)
+        if self.kind.rests or self.by_half:
+            return False
+        if self.period % 2 == 0:
+            after = self.strobe(value)(state, self.period // 2)
+        elif is_mirrored(self.strobe(value)):
+            after, _ = self.half(value).mirrored(state, self.period)
+        else:
+            return False
+        return bool(np.max(np.abs(after - state) / self.sizes[:2]) < SAME)
+
+    def multipliers(self, z: Floats) -> NDArray[np.complex128]:
+        """Floquet multipliers at a point."""
+        state, value = self.physical(z)
+        return multipliers_of(self.strobe(value).derivative(state, self.period)[1])
+
+    def at_start(self, z: Floats) -> Floats:
+        """State at the start of the period as it was given."""
+        state, value = self.physical(z)
+        if self.shift == 0:
+            return state
+        _, motion = self.family(value)
+        time = motion.duration - float(motion.breakpoints[self.shift])
+        return response_of(self.strobe(value), state, self.period).states(time)[:2]
+
+    def orbit(self, z: Floats) -> PeriodicOrbit:
+        """Orbit at a point."""
+        strobe = StroboscopicMap(*self.family(self.physical(z)[1]), self.model, self.treatment)
+        return orbit_at(strobe, self.at_start(z), self.period)
+
+    def moved(self, z: Floats, course: Course) -> tuple[OrbitEquations, Floats]:
+        """Equations with a start of the period that no impact is near, and the same orbit in these."""
+        state, value = self.physical(z)
+        _, motion = self.family(value)
+        starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
+        phases = np.mod(course.phases + starts[self.shift], period)
+        if not len(phases):
+            return self, z
+        away = np.abs(starts[:, None] - phases)
+        nearest = np.min(np.minimum(away, period - away), axis=1)
+        best = int(np.argmax(nearest))
+        if nearest[self.shift] > _TOO_NEAR * period or nearest[best] <= nearest[self.shift]:
+            return self, z
+        response = response_of(self.strobe(value), state, self.period)
+        later = response.states(float(np.mod(starts[best] - starts[self.shift], period)))[:2]
+        return replace(self, shift=best), np.append(later, value) / self.sizes
+
+
+def tangent_of(jacobian: Floats, like: Floats) -> Floats:
+    """Return the unit tangent of a branch, in the direction of another."""
+    along = np.cross(jacobian[0], jacobian[1])
+    size = float(np.linalg.norm(along))
+    if size == 0.0:
+        return like
+    along /= size
+    return along if along @ like >= 0.0 else -along
+
+
+def _kind_of(strobe: StroboscopicMap, state: Floats, period: int) -> Kind:
+    after, fate, impacts = strobe.followed(state, period)
+    _, change = strobe.derivative(state, period)
+    rests, for_ever = not np.any(change), bool(fate == Fate.RESTS_FOR_EVER and not impacts)
+    return Kind(rests, for_ever, 0 if rests else int(impacts), bool(np.isnan(after).any()))
+
+
+def _shifted(motion: Motion, shift: int) -> Motion:
+    """One period of a motion that starts some pieces later."""
+    if shift == 0:
+        return motion
+    breaks = motion.breakpoints
+    later = np.concatenate([breaks[shift:] - breaks[shift], breaks[1 : shift + 1] + (breaks[-1] - breaks[shift])])
+    return Motion(
+        later, np.roll(motion.coefficients, -shift, axis=0), motion.name, motion.description, error=motion.error
+    )

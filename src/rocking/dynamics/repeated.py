@@ -1,0 +1,181 @@
+"""A body under a motion that repeats for ever, as kernels take both, and the natural sizes of its states."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.arrays import Floats, Integers
+from rocking.block import Block
+from rocking.body import Body
+from rocking.constants import Model
+from rocking.dynamics.simulation import model_of
+from rocking.errors import InvalidMotion, InvalidOption
+from rocking.kernels import state
+from rocking.kernels.ground import Ground, ground_of
+from rocking.kernels.periodic import Fate, Setting, step_rows
+from rocking.motion.motion import Motion
+from rocking.motion.named import one_motion
+from rocking.problem import one_body, rules_of, set_start
+from rocking.treatment import Treatment, treatment
+
+#: Ground acceleration, g, that lifts any body: it stands behind the second period.
+_BEYOND_ALL: Final = 1e12
+
+#: States that a thread takes at once, so that an interrupt is seen soon.
+TOGETHER: Final = 256
+
+#: A highest rotation that asks for none: below the one at which a body has fallen by no more than rounding.
+_ALMOST: Final = 1.0 - 2.0**-40
+
+
+class Repeated:
+    """A body under a motion that repeats for ever, as kernels take both."""
+
+    def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | Treatment) -> None:
+        self.body, self.motion = one_body(body), _one_period(motion)
+        self.bodies = self.body.alone()
+        self.model: Model = model_of(self.body, model)
+        self.treatment = treatment(chattering)
+        self.period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
+        limits = self.treatment.limits(self.bodies, self.motion, self.model)
+        self._records = self.bodies.kernel_records(self.model, limits)
+        self._ground = repeated(self.motion, self.body.gravity)
+        rows = step_rows(self._ground, self._records[0])
+        self._steps = rows if self.model == "linear" else rows[:, :0]
+
+    def _rules(self, *, record: bool) -> state.Record:
+        rules = rules_of(self.bodies, self.model, self.treatment, self.period, record=record)
+        rules["stop"], rules["endless"] = np.inf, True
+        return rules
+
+    def _setting(self) -> Setting:
+        return Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
+
+    def _states(self, states: ArrayLike) -> tuple[Floats, state.Records]:
+        """States as given, flat, and as records."""
+        given = checks.numbers(states, "states", InvalidOption)
+        if given.ndim == 0 or given.shape[-1] != 2:
+            raise InvalidOption(
+                f"{{}} must hold pairs ({self.body.coordinate.name}, velocity) along the last axis, not have the shape "
+                f"{given.shape}",
+                "states",
+            )
+        flat = given.reshape(-1, 2)
+        made = state.new_states(len(flat), 0)
+        set_start(made, self._records, self.bodies, flat[:, 0], flat[:, 1])
+        fallen = float(self._records["fallen"][0])
+        made["peak"] = fallen if np.isinf(fallen) else fallen * _ALMOST
+        return given, made
+
+    def _coordinates(self, u: Floats, v: Floats, side: Integers) -> Floats:
+        """Coordinates and velocities of states given in the frames of their sides."""
+        at = np.where(side < 0, -1 - side, side)
+        sign = 1.0 - 2.0 * at
+        stops = np.array(self.body.stops)[at]
+        found = np.stack([stops + sign * u, sign * v], axis=-1)
+        found[side < 0] = np.stack([stops, np.zeros_like(stops)], axis=-1)[side < 0]
+        return found + 0.0
+
+    def _known(self, made: state.Records) -> Floats:
+        """Coordinates and velocities of states; NaN of those that are not known."""
+        found = self._coordinates(made["u"], made["v"], made["side"])
+        found[np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))] = np.nan
+        return found
+
+    def _signs(self, side: Integers) -> Floats:
+        return np.where(side > 0, -1.0, 1.0)
+
+    @property
+    def _is_two_sided(self) -> bool:
+        """Whether the coordinate passes zero, or there is a second stop."""
+        record = self._records[0]
+        return bool(record["facing"] or record["entered"][0] == 1)
+
+    def _pairs_of_impacts(self, impacts: ArrayLike) -> Floats:
+        given = checks.numbers(impacts, "impacts", InvalidOption)
+        if given.ndim == 0 or given.shape[-1] != 2:
+            raise InvalidOption("{} must hold pairs (phase in s, velocity) along the last axis", "impacts")
+        return given
+
+    def _after_impacts(self, flat: Floats) -> state.Records:
+        record, made = self._records[0], state.new_states(len(flat), 0)
+        phase = np.mod(flat[:, 0], self.period)
+        starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
+        made["piece"] = np.searchsorted(starts, phase, side="right") - 1
+        made["offset"] = phase - starts[made["piece"]]
+        made["side"] = np.where(self._directions(flat[:, 1]) < 0.0, 1, 0)
+        made["v"] = np.abs(flat[:, 1])
+        if np.any(flat[:, 1] == 0.0) or (not self._is_two_sided and np.any(flat[:, 1] < 0.0)):
+            raise InvalidOption("every velocity in {} must lead away from the stop that was hit", "impacts")
+        made["peak"] = record["fallen"] if np.isinf(record["fallen"]) else record["fallen"] * _ALMOST
+        return made
+
+    def _directions(self, velocity: Floats) -> Floats:
+        return np.where(velocity < 0.0, -1.0, 1.0)
+
+
+class Scale(NamedTuple):
+    """Sizes of a coordinate and a velocity by which states are compared."""
+
+    coordinate: float
+    velocity: float
+
+
+def scale_of(strobe: Repeated) -> Scale:
+    """Sizes of coordinate and velocity that are natural to a body under a motion."""
+    record, period = strobe._records[0], strobe.period
+    if isinstance(strobe.body, Block):
+        alpha = float(np.max(record["slenderness"]))
+        return Scale(alpha, alpha * math.sqrt(float(np.max(record["stiffness"]))))
+    pull = float(np.max(np.abs(record["gain"] * record["threshold"])[: 2 if record["facing"] else 1]))
+    speed = period * max(mean_size(strobe.motion), pull, 1e-300)
+    rate = math.sqrt(abs(float(record["stiffness"][0])))
+    if record["facing"]:
+        width = float(record["fallen"])
+        return Scale(width, max(width * rate, width / period))
+    return Scale(speed / max(rate, 1.0 / period), speed)
+
+
+def mean_size(motion: Motion) -> float:
+    """Mean size of an acceleration, roughly."""
+    times = np.linspace(motion.breakpoints[0], motion.breakpoints[-1], 257)
+    return float(np.mean(np.abs(motion.acceleration(times))))
+
+
+def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
+    """Ground of a motion that repeats for ever, with this sign: twice, and behind that what lifts any body."""
+    breaks = motion.breakpoints - motion.breakpoints[0]
+    period, columns = breaks[-1], motion.coefficients.shape[1]
+    beyond = np.zeros((2, columns))
+    beyond[:, 0] = _BEYOND_ALL * gravity, -_BEYOND_ALL * gravity
+    breakpoints = np.concatenate([breaks, period + breaks[1:], [3.0 * period, 4.0 * period]])
+    coefficients = np.concatenate([motion.coefficients, sign * motion.coefficients, beyond])
+    breakpoints.flags.writeable = coefficients.flags.writeable = False  # as a motion's: a kernel is compiled for these
+    return ground_of(breakpoints, coefficients, 1.0 / gravity, motion.error)
+
+
+def parts_of(count: int) -> Sequence[slice]:
+    """Ranges of states for one call of a kernel each."""
+    return [slice(start, min(start + TOGETHER, count)) for start in range(0, count, TOGETHER)]
+
+
+def described(what: Body | Motion) -> str:
+    """Return what moves, or what shakes it, with its parameters in one line."""
+    if isinstance(what, Motion):
+        return ", ".join(part for part in (what.label, what.description.numbers) if part)
+    return ", ".join([what.description, *dict.fromkeys(map(str, what.sides))])
+
+
+def _one_period(motion: Motion) -> Motion:
+    given = one_motion(motion)
+    if given is None:
+        raise InvalidMotion("one period of the motion is needed, as rocking.pulses.sine(a, f, cycles=1), not None")
+    if given.vertical is not None:
+        raise InvalidMotion("maps are made for one component; give a motion without a vertical one")
+    return given
