@@ -15,6 +15,7 @@ from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.errors import InvalidOption
+from rocking.kernels import state
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
 from rocking.response.history import (
@@ -66,7 +67,9 @@ class Answers:
 
     @cached_property
     def _history(self) -> History:
-        """Its course, with the impacts that follow the closing of each of its sequences."""
+        """Its course, with the impacts that follow where a proof has closed a sequence."""
+        if int(self._trail.rules["treatment"]) != state.RestRule.CERTIFIED:
+            return History(self._trail, self.duration, self.body.stops)
         closed = bool(len(self.chattering)) and bool(self.chattering["end"][-1] >= self.duration)
         trail = with_all_impacts(self._trail, cut=closed and self.moves_at_end)
         return History(trail, self.duration, self.body.stops)
