@@ -71,9 +71,7 @@ def compared(seed, cells, periods=200):
     return judged, wrong, ambiguous
 
 
-@pytest.mark.parametrize(
-    "seeds", [range(7), pytest.param(range(7, 60), marks=pytest.mark.thorough)], ids=["some", "more"]
-)
+@pytest.mark.parametrize("seeds", [range(7), pytest.param(range(7, 60), marks=pytest.mark.slow)], ids=["some", "more"])
 def test_a_state_goes_where_plain_iteration_takes_it(seeds):
     found = np.array([compared(seed, 12) for seed in seeds])
     judged, wrong, ambiguous = found.sum(axis=0)

@@ -7,8 +7,9 @@ from .comparison import SchemeComparison, SchemeOutcome
 from .continuation import continue_orbit
 from .erosion import BasinErosion, safe_basin_erosion
 from .exponents import LyapunovExponents, lyapunov_exponents
+from .impact_maps import ImpactMap, impact_map
 from .linear_bodies import Law, LinearBodies
-from .maps import Fate, ImpactMap, StroboscopicMap, impact_map, stroboscopic_map
+from .maps import Fate, StroboscopicMap, stroboscopic_map
 from .orbit_search import periodic_orbits
 from .orbits import PeriodicOrbit
 from .schemes import compare_schemes, scheme_of

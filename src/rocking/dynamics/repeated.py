@@ -19,6 +19,7 @@ from rocking.errors import InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
 from rocking.kernels.periodic import Fate, Setting, step_rows
+from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
 from rocking.problem import one_body, rules_of, set_start
@@ -29,6 +30,9 @@ _BEYOND_ALL: Final = 1e12
 
 #: States that a thread takes at once, so that an interrupt is seen soon.
 TOGETHER: Final = 256
+
+#: Rows of the table that a derivative uses again and again.
+_ROWS: Final = 512
 
 #: A highest rotation that asks for none: below the one at which a body has fallen by no more than rounding.
 _ALMOST: Final = 1.0 - 2.0**-40
@@ -56,6 +60,11 @@ class Repeated:
 
     def _setting(self) -> Setting:
         return Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
+
+    def _marching(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
+        """Return what kernels of derivatives need beside the states: the problem, and space to work in."""
+        trail = Trail(self._ground, self._records[0], self._rules(record=True), NO_NODES)
+        return trail, state.new_scratch(), state.record(state.VARIATION), state.new_table(_ROWS)
 
     def _states(self, states: ArrayLike) -> tuple[Floats, state.Records]:
         """States as given, flat, and as records."""
