@@ -1,6 +1,5 @@
 """Fixtures shared by all tests."""
 
-import gc
 import json
 import os
 import tempfile
@@ -52,11 +51,6 @@ def pytest_configure(config: pytest.Config) -> None:
     """Keep Matplotlib's settings and list of fonts to the tests: a user's own change what is drawn and said."""
     cached = config.pluginmanager.hasplugin("cacheprovider")
     os.environ["MPLCONFIGDIR"] = str(config.cache.mkdir("matplotlib")) if cached else tempfile.mkdtemp()
-
-
-def pytest_collection_finish() -> None:
-    """Leave what is there by now out of searches for garbage: thousands of tests, and all that they import, stay."""
-    gc.freeze()
 
 
 @pytest.fixture
