@@ -87,6 +87,17 @@ chattering.chattering_report(8.0, 3.0, 0.9)
 motions = [motion.scaled(factor) for factor in np.linspace(0.3, 2.5, 12)]
 outcomes = [rocking.simulate(rocking.Block.from_parameters(p=2.0, alpha=0.2), each).overturned for each in motions]
 rocking.calibrate(motions, outcomes, model="linear", two_sided=False, candidates=256, seed=1)
+from rocking import dynamics
+ball, table = dynamics.BouncingBall(0.5), rocking.pulses.sine(15.0, 2.0, cycles=1)
+rock = dynamics.stroboscopic_map(ball, table)
+rock([0.1, 0.5])
+rock.derivative([0.1, 0.5])
+dynamics.impact_map(ball, table)([0.05, 1.0])
+dynamics.lyapunov_exponents(ball, table, [0.1, 0.5], 20, transient=5)
+dynamics.basins(ball, table, [0.01, 0.05], [0.0, 0.1], periods=10, progress=False)
+dynamics.simulate(dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.1, stop=0.01), table)
+for scheme in (dynamics.MoreauJean(1e-2), dynamics.SchatzmanPaoli(1e-2)):
+    dynamics.integrate(ball, table, scheme, 1.0)
 print(json.dumps(sorted(name.removeprefix("rocking.kernels.") for name in called)))
 """
 
