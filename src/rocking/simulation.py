@@ -116,7 +116,7 @@ def simulate(
         overturned=overturned,
         unfinished=ending == state.Ending.UNFINISHED,
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
-        peak_rotation=math.nan if records["facing"][0] else float(start["peak"]) + block.stops[0],
+        peak_rotation=math.nan if trail.block["facing"] else float(start["peak"]) + block.stops[0],
         peak_time=float(start["peak_time"]),
         duration=float(start["end"]),
         events=_events(events),
@@ -149,8 +149,10 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
 
 def started(body: Body, records: state.Records, rotation: float, velocity: float) -> state.Record:
     """State of a body at time zero, of which ``records`` has the one record."""
-    _check_start(body, float(records["fallen"][0]), bool(records["facing"][0]), rotation, velocity)
     states = state.new_states(1, 0)
+    if rotation == 0.0 and velocity == 0.0 and not any(body.stops):  # at rest, as new states are
+        return states[0]
+    _check_start(body, float(records["fallen"][0]), bool(records["facing"][0]), rotation, velocity)
     set_start(states, records, body.alone(), rotation, velocity)
     return states[0]
 
