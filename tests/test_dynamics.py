@@ -191,6 +191,13 @@ def test_many_bodies_as_one_by_one():
         (lambda: dynamics.simulate(dynamics.BouncingBall(0.5), None, initial_velocity=-1.0), InvalidOption, "into it"),
         (lambda: dynamics.simulate(dynamics.ImpactOscillator(1.0, 0.5, stop=0.1), None), InvalidOption, "duration"),
         (lambda: dynamics.simulate(rocking.Block(width=0.2, height=1.0), None), InvalidBlock, "rocking.simulate"),
+        (
+            lambda: dynamics.simulate_many(
+                dynamics.BouncingBall(0.5), rocking.pulses.one_sine(1.0, 1.0), initial_position=math.nan
+            ),
+            InvalidOption,
+            "initial_position",
+        ),
         (lambda: dynamics.simulate_many([], rocking.pulses.one_sine(1.0, 1.0)), InvalidBlock, "same kind"),
         (
             lambda: dynamics.simulate(

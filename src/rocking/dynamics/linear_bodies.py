@@ -7,6 +7,7 @@ restitution.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import ClassVar, Final, NamedTuple, Self, cast
@@ -34,7 +35,7 @@ class Law(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LinearBody:
+class LinearBody(ABC):
     """What the kinds share: what `rocking.Body` asks of them."""
 
     coordinate: ClassVar[Coordinate] = _POSITION
@@ -44,9 +45,9 @@ class LinearBody:
     units: ClassVar[Mapping[str, str]]
 
     @property
+    @abstractmethod
     def law(self) -> Law:
         """Equation of motion."""
-        raise NotImplementedError
 
     @property
     def gravity(self) -> float:

@@ -200,6 +200,8 @@ def simulate_many(
     product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
     for motion in product.motions:
         _along_one_line(motion)
+    if initial_position is not None:
+        initial_position = checks.finite(initial_position, "initial_position", InvalidOption)
     setup = replace(
         setup_of(product),
         start=(initial_position, checks.finite(initial_velocity, "initial_velocity", InvalidOption)),

@@ -177,7 +177,7 @@ def add_ticks(axes: Axes, places: Floats, height: float, marker: str = "|", **lo
 
 
 def scale_by_ratio(axes: Axes, x: Floats) -> None:
-    """Scale an axis that these numbers go along logarithmically, with as many numbers as there is room for."""
+    """Scale an axis that these numbers go along logarithmically, with as many numbers as fit."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     decades = float(np.log10(x[-1] / x[0])) if x.size > 1 else 0.0

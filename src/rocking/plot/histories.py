@@ -237,7 +237,7 @@ def _draw_cycles(axes: Axes, time: Floats, rotation: Floats, impacts: Floats, nu
 
 
 def _draw_intervals(axes: Axes, impacts: Floats, number: int, height: float) -> None:
-    """Draw an arrow from impact to impact, where there is room for its name."""
+    """Draw an arrow from impact to impact, where its name fits."""
     for k, (start, end) in enumerate(itertools.pairwise(impacts)):
         if end - start < _NARROW * (impacts[-1] - impacts[0]):
             continue
@@ -270,7 +270,7 @@ _DOTS: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "m
 #: Up to so many intervals are joined by a line, which shows how they take turns.
 _JOINED: Final = 100
 
-#: Room beside the first and the last impact, over their number.
+#: Space beside the first and the last impact, over their number.
 _MARGIN: Final = 0.03
 
 

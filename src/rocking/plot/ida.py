@@ -38,7 +38,7 @@ _STRIP: Final[dict[str, Any]] = {"linewidth": 5.0, "solid_capstyle": "butt"}
 _END: Final[dict[str, Any]] = {"linestyle": "", "marker": "_", "markersize": 5.0, "markeredgewidth": 0.8}
 _GOES_ON: Final[dict[str, Any]] = {"linestyle": "", "marker": "^", "markersize": 9.0, "markeredgewidth": 0.0}
 
-#: Up to so many strips there is room for names in lines of so many letters, which would else be as long as the panel.
+#: Up to so many strips have space for names in lines of so many letters, which would else be as long as the panel.
 _ROOMY: Final = 8
 _NAME_LINE: Final = 18
 

@@ -190,7 +190,7 @@ def blocks_figure(
     """Draw a number for each block as the colour of a mark, in one panel or several with the same colours.
 
     Blocks are given by p (rad/s) and alpha (rad), `panels` by their names: arrays of shape (n,). Where a value is not
-    finite, the block has a cross, and `missing_label` says why. In `ax` there is room for one panel.
+    finite, the block has a cross, and `missing_label` says why. In `ax` one panel is drawn.
     """
     if ax is not None and len(panels) > 1:
         raise InvalidOption(f"{len(panels)} panels need a figure of their own: leave ax out, or select one of them")
