@@ -8,18 +8,10 @@ from hypothesis import strategies as st
 from kernel_records import in_units_of_g, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import System, after, coefficients, mp
 
-from rocking.kernels.arc import (
-    NEGLIGIBLE,
-    converged,
-    evaluate,
-    expand,
-    expand_nonlinear,
-    linear_order,
-    shortened_linear,
-    step_length,
-)
+from rocking.kernels.arc import converged, evaluate, expand, expand_nonlinear, linear_order, step_length
 from rocking.kernels.recurrences import linear_coefficients
 from rocking.kernels.state import ORDER, Record, new_scratch
+from rocking.kernels.truncation import NEGLIGIBLE, shortened_linear
 
 ULP = 2.0**-52
 

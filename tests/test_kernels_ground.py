@@ -235,7 +235,7 @@ def test_no_piece_that_passes_the_threshold_is_passed_over(
     samples = np.array([dense(ground, k, 0.0, float(ground.pieces[k, 1]), 30)[1] for k in range(count)])
     beyond = np.append(np.max(samples, axis=1) > above, True) | np.append(np.min(samples, axis=1) < -below, True)
     for piece in random.integers(0, count + 1, size=20):
-        found = next_beyond(ground, int(piece), -below, above)
+        found = next_beyond(ground, int(piece), (-below, above), (0.0, 0.0))
         assert piece <= found <= piece + np.argmax(beyond[piece:])
 
 
@@ -244,8 +244,8 @@ def test_stretches_without_anything_are_passed_over() -> None:
     coefficients = np.full((count, 2), [0.1, 0.0])
     coefficients[7 * STRETCH + 5, 0] = -0.5
     ground = in_units_of_g(np.arange(count + 1.0), coefficients)
-    assert next_beyond(ground, 3, -0.2, 0.2) == 7 * STRETCH
-    assert next_beyond(ground, 7 * STRETCH + 3, -0.2, 0.2) == 7 * STRETCH + 3
-    assert next_beyond(ground, 8 * STRETCH, -0.2, 0.2) == count
-    assert next_beyond(ground, 3, -0.6, 0.2) == count
-    assert next_beyond(ground, 3, -0.6, 0.05) == 3
+    assert next_beyond(ground, 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * STRETCH
+    assert next_beyond(ground, 7 * STRETCH + 3, (-0.2, 0.2), (0.0, 0.0)) == 7 * STRETCH + 3
+    assert next_beyond(ground, 8 * STRETCH, (-0.2, 0.2), (0.0, 0.0)) == count
+    assert next_beyond(ground, 3, (-0.6, 0.2), (0.0, 0.0)) == count
+    assert next_beyond(ground, 3, (-0.6, 0.05), (0.0, 0.0)) == 3

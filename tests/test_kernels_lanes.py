@@ -12,7 +12,7 @@ from kernel_records import ULP, in_units_of_g, long_uncompiled, one_sided, rocki
 from oracles.taylor import System, after
 
 from rocking.kernels import state
-from rocking.kernels.arc import Line, evaluate, expand
+from rocking.kernels.arc import evaluate, expand
 from rocking.kernels.ground import Ground
 from rocking.kernels.lane_steps import WIDTH, is_event_free, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.lanes import (
@@ -25,6 +25,7 @@ from rocking.kernels.lanes import (
     stumpff,
     unload,
 )
+from rocking.kernels.recurrences import Line
 from rocking.kernels.state import Record, Records, new_scratch
 
 mp = mpmath.mp.clone()

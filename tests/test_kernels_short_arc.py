@@ -13,8 +13,9 @@ from kernel_records import ULP, in_units_of_g, long_uncompiled, rocking_block, r
 from oracles.exact import exact, real_roots
 from oracles.taylor import System, after
 
-from rocking.kernels.arc import Line, evaluate, expand
+from rocking.kernels.arc import evaluate, expand
 from rocking.kernels.events import StepEnd, advance
+from rocking.kernels.recurrences import Line
 from rocking.kernels.short_arc import short_step
 from rocking.kernels.state import Outcome, Record, new_scratch
 

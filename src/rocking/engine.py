@@ -252,7 +252,7 @@ def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> I
         substeps = np.where(
             width <= lanes.LONGEST_STEP, _substeps(width, model, motion.vertical is not None), -1.0
         ).astype(np.int64)
-    substeps[(records["damping"] > 0.0) | records["facing"]] = -1
+    substeps[records["restrained"] | records["facing"]] = -1
     for count in np.unique(substeps):
         chosen = np.flatnonzero(substeps == count)
         for start in range(0, len(chosen), _TOGETHER):

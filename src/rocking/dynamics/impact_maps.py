@@ -107,8 +107,8 @@ class ImpactMap(Repeated):
         for column in pieces[:, :1:-1].T:
             push = push * made["offset"] + column
         sign = np.where(side > 0, -1.0, 1.0)
-        restoring = record["gain"][side] * (record["threshold"][side] + sign * push)
-        return np.stack([made["v"], -restoring - record["damping"] * made["v"]], axis=-1)
+        restoring = record["gain"][side] * (record["threshold"][side] + record["hold"][side] + sign * push)
+        return np.stack([made["v"], -restoring - record["damping"][side] * made["v"]], axis=-1)
 
 
 def impact_map(body: Body, motion: Motion, *, model: Model | None = None) -> ImpactMap:

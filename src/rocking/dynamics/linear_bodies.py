@@ -302,7 +302,8 @@ class LinearBodies:
         laws = np.array([each.law for each in self.members])
         facing = np.isfinite(laws[:, 4])
         made["stiffness"] = laws[:, :1]
-        made["damping"] = laws[:, 1]
+        made["damping"] = laws[:, 1:2]
+        made["restrained"] = laws[:, 1] > 0.0
         made["gain"] = self.gravity
         made["threshold"] = np.array([each.thresholds for each in self.members]) / self.gravity
         made["restitution"] = self.restitution

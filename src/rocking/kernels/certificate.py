@@ -126,7 +126,7 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     motion = bounds_on_motion(ground, block, state, window + rounding, scratch)
     first = side_bounds(block, rules, i, motion)
     second = side_bounds(block, rules, j, motion)
-    drag = block.damping * _FASTEST * v * (1.0 + ROUNDING)
+    drag = max(block.damping[i], block.damping[j]) * _FASTEST * v * (1.0 + ROUNDING)
     if drag > 0.0:
         first, second = with_drag(first, drag), with_drag(second, drag)
         if not arc_bounds(v, first)[0] <= _ENERGY:
@@ -167,7 +167,7 @@ def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float
         exact = bounds_over(vertical_of(ground), state.piece, state.offset, window, limits, scratch.ground)
         vertical = widened(exact, ground.error)
     weight = 1.0 + vertical.high
-    limits = (-block.threshold[0] * weight, block.threshold[1] * weight)
+    limits = (-block.threshold[0] * weight - block.hold[0], block.threshold[1] * weight + block.hold[1])
     if block.facing:  # the other stop is out of reach
         limits = (limits[0], np.inf) if state.side == 0 else (-np.inf, limits[1])
     horizontal = bounds_over(ground, state.piece, state.offset, window, limits, scratch.ground)
@@ -213,26 +213,29 @@ def restoring_parabola(block: Record, rules: Record, j: int, scratch: Record, ho
     """
     A, W = scratch.ground, scratch.weight
     sign, gain, threshold, lam = sign_of(j), block.gain[j], block.threshold[j], block.stiffness[j]
+    weight, push = W[0] + block.added_weight[j], sign * A[0] + block.added_push[j]
     horizontal, vertical = horizon.motion
     error = horizon.error + beyond_parabola(A, horizon)
     # Where almost no weight presses the block down, weight and push cancel, and the rounding of both remains.
-    error += ROUNDING * (abs(threshold) * (1.0 + largest(vertical)) + largest(horizontal))
+    error += ROUNDING * (abs(threshold) * (1.0 + largest(vertical)) + abs(block.hold[j]) + largest(horizontal))
     weight_changes = vertical.high > vertical.low
     weight_error = horizon.error + beyond_parabola(W, horizon) if weight_changes else 0.0
     weight_change = vertical.slope * horizon.window + 2.0 * horizon.error if weight_changes else 0.0
     if not rules.nonlinear:
-        stiffness = lam * W[0]
+        stiffness = lam * weight - block.spring[j]
         error = gain * (error + abs(threshold) * weight_error) + horizon.drag
         if weight_changes:
             error = deviation(error, abs(lam) * weight_change, 0.0, horizon.height)
     else:
         sine, cosine = block.sine[j], block.cosine[j]
-        stiffness = lam * (cosine * W[0] - sign * A[0] * sine)
+        stiffness = lam * (cosine * weight - push * sine) - block.spring[j]
         push_change = horizontal.slope * horizon.window + 2.0 * horizon.error
         change = lam * (sine * push_change + cosine * weight_change)
-        curvature = lam * diagonal(largest_weight(vertical), largest(horizontal))
-        error = deviation(lam * (error + weight_error), change, curvature, horizon.height)
-    g = gain * (threshold * W[0] + sign * A[0])
+        curvature = (
+            lam * diagonal(heaviest(block, j, vertical), hardest(block, j, horizontal)) + 0.25 * block.prestress[j]
+        )
+        error = deviation(lam * (error + weight_error) + horizon.drag, change, curvature, horizon.height)
+    g = gain * (threshold * W[0] + block.hold[j] + sign * A[0])
     rate, half_curvature = gain * (sign * A[1]), gain * (sign * A[2]) if horizon.columns > 2 else 0.0
     if weight_changes:
         rate += gain * threshold * W[1]
@@ -275,6 +278,18 @@ def largest_weight(vertical: Window) -> float:
 
 
 @inlined
+def heaviest(block: Record, j: int, vertical: Window) -> float:
+    """Largest absolute value of the weight on side j with what restraints add to it."""
+    return largest_weight(vertical) + abs(block.added_weight[j])
+
+
+@inlined
+def hardest(block: Record, j: int, horizontal: Window) -> float:
+    """Largest absolute value of the push on side j with what restraints add to it."""
+    return largest(horizontal) + abs(block.added_push[j])
+
+
+@inlined
 def diagonal(a: float, b: float) -> float:
     """Length of a vector. The C library's hypot rounds differently from version to version, and in Python."""
     return math.sqrt(a * a + b * b)
@@ -288,15 +303,20 @@ def side_bounds(block: Record, rules: Record, j: int, motion: MotionBounds) -> B
     from_weight = (threshold * (1.0 + vertical.low), threshold * (1.0 + vertical.high))
     from_push = (sign * horizontal.low, sign * horizontal.high)
     push, weight = largest(horizontal), largest_weight(vertical)
-    rounding = ROUNDING * (abs(threshold) * weight + push)
+    rounding = ROUNDING * (abs(threshold) * weight + abs(block.hold[j]) + push)
     # A rotation changes both models' stiffness and, in the nonlinear one, what the motion adds (at most p^2 a/g).
-    stiffness = abs(block.stiffness[j]) * (diagonal(weight, push) if rules.nonlinear else weight) * (1.0 + ROUNDING)
+    bend = heaviest(block, j, vertical)
+    spring = abs(block.spring[j])
+    if rules.nonlinear:
+        bend = diagonal(bend, hardest(block, j, horizontal))
+        spring += 0.5 * abs(block.prestress[j])
+    stiffness = (abs(block.stiffness[j]) * bend + spring) * (1.0 + ROUNDING)
     per_push = (block.stiffness[j] if rules.nonlinear else block.gain[j]) * (1.0 + ROUNDING)
     per_weight = block.gain[j] * threshold * (1.0 + ROUNDING)  # largest at zero rotation: `is_greatest_at_zero`
     return Bounds(
         stiffness,
-        block.gain[j] * (from_weight[0] + min(from_push[0], from_push[1]) - rounding),
-        block.gain[j] * (from_weight[1] + max(from_push[0], from_push[1]) + rounding),
+        block.gain[j] * (from_weight[0] + block.hold[j] + min(from_push[0], from_push[1]) - rounding),
+        block.gain[j] * (from_weight[1] + block.hold[j] + max(from_push[0], from_push[1]) + rounding),
         per_push * (horizontal.high - horizontal.low) + per_weight * (vertical.high - vertical.low),
         per_push * horizontal.slope + per_weight * vertical.slope,
         per_push * horizontal.jumps + per_weight * vertical.jumps,

@@ -305,16 +305,17 @@ def jump_after(ground: Ground, piece: int) -> float:
 
 
 @inlined
-def next_beyond(ground: Ground, piece: int, below: float, above: float) -> int:
-    """First piece from this one on whose stretch is not within [below, above]; the last one where none is.
+def next_beyond(ground: Ground, piece: int, limits: tuple[float, float], added: tuple[float, float]) -> int:
+    """First piece from this one on whose stretch is not within limits, times the weight, and what is added to them.
 
-    The limits are those under gravity alone: a vertical acceleration scales them with the weight.
+    The last one where none is.
     """
+    below, above = limits
     while piece < last_piece(ground):
         stretch = piece // STRETCH
         weight = 1.0 + (stretch_bounds(vertical_of(ground), stretch).low if has_vertical(ground) else 0.0)
         bounds = stretch_bounds(ground, stretch)
-        if bounds.low < below * weight or bounds.high > above * weight:
+        if bounds.low < below * weight + added[0] or bounds.high > above * weight + added[1]:
             return piece
         piece = (stretch + 1) * STRETCH
     return last_piece(ground)

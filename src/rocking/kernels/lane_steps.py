@@ -8,10 +8,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from rocking.kernels.arc import strength_of, truncation_is_negligible
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.recurrences import Line, nonlinear_rates, weighted_rates
 from rocking.kernels.state import Record
+from rocking.kernels.truncation import strength_of, truncation_is_negligible
 
 #: Lanes that step together. A constant, so that their loops have a fixed length.
 WIDTH = 32

@@ -110,8 +110,8 @@ def march_step(ground: Ground, block: Record, rules: Record, table: Records, scr
 
 @inlined
 def may_pass(ground: Ground, block: Record, rules: Record) -> bool:
-    """Whether `pass_proven_impacts` applies: linear, undamped, a constant weight, a motion linear in time."""
-    return not rules.nonlinear and is_straight(ground) and not has_vertical(ground) and block.damping == 0.0
+    """Whether `pass_proven_impacts` applies: linear, unrestrained, a constant weight, a motion linear in time."""
+    return not rules.nonlinear and is_straight(ground) and not has_vertical(ground) and not block.restrained
 
 
 @inlined

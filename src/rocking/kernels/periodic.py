@@ -18,7 +18,7 @@ from rocking.kernels.ground import ROUNDING, Ground, length_of, start_of
 from rocking.kernels.march import march
 from rocking.kernels.recurrences import variation_coefficients
 from rocking.kernels.state import AT_REST, Ending, Record, Records
-from rocking.kernels.trace import Trail, expand_coefficients
+from rocking.kernels.trace import Trail, add_restraints, expand_coefficients
 
 #: Turns of a march that one period, or one impact, may take.
 TURNS = 100_000
@@ -173,12 +173,13 @@ def step_rows(ground: Ground, block: Record) -> Floats:
     pieces = (len(ground.pieces) - 3) // 2
     rows = np.zeros((2, pieces, _COLUMNS))
     length, coefficients = ground.pieces[:pieces, 1], ground.pieces[:pieces, 2 : 2 + ground.columns]
-    drag = float(block["damping"])
+    if any(np.any(block[name]) for name in ("hold", "added_weight", "spring")):
+        return np.zeros((2, 0, _COLUMNS))
     for side in range(2):
         lam, gain, threshold = (float(block[name][side]) for name in ("stiffness", "gain", "threshold"))
         if not np.isfinite(threshold):
             continue
-        root = np.sqrt(abs(lam))
+        root, drag = np.sqrt(abs(lam)), float(block["damping"][side])
         if length.max() * (root + drag) > _LONGEST:
             return np.zeros((2, 0, _COLUMNS))
         force = -gain * (1.0 - 2.0 * side) * coefficients
@@ -324,9 +325,10 @@ def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, followin
     expand_coefficients(trail, scratch, work, node.side, degree, order)
     for j in range(order - 1):
         work.forcing[j] = 0.0
+    add_restraints(trail, scratch, work, node.side, order)
     for column in range(2):
         work.change[0], work.change[1] = M[0, column], M[1, column]
-        variation_coefficients(work, block.damping, order)
+        variation_coefficients(work, block.damping[node.side], order)
         M[0, column], M[1, column], _ = evaluate(work.change, order, h)
     if following.u == 0.0 and (following.side != node.side or following.v > 0.0):
         _, v, _ = evaluate(scratch.rotation, order, h)
@@ -339,8 +341,10 @@ def apply_saltation(ground: Ground, block: Record, left: int, following: Record,
     across = block.facing and following.side != left  # at the other stop: seen from there, all signs change
     hit, sign = (following.side, -1.0) if across else (left, 1.0)
     speed, e = -sign * v, block.restitution[hit]
-    before = restoring(ground, block, hit, following.piece, following.offset) - block.damping * speed
-    after = restoring(ground, block, following.side, following.piece, following.offset) + block.damping * (e * speed)
+    before = restoring(ground, block, hit, following.piece, following.offset) - block.damping[hit] * speed
+    after = restoring(ground, block, following.side, following.piece, following.offset) + block.damping[
+        following.side
+    ] * (e * speed)
     coupling = (e * before + after) / speed
     for column in range(2):
         du, dv = sign * M[0, column], sign * M[1, column]

@@ -3,11 +3,11 @@
 The rotation u >= 0 is counted in the frame of the block's side, and so is the ground acceleration A(t) = i a(t)/g with
 i the sign of that side. A vertical ground acceleration changes the weight: W(t) = 1 + a_v(t)/g. The equations are
 
-    linear      u'' = W lam u - gain (W threshold + A) [- c u', without a changing weight]
+    linear      u'' = W lam u - gain (W threshold + A)
     nonlinear   u'' = -lam (W sin(alpha - u) + A cos(alpha - u))
 
 In the linear model lam may have any sign: p^2 for a rocking block (whose gain is p^2, too), 0 for a ball, negative for
-an oscillator with a stop.
+an oscillator with a stop. What restraints and damping add is in `restrained`.
 
 Each equation is written three times, for three purposes: to any order into arrays (`arc`); nine terms of one arc in
 registers (`short_arc`); and some ten terms of many lanes at once (`lane_steps`). One form for all was measured: as
@@ -57,16 +57,6 @@ def linear_coefficients(block: Record, state: Record, scratch: Record, degree: i
         c[k + 2] = (lam * c[k] - gain * A[k]) * INTEGRATED_TWICE[k]
     for k in range(degree + 1, order - 1):
         c[k + 2] = lam * c[k] * INTEGRATED_TWICE[k]
-
-
-@inlined
-def damped_coefficient(block: Record, side: int, scratch: Record, degree: int, k: int) -> float:
-    """Coefficient c[k + 2] of a linear arc with damping, from the two before it."""
-    c = scratch.rotation
-    value = block.stiffness[side] * c[k] - block.damping * ((k + 1) * c[k + 1])
-    if k <= degree:
-        value -= block.gain[side] * (scratch.ground[k] + (block.threshold[side] if k == 0 else 0.0))
-    return value * INTEGRATED_TWICE[k]
 
 
 @inlined

@@ -8,12 +8,13 @@ import math
 
 import numpy as np
 
-from rocking.kernels.arc import sign_of, strength_of, truncation_is_negligible, weight_at
+from rocking.kernels.arc import sign_of, weight_at
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.events import StepEnd
 from rocking.kernels.ground import Ground, acceleration, coefficient, has_vertical, is_straight, vertical_of
 from rocking.kernels.recurrences import Line, Seven, Ten, linear_ten, nonlinear_ten, weighted_ten
 from rocking.kernels.state import Outcome, Record
+from rocking.kernels.truncation import strength_of, truncation_is_negligible
 
 #: Largest lam t^2 of a linear step, lam |W| t^2 of one while the weight W changes, and (lam (|W| + |a|/g) + v^2) t^2 of
 #: a nonlinear one.
@@ -36,7 +37,7 @@ _CONVERGED = 1e-8
 @inlined
 def short_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> StepEnd:
     """Step to the next impact or over ``left``, or the part of it that is short; UNDECIDED where it is not simple."""
-    if not is_straight(ground) or block.damping > 0.0:
+    if not is_straight(ground) or block.restrained:
         return undecided()
     if has_vertical(ground):
         return short_weighted_step(ground, block, rules, state, left)

@@ -89,12 +89,15 @@ _SERIES = ("f8", (ORDER + 2,))
 #: A block, side by side: lambda in u'' = lambda u - ...; uplift threshold in g and its gain (the restoring acceleration
 #: at zero rotation is gain (threshold + side a/g)); restitution on leaving the side, and the side entered from it; the
 #: rotation at which the block has overturned; slenderness, its sine and cosine; limit of a treatment other than the
-#: certificate; damping, c in u'' = ... - c u' (linear model only); and whether the sides are two stops that face each
+#: certificate; what restraints add: to the restoring acceleration at zero rotation, over the gain (``hold``); to the
+#: weight and to the push of u'', in g; a force of cos(u/2) and one of u, over inertia; damping, c in u'' = ... - c u';
+#: whether there is any of these five; and whether the sides are two stops that face each
 #: other: each side is then entered from itself, and at ``fallen``, their distance, the body hits the other stop.
 #: The fields that most iterations of a march read come first, here and below: fewer cache lines are read.
 BLOCK = _record(
-    stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, restitution=_SIDES, entered=("i8", (2,)), fallen="f8",
-    slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES, damping="f8", facing="?",
+    stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, hold=_SIDES, restitution=_SIDES, entered=("i8", (2,)),
+    fallen="f8", restrained="?", facing="?", slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES,
+    added_weight=_SIDES, added_push=_SIDES, prestress=_SIDES, spring=_SIDES, damping=_SIDES,
 )  # fmt: skip
 
 #: How to compute: model, end of chattering (`RestRule`), width of a good bracket (s), when to stop (s), whether that
@@ -123,8 +126,12 @@ SEQUENCE_ROW = _record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8
 #: arrays by value.
 TABLE = _record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
 
-#: Scratch space: the series of one step; of the ground, the weight and sin and cos(alpha - u) about its start; another.
-SCRATCH = _record(rotation=_SERIES, ground=_SERIES, weight=_SERIES, sine=_SERIES, cosine=_SERIES, other=_SERIES)
+#: Scratch space: the series of one step; of the ground, the weight, sin and cos(alpha - u), and sin and cos(u/2) about
+#: its start; another.
+SCRATCH = _record(
+    rotation=_SERIES, ground=_SERIES, weight=_SERIES, sine=_SERIES, cosine=_SERIES, other=_SERIES,
+    half_sine=_SERIES, half_cosine=_SERIES,
+)  # fmt: skip
 
 #: Scratch space of a variation: series of the stiffness, of the forcing and of the variation itself.
 VARIATION = _record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)

@@ -46,15 +46,15 @@ def moreau_jean(
     for k in range(1, out.shape[0]):
         before, time = (k - 1) * h, k * h
         force, _ = acceleration_of(ground, block, rules, side, piece, before, u)
-        force -= block.damping * v
+        force -= block.damping[side] * v
         piece = piece_at(ground, piece, time)
         free = v + h * force
         for _ in range(_NEWTON_STEPS if theta > 0.0 else 0):
             ahead_u = u + h * (theta * free + (1.0 - theta) * v)
             end_force, slope = acceleration_of(ground, block, rules, side, piece, time, ahead_u)
-            end_force -= block.damping * free
+            end_force -= block.damping[side] * free
             excess = free - v - h * (theta * end_force + (1.0 - theta) * force)
-            change = excess / (1.0 + h * theta * (block.damping - h * theta * slope))
+            change = excess / (1.0 + h * theta * (block.damping[side] - h * theta * slope))
             free -= change
             if not rules.nonlinear or abs(change) <= _ROUNDING * abs(free):
                 break
@@ -88,9 +88,9 @@ def schatzman_paoli(ground: Ground, block: Record, rules: Record, state: Record,
         piece = piece_at(ground, piece, time)
         force, _ = acceleration_of(ground, block, rules, side, piece, time, u)
         if k == 1:
-            free, least = u + h * (v + 0.5 * h * (force - block.damping * v)), 0.0
+            free, least = u + h * (v + 0.5 * h * (force - block.damping[side] * v)), 0.0
         else:
-            drag = 0.5 * h * block.damping  # by the central difference
+            drag = 0.5 * h * block.damping[side]  # by the central difference
             free = u + ((1.0 - drag) * (u - before) + h * h * force) / (1.0 + drag)
             least = -block.restitution[side] * before
         end = max(free, least)
@@ -131,12 +131,14 @@ def acceleration_of(
     """Acceleration of u off the ground but for damping, and its derivative by u."""
     offset = time - start_of(ground, piece)
     push, weight = sign_of(side) * acceleration(ground, piece, offset), weight_at(ground, piece, offset)
-    stiffness = block.stiffness[side]
+    weight, push = weight + block.added_weight[side], push + block.added_push[side]
+    stiffness, spring, prestress = block.stiffness[side], block.spring[side], block.prestress[side]
     if rules.nonlinear:
         sine, cosine = math.sin(block.slenderness[side] - u), math.cos(block.slenderness[side] - u)
-        return -stiffness * (weight * sine + push * cosine), stiffness * (weight * cosine - push * sine)
-    slope = stiffness * weight
-    return slope * u - block.gain[side] * (block.threshold[side] * weight + push), slope
+        force = -stiffness * (weight * sine + push * cosine) - prestress * math.cos(0.5 * u) - spring * u
+        return force, stiffness * (weight * cosine - push * sine) + 0.5 * prestress * math.sin(0.5 * u) - spring
+    slope = stiffness * weight - spring
+    return slope * u - block.gain[side] * (block.threshold[side] * weight + push) - prestress, slope
 
 
 @inlined

@@ -163,34 +163,54 @@ def expand_variation(
         for k in range(order - 1):
             work.forcing[k] = 0.0
     work.change[0], work.change[1] = start
-    variation_coefficients(work, trail.block.damping, order)
+    add_restraints(trail, scratch, work, node.side, order)
+    variation_coefficients(work, trail.block.damping[node.side], order)
     return order
 
 
 @inlined
 def expand_coefficients(trail: Trail, scratch: Record, work: Record, side: int, degree: int, order: int) -> None:
-    """Write the series of d u''/d u, and of u'' per unit of change of the motion, into ``work``."""
+    """Write the series of d u''/d u but for `add_restraints`, and of u'' per unit of change of the motion, to ``work``.
+
+    The motion is then in scratch without what restraints add to it.
+    """
     lam, gain, threshold = trail.block.stiffness[side], trail.block.gain[side], trail.block.threshold[side]
     A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
     changes = degree if has_vertical(trail.ground) else 0
     for k in range(order - 1):
-        stiffness, forcing = 0.0, 0.0
+        if trail.rules.nonlinear:
+            stiffness = 0.0
+            for j in range(min(k, changes) + 1):
+                stiffness += W[j] * C[k - j]
+            for j in range(min(k, degree) + 1):
+                stiffness -= A[j] * S[k - j]
+            work.stiffness[k] = lam * stiffness
+        else:
+            work.stiffness[k] = lam * W[k] if k <= changes else 0.0
+    W[0] -= trail.block.added_weight[side]
+    A[0] -= trail.block.added_push[side]
+    for k in range(order - 1):
         if trail.rules.nonlinear:
             forcing = -S[k]
             for j in range(min(k, changes) + 1):
-                stiffness += W[j] * C[k - j]
                 forcing += W[j] * S[k - j]
             for j in range(min(k, degree) + 1):
-                stiffness -= A[j] * S[k - j]
                 forcing += A[j] * C[k - j]
-            work.stiffness[k] = lam * stiffness
             work.forcing[k] = -lam * forcing
         else:
-            work.stiffness[k] = lam * W[k] if k <= changes else 0.0
             forcing = gain * (A[k] + threshold * added_weight(W, k, changes)) if k <= degree else 0.0
             for j in range(min(k, changes) + 1):
                 forcing -= lam * added_weight(W, j, changes) * scratch.rotation[k - j]
             work.forcing[k] = -forcing
+
+
+@inlined
+def add_restraints(trail: Trail, scratch: Record, work: Record, side: int, order: int) -> None:
+    """Add what prestress and springs are to d u''/d u, after `expand_coefficients`."""
+    work.stiffness[0] -= trail.block.spring[side]
+    if trail.rules.nonlinear and trail.block.prestress[side] != 0.0:
+        for k in range(order - 1):
+            work.stiffness[k] += 0.5 * trail.block.prestress[side] * scratch.half_sine[k]
 
 
 @inlined
@@ -209,10 +229,10 @@ def saltation(
     block = trail.block
     dv, speed = rates
     hit = following.side if block.facing else node.side
-    left = restoring(trail.ground, block, hit, following.piece, following.offset) - block.damping * speed
+    left = restoring(trail.ground, block, hit, following.piece, following.offset) - block.damping[hit] * speed
     e = block.restitution[hit]
     entered = restoring(trail.ground, block, following.side, following.piece, following.offset)
-    entered += block.damping * (e * speed)
+    entered += block.damping[following.side] * (e * speed)
     faster = -(dv - left * shift) + (speed if quantity == Quantity.RESTITUTION else 0.0)
     return -e * speed * shift, e * faster + entered * shift
 
@@ -224,14 +244,16 @@ def uplift_shift(trail: Trail, node: Record, quantity: int) -> float:
     threshold = block.threshold[node.side]
     push = -push_at(ground, block, node.side, node.piece, node.offset)
     rate = -push_rate(ground, block, node.side, node.piece, node.offset)
-    if abs(push - threshold) > _JUMP * abs(threshold):
+    if abs(push - threshold - block.hold[node.side]) > _JUMP * (abs(threshold) + abs(block.hold[node.side])):
         return 0.0
     if quantity == Quantity.MOTION:
         return -push / rate
     if quantity == Quantity.SLENDERNESS:
-        growth = 1.0 + threshold * threshold if rules.nonlinear else 1.0
-        weight = weight_at(ground, node.piece, node.offset)
-        return block.slenderness[node.side] * growth * weight / rate
+        growth = weight_at(ground, node.piece, node.offset) + block.added_weight[node.side]
+        if rules.nonlinear:
+            growth *= 1.0 + threshold * threshold
+            growth += block.prestress[node.side] * threshold / block.gain[node.side]
+        return block.slenderness[node.side] * growth / rate
     return 0.0
 
 
@@ -282,7 +304,10 @@ def restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: fl
     elif quantity == Quantity.FREQUENCY:
         change += 2.0 * restoring(ground, block, j, node.piece, node.offset)
     elif quantity == Quantity.SLENDERNESS:
-        weight = weight_at(ground, node.piece, node.offset)
-        slope_of_angle = block.cosine[j] * weight - sign_of(j) * here * block.sine[j] if rules.nonlinear else weight
+        slope_of_angle = weight_at(ground, node.piece, node.offset) + block.added_weight[j]
+        if rules.nonlinear:
+            slope_of_angle = (
+                block.cosine[j] * slope_of_angle - (sign_of(j) * here + block.added_push[j]) * block.sine[j]
+            )
         change += block.stiffness[j] * slope_of_angle * block.slenderness[j]
     return change

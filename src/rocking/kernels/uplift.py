@@ -44,10 +44,11 @@ def next_uplift(
     """
     A, d = scratch.ground, scratch.other
     plus, minus = block.threshold[0], block.threshold[1]
+    hold_plus, hold_minus = block.hold[0], block.hold[1]
     if block.facing:  # only the stop at which it rests
         plus, minus = (plus, np.inf) if stop_of(resting) == 0 else (np.inf, minus)
     while True:
-        following = next_beyond(ground, piece, -plus, minus)
+        following = next_beyond(ground, piece, (-plus, minus), (-hold_plus, hold_minus))
         if following > piece:
             piece, offset = following, 0.0
         if piece == last_piece(ground) or not start_of(ground, piece) + offset < stop:
@@ -58,11 +59,11 @@ def next_uplift(
         weight = 1.0
         if has_vertical(ground):
             weight += bounds_within(vertical_of(ground), piece, offset, left, A).low
-        if bounds.high > minus * weight or -bounds.low > plus * weight:
+        if bounds.high > minus * weight + hold_minus or -bounds.low > plus * weight + hold_plus:
             degree = push_series(ground, piece, offset, plus, -1.0, A, d)
-            to_plus, jump_plus = first_excess(A, degree, left, plus, -1.0, d)
+            to_plus, jump_plus = first_excess(A, degree, left, plus + hold_plus, -1.0, d)
             degree = push_series(ground, piece, offset, minus, 1.0, A, d)
-            to_minus, jump_minus = first_excess(A, degree, left, minus, 1.0, d)
+            to_minus, jump_minus = first_excess(A, degree, left, minus + hold_minus, 1.0, d)
             passed = min(to_plus, to_minus)
             # A passing that rounding puts at the end of the piece is decided in the next one, which may turn back.
             if offset + passed < length:
@@ -234,6 +235,7 @@ def time_beyond(ground: Ground, block: Record, scratch: Record, piece: int, offs
     sign, threshold = 1.0 if side == 1 else -1.0, block.threshold[side]
     A, d = scratch.ground, scratch.other
     degree = push_series(ground, piece, offset, threshold, sign, A, d)
+    threshold += block.hold[side]
     d[0] = sign * A[0] - (threshold - _BACK * abs(threshold))
     for k in range(1, degree + 1):
         d[k] = sign * A[k]
