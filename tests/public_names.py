@@ -19,7 +19,12 @@ import rocking
 from rocking.body import Bodies, Body
 
 #: What describes the methods of these classes, which do not inherit from it.
-PROTOCOLS: dict[Any, tuple[Any, ...]] = {rocking.Block: (Body,), rocking.Blocks: (Bodies,)}
+PROTOCOLS: dict[Any, tuple[Any, ...]] = {
+    rocking.Block: (Body,),
+    rocking.Blocks: (Bodies,),
+    rocking.RestrainedBlock: (Body,),
+    rocking.RestrainedBlocks: (Bodies,),
+}
 
 #: Checks of numpydoc: form and order of sections; parameters, returns and yields without a name, a type or a word.
 CHECKS = frozenset({"GL01", "GL03", "GL05", "GL06", "GL07", "GL08", "PR02", "PR03", "PR04", "PR07", "RT03"})

@@ -11,7 +11,20 @@ from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
-from .block import Block, Blocks, Side
+from .block import (
+    Block,
+    Blocks,
+    Damper,
+    Load,
+    RestrainedBlock,
+    RestrainedBlocks,
+    Restraint,
+    Side,
+    Spring,
+    Tendon,
+    Thrust,
+    one_sided_restitution,
+)
 from .body import Bodies, Body, Coordinate
 from .ensemble import Product, Scales, simulate_many
 from .errors import (
@@ -51,6 +64,7 @@ __all__ = [
     "Certified",
     "Coordinate",
     "DamagedStudy",
+    "Damper",
     "DatasetResult",
     "Description",
     "DrawnResult",
@@ -63,6 +77,7 @@ __all__ = [
     "InvalidBlock",
     "InvalidMotion",
     "InvalidOption",
+    "Load",
     "Measure",
     "Motion",
     "Origin",
@@ -70,15 +85,21 @@ __all__ = [
     "OutsideFit",
     "Product",
     "Response",
+    "RestrainedBlock",
+    "RestrainedBlocks",
+    "Restraint",
     "Result",
     "RockingError",
     "Row",
     "Scales",
     "Sensitivity",
     "Side",
+    "Spring",
     "Study",
     "StudyError",
     "TableResult",
+    "Tendon",
+    "Thrust",
     "Treatment",
     "UnequalSides",
     "Unfinished",
@@ -95,6 +116,7 @@ __all__ = [
     "fit_fragility",
     "fragility",
     "incremental_dynamic_analysis",
+    "one_sided_restitution",
     "overturning_map",
     "pulses",
     "read",

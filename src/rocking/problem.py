@@ -12,7 +12,7 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Flags, Floats
 from rocking.block import Block, Blocks, one_block
-from rocking.body import Bodies, Body, Coordinate
+from rocking.body import KINDS, Bodies, Body, Coordinate
 from rocking.constants import MODELS, Model
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
@@ -48,13 +48,18 @@ def step_of(motion: Motion) -> float | None:
     return None if None in steps else steps[0]
 
 
-def bodies_of(given: Bodies | Body | Iterable[Block]) -> Bodies:
-    """Return bodies as they are, a single one as `Bodies` of which it is the only one, and blocks as `Blocks`."""
+def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
+    """Return bodies as they are, and single ones of one kind as `Bodies` of that kind."""
     if isinstance(given, type):  # has what its objects have, but is none
         return Blocks.of(cast("Iterable[Block]", given))
     if isinstance(given, Bodies):
         return given
-    return given.alone() if isinstance(given, Body) else Blocks.of(given)
+    if isinstance(given, Body):
+        return given.alone()
+    several = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else given
+    if isinstance(several, list) and several and isinstance(several[0], Body) and not isinstance(several[0], type):
+        return KINDS[several[0].alone().kind].of(several)
+    return Blocks.of(cast("Iterable[Block]", several))
 
 
 def one_body(body: Body) -> Body:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Never
+from typing import TYPE_CHECKING, Any, Final, Never
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, 
 from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
+
+if TYPE_CHECKING:
+    from rocking.block.restrained import RestrainedBlock
+    from rocking.block.restraints import Restraint
 
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
@@ -162,7 +166,7 @@ class Block:
                 (b - s, b + s), h, gyration_squared(b, h, s), g, restitution, _perhaps_swapped(b, h)
             )
             text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
-        _filled(self, sides, g, text, mass, (b, h, s))
+        block_of_sides(self, sides, g, text, mass, (b, h, s))
 
     @classmethod
     def from_parameters(
@@ -233,7 +237,7 @@ class Block:
                 k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
                 text = f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
         sides = tuple(Side(rates[i], angles[i], e[i], radii[i]) for i in range(2))
-        return _filled(cls.__new__(cls), (sides[0], sides[1]), g, text)
+        return block_of_sides(cls.__new__(cls), (sides[0], sides[1]), g, text)
 
     @classmethod
     def from_pivots(
@@ -293,7 +297,7 @@ class Block:
         g = checked_gravity(gravity)
         sides = _sides_on_pivots((plus, minus), h, k * k, g, restitution)
         text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
-        return _filled(cls.__new__(cls), sides, g, text, mass)
+        return block_of_sides(cls.__new__(cls), sides, g, text, mass)
 
     @classmethod
     def from_frame(
@@ -348,9 +352,55 @@ class Block:
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
         sides = _even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), _perhaps_swapped(b, h))
-        return _filled(
+        return block_of_sides(
             cls.__new__(cls), sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
         )
+
+    @classmethod
+    def one_sided(
+        cls,
+        *restraints: Restraint,
+        lean: float = 0.0,
+        restitution: float | None = None,
+        **sizes: Any,
+    ) -> RestrainedBlock:
+        """Rectangular block that rocks to side + only, as a facade that stands against transverse walls.
+
+        Parameters
+        ----------
+        *restraints : Restraint
+            What holds it back or pushes it: `Thrust` of a vault, `Load`, `Tendon`.
+        lean : float
+            Angle by which it stands out of plumb to side +, rad.
+        restitution : float, optional
+            Factor on the angular speed with which it bounces back to the same side. By default
+            `one_sided_restitution`; measured ones are better.
+        **sizes
+            As of `Block`: `width` and `height`, m, or half of them, `mass`, kg, `gravity`.
+
+        Returns
+        -------
+        RestrainedBlock
+            With one side.
+
+        Raises
+        ------
+        InvalidBlock
+            As of `Block` and `RestrainedBlock`.
+
+        Notes
+        -----
+        The law is that of Sorrentino, AlShawa and Decanini (2011).
+
+        Examples
+        --------
+        >>> wall = Block.one_sided(width=0.4, height=4.0)
+        >>> round(wall.sides[0].restitution, 4)
+        0.4708
+        """
+        from rocking.block.restrained import RestrainedBlock
+
+        return RestrainedBlock(cls(**sizes), *restraints, one_sided=True, lean=lean, restitution=restitution)
 
     def __str__(self) -> str:
         """Return description and parameters in one line."""
@@ -470,7 +520,7 @@ def one_block(block: Block) -> Block:
     return block
 
 
-def _filled(
+def block_of_sides(
     block: Block,
     sides: tuple[Side, Side],
     gravity: float,

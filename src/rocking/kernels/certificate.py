@@ -30,13 +30,15 @@ from rocking.kernels.ground import (
 )
 from rocking.kernels.remaining import Restoring, deviation, refined_bracket, remaining_time
 from rocking.kernels.state import Record
+from rocking.kernels.tendon import may_change_below
 
 #: Window of the proof over the first estimate of the remaining time.
 _WINDOW = 1.5
 
-#: Bound on every speed until rest over the first, where damping counts; and on `arc_bounds`' first for it to hold.
+#: Bound on every speed until rest over the first, where damping counts; and on what energy the first two arcs gain for
+#: it to hold.
 _FASTEST = 1.5
-_ENERGY = 1.25
+_GAINED = 2.25
 
 
 class Bounds(NamedTuple):
@@ -129,7 +131,9 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     drag = max(block.damping[i], block.damping[j]) * _FASTEST * v * (1.0 + ROUNDING)
     if drag > 0.0:
         first, second = with_drag(first, drag), with_drag(second, drag)
-        if not arc_bounds(v, first)[0] <= _ENERGY:
+        gained = 1.0 + arc_bounds(v, first)[0]
+        fastest = e_i * math.sqrt(gained) * v
+        if not (gained <= _GAINED and e_i * e_i * gained * (1.0 + arc_bounds(fastest, second)[0]) <= _GAINED):
             return unproven()
     lower, upper = geometric_bracket(v, first, second, e_i, e_j)
     if not upper <= window:
@@ -137,6 +141,8 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     least, change = min(first.least, second.least), max(first.change, second.change)
     height = v * v * (1.0 + 2.0 * change / least) / least
     if has_vertical(ground) and not is_greatest_at_zero(block, height):
+        return unproven()
+    if block.yielding and may_change_below(block, rules, state.plastic, height):
         return unproven()
     local_series(ground, state.piece, state.offset, 1.0, clear(scratch.ground))
     weight_series(ground, state.piece, state.offset, clear(scratch.weight))

@@ -30,6 +30,7 @@ from rocking.kernels.state import (
     Record,
     Records,
     RestRule,
+    TendonLaw,
     has_space,
     resting_side,
     write_event,
@@ -37,6 +38,7 @@ from rocking.kernels.state import (
     write_node,
     write_sequence,
 )
+from rocking.kernels.tendon import adopt, change_law, elongation_at, next_law
 from rocking.kernels.uplift import next_uplift
 
 #: Distance below zero rotation that is within rounding, over the highest rotation so far.
@@ -53,6 +55,8 @@ def march(ground: Ground, block: Record, rules: Record, table: Records, scratch:
     RUNNING: the piece ``state.until`` is reached; a block at rest may be at its next uplift. PAUSED: the budget is
     spent. FULL: the table has no space left. After each of them, call again with the same state.
     """
+    if block.yielding:
+        take_up(ground, block, rules, state)
     while state.piece < state.until:
         if state.budget <= 0:
             return Ending.PAUSED.value
@@ -63,6 +67,15 @@ def march(ground: Ground, block: Record, rules: Record, table: Records, scratch:
         if ending != Ending.RUNNING:
             return ending.value
     return Ending.RUNNING.value
+
+
+@inlined
+def take_up(ground: Ground, block: Record, rules: Record, state: Record) -> None:
+    """Give a body's tendon the law of its state; one that starts too far from rest has stretched it for good."""
+    if time_of(ground, state) == 0.0 and state.side >= 0:
+        stretched = elongation_at(block, rules.nonlinear, state.side, state.u) - block.yields
+        state.plastic = max(state.plastic, stretched)
+    adopt(block, state.law, state.plastic)
 
 
 #: Turns of marches in one process that Python takes (two seconds' work or three, where compiling takes ten), and how
@@ -163,12 +176,28 @@ def follow_arc(ground: Ground, block: Record, rules: Record, scratch: Record, st
 def long_step(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float) -> StepEnd:
     """Step along the full series of the arc."""
     order, h, _ = expand(ground, block, rules, scratch, state, left)
+    if block.yielding:
+        return yielding_step(block, rules, scratch, state, order, h)
     if state.smooth:  # the acceleration at an uplift is zero, whatever rounding says
         scratch.rotation[2] = 0.0
     balanced = state.v == 0.0 and scratch.rotation[2] == 0.0
     if balanced and state.piece == last_piece(ground) and rules.endless:
         return StepEnd(Outcome.BALANCED, 0.0, state.u, 0.0, 0.0, 0.0)
     return advance(state, scratch, order, h, block.fallen)
+
+
+@shared
+def yielding_step(block: Record, rules: Record, scratch: Record, state: Record, order: int, h: float) -> StepEnd:
+    """Step along a series up to its first event, or to where the law of the tendon changes."""
+    if state.smooth:
+        scratch.rotation[2] = 0.0
+    change, law = next_law(block, rules, scratch, state, order, h)
+    end = advance(state, scratch, order, min(h, change), block.fallen)
+    if end.outcome == Outcome.STEP and end.time >= change:
+        turns = state.law == TendonLaw.PLASTIC
+        change_law(block, rules, state, law, end.u)
+        return StepEnd(end.outcome, end.time, end.u, 0.0 if turns else end.v, end.peak_time, end.peak)
+    return end
 
 
 @inlined

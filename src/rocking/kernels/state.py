@@ -41,6 +41,14 @@ class Outcome(IntEnum):
     UNDECIDED = 5
 
 
+class TendonLaw(IntEnum):
+    """What a tendon that yields does at present; see `tendon`."""
+
+    ELASTIC = 0
+    SLACK = 1
+    PLASTIC = 2
+
+
 class EventKind(IntEnum):
     """Kinds of event in a response."""
 
@@ -93,11 +101,16 @@ _SERIES = ("f8", (ORDER + 2,))
 #: weight and to the push of u'', in g; a force of cos(u/2) and one of u, over inertia; damping, c in u'' = ... - c u';
 #: whether there is any of these five; and whether the sides are two stops that face each
 #: other: each side is then entered from itself, and at ``fallen``, their distance, the body hits the other stop.
+#: From ``yielding`` on: whether there is a tendon that yields; of it stiffness times lever arm over inertia, lever arm,
+#: what it adds to weight and push where it is elastic, elongations at which it yields and hangs slack; and the values
+#: of four fields without it.
 #: The fields that most iterations of a march read come first, here and below: fewer cache lines are read.
 BLOCK = _record(
     stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, hold=_SIDES, restitution=_SIDES, entered=("i8", (2,)),
     fallen="f8", restrained="?", facing="?", slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES,
     added_weight=_SIDES, added_push=_SIDES, prestress=_SIDES, spring=_SIDES, damping=_SIDES,
+    yielding="?", tendon=_SIDES, opening=_SIDES, tendon_weight=_SIDES, tendon_push=_SIDES, yields="f8", slack="f8",
+    base_weight=_SIDES, base_push=_SIDES, base_prestress=_SIDES, base_hold=_SIDES,
 )  # fmt: skip
 
 #: How to compute: model, end of chattering (`RestRule`), width of a good bracket (s), when to stop (s), whether that
@@ -108,16 +121,18 @@ RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endles
 #: iterations left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a
 #: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests only because time hardly
 #: advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties`` counts the
-#: decisions by the last digits whether a block without weight touches the ground.
+#: decisions by the last digits whether a block without weight touches the ground. ``law`` and ``plastic`` are those of
+#: a tendon that yields.
 STATE = _record(
     piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
     run="i8", proof_speed="f8", last_impact_time="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8",
     run_start="f8", uplifted="f8", rested="f8", first_uplift="f8", first_rest="f8", resting="f8", end="f8",
     nodes="i8", events="i8", sequences="i8", uplifts="i8", rests="i8", stalled="i8", near_ties="i8",
+    law="i8", plastic="f8",
 )  # fmt: skip
 
 #: A step of a response: the state at its start, as `expand` takes it. Elsewhere a side is +1 or -1, and 0 at rest.
-NODE_ROW = _record(time="f8", piece="i8", offset="f8", side="i8", u="f8", v="f8")
+NODE_ROW = _record(time="f8", piece="i8", offset="f8", side="i8", u="f8", v="f8", law="i8", plastic="f8")
 IMPACT_ROW = _record(time="f8", side="i8", speed_before="f8", speed_after="f8")
 EVENT_ROW = _record(time="f8", kind="i8", side="i8")
 SEQUENCE_ROW = _record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
@@ -224,6 +239,8 @@ def write_node(ground: Ground, rules: Record, table: Records, state: Record) -> 
     row.side = state.side
     row.u = state.u
     row.v = state.v
+    row.law = state.law
+    row.plastic = state.plastic
     state.nodes += 1
 
 

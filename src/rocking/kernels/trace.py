@@ -16,7 +16,8 @@ from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import first_root
 from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, start_of, vertical_of
 from rocking.kernels.recurrences import INTEGRATED_TWICE, variation_coefficients
-from rocking.kernels.state import NODE_ROW, Record, Records, records
+from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, records
+from rocking.kernels.tendon import adopt, law_of_standing
 
 #: Nodes of a response before its march.
 NO_NODES = records(0, NODE_ROW)
@@ -30,6 +31,9 @@ class Trail(NamedTuple):
     rules: Record
     nodes: Records
 
+
+#: Three variations.
+Three = tuple[float, float, float]
 
 #: Columns of what `trace` writes.
 _ROTATION, _VELOCITY, _ACCELERATION = 0, 1, 2
@@ -55,6 +59,8 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
             out[k, _ROTATION] = out[k, _VELOCITY] = out[k, _ACCELERATION] = 0.0
             continue
         if row != expanded:
+            if block.yielding:
+                adopt(block, node.law, node.plastic)
             left = np.inf if last else nodes[row + 1].time - node.time
             order, h, _ = expand(ground, block, rules, scratch, node, left)
             landing = np.inf
@@ -102,30 +108,36 @@ def vary(
     """
     nodes = trail.nodes
     impact_count = event_count = 0
+    dp = 0.0  # of the plastic elongation of a tendon
     du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
     dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
     at_peak = du
     for k in range(nodes.shape[0]):
         node = nodes[k]
+        if trail.block.yielding:
+            adopt(trail.block, node.law, node.plastic)
         if k + 1 == nodes.shape[0]:
             if node.side >= 0 and event_count < events.shape[0]:
                 events[event_count] = -du / node.v
             break
         following = nodes[k + 1]
         if node.side < 0:
-            events[event_count] = uplift_shift(trail, following, quantity)
+            events[event_count] = uplift_shift(trail, following, quantity, dp)
             event_count += 1
             du = dv = 0.0
         elif following.side < 0:
             shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
-            events[event_count] = rest_shift(trail, node, quantity, dv, shift, following)
+            events[event_count] = rest_shift(trail, node, quantity, (dv, shift, dp), following)
             event_count += 1
         else:
-            order = expand_variation(trail, scratch, work, node, quantity, (du, dv), following.time - node.time)
+            order = expand_variation(trail, scratch, work, node, quantity, (du, dv, dp), following.time - node.time)
             if node.time < peak_time <= following.time:
                 at_peak, _, _ = evaluate(work.change, order, peak_time - node.time)
             t = elapsed(trail, node, following)
             du, dv, _ = evaluate(work.change, order, t)
+            if node.law == TendonLaw.PLASTIC and following.law != node.law:
+                half = math.cos(0.5 * following.u) if trail.rules.nonlinear else 1.0
+                dp = trail.block.opening[node.side] * half * du
             if following.u == 0.0 and (following.side != node.side or following.v > 0.0):  # no touch
                 _, speed, _ = evaluate(scratch.rotation, order, t)
                 shift = du / -speed
@@ -148,9 +160,12 @@ def elapsed(trail: Trail, node: Record, following: Record) -> float:
 
 @shared
 def expand_variation(
-    trail: Trail, scratch: Record, work: Record, node: Record, quantity: int, start: tuple[float, float], left: float
+    trail: Trail, scratch: Record, work: Record, node: Record, quantity: int, start: Three, left: float
 ) -> int:
-    """Series of the variation along the arc from a node, into ``work.change``; returns its order."""
+    """Series of the variation along the arc from a node, into ``work.change``; returns its order.
+
+    ``start``: variations of rotation and velocity there, and of a tendon's plastic elongation.
+    """
     order, _, degree = expand(trail.ground, trail.block, trail.rules, scratch, node, left)
     expand_coefficients(trail, scratch, work, node.side, degree, order)
     if quantity == Quantity.FREQUENCY:
@@ -162,7 +177,11 @@ def expand_variation(
     elif quantity != Quantity.MOTION:
         for k in range(order - 1):
             work.forcing[k] = 0.0
-    work.change[0], work.change[1] = start
+    work.change[0], work.change[1], plastic = start
+    if plastic != 0.0 and node.law == TendonLaw.ELASTIC:
+        change = trail.block.tendon[node.side] * plastic
+        for k in range(order - 1):
+            work.forcing[k] += change * (scratch.half_cosine[k] if trail.rules.nonlinear else (1.0 if k == 0 else 0.0))
     add_restraints(trail, scratch, work, node.side, order)
     variation_coefficients(work, trail.block.damping[node.side], order)
     return order
@@ -238,23 +257,32 @@ def saltation(
 
 
 @inlined
-def uplift_shift(trail: Trail, node: Record, quantity: int) -> float:
-    """Shift of the uplift with which a node begins."""
+def uplift_shift(trail: Trail, node: Record, quantity: int, plastic: float) -> float:
+    """Shift of the uplift with which a node begins; ``plastic``: variation of a tendon's plastic elongation."""
     ground, block, rules, _ = trail
     threshold = block.threshold[node.side]
     push = -push_at(ground, block, node.side, node.piece, node.offset)
     rate = -push_rate(ground, block, node.side, node.piece, node.offset)
     if abs(push - threshold - block.hold[node.side]) > _JUMP * (abs(threshold) + abs(block.hold[node.side])):
         return 0.0
+    slackening = restoring_by_tendon(block, node, node.side, plastic) / (block.gain[node.side] * rate)
     if quantity == Quantity.MOTION:
-        return -push / rate
+        return -push / rate + slackening
     if quantity == Quantity.SLENDERNESS:
         growth = weight_at(ground, node.piece, node.offset) + block.added_weight[node.side]
         if rules.nonlinear:
             growth *= 1.0 + threshold * threshold
             growth += block.prestress[node.side] * threshold / block.gain[node.side]
-        return block.slenderness[node.side] * growth / rate
-    return 0.0
+        return block.slenderness[node.side] * growth / rate + slackening
+    return slackening
+
+
+@inlined
+def restoring_by_tendon(block: Record, node: Record, side: int, plastic: float) -> float:
+    """Change of the restoring acceleration at zero rotation with a tendon's plastic elongation."""
+    if not block.yielding or law_of_standing(block, node.plastic) == TendonLaw.SLACK:
+        return 0.0
+    return -block.tendon[side] * plastic
 
 
 @inlined
@@ -272,19 +300,22 @@ def push_rate(ground: Ground, block: Record, side: int, piece: int, offset: floa
 
 
 @inlined
-def rest_shift(trail: Trail, node: Record, quantity: int, dv: float, shift: float, rest: Record) -> float:
+def rest_shift(trail: Trail, node: Record, quantity: int, changes: Three, rest: Record) -> float:
     """Shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
 
-    ``shift`` is that of the impact with which the node begins, ``dv`` the variation of the velocity after it, at the
-    unchanged time. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g at the impact.
+    ``changes``: variation of the velocity after the impact with which the node begins, at the unchanged time, shift of
+    that impact, and variation of a tendon's plastic elongation. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i
+    e_j), with v and g at the impact.
     """
+    dv, shift, plastic = changes
     if rest.time == node.time:
         return shift
     block, i = trail.block, node.side
     j = block.entered[i]
     g_i = restoring(trail.ground, block, i, node.piece, node.offset)
     g_j = restoring(trail.ground, block, j, node.piece, node.offset)
-    dg_i, dg_j = restoring_shift(trail, node, i, quantity, shift), restoring_shift(trail, node, j, quantity, shift)
+    dg_i = restoring_shift(trail, node, i, quantity, shift) + restoring_by_tendon(block, node, i, plastic)
+    dg_j = restoring_shift(trail, node, j, quantity, shift) + restoring_by_tendon(block, node, j, plastic)
     e_i, e_j = block.restitution[i], block.restitution[j]
     de = 1.0 if quantity == Quantity.RESTITUTION else 0.0
     per_speed = 2.0 * (1.0 / g_i + e_i / g_j)

@@ -1,0 +1,452 @@
+"""Blocks that are held back by restraints, lean, or rock one way only: one, and many."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, Final
+
+import numpy as np
+
+from rocking import checks
+from rocking.arrays import Floats, Integers
+from rocking.bisection import bisected
+from rocking.block.limits import checked_parameter
+from rocking.block.restraints import Held, Load, Pivot, Restraint, Yielding
+from rocking.block.single import Block, Side, block_of_sides, one_block
+from rocking.body import KINDS, Coordinate
+from rocking.constants import MODELS, STANDARD_GRAVITY, Model
+from rocking.errors import InvalidBlock, InvalidOption
+from rocking.kernels import state
+
+_ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
+
+#: Rotations at which the balance is looked for, on each side.
+_LOOKS: Final = 512
+
+
+@dataclass(frozen=True)
+class RestrainedBlock:
+    """A block that restraints hold back, that leans, or that rocks one way only, as a facade against its side walls.
+
+    Parameters
+    ----------
+    block : Block
+        The block by itself. With restraints it needs its `mass`.
+    *restraints : Restraint
+        `Tendon`, `Spring`, `Damper`, `Thrust`, `Load`.
+    one_sided : bool
+        Whether it rocks to side + only, and bounces back from what stands behind it with `restitution` times its speed.
+    lean : float
+        Angle by which it stands out of plumb to side +, rad.
+    restitution : float or pair, optional
+        Factor on the angular speed at an impact. By default that of the block; with a load that follows, the one that
+        conserves angular momentum; of a one-sided block `one_sided_restitution`.
+
+    Raises
+    ------
+    InvalidBlock
+        If there is no mass for the restraints, the block does not stand, or there is no such restraint.
+
+    Notes
+    -----
+    Between impacts, with the weight W = 1 + a_v/g and the push A = +-a/g of the ground on a side,
+
+        u'' = -p^2 [(W + s) sin(alpha - u) + (A + c) cos(alpha - u) + h cos(u/2) + k u] - d u'
+
+    where s, c, h, k and d are sums over the restraints. The linear model is that equation to first order in u, with
+    alpha for sin(alpha) and 1 for cos(alpha) in the block's own part (derived in the documentation).
+
+    Examples
+    --------
+    >>> from rocking import Tendon
+    >>> column = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0), Tendon(2e5, prestress=2e3))
+    >>> [round(a, 4) for a in column.uplift_thresholds()]
+    [2.1613, 2.1613]
+    >>> wall = Block.one_sided(width=0.4, height=4.0, restitution=0.4)
+    >>> wall.uplift_thresholds("linear")[1]
+    inf
+    """
+
+    coordinate: ClassVar[Coordinate] = _ROTATION
+    contact: ClassVar[None] = None
+
+    block: Block
+    held: tuple[Held, Held]
+    tendon: tuple[Yielding, Yielding]
+    is_one_sided: bool
+    description: str
+
+    def __init__(
+        self,
+        block: Block,
+        *restraints: Restraint,
+        one_sided: bool = False,
+        lean: float = 0.0,
+        restitution: float | Sequence[float] | None = None,
+    ) -> None:
+        own = one_block(block)
+        for each in restraints:
+            if not isinstance(each, Restraint):
+                raise InvalidBlock(
+                    f"{checks.shown(each)} is no restraint: Tendon, Spring, Damper, Thrust and Load are some"
+                )
+        if restraints and own.mass is None:
+            raise InvalidBlock("a block with restraints needs its {}, kg: Block(width=, height=, mass=)", "mass")
+        tilt = checks.finite(lean, "lean", InvalidBlock)
+        loads = [each for each in restraints if isinstance(each, Load) and each.follows]
+        standing = _leaning(_carrying(own, loads), tilt)
+        if one_sided and restitution is None:
+            restitution = one_sided_restitution(own.sides[0].alpha)
+        if restitution is not None:
+            standing = _with_restitution(standing, restitution)
+        pivots = _pivots(standing, tilt)
+        held = [Held(), Held()]
+        for each in restraints:
+            held = [of_side.plus(each.held(pivot)) for of_side, pivot in zip(held, pivots, strict=True)]
+        yielding = [found for each in restraints for pivot in pivots if (found := each.yielding(pivot))]
+        if len(yielding) > len(pivots):
+            raise InvalidBlock("one tendon of a block may yield; let the others have no {}", "strength")
+        tendon = (yielding[0], yielding[1]) if yielding else (Yielding(), Yielding())
+        texts = [own.description, *map(str, restraints)]
+        texts += [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_sided
+        _fill(self, standing, (held[0], held[1]), tendon, one_sided, ", ".join(texts))
+        if (least := min(self.uplift_thresholds())) <= 0.0:
+            raise InvalidBlock(
+                f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
+                "a smaller thrust, load or lean lets it"
+            )
+
+    @property
+    def gravity(self) -> float:
+        """Acceleration of gravity, m/s^2."""
+        return self.block.gravity
+
+    @property
+    def sides(self) -> Sequence[Side]:
+        """Sides of the block as it stands, with the loads that follow it; one of a block that rocks one way."""
+        return self.block.sides[:1] if self.is_one_sided else self.block.sides
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """Rotation at which it stands, for each side: zero."""
+        return 0.0, 0.0
+
+    @property
+    def balance(self) -> tuple[float, float]:
+        """Rotation of the unstable balance on each side, rad; infinite where the restraints hold it at any rotation."""
+        plus, minus = map(_balance, self.block.sides, self.held, self.tendon)
+        return plus, math.inf if self.is_one_sided else minus
+
+    def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
+        """Ground accelerations, m/s^2, that lift it to side + (when -a passes the first) and to side -."""
+        made = self.alone().kernel_records(model, np.zeros((1, 2)))
+        plus, minus = (self.gravity * (made["threshold"] + made["hold"])[0]).tolist()
+        return plus, minus
+
+    def alone(self) -> RestrainedBlocks:
+        """Return `RestrainedBlocks` of which it is the only one."""
+        return RestrainedBlocks.of([self])
+
+
+def one_sided_restitution(alpha: float) -> float:
+    """Restitution of a wall that rocks against transverse walls, by angular momentum at three impacts.
+
+    The wall meets the ground with its inner edge, then the transverse walls with its top, then the ground again.
+
+    Parameters
+    ----------
+    alpha : float
+        Slenderness, rad.
+
+    Returns
+    -------
+    float
+        |(1 - 1.5 sin(alpha)^2)^2 (1 - 1.5 cos(alpha)^2)|: 0.47 for a slenderness of 0.1.
+
+    Notes
+    -----
+    After Sorrentino, AlShawa and Decanini (2011), who measured about as much and less; give a measured value where
+    there is one.
+
+    Examples
+    --------
+    >>> round(one_sided_restitution(0.1), 4)
+    0.4707
+    """
+    sine, cosine = math.sin(alpha), math.cos(alpha)
+    return abs((1.0 - 1.5 * sine * sine) ** 2 * (1.0 - 1.5 * cosine * cosine))
+
+
+@dataclass(frozen=True, eq=False)
+class RestrainedBlocks:
+    """Any number n of such blocks under one gravity, each array of shape (n, 2): side +, side -.
+
+    Parameters
+    ----------
+    p, alpha, restitution : ndarray
+        As of `rocking.Blocks`, of the blocks as they stand.
+    sine, cosine, prestress, spring, damping : ndarray
+        What the restraints do: the coefficients s, c, h, k and d of `RestrainedBlock`; damping in 1/s.
+    opening, stiffness, yields, slack : ndarray
+        Of a tendon that yields what `rocking.block.restraints.Yielding` says, in m and 1/m; of none 0, 0, inf and 0.
+    one_sided : ndarray
+        1 where a block rocks to side + only, else 0, twice the same.
+    gravity : float
+        m/s^2.
+
+    Examples
+    --------
+    >>> wall = Block.one_sided(width=0.4, height=4.0, restitution=0.4)
+    >>> RestrainedBlocks.of([wall, wall])
+    <RestrainedBlocks: 2>
+    """
+
+    kind: ClassVar[str] = "restrained-blocks"
+
+    p: Floats
+    alpha: Floats
+    restitution: Floats
+    sine: Floats
+    cosine: Floats
+    prestress: Floats
+    spring: Floats
+    damping: Floats
+    opening: Floats
+    stiffness: Floats
+    yields: Floats
+    slack: Floats
+    one_sided: Floats
+    gravity: float = STANDARD_GRAVITY
+
+    @classmethod
+    def of(cls, bodies: Iterable[RestrainedBlock]) -> RestrainedBlocks:
+        """Gather single ones.
+
+        Parameters
+        ----------
+        bodies : iterable of RestrainedBlock
+            At least one, all under one gravity.
+
+        Returns
+        -------
+        RestrainedBlocks
+            In their order.
+
+        Raises
+        ------
+        InvalidBlock
+            If there is none, one is none, or their gravities differ.
+
+        Examples
+        --------
+        >>> len(RestrainedBlocks.of([Block.one_sided(width=0.4, height=4.0, restitution=0.4)]))
+        1
+        """
+        given = list(bodies)
+        if not given or not all(isinstance(each, RestrainedBlock) for each in given):
+            raise InvalidBlock("restrained blocks are needed, at least one: RestrainedBlock(block, restraint, ...)")
+        if len({each.gravity for each in given}) > 1:
+            raise InvalidBlock("all blocks must be under one {}", "gravity")
+        rows = [
+            [(*(side.p, side.alpha, side.restitution), *held, *tendon, float(each.is_one_sided)) for side, held, tendon
+             in zip(each.block.sides, each.held, each.tendon, strict=True)]
+            for each in given
+        ]  # fmt: skip
+        return cls(**dict(zip(_PARAMETERS, np.moveaxis(np.array(rows), 2, 0), strict=True)), gravity=given[0].gravity)
+
+    def parameters(self) -> Mapping[str, tuple[Floats, str]]:
+        """Return what they are made from, with units, by name."""
+        units = {"p": "rad/s", "alpha": "rad", "damping": "1/s", "opening": "m", "stiffness": "1/m"}
+        units |= {"yields": "m", "slack": "m"}
+        return {name: (getattr(self, name), units.get(name, "1")) for name in _PARAMETERS}
+
+    @property
+    def stops(self) -> Floats:
+        """Rotation at which each stands, for each side: zero."""
+        return np.zeros((len(self), 2))
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether both sides of every block are equal, and it rocks to both."""
+        even = all(np.array_equal(values[:, 0], values[:, 1]) for values, _ in self.parameters().values())
+        return even and not np.any(self.one_sided)
+
+    def __len__(self) -> int:
+        return len(self.p)
+
+    def __repr__(self) -> str:
+        return f"<RestrainedBlocks: {len(self)}>"
+
+    def __getitem__(self, index: int) -> RestrainedBlock:
+        p, alpha, e, *others, one_sided = (getattr(self, name)[index].tolist() for name in _PARAMETERS)
+        block = Block.from_parameters(p, alpha, e, gravity=self.gravity)
+        plus, minus = ([values[j] for values in others] for j in range(2))
+        held, tendon = (Held(*plus[:5]), Held(*minus[:5])), (Yielding(*plus[5:]), Yielding(*minus[5:]))
+        text = "block with restraints" + ", rocking one way" * bool(one_sided[0])
+        return _fill(RestrainedBlock.__new__(RestrainedBlock), block, held, tendon, bool(one_sided[0]), text)
+
+    def select(self, index: slice | Integers) -> RestrainedBlocks:
+        """Return some of them: a slice, indices, or a mask."""
+        return replace(self, **{name: getattr(self, name)[index] for name in _PARAMETERS})
+
+    def speed_limits(self, share: float) -> Floats:
+        """Return a share of p alpha on every side, rad/s, shape (n, 2)."""
+        return share * self.p * self.alpha
+
+    def kernel_records(self, model: Model, limits: Floats) -> state.Records:
+        """Return every block as kernels take it (`kernels.state.BLOCK`), shape (n,)."""
+        linear = checks.one_of(model, "model", InvalidOption, MODELS) == "linear"
+        p, alpha, one_way = self.p, self.alpha, self.one_sided > 0.0
+        sine, cosine = np.sin(alpha), np.cos(alpha)
+        made = state.records(len(self), state.BLOCK)
+        made["stiffness"] = p * p
+        made["slenderness"], made["sine"], made["cosine"] = alpha, sine, cosine
+        made["restitution"], made["limit"] = self.restitution, limits
+        made["entered"] = np.where(one_way, 0, (1, 0))
+        made["fallen"] = 0.5 * math.pi
+        made["prestress"], made["spring"] = p * p * self.prestress, p * p * self.spring
+        made["damping"] = self.damping
+        at_zero = self.sine * sine + self.cosine * cosine  # of the moment, and its slope by -u
+        slope = self.sine * cosine - self.cosine * sine
+        # A moment that only a tendon without prestress makes is zero there, whatever rounding says.
+        at_zero[np.abs(at_zero) <= 1e-14 * (np.abs(self.sine * sine) + np.abs(self.cosine * cosine))] = 0.0
+        standing = at_zero + self.prestress
+        if linear:
+            made["threshold"], made["gain"], made["hold"] = alpha, p * p, standing
+            made["added_weight"], made["added_push"] = slope, at_zero - alpha * slope
+        else:
+            made["threshold"], made["gain"], made["hold"] = sine / cosine, p * p * cosine, standing / cosine
+            made["added_weight"], made["added_push"] = self.sine, self.cosine
+        made["threshold"][:, 1] = np.where(one_way[:, 1], math.inf, made["threshold"][:, 1])
+        made["yielding"] = np.any(self.stiffness > 0.0, axis=1)
+        if np.any(made["yielding"]):
+            self._add_tendons(made, linear)
+        names = ("hold", "added_weight", "added_push", "prestress", "spring", "damping", "tendon")
+        made["restrained"] = np.any([np.any(made[name] != 0.0, axis=1) for name in names], axis=0)
+        return made
+
+    def _add_tendons(self, made: state.Records, linear: bool) -> None:
+        """Write the tendons that yield into records of the blocks without them, elastic as they are at first."""
+        for name in ("weight", "push", "prestress"):
+            made[f"base_{name}"] = made[name if name == "prestress" else f"added_{name}"]
+        made["base_hold"] = made["hold"]
+        made["tendon"] = self.p * self.p * self.stiffness
+        made["opening"], made["yields"], made["slack"] = self.opening, self.yields[:, 0], self.slack[:, 0]
+        stiff = self.stiffness * self.opening
+        made["tendon_weight"] = -stiff if linear else -stiff * np.cos(self.alpha)
+        made["tendon_push"] = stiff * self.alpha if linear else stiff * np.sin(self.alpha)
+        at_rest = -self.stiffness * self.slack
+        made["added_weight"] += made["tendon_weight"]
+        made["added_push"] += made["tendon_push"]
+        made["prestress"] += self.p * self.p * at_rest
+        made["hold"] += at_rest if linear else at_rest / np.cos(self.alpha)
+
+
+_PARAMETERS: Final = (
+    "p", "alpha", "restitution", "sine", "cosine", "prestress", "spring", "damping", "opening", "stiffness", "yields",
+    "slack", "one_sided",
+)  # fmt: skip
+
+
+def _fill(
+    made: RestrainedBlock,
+    block: Block,
+    held: tuple[Held, Held],
+    tendon: tuple[Yielding, Yielding],
+    one_sided: bool,
+    description: str,
+) -> RestrainedBlock:
+    """Fill in what a restrained block is, and return it."""
+    for name, value in {
+        "block": block, "held": held, "tendon": tendon, "is_one_sided": bool(one_sided), "description": description,
+    }.items():  # fmt: skip
+        object.__setattr__(made, name, value)
+    return made
+
+
+def _carrying(block: Block, loads: Sequence[Load]) -> Block:
+    """Return the rigid body of a block and the loads that follow it."""
+    if not loads:
+        return block
+    assert block.mass is not None
+    plus = block.sides[0]
+    height, (right, left) = plus.radius * math.cos(plus.alpha), _distances(block)
+    masses = np.array([block.mass, *(load.mass for load in loads)])
+    across = np.array([0.0, *(load.offset for load in loads)])
+    up = np.array([height, *(load.height for load in loads)])
+    share = masses / masses.sum()
+    x, z = float(share @ across), float(share @ up)
+    own = block.gravity * plus.radius / plus.p**2 - plus.radius**2
+    gyration = float(share[0] * own + share @ ((across - x) ** 2 + (up - z) ** 2))
+    return Block.from_pivots(
+        (right - x, left + x), z, math.sqrt(gyration), mass=float(masses.sum()), gravity=block.gravity
+    )
+
+
+def _leaning(block: Block, lean: float) -> Block:
+    """Return a block that leans to side + by an angle."""
+    if lean == 0.0:
+        return block
+    plus, minus = block.sides
+    if not -minus.alpha < lean < plus.alpha:
+        raise InvalidBlock(
+            f"a block whose {{}} is {lean:g} rad falls: from {-minus.alpha:.4g} to {plus.alpha:.4g} rad it stands",
+            "lean",
+            value=lean,
+        )
+    sides = replace(plus, alpha=plus.alpha - lean), replace(minus, alpha=minus.alpha + lean)
+    return block_of_sides(Block.__new__(Block), sides, block.gravity, block.description, block.mass)
+
+
+def _with_restitution(block: Block, restitution: float | Sequence[float]) -> Block:
+    """Return a block with another restitution."""
+    factors = np.broadcast_to(checks.numbers(restitution, "restitution", InvalidBlock), 2).tolist()
+    plus, minus = (
+        replace(side, restitution=checked_parameter(factor, "restitution"))
+        for side, factor in zip(block.sides, factors, strict=True)
+    )
+    return block_of_sides(Block.__new__(Block), (plus, minus), block.gravity, block.description, block.mass)
+
+
+def _distances(block: Block) -> tuple[float, float]:
+    """Distances of the pivots from the centre of mass along the base, m."""
+    plus, minus = block.sides
+    return plus.radius * math.sin(plus.alpha), minus.radius * math.sin(minus.alpha)
+
+
+def _pivots(block: Block, lean: float) -> tuple[Pivot, Pivot]:
+    """Both sides of a block that leans, as restraints see them."""
+    weight = math.nan if block.mass is None else block.mass * block.gravity
+    plus, minus = (
+        Pivot(
+            sign, side.alpha, sign * lean, side.radius * math.sin(side.alpha + sign * lean), side.p,
+            weight * side.radius, block.gravity,
+        )
+        for sign, side in zip((1.0, -1.0), block.sides, strict=True)
+    )  # fmt: skip
+    return plus, minus
+
+
+def _balance(side: Side, held: Held, tendon: Yielding) -> float:
+    """First rotation at which what brings a block back has become nothing, without ground motion, rad.
+
+    A tendon that yields does so for the first time.
+    """
+
+    def moment(u: float) -> float:
+        own = (1.0 + held.sine) * math.sin(side.alpha - u) + held.cosine * math.cos(side.alpha - u)
+        stretch = min(2.0 * tendon.opening * math.sin(0.5 * u), tendon.yields) - tendon.slack
+        return own + (held.prestress + tendon.stiffness * stretch) * math.cos(0.5 * u) + held.spring * u
+
+    looks = np.linspace(0.0, 0.5 * math.pi, _LOOKS)
+    values = np.array([moment(u) for u in looks.tolist()])
+    negative = np.flatnonzero(values[1:] <= 0.0)
+    if not len(negative):
+        return math.inf
+    k = int(negative[0])
+    return bisected(float(looks[k]), float(looks[k + 1]), lambda u: moment(u) <= 0.0)[1]
+
+
+KINDS[RestrainedBlocks.kind] = RestrainedBlocks

@@ -1,0 +1,397 @@
+"""What holds a block back, or pushes it: tendons, springs, dampers, thrusts and loads, as moments about its pivots."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from rocking import checks
+from rocking.errors import InvalidBlock
+
+
+class Held(NamedTuple):
+    """What restraints do on one side, at a rotation u and a rate u'.
+
+    Their moment about the pivot, positive where it brings the block back, over the weight times R is
+
+        sine sin(alpha - u) + cosine cos(alpha - u) + prestress cos(u/2) + spring u + (damping/p^2) u'.
+    """
+
+    sine: float = 0.0
+    cosine: float = 0.0
+    prestress: float = 0.0
+    spring: float = 0.0
+    damping: float = 0.0
+
+    def plus(self, other: Held) -> Held:
+        """Return both together."""
+        return Held(*(a + b for a, b in zip(self, other, strict=True)))
+
+
+class Yielding(NamedTuple):
+    """A tendon that yields, on one side.
+
+    Attributes
+    ----------
+    opening : float
+        Distance x of its duct from the pivot, m: it is longer by 2 x sin(u/2) than while the block stands.
+    stiffness : float
+        Its stiffness times x over weight times R, 1/m.
+    yields, slack : float
+        Elongations, beyond the plastic one, at which it yields and above which it is taut, m.
+    """
+
+    opening: float = 0.0
+    stiffness: float = 0.0
+    yields: float = math.inf
+    slack: float = 0.0
+
+
+class Pivot(NamedTuple):
+    """One side of a standing block, as restraints see it.
+
+    Attributes
+    ----------
+    sign : float
+        +1 on side +, -1 on side -.
+    alpha, lean : float
+        Slenderness as it stands, and the angle by which the block leans to this side, rad.
+    distance : float
+        Distance of the pivot from the centre of mass along the base, m.
+    p : float
+        Frequency parameter, rad/s.
+    moment : float
+        Weight times R, N m.
+    gravity : float
+        m/s^2.
+    """
+
+    sign: float
+    alpha: float
+    lean: float
+    distance: float
+    p: float
+    moment: float
+    gravity: float
+
+    def arms(self, height: float, offset: float) -> tuple[float, float]:
+        """Distance from the pivot inwards and height above it, m, of a point of the standing block.
+
+        The point is at a height above the base and at an offset from the centre of mass to side +, both along the
+        block's own axes.
+        """
+        inwards = self.distance - self.sign * offset
+        c, s = math.cos(self.lean), math.sin(self.lean)
+        return inwards * c - height * s, height * c + inwards * s
+
+    def turned(self, inwards: float, upwards: float) -> tuple[float, float]:
+        """Return ``rho sin`` and ``rho cos`` of the angle of a point from the line of the centre of mass, m."""
+        c, s = math.cos(self.alpha), math.sin(self.alpha)
+        return inwards * c - upwards * s, upwards * c + inwards * s
+
+
+class Restraint(ABC):
+    """What holds a block back, or pushes it."""
+
+    def yielding(self, pivot: Pivot) -> Yielding | None:
+        """Return what it is as a tendon that yields, on a side; None where it is none.
+
+        Parameters
+        ----------
+        pivot : Pivot
+            The side.
+
+        Returns
+        -------
+        Yielding or None
+            Without what `held` returns.
+
+        Examples
+        --------
+        >>> Spring(2e3).yielding(Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)) is None
+        True
+        """
+        return None
+
+    def _finite(self, name: str) -> float:
+        """Check a number and keep it as a float."""
+        value = checks.finite(getattr(self, name), name, InvalidBlock)
+        object.__setattr__(self, name, value)
+        return value
+
+    def _positive(self, name: str, unit: str) -> None:
+        """Check that a number is positive and keep it as a float."""
+        object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, unit))
+
+    @abstractmethod
+    def held(self, pivot: Pivot) -> Held:
+        """Say what it does while the block leans to a side.
+
+        Parameters
+        ----------
+        pivot : Pivot
+            The side.
+
+        Returns
+        -------
+        Held
+            Its moment.
+
+        Examples
+        --------
+        >>> Spring(2e3).held(Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)).spring
+        0.2
+        """
+
+
+@dataclass(frozen=True)
+class Tendon(Restraint):
+    """Elastic tendon through a duct in the block and the ground, unbonded, as long as the block stands it is vertical.
+
+    Where the block's base opens at the duct by 2 x sin(u/2), x being the duct's distance from the pivot, the tendon
+    becomes longer by that.
+
+    Parameters
+    ----------
+    stiffness : float
+        Force per elongation, N/m: of a bar E A/L.
+    prestress : float
+        Force while the block stands, N.
+    offset : float
+        Distance of the duct from the centre of mass, m, positive to side +. At a pivot's distance it is at that toe,
+        and does nothing while the block rocks about it.
+    strength : float
+        Force at which it yields, N: it becomes longer for good then, and hangs slack when the block has come back.
+
+    Raises
+    ------
+    InvalidBlock
+        If the stiffness or the prestress is negative, or both are zero, or the strength is not above the prestress.
+
+    Notes
+    -----
+    The moment is x cos(u/2) T with the force T = prestress + stiffness 2 x sin(u/2): without prestress
+    stiffness x^2 sin(u), so that uplift is unchanged, and the slender block has the stiffness p^2 less
+    stiffness x^2/I, which may be negative (Makris and Vassiliou 2015; derived in the documentation).
+
+    Examples
+    --------
+    >>> Tendon(2e6, prestress=5e3)
+    Tendon(stiffness=2000000.0, prestress=5000.0, offset=0.0, strength=inf)
+    """
+
+    stiffness: float
+    prestress: float = 0.0
+    offset: float = 0.0
+    strength: float = math.inf
+
+    def __post_init__(self) -> None:
+        stiffness = self._finite("stiffness")
+        prestress = self._finite("prestress")
+        self._finite("offset")
+        if stiffness < 0.0:
+            raise InvalidBlock(
+                f"{{}} of a tendon must be at least 0 N/m, not {stiffness:g}", "stiffness", value=stiffness
+            )
+        if prestress < 0.0:
+            raise InvalidBlock(
+                f"{{}} of a tendon must be at least 0 N, not {prestress:g}: a tendon that hangs slack holds nothing",
+                "prestress",
+                value=prestress,
+            )
+        if stiffness == prestress == 0.0:
+            raise InvalidBlock("a tendon needs {} (N/m) or {} (N)", "stiffness", "prestress")
+        object.__setattr__(self, "strength", float(self.strength))
+        if not self.strength > prestress:
+            raise InvalidBlock(
+                f"{{}} of a tendon must be above its prestress, {prestress:g} N, not {self.strength:g}",
+                "strength",
+                value=self.strength,
+            )
+        if stiffness == 0.0 and self.strength < math.inf:
+            raise InvalidBlock("a tendon that yields needs a {}, N/m", "stiffness")
+
+    def held(self, pivot: Pivot) -> Held:
+        """Its moment; without one where the duct is at the pivot, or where it yields."""
+        x = self._opening(pivot)
+        if self.strength < math.inf:
+            return Held()
+        stiff = self.stiffness * x * x / pivot.moment
+        return Held(-stiff * math.cos(pivot.alpha), stiff * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
+
+    def yielding(self, pivot: Pivot) -> Yielding | None:
+        """Return what it is where it yields."""
+        if self.strength == math.inf:
+            return None
+        x = self._opening(pivot)
+        return Yielding(
+            x,
+            self.stiffness * x / pivot.moment,
+            (self.strength - self.prestress) / self.stiffness,
+            -self.prestress / self.stiffness,
+        )
+
+    def _opening(self, pivot: Pivot) -> float:
+        """Distance of the duct from the pivot, m."""
+        x = pivot.distance - pivot.sign * self.offset
+        if x < -1e-12 * pivot.distance:
+            raise InvalidBlock(
+                f"a tendon at {{}} = {self.offset:g} m is beyond the pivot, which is {pivot.distance:g} m from the "
+                "centre of mass",
+                "offset",
+                value=self.offset,
+            )
+        return max(x, 0.0)
+
+
+@dataclass(frozen=True)
+class Spring(Restraint):
+    """Rotational spring between block and ground.
+
+    Parameters
+    ----------
+    stiffness : float
+        Moment per rotation, N m/rad. A vertical spring of k N/m at a distance x from the pivot is a `Tendon`.
+
+    Raises
+    ------
+    InvalidBlock
+        If it is not positive.
+
+    Examples
+    --------
+    >>> Spring(1e3)
+    Spring(stiffness=1000.0)
+    """
+
+    stiffness: float
+
+    def __post_init__(self) -> None:
+        self._positive("stiffness", "N m/rad")
+
+    def held(self, pivot: Pivot) -> Held:
+        """Its moment."""
+        return Held(spring=self.stiffness / pivot.moment)
+
+
+@dataclass(frozen=True)
+class Damper(Restraint):
+    """Linear viscous damper between block and ground.
+
+    Parameters
+    ----------
+    coefficient : float
+        Moment per angular velocity, N m s/rad.
+
+    Raises
+    ------
+    InvalidBlock
+        If it is not positive.
+
+    Examples
+    --------
+    >>> Damper(200.0)
+    Damper(coefficient=200.0)
+    """
+
+    coefficient: float
+
+    def __post_init__(self) -> None:
+        self._positive("coefficient", "N m s/rad")
+
+    def held(self, pivot: Pivot) -> Held:
+        """Its moment."""
+        return Held(damping=self.coefficient * pivot.p**2 / pivot.moment)
+
+
+@dataclass(frozen=True)
+class Thrust(Restraint):
+    """Horizontal force of constant size, as that of a vault on a wall.
+
+    Parameters
+    ----------
+    force : float
+        N, positive to side +.
+    height : float
+        Height of the point where it acts, above the base, m.
+    offset : float
+        Distance of that point from the centre of mass, m, positive to side +.
+
+    Raises
+    ------
+    InvalidBlock
+        If the force is zero, or the height not positive.
+
+    Notes
+    -----
+    Vertical motion of the ground does not change it.
+
+    Examples
+    --------
+    >>> Thrust(1.5e3, height=4.0)
+    Thrust(force=1500.0, height=4.0, offset=0.0)
+    """
+
+    force: float
+    height: float
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self._finite("force") == 0.0:
+            raise InvalidBlock("{} of a thrust must not be zero", "force", value=self.force)
+        self._positive("height", "m")
+        self._finite("offset")
+
+    def held(self, pivot: Pivot) -> Held:
+        """Its moment, which pushes the block over on the side it points to."""
+        across, along = pivot.turned(*pivot.arms(self.height, self.offset))
+        force = pivot.sign * self.force / pivot.moment
+        return Held(force * across, -force * along)
+
+
+@dataclass(frozen=True)
+class Load(Restraint):
+    """Weight on the block: one that moves with it, or one that only presses, as a floor that slides on a wall.
+
+    Parameters
+    ----------
+    mass : float
+        kg.
+    height : float
+        Height of the point where it rests, above the base, m.
+    offset : float
+        Distance of that point from the centre of mass, m, positive to side +.
+    follows : bool
+        Whether it moves with the block. One that does not presses with its weight, whatever the ground does, and its
+        own inertia does not count.
+
+    Raises
+    ------
+    InvalidBlock
+        If mass or height are not positive.
+
+    Examples
+    --------
+    >>> Load(250.0, height=3.0, follows=False)
+    Load(mass=250.0, height=3.0, offset=0.0, follows=False)
+    """
+
+    mass: float
+    height: float
+    offset: float = 0.0
+    follows: bool = True
+
+    def __post_init__(self) -> None:
+        self._positive("mass", "kg")
+        self._positive("height", "m")
+        self._finite("offset")
+
+    def held(self, pivot: Pivot) -> Held:
+        """Return the moment of one that does not follow; of one that follows none, which is part of the block."""
+        if self.follows:
+            return Held()
+        across, along = pivot.turned(*pivot.arms(self.height, self.offset))
+        weight = self.mass * pivot.gravity / pivot.moment
+        return Held(weight * along, weight * across)

@@ -1,0 +1,257 @@
+"""Blocks that are held back, lean or rock one way, against an integration of forces on points."""
+
+import math
+
+import numpy as np
+import pytest
+from oracles.restrained import Held, integrated
+
+import rocking
+from rocking import Block, Damper, InvalidBlock, Load, RestrainedBlock, Spring, Tendon, Thrust
+
+
+def drawn(seed):
+    """The same body twice, for the package and for the oracle; a motion; a start."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-0.5, 0.7)
+    distances = tuple((size * rng.uniform(0.1, 0.4, 2)).tolist())
+    if seed % 2:
+        distances = distances[:1] * 2
+    height, gyration = size, size * rng.uniform(0.5, 0.9)
+    e = tuple(rng.uniform(0.5, 0.95, 2).tolist())
+    mass, one_sided = 10.0 ** rng.uniform(1.0, 4.0), seed % 3 == 0
+    lean = rng.uniform(-0.05, 0.05) if seed % 5 == 0 else 0.0
+    body = Held(distances, height, gyration, mass, 9.81, e, one_sided, lean)
+    weight, restraints = mass * 9.81, []
+    if rng.random() < 0.6:
+        stiffness, prestress = weight / size * 10.0 ** rng.uniform(-1.0, 1.5), weight * rng.choice([0.0, rng.uniform()])
+        offset = rng.choice([0.0, -distances[1], distances[0], rng.uniform(-distances[1], distances[0])])
+        body.tendons.append((stiffness, prestress, offset))
+        restraints.append(Tendon(stiffness, prestress, offset))
+    if rng.random() < 0.5:
+        prestress = weight * rng.choice([0.0, rng.uniform(0.0, 0.5)])
+        strength = prestress + weight * 10.0 ** rng.uniform(-1.5, 0.0)
+        body.yielding = (
+            weight / size * 10.0 ** rng.uniform(0.0, 2.0),
+            prestress,
+            rng.choice([0.0, 0.9 * distances[0]]),
+            strength,
+        )
+        restraints.append(Tendon(*body.yielding))
+    if rng.random() < 0.3:
+        body.spring = weight * size * rng.uniform(0.0, 1.0)
+        restraints.append(Spring(body.spring))
+    if rng.random() < 0.4:
+        body.damper = weight * size * 10.0 ** rng.uniform(-3.0, -0.5)
+        restraints.append(Damper(body.damper))
+    if rng.random() < 0.3:
+        body.thrusts.append((rng.uniform(-0.03, 0.03) * weight, rng.uniform(0.5, 2.0) * size, rng.uniform(-0.1, 0.1)))
+        restraints.append(Thrust(*body.thrusts[-1]))
+    if rng.random() < 0.3:
+        body.loads.append((mass * rng.uniform(0.0, 1.0), 2.0 * size, rng.uniform(-0.05, 0.05) * size))
+        restraints.append(Load(*body.loads[-1], follows=False))
+    block = Block.from_pivots(distances, height, gyration, restitution=e, mass=mass, gravity=9.81)
+    ours = RestrainedBlock(block, *restraints, one_sided=one_sided, lean=lean, restitution=e)
+    threshold = min(ours.uplift_thresholds())
+    motion = rocking.pulses.sine(
+        threshold * 10.0 ** rng.uniform(0.05, 1.2),
+        10.0 ** rng.uniform(-0.7, 0.5),
+        cycles=3,
+        phase=rng.uniform(0.0, 6.0),
+    )
+    if seed % 4 == 0:
+        motion = motion.with_vertical(rocking.pulses.sine(rng.uniform(0.5, 5.0), rng.uniform(1.0, 4.0), cycles=3))
+    tendon = ours.tendon[0]  # a start beyond its yield is another matter
+    start = min(0.3 * min(*ours.balance, 0.5), 0.1, 0.8 * tendon.yields / max(tendon.opening, 1e-9))
+    return ours, body, motion, start
+
+
+def compared(seeds):
+    """Judge cases; returns how many impacts, peaks and overturnings were."""
+    impacts = peaks = overturned = 0
+    for seed in seeds:
+        ours, body, motion, start = drawn(seed)
+        times, speeds, peak, ended = integrated(body, motion, motion.end, start, 0.0, 0)
+        found = rocking.simulate(ours, motion, duration=motion.end, initial_rotation=start)
+        if found.ambiguous:
+            continue
+        count = min(len(times), len(found.impacts))
+        assert count == len(times), seed
+        growth = np.cumprod(1.0 / np.array([0.3, *speeds][:count]))  # slow impacts multiply the error of their times
+        for k in range(count):
+            allowed = 1e-9 * max(1.0, growth[k]) ** 0.5
+            assert found.impacts["time"][k] == pytest.approx(times[k], abs=allowed), (seed, k)
+            assert found.impacts["speed_before"][k] == pytest.approx(speeds[k], rel=1e-7, abs=1e-7), (seed, k)
+            impacts += 1
+        assert found.overturned == (ended == "overturned") or ended == "chatters", seed
+        overturned += found.overturned
+        if ended == "over":
+            assert found.peak_rotation == pytest.approx(peak, rel=1e-8), seed
+            peaks += 1
+    return impacts, peaks, overturned
+
+
+def test_restrained_blocks_move_as_forces_on_their_points_make_them():
+    impacts, peaks, overturned = compared(range(8, 16))
+    assert (impacts, peaks, overturned) >= (20, 1, 5)
+
+
+@pytest.mark.thorough
+def test_restrained_blocks_move_so_over_wide_ranges():
+    impacts, peaks, overturned = compared(range(16, 120))
+    assert impacts > 150
+    assert peaks > 20
+    assert overturned > 40
+
+
+def of_restraints(body, j, u):
+    """Acceleration that restraints give a body at rest at a rotation: without the block's own weight and push."""
+    return -body.moment(j, u, 0.0, 0.0, -body.gravity) / body.inertia(j)
+
+
+@pytest.mark.parametrize("seed", [1, 4, 10])
+def test_the_linear_model_is_the_equation_to_first_order(seed):
+    _, body, _, _ = drawn(seed)
+    body.yielding = None
+    restraints = [Tendon(*each) for each in body.tendons] + [Thrust(*each) for each in body.thrusts]
+    restraints += [Load(*each, follows=False) for each in body.loads]
+    restraints += [Spring(body.spring)] if body.spring > 0.0 else []
+    block = Block.from_pivots(body.distances, body.height, body.gyration, mass=body.mass, gravity=9.81, restitution=0.8)
+    ours = RestrainedBlock(block, *restraints, lean=body.lean)
+    found = rocking.simulate(ours, None, model="linear", initial_rotation=1e-3, duration=1e-3)
+    u, v, acceleration = found.states(0.0)
+    h, side = 1e-4, ours.block.sides[0]
+    at_zero = of_restraints(body, 0, 0.0)
+    slope = (4.0 * of_restraints(body, 0, h) - of_restraints(body, 0, 2.0 * h) - 3.0 * at_zero) / (2.0 * h)
+    own = side.p**2 * (side.alpha - 1e-3)
+    assert acceleration == pytest.approx(-own - at_zero - slope * 1e-3, rel=1e-6)
+    assert (u, v) == (1e-3, 0.0)
+
+
+def test_derivatives_are_those_of_finite_differences():
+    judged = 0
+    for seed in range(24):
+        ours, _, motion, start = drawn(seed)
+        motion = motion * (1.3 * min(ours.uplift_thresholds()) / motion.pga)
+        found = rocking.simulate(ours, motion, initial_rotation=start, duration=motion.end)
+        if found.overturned or found.ambiguous or not 0.0 < found.peak_time < 0.99 * motion.end:
+            continue
+        for name in ("motion", "initial_rotation"):
+            peaks = []
+            for factor in (1.0 - 1e-6, 1.0 + 1e-6):
+                shaken = motion * factor if name == "motion" else motion
+                from_there = start * factor if name != "motion" else start
+                again = rocking.simulate(ours, shaken, initial_rotation=from_there, duration=motion.end)
+                peaks.append(again.peak_rotation)
+            slope = (peaks[1] - peaks[0]) / 2e-6
+            assert found.sensitivity.peak[name][0] == pytest.approx(slope, rel=2e-4, abs=1e-8), (seed, name)
+            judged += 1
+    assert judged >= 8
+
+
+def test_rest_is_proven_where_impacts_accumulate():
+    judged = 0
+    for seed in range(40):
+        ours, _, motion, start = drawn(seed)
+        shaken = motion * (0.6 * min(ours.uplift_thresholds()) / motion.pga)
+        proven = rocking.simulate(ours, shaken, initial_rotation=start, chattering=rocking.Certified(1e-4))
+        stepped = rocking.simulate(ours, shaken, initial_rotation=start, chattering=rocking.VelocityThreshold(1e-13))
+        if proven.overturned or not len(proven.chattering):
+            continue
+        end = stepped.events["time"][stepped.events["kind"] == "rest"][0]
+        first = proven.chattering[0]
+        assert first["lower"] - 1e-11 <= end <= first["upper"] + 1e-11, seed
+        judged += 1
+    assert judged >= 15
+
+
+def test_many_restrained_blocks_are_those_one_by_one():
+    bodies, motion = [drawn(seed)[0] for seed in range(12)], rocking.pulses.one_sine(4.0, 1.2)
+    found = rocking.simulate_many(bodies, motion)
+    many = bodies[0].alone().of(bodies)
+    for k, body in enumerate(bodies):
+        for alone in (body, many[k]):
+            response = rocking.simulate(alone, motion)
+            assert found["overturned"].values.ravel()[k] == response.overturned
+            assert found["peak_rotation"].values.ravel()[k] == response.peak_rotation
+    assert len(many.select(slice(2, 5))) == 3
+
+
+def test_what_is_known_in_closed_form():
+    column = Block(width=0.5, height=3.0, mass=4000.0)
+    free = column.uplift_thresholds()
+    stiffness = 3e5
+    tied = RestrainedBlock(column, Tendon(stiffness))
+    assert tied.uplift_thresholds() == pytest.approx(free, rel=1e-15)
+    record = tied.alone().kernel_records("linear", np.zeros((1, 2)))[0]
+    own, inertia = column.p**2, column.inertia
+    rate = own * (1.0 + record["added_weight"]) - own  # Makris and Vassiliou (2015): less stiffness x^2/I
+    assert rate == pytest.approx(-stiffness * 0.25**2 / inertia)
+    stressed = RestrainedBlock(column, Tendon(0.0, prestress=2e3))
+    assert stressed.uplift_thresholds()[0] == pytest.approx(free[0] * (1.0 + 2e3 / (4000.0 * column.gravity)))
+    loaded = RestrainedBlock(column, Load(1000.0, height=3.0))
+    whole = loaded.block
+    x, z = 0.0, (4000.0 * 1.5 + 1000.0 * 3.0) / 5000.0
+    inertia = 4000.0 * (0.25**2 + 1.5**2) * 4.0 / 3.0 + 1000.0 * (0.25**2 + 3.0**2)
+    assert whole.p == pytest.approx(math.sqrt(5000.0 * column.gravity * math.hypot(0.25, z) / inertia))
+    assert whole.alpha == pytest.approx(math.atan2(0.25 - x, z))
+    toe = RestrainedBlock(column, Tendon(1e5, offset=0.25))
+    assert toe.held[0].sine == 0.0 < -toe.held[1].sine
+    leaning = RestrainedBlock(column, lean=0.02)
+    assert [side.alpha for side in leaning.sides] == pytest.approx([column.alpha - 0.02, column.alpha + 0.02])
+
+
+def test_a_tendon_that_has_yielded_leaves_the_block_free():
+    column = Block(width=0.5, height=3.0, mass=4000.0)
+    tied = RestrainedBlock(column, Tendon(1e6, strength=1e3))
+    pull = rocking.pulses.one_sine(3.0, 1.7)
+    found = rocking.simulate(tied, pull, duration=3.0)
+    elongation = 2.0 * 0.25 * math.sin(0.5 * found.peak_rotation) - 1e-3
+    assert elongation > 0.01
+    slack = 2.0 * math.asin(elongation / 0.5)
+    free = rocking.simulate(column, None, initial_rotation=0.9 * slack)
+    again = rocking.simulate(tied, None, initial_rotation=found.peak_rotation)
+    assert again.peak_rotation == pytest.approx(found.peak_rotation)
+    below = again.impacts["time"][1:] - again.impacts["time"][0]
+    speed = again.impacts["speed_after"][0]
+    freely = rocking.simulate(column, None, initial_velocity=-speed)
+    assert below[:5] == pytest.approx(freely.impacts["time"][:5])
+    assert len(free.impacts) > 5
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Tendon(0.0), "a tendon needs stiffness"),
+        (lambda: Tendon(-1.0), "stiffness of a tendon must be at least 0"),
+        (lambda: Tendon(1e5, prestress=-3.0), "hangs slack holds nothing"),
+        (lambda: Tendon(1e5, prestress=5e3, strength=4e3), "must be above its prestress"),
+        (lambda: Tendon(0.0, prestress=5e3, strength=6e3), "that yields needs a stiffness"),
+        (lambda: Spring(0.0), "stiffness must be a positive number"),
+        (lambda: Damper(math.nan), "coefficient must be"),
+        (lambda: Thrust(0.0, 2.0), "must not be zero"),
+        (lambda: Thrust(10.0, -2.0), "height must be a positive number"),
+        (lambda: Load(-1.0, 2.0), "mass must be a positive number"),
+        (lambda: RestrainedBlock(Block(width=0.4, height=2.0), Spring(1.0)), "needs its mass"),
+        (lambda: RestrainedBlock(Block(width=0.4, height=2.0, mass=1.0), 3.0), "is no restraint"),
+        (lambda: RestrainedBlock(0.4), "a Block is needed"),
+        (lambda: RestrainedBlock(Block(width=0.4, height=2.0, mass=9.0), Thrust(900.0, 2.0)), "does not stand"),
+        (lambda: RestrainedBlock(Block(width=0.4, height=2.0), lean=0.3), "falls: from -0.1974 to 0.1974 rad"),
+        (lambda: RestrainedBlock(Block(width=0.4, height=2.0), restitution=1.2), "restitution must be in"),
+        (
+            lambda: RestrainedBlock(Block(width=0.4, height=2.0, mass=9.0), Tendon(1.0, offset=0.3)),
+            "is beyond the pivot",
+        ),
+        (
+            lambda: RestrainedBlock(
+                Block(width=0.4, height=2.0, mass=9.0), Tendon(1e3, strength=9.0), Tendon(1e3, strength=8.0)
+            ),
+            "one tendon of a block may yield",
+        ),
+        (lambda: Block.one_sided(width=0.4, height=-2.0), "height must be a positive number"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_sentence(make, says):
+    with pytest.raises(InvalidBlock, match=says) as refused:
+        make()
+    assert "\n" not in str(refused.value)
