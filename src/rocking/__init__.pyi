@@ -1,4 +1,4 @@
-from . import analysis, chattering, dynamics, studies
+from . import analysis, chattering, dynamics, solid, studies
 from .analysis import rules
 from .analysis.calibration.history import HistoryCalibration, calibrate_history
 from .analysis.calibration.outcomes import calibrate
@@ -36,6 +36,7 @@ from .motion.scaling import Measure
 from .response import Response, Sensitivity
 from .result import DatasetResult, DrawnResult, Result, Row, TableResult
 from .simulation import simulate
+from .solid.solid import Solid
 from .studies import Study, study
 from .treatment import AsymptoticTime, Certified, GeometricBypass, IntervalThreshold, Treatment, VelocityThreshold
 
@@ -76,6 +77,7 @@ __all__ = [
     "Scales",
     "Sensitivity",
     "Side",
+    "Solid",
     "Study",
     "StudyError",
     "TableResult",
@@ -103,6 +105,7 @@ __all__ = [
     "rules",
     "simulate",
     "simulate_many",
+    "solid",
     "studies",
     "study",
     "survey",
