@@ -3,6 +3,7 @@ from .analysis import rules
 from .analysis.calibration.history import HistoryCalibration, calibrate_history
 from .analysis.calibration.outcomes import calibrate
 from .analysis.calibration.result import Calibration
+from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
 from .analysis.fragility.fit import fit_fragility, fragility
 from .analysis.fragility.result import Fragility
@@ -101,6 +102,7 @@ __all__ = [
     "pulses",
     "read",
     "records",
+    "response_rose",
     "rocking_spectrum",
     "rules",
     "simulate",

@@ -48,7 +48,8 @@ def rose_figure(
                 add_labels(axes, "" if axes is upper else "azimuth (deg)", label)
             upper.tick_params(labelbottom=False)
             lower.set_xlim(0.0, 360.0)
-            lower.set_xticks([0.0, 90.0, 180.0, 270.0, 360.0])
+            lower.set_xticks([0.0, 180.0, 360.0])
+            lower.set_xticks([90.0, 270.0], minor=True)
         _draw_circles(main, float(max(acceleration.max(), np.abs(support).max())))
         main.add_patch(
             Polygon(
@@ -65,7 +66,7 @@ def rose_figure(
             linestyle=(0, (4, 1.5)),
             label=f"least: {weakest[1]:.3g} g at {weakest[0]:.3g} deg",
         )
-        add_labels(main, "towards east (g)", "towards north (g)")
+        add_labels(main, "towards west and east (g)", "towards south and north (g)")
         add_legend(figure, ax, handles_of(main))
     return figure
 
@@ -85,7 +86,7 @@ def shares_figure(
         _draw_circles(axes, 1.0)
         for share, label, style in zip(shares, labels, styles_of(len(labels)), strict=True):
             axes.plot(*_around(azimuth, share), linewidth=1.4, marker="o", markersize=2.0, label=label, **style)
-        add_labels(axes, "share towards east", "share towards north")
+        add_labels(axes, "share towards west and east", "share towards south and north")
         add_legend(figure, ax, handles_of(axes))
     return figure
 
@@ -118,7 +119,10 @@ def _draw_circles(axes: Axes, most: float) -> None:
     for azimuth, name in ((0.0, "N"), (90.0, "E"), (180.0, "S"), (270.0, "W")):
         end = reach * _unit(azimuth)
         axes.plot(*np.column_stack([np.zeros(2), end]), color=REST, linewidth=0.7, zorder=0)
-        axes.annotate(name, tuple(1.08 * end), ha="center", va="center", fontsize=7.5, color=INK)
+        axes.annotate(name, tuple(1.1 * end), ha="center", va="center", fontsize=7.5, color=INK)
     axes.set_aspect("equal")
-    axes.set_xlim(-1.16 * reach, 1.16 * reach)
-    axes.set_ylim(-1.16 * reach, 1.16 * reach)
+    axes.set_xlim(-1.2 * reach, 1.2 * reach)
+    axes.set_ylim(-1.2 * reach, 1.2 * reach)
+    for axis in (axes.xaxis, axes.yaxis):  # to either side the distance from the middle
+        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
+        axis.set_major_formatter(lambda value, _: f"{abs(value):g}")
