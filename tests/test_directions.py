@@ -55,7 +55,7 @@ def test_pairs_as_they_are_have_one_level(statue, pairs):
     found = response_rose(statue, [pairs["pulses"]] * 2, azimuths=[0.0])
     assert found.level.values.tolist() == [1.0]
     assert len({*found.pair.values.tolist()}) == 2
-    assert "factor 1" in found.summary()
+    assert "factor of the motion 1" in found.summary()
 
 
 def test_the_figure_has_the_full_circle(statue, pairs):

@@ -17,7 +17,7 @@ from rocking.ensemble import Scales, simulate_many
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import several_motions
-from rocking.motion.scaling import Measure, MeasureName
+from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.progress import Progress
 from rocking.result import DatasetResult, variable
 from rocking.solid.rose import checked_azimuths
@@ -153,7 +153,7 @@ def response_rose(
                 ),
                 "azimuth": variable("azimuth", at, "clockwise from north", "deg"),
             },
-            {"description": solid.description, "model": model, "measure": scales.about["measure"]},
+            {"description": solid.description, "model": model, "measure": (scales.measure or FACTOR).quantity},
         )
     )
 
@@ -188,8 +188,9 @@ class ResponseRose(DatasetResult):
         """Return levels as people read them."""
         data = self.data
         unit = data.level.attrs.get("units", "1")
-        name = "factor" if data.measure == "factor" else data.measure
-        return [f"{name} {value:.4g}{'' if unit == '1' else f' {unit}'}" for value in data.level.values.tolist()]
+        return [
+            f"{data.measure} {value:.4g}{'' if unit == '1' else f' {unit}'}" for value in data.level.values.tolist()
+        ]
 
     def summary(self) -> str:
         data = self.data

@@ -124,5 +124,5 @@ def _draw_circles(axes: Axes, most: float) -> None:
     axes.set_xlim(-1.2 * reach, 1.2 * reach)
     axes.set_ylim(-1.2 * reach, 1.2 * reach)
     for axis in (axes.xaxis, axes.yaxis):  # to either side the distance from the middle
-        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
+        axis.set_ticks([-place for place in reversed(places)] + [0.0, *places])
         axis.set_major_formatter(lambda value, _: f"{abs(value):g}")
