@@ -41,7 +41,7 @@ Corner = tuple[float, float, float]
 
 def revolved(
     profile: tuple[tuple[float, float], ...], at: Corner, top: float | None
-) -> tuple[list[Corner], list[tuple[int, ...]]]:
+) -> tuple[list[Corner], list[tuple[int, int, int]]]:
     """Return corners and triangles of rings of corners, with a corner in the middle of the lowest, and one on top."""
     east, north, up = at
     turns = [2.0 * math.pi * k / SEGMENTS for k in range(SEGMENTS)]
@@ -51,7 +51,7 @@ def revolved(
         for turn in turns
     ]
     rings = len(profile)
-    faces: list[tuple[int, ...]] = []
+    faces: list[tuple[int, int, int]] = []
     for ring in range(rings - 1):
         for k in range(SEGMENTS):
             here, there = ring * SEGMENTS + k, ring * SEGMENTS + (k + 1) % SEGMENTS
@@ -64,7 +64,7 @@ def revolved(
     return corners, faces
 
 
-def parts() -> dict[str, tuple[list[Corner], list[tuple[int, ...]]]]:
+def parts() -> dict[str, tuple[list[Corner], list[tuple[int, int, int]]]]:
     """Return corners and triangles of all parts by name."""
     x, y, z = 0.5 * PLINTH[0], 0.5 * PLINTH[1], PLINTH[2]
     box = [(a, b, c) for c in (0.0, z) for b in (-y, y) for a in (-x, x)]
