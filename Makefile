@@ -94,7 +94,7 @@ distclean: clean ## remove the environment, too
 # A stamp per set of packages: installing again is needed only when the versions or the project's table change.
 # Python compiles a module when it is first imported; to compile all of them takes longer than to install them.
 .venv/.base: EXTRAS :=
-.venv/.all: EXTRAS := [formats,excel,explorer,browser,cluster,objects,parquet,test,lint,docs]
+.venv/.all: EXTRAS := [formats,excel,explorer,browser,cluster,objects,parquet,mesh,test,lint,docs]
 .venv/.base .venv/.all: pyproject.toml constraints.txt | .venv/bin/python
 	@echo "Installing rocking$(EXTRAS) into .venv (a few minutes the first time) ..."
 	@$(BIN)/python -m pip install --disable-pip-version-check -qq --no-compile -c constraints.txt -e ".$(EXTRAS)"

@@ -17,6 +17,7 @@ from rocking.plot.maps import outcome_figure, regions_figure
 from rocking.plot.orbits import branch_figure, orbit_figure
 from rocking.plot.response import DrawnSequence, response_figure
 from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
+from rocking.plot.rose import rose_figure, shares_figure
 from rocking.plot.schemes import SchemeCurve, schemes_figure
 from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
@@ -53,6 +54,21 @@ def fragility_of(**options):
     line = FragilityLine("overturning: median 4.149", x, p, 0.8 * p, 1.1 * p, x[[9, 19, 29]], p[[9, 19, 29]], held)
     texts = {"intensity_label": "peak ground acceleration (m/s²)", "band_label": "band: 90 % confidence (likelihood)"}
     return fragility_figure(lines=[line, line._replace(label="half: median 3.6")], **(texts | options))
+
+
+def rose_of(**options):
+    azimuth = np.arange(0.0, 360.0, 10.0)
+    values = 0.3 + 0.1 * np.abs(np.sin(np.deg2rad(2.0 * azimuth)))
+    corners = np.array([[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]])
+    each = {"acceleration": values, "slenderness": 60.0 * values, "p": 3.0 - values}
+    return rose_figure(azimuth=azimuth, support=corners, weakest=(90.0, 0.3), **each, **options)
+
+
+def shares_of(**options):
+    azimuth = np.arange(0.0, 360.0, 15.0)
+    shares = np.array([0.2, 0.4, 0.7, 1.0])[:, None] * np.abs(np.cos(np.deg2rad(azimuth)))
+    labels = [f"peak ground velocity {level:g} m/s" for level in (0.4, 0.8, 1.2, 2.0)]
+    return shares_figure(azimuth=azimuth, shares=shares, labels=labels, **options)
 
 
 def map_of(**options):
@@ -209,6 +225,8 @@ FIGURES = {
     "risk": (risk_of, 4.8),
     "survival": (survival_of, 3.6),
     "map": (map_of, 3.8),
+    "rose": (rose_of, 4.0),
+    "shares": (shares_of, 4.6),
     "outcomes": (outcomes_of, 3.8),
     "orbit": (orbit_of, 3.8),
     "branch": (branch_of, 3.8),

@@ -16,7 +16,7 @@ from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose, assert_array_equal
 
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion import pulses
+from rocking.motion import pulses, records
 from rocking.motion.motion import Description, Motion
 from rocking.motion.scaling import Measure
 
@@ -499,3 +499,69 @@ def test_motions_import_without_slow_libraries():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# Two components
+
+
+@pytest.fixture(scope="module")
+def two_components():
+    return records.load("el-centro-meloland-270"), records.load("el-centro-meloland-360")
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 33.0, 90.0, 200.0, 360.0, -45.0])
+def test_the_component_along_an_azimuth_is_the_projection_of_the_vector(two_components, azimuth):
+    west, north = two_components
+    times = np.linspace(0.0, 20.0, 777)
+    east, up = -west.acceleration(times), north.acceleration(times)
+    wanted = east * np.sin(np.radians(azimuth)) + up * np.cos(np.radians(azimuth))
+    for motion in (west.rotated(north, azimuth), north.rotated(west, azimuth)):
+        np.testing.assert_allclose(motion.acceleration(times), wanted, rtol=0.0, atol=1e-14)
+        assert motion.description.origin.azimuth == azimuth
+
+
+def test_along_their_own_azimuths_components_are_themselves_to_the_bit(two_components):
+    west, north = two_components
+    for azimuth, own in ((270.0, west), (0.0, north), (90.0, -west), (180.0, -north)):
+        found = west.rotated(north, azimuth)
+        times = own.breakpoints[:-1]  # the one lasts longer than the other
+        assert np.array_equal(found.acceleration(times), own.acceleration(times))
+
+
+def test_components_that_are_not_perpendicular_are_components_of_one_vector():
+    vector = {0.0: 3.0, 90.0: 4.0}  # towards north and towards east
+    one, other = (
+        Motion([0.0, 1.0], [[vector[0.0] * np.cos(np.radians(at)) + vector[90.0] * np.sin(np.radians(at))]])
+        for at in (10.0, 70.0)
+    )
+    for azimuth, value in vector.items():
+        found = one.rotated(other, azimuth, recorded=(10.0, 70.0))
+        assert found.acceleration(0.5) == pytest.approx(value, rel=1e-14)
+
+
+def test_a_rotated_motion_has_the_pieces_of_both_and_one_vertical_component():
+    up = Motion([0.0, 1.0], [[2.0]], name="up")
+    one, other = Motion([0.0, 1.0], [[1.0]], name="one"), Motion([0.0, 0.5, 3.0], [[1.0], [-1.0]], name="other")
+    found = one.with_vertical(up).rotated(other.with_vertical(up), 45.0, recorded=(0.0, 90.0))
+    assert found.breakpoints.tolist() == [0.0, 0.5, 1.0, 3.0]
+    assert found.vertical is up
+    assert found.label == "one with vertical up, with other rotated to 45 deg"
+    with pytest.raises(InvalidMotion, match="give it to one of the two"):
+        one.with_vertical(up).rotated(other.with_vertical(-up), 45.0, recorded=(0.0, 90.0))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({}, "the azimuth of 'one' is not known: give recorded"),
+        ({"recorded": (0.0, 171.0)}, "along one line to 9 deg"),
+        ({"recorded": (0.0,)}, "recorded must be the azimuths of both"),
+        ({"recorded": (0.0, np.nan)}, "recorded must be the azimuths of both"),
+        ({"azimuth": np.inf, "recorded": (0.0, 90.0)}, "azimuth must be a finite number"),
+        ({"other": 3.0}, "other must be a Motion"),
+    ],
+)
+def test_a_direction_that_is_not_known_is_refused(arguments, sentence):
+    one = Motion([0.0, 1.0], [[1.0]], name="one")
+    with pytest.raises(InvalidMotion, match=sentence):
+        one.rotated(**{"other": one, "azimuth": 30.0} | arguments)

@@ -87,6 +87,10 @@ def results(spectrum, study):
         "OverturningMap": rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0, 3.0]),
         "IncrementalDynamicAnalysis": rocking.incremental_dynamic_analysis(BLOCK, PULSE),
         "MeasureComparison": rocking.compare_measures(BLOCK, [PULSE, rocking.pulses.one_sine(6.0, 2.0)]),
+        "Rose": rocking.Solid.from_mesh("statue").rose(),
+        "ResponseRose": rocking.response_rose(
+            rocking.Solid.from_mesh("statue"), [(PULSE, PULSE)], azimuths=[0.0, 90.0], recorded=(0.0, 90.0)
+        ),
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
         "StudySpectrum": study.spectrum().select(scale=3.0),
         "BlockFragilities": study.block_fragilities(),
@@ -159,6 +163,11 @@ HEADERS = {
     ("BasinErosion", "erosion"): "factor,safe,standard_error,to_plus,to_minus",
     ("BifurcationDiagram", "states"): "direction,value,start,iterate,coordinate_rad,velocity_rad_s",
     ("BifurcationDiagram", "orbits"): "direction,value,start,period,impacts",
+    ("Rose", "rose"): "azimuth_deg,acceleration_g,alpha_rad,p_rad_s,restitution,radius_m,rise_m,coupling,aside_m,gap_m",
+    ("Rose", "support"): "east_m,north_m",
+    ("ResponseRose", "responses"): "pair,level,azimuth_deg,overturned,peak_over_slenderness",
+    ("ResponseRose", "shares"): "level,azimuth_deg,overturned_share",
+    ("ResponseRose", "levels"): "level,anywhere",
     ("RockingSpectrum", "fractiles"): "fractile,alpha_rad,restitution,p_rad_s,period_s,size_m,"
     "fractile_over_alpha,overturned_share",
     ("RockingSpectrum", "peaks"): "motion,alpha_rad,restitution,p_rad_s,period_s,size_m,"

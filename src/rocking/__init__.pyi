@@ -1,8 +1,9 @@
-from . import analysis, chattering, dynamics, studies
+from . import analysis, chattering, dynamics, solid, studies
 from .analysis import rules
 from .analysis.calibration.history import HistoryCalibration, calibrate_history
 from .analysis.calibration.outcomes import calibrate
 from .analysis.calibration.result import Calibration
+from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
 from .analysis.fragility.fit import fit_fragility, fragility
 from .analysis.fragility.result import Fragility
@@ -49,6 +50,7 @@ from .motion.scaling import Measure
 from .response import Response, Sensitivity
 from .result import DatasetResult, DrawnResult, Result, Row, TableResult
 from .simulation import simulate
+from .solid.solid import Solid
 from .studies import Study, study
 from .treatment import AsymptoticTime, Certified, GeometricBypass, IntervalThreshold, Treatment, VelocityThreshold
 
@@ -94,6 +96,7 @@ __all__ = [
     "Scales",
     "Sensitivity",
     "Side",
+    "Solid",
     "Spring",
     "Study",
     "StudyError",
@@ -121,10 +124,12 @@ __all__ = [
     "pulses",
     "read",
     "records",
+    "response_rose",
     "rocking_spectrum",
     "rules",
     "simulate",
     "simulate_many",
+    "solid",
     "studies",
     "study",
     "survey",

@@ -37,6 +37,8 @@ _UNCERTAIN: Final = 0.01
 
 #: Largest plausible diagonal of a block, m.
 _LARGEST: Final = 30.0
+#: Least plausible height of what is scanned or modelled, m.
+_LOWEST: Final = 0.02
 
 _VERTICAL: Final = re.compile(r"(up|down|dn|dwn|ver|vert|vertical|u-?d|z|v|[a-z]{2}z)\b.*", re.IGNORECASE)
 _HORIZONTAL: Final = re.compile(
@@ -173,6 +175,19 @@ def block_notes(block: Block) -> tuple[Message | str, ...]:
         width, height = 2.0 * block.half_width, 2.0 * block.half_height
         notes.append(f"the block is wider, {width:g} m, than it is high, {height:g} m: are the sizes swapped?")
     return (*notes, *_side_notes(block))
+
+
+def height_notes(height: float) -> tuple[str, ...]:
+    """Return what looks like a mistake in the height, m, of a body that was read from a mesh; empty if nothing does.
+
+    Examples
+    --------
+    >>> height_notes(1.8), height_notes(1800.0)
+    ((), ('the body is 1800 m high: are its coordinates in metres?',))
+    """
+    return (
+        () if _LOWEST <= height <= _LARGEST else (f"the body is {height:.4g} m high: are its coordinates in metres?",)
+    )
 
 
 def _side_notes(block: Block) -> Iterator[Message | str]:

@@ -2,6 +2,7 @@ from . import rules
 from .calibration.diagnostics import BoundReached, Diagnostics, Scores
 from .calibration.history import Measured
 from .calibration.result import Estimate, Validation
+from .directions import ResponseRose
 from .efficiency import MeasureComparison
 from .fragility.curve import Band, FragilityCurve
 from .fragility.lognormal import Goodness, Likelihood, Probit
@@ -27,6 +28,7 @@ __all__ = [
     "OverturningMap",
     "Probit",
     "Rate",
+    "ResponseRose",
     "Risk",
     "RockingSpectrum",
     "Scores",

@@ -37,6 +37,7 @@ for _module, _commands in {
     "analysis": ("spectrum", "map", "ida", "measures"),
     "dynamics": ("orbits", "bifurcation", "basin"),
     "fits": ("fragility", "calibrate"),
+    "mesh": ("mesh",),
     "explore": ("explore",),
 }.items():
     _lines = _lines_of(_module)

@@ -14,7 +14,8 @@ from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import measures, piecewise, processing
-from rocking.motion.description import Description, check_description, checked_history, labelled
+from rocking.motion.description import Description, Origin, check_description, checked_history, labelled
+from rocking.motion.directions import recorded_azimuths, shares
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 
 if TYPE_CHECKING:
@@ -524,6 +525,69 @@ class Motion:
         ['0.006366', '0.003524']
         """
         return self if vertical is self.vertical else replace(self, vertical=vertical)
+
+    def rotated(self, other: Motion, azimuth: float, *, recorded: tuple[float, float] | None = None) -> Motion:
+        """Return the component along any azimuth of the horizontal motion whose two components are this and another.
+
+        Parameters
+        ----------
+        other : Motion
+            Second horizontal component of the same place, which starts at the same time.
+        azimuth : float
+            Direction in which the result is positive, degrees clockwise from north.
+        recorded : pair of float, optional
+            Azimuths of this component and the other, degrees clockwise from north; by default as their records say.
+
+        Returns
+        -------
+        Motion
+            With the vertical component of either.
+
+        Raises
+        ------
+        InvalidMotion
+            If an azimuth is not known or no number, both components lie nearly along one line, or each brings a
+            vertical component of its own.
+
+        Notes
+        -----
+        a(phi) = (a_1 sin(phi_2 - phi) + a_2 sin(phi - phi_1))/sin(phi_2 - phi_1), exactly, piece by piece; of
+        perpendicular components a_1 cos(phi - phi_1) + a_2 cos(phi - phi_2).
+
+        Examples
+        --------
+        >>> import rocking
+        >>> west, north = (rocking.records.load(f"el-centro-meloland-{azimuth}") for azimuth in (270, 360))
+        >>> [f"{west.rotated(north, azimuth).pga:.3f}" for azimuth in (270, 0, 315)]
+        ['2.927', '3.050', '2.322']
+        """
+        if not isinstance(other, Motion):
+            raise InvalidMotion(
+                f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}", "other"
+            )
+        first, second = recorded_azimuths(self, other, recorded)
+        wanted = checks.finite(azimuth, "azimuth", InvalidMotion)
+        verticals = [motion.vertical for motion in (self, other) if motion.vertical is not None]
+        if len(verticals) == 2 and verticals[0] is not verticals[1]:
+            raise InvalidMotion("each component has a vertical one: give it to one of the two with with_vertical")
+        mine, theirs = shares((first, second), wanted)
+        breakpoints, (one, two) = piecewise.together(self, other)
+        origin = replace(self.description.origin or Origin(), channel=f"{wanted:g} deg", number=None, azimuth=wanted)
+        described = replace(
+            self.description.changed("rotated"),
+            parameters={},
+            text=f"at {wanted:g} deg, from {first:g} deg: {self._origin()}; and {second:g} deg: {other._origin()}",
+            origin=origin,
+        )
+        return replace(
+            self,
+            breakpoints=breakpoints,
+            coefficients=mine * one + theirs * two,
+            description=described,
+            history=(*self.history, f"with {other.name} rotated to {wanted:g} deg"),
+            error=abs(mine) * self.error + abs(theirs) * other.error,
+            vertical=verticals[0] if verticals else None,
+        )
 
     def delayed(self, delay: float) -> Motion:
         """Return the motion after a time of no acceleration.

@@ -166,7 +166,13 @@ def load(name: str) -> Motion:
         description=Description(
             "record",
             text=f"{'; '.join(facts)}; terms: {record.terms}",
-            origin=Origin(event=record.event, station=record.station, channel=record.direction, units=record.units),
+            origin=Origin(
+                event=record.event,
+                station=record.station,
+                channel=record.direction,
+                azimuth=float(record.direction) if record.direction.isdecimal() else None,
+                units=record.units,
+            ),
         ),
     )
 

@@ -1,0 +1,265 @@
+"""A body under pairs of horizontal components: what becomes of it in the plane of each azimuth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.constants import Model
+from rocking.engine import require_finished
+from rocking.ensemble import Scales, simulate_many
+from rocking.errors import InvalidBlock, InvalidOption
+from rocking.motion.motion import Motion
+from rocking.motion.named import several_motions
+from rocking.motion.scaling import FACTOR, Measure, MeasureName
+from rocking.progress import Progress
+from rocking.result import DatasetResult, variable
+from rocking.solid.rose import checked_azimuths
+from rocking.solid.solid import Solid
+from rocking.tables import counted, text_table
+from rocking.treatment import Treatment
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Azimuths unless others are asked for, degrees: the opposite ones see the mirror image.
+_HALF: Final = np.arange(0.0, 180.0, 15.0)
+#: Curves of a figure.
+_DRAWN: Final = 4
+
+#: Two horizontal components of one place, and maybe several such pairs by their names.
+Pair = tuple[Motion, Motion]
+Pairs = Sequence[Pair] | Mapping[str, Pair]
+
+
+def response_rose(
+    solid: Solid,
+    pairs: Pairs,
+    *,
+    azimuths: ArrayLike | None = None,
+    levels: ArrayLike | None = None,
+    measure: MeasureName | Measure = "factor",
+    recorded: tuple[float, float] | None = None,
+    restitution: float | Sequence[float] | None = None,
+    model: Model = "nonlinear",
+    chattering: str | Treatment = "certified",
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> ResponseRose:
+    """Simulate a body in the plane of every azimuth, under the component of the ground motion along it.
+
+    Parameters
+    ----------
+    solid : Solid
+        What rocks; across each azimuth it is the block of `Solid.block`.
+    pairs : sequence of (Motion, Motion), or mapping of str to (Motion, Motion)
+        m pairs of horizontal components, which start together.
+    azimuths : array_like, optional
+        Degrees clockwise from north; by default every 15 from 0 to 165, since at 180 more all is mirrored.
+    levels : array_like, optional
+        Levels that every pair is scaled to; by default pairs as they are.
+    measure : {"factor", "pga", "pgv"} or Measure
+        What the levels are, SI units: of a pair the geometric mean of both components as they were recorded. Both are
+        scaled by one factor.
+    recorded : pair of float, optional
+        Azimuths of the first and the second component of every pair; by default as their records say.
+    restitution : float or pair, optional
+        As for `Solid.block`.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    chattering : str or Treatment
+        As for `simulate`.
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
+        As for `simulate_many`.
+
+    Returns
+    -------
+    ResponseRose
+        Peaks and verdicts for each pair, level and azimuth.
+
+    Raises
+    ------
+    InvalidBlock
+        If `solid` is none, or too stocky to rock across an azimuth.
+    InvalidMotion
+        If a component is no motion, or its azimuth is not known.
+    InvalidOption
+        If there is no pair, or an argument is out of its range.
+
+    Notes
+    -----
+    Each azimuth is a simulation of its own: the body rocks in one vertical plane, and what happens across that is left
+    out.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> pair = tuple(rocking.records.load(f"ridgecrest-tow2-{azimuth}") for azimuth in ("090", "360"))
+    >>> found = response_rose(rocking.Solid.from_mesh("statue"), [pair], azimuths=[0.0, 45.0, 90.0])
+    >>> found.overturned.values[0, 0].tolist()
+    [False, False, False]
+    """
+    import xarray as xr
+
+    if not isinstance(solid, Solid):
+        raise InvalidBlock(f"a Solid is needed, not a {type(solid).__name__}: make one with rocking.Solid.from_mesh")
+    named = _named_pairs(pairs)
+    at = _HALF if azimuths is None else checked_azimuths(azimuths)
+    scales = Scales.of(levels, measure)
+    blocks = [solid.block(azimuth, restitution=restitution) for azimuth in at]
+    factors = np.array([_factors(scales, pair) for pair in named.values()])
+    shape = (len(named), scales.count, len(at))
+    peak, overturned = np.empty(shape), np.empty(shape, bool)
+    with Progress("simulating", total=len(at), show=progress) as bar:
+        for k, (azimuth, block) in enumerate(zip(at.tolist(), blocks, strict=True)):
+            along = [one.rotated(other, azimuth, recorded=recorded) for one, other in named.values()]
+            motions = [
+                motion.scaled(factor) for motion, own in zip(along, factors, strict=True) for factor in own.tolist()
+            ]
+            found = simulate_many(block, motions, model=model, chattering=chattering, threads=threads, progress=False)
+            require_finished(found.unfinished.values)
+            overturned[..., k] = found.overturned.values.reshape(shape[:2])
+            ratio = found.peak_rotation.values.reshape(shape[:2]) / min(block.balance)
+            peak[..., k] = np.where(overturned[..., k], np.inf, ratio)
+            bar.advance()
+    dims = ("pair", "level", "azimuth")
+    return ResponseRose(
+        xr.Dataset(
+            {
+                "overturned": variable(dims, overturned, "whether the body overturns in the plane of the azimuth"),
+                "peak_over_slenderness": variable(
+                    dims, peak, "largest rotation over the smaller slenderness; infinite where it overturns", "1"
+                ),
+                "overturned_share": variable(
+                    dims[1:], overturned.mean(axis=0), "share of the pairs that overturn the body", "1"
+                ),
+                "anywhere": variable(
+                    "level", overturned.any(axis=2).mean(axis=0), "share that does at any azimuth", "1"
+                ),
+            },
+            {
+                "pair": [*named],
+                "level": variable(
+                    "level", scales.values, "of the geometric mean of both components", scales.about["units"]
+                ),
+                "azimuth": variable("azimuth", at, "clockwise from north", "deg"),
+            },
+            {"description": solid.description, "model": model, "measure": (scales.measure or FACTOR).quantity},
+        )
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ResponseRose(DatasetResult):
+    """What becomes of a body in the plane of each azimuth; from `response_rose`.
+
+    Its figure has the share of the pairs that overturn the body, over the full circle, for up to four levels.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Over (pair, level, azimuth): overturned, peak_over_slenderness. Over (level, azimuth): overturned_share. Over
+        (level): anywhere, the share of the pairs that overturn the body at one azimuth or more.
+    """
+
+    TABLES = MappingProxyType(
+        {
+            "responses": ("overturned", "peak_over_slenderness"),
+            "shares": ("overturned_share",),
+            "levels": ("anywhere",),
+        }
+    )
+
+    def _headline(self) -> str:
+        data = self.data
+        over = f"{counted(data.sizes['pair'], 'pair')}, {counted(data.sizes['azimuth'], 'azimuth')}"
+        return f"{data.description}, {data.model} model: share overturned, {over}"
+
+    def _levels(self) -> list[str]:
+        """Return levels as people read them."""
+        data = self.data
+        unit = data.level.attrs.get("units", "1")
+        return [
+            f"{data.measure} {value:.4g}{'' if unit == '1' else f' {unit}'}" for value in data.level.values.tolist()
+        ]
+
+    def summary(self) -> str:
+        data = self.data
+        rows = []
+        for k, name in enumerate(self._levels()):
+            share = data.overturned_share.values[k]
+            most = data.azimuth.values[share == share.max()]
+            where = f"{most[0]:g} deg" if len(most) == 1 else f"{len(most)} azimuths"
+            rows.append([name, share.min(), share.max(), where, float(data.anywhere[k])])
+        table = text_table(["level", "least share", "largest share", "at", "at any azimuth"], rows)
+        return f"{self._headline()}\n\n{table}"
+
+    def to_dict(self) -> dict[str, Any]:
+        data = self.data
+        return {
+            "description": data.description,
+            "model": data.model,
+            "measure": data.measure,
+            "pairs": [str(name) for name in data.pair.values],
+            "levels": data.level.values.tolist(),
+            "azimuths_deg": data.azimuth.values.tolist(),
+            **{str(name): each.values.tolist() for name, each in data.data_vars.items()},
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.arrays import evenly
+        from rocking.plot.rose import shares_figure
+
+        data = self.data
+        chosen = [*evenly(data.sizes["level"], _DRAWN)]
+        azimuth = data.azimuth.values
+        # Where no opposite azimuth was asked for, it does what this one does.
+        opposite = np.mod(azimuth + 180.0, 360.0)
+        new = ~np.isin(opposite, azimuth)
+        around = np.concatenate([azimuth, opposite[new]])
+        order = np.argsort(around)
+        shares = data.overturned_share.values[chosen]
+        names = self._levels()
+        return shares_figure(
+            azimuth=around[order],
+            shares=np.concatenate([shares, shares[:, new]], axis=1)[:, order],
+            labels=[names[k] for k in chosen],
+            title=title or self._headline(),
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+def _named_pairs(pairs: Pairs) -> dict[str, Pair]:
+    """Pairs of motions by name, or refuse what is none."""
+    given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.several(pairs, "pairs", InvalidOption)
+    found: list[Pair] = []
+    for pair in given:
+        components = [] if isinstance(pair, Motion) else several_motions(pair)
+        if len(components) != 2:
+            raise InvalidOption(
+                "{} must hold the two horizontal components of each place, as [(first, second)]", "pairs", value=pairs
+            )
+        found.append((components[0], components[1]))
+    if not found:
+        raise InvalidOption("{} must hold a pair of horizontal components or more", "pairs")
+    names = [f"{one.name} and {other.name}" for one, other in found]
+    numbered = [f"{name} #{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
+    return dict(zip(map(str, pairs) if isinstance(pairs, Mapping) else numbered, found, strict=True))
+
+
+def _factors(scales: Scales, pair: Pair) -> Any:
+    """Return the factors on both components that bring the geometric mean of what they measure to the levels."""
+    if scales.measure is None:
+        return scales.values
+    one, other = (scales.measure.positive(motion, motion.name) for motion in pair)
+    return scales.values / np.sqrt(one * other)

@@ -1,0 +1,129 @@
+"""`rocking mesh`: a body from a mesh, how it resists in every direction, and the blocks that it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from rocking.block import Block
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
+from rocking.errors import InvalidOption
+from rocking.plausibility import block_notes
+from rocking.progress import note
+from rocking.quantities import length, number, sides, values
+from rocking.solid.solid import Solid
+from rocking.tables import text_table, write_csv
+
+_Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
+
+
+def mesh(
+    file: str,
+    *,
+    azimuth: _Signed = None,
+    density: str | None = None,
+    support: _Signed = None,
+    tolerance: str | None = None,
+    up: _Signed = None,
+    unit: str = "m",
+    turn: _Signed = None,
+    restitution: str | None = None,
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Make a body from a mesh: its mass, how it resists in every direction, and the blocks that it is.
+
+    FILE is an OBJ, PLY, STL or glTF file, or another that trimesh reads, or "statue", a mesh that ships. x is to the
+    east and y to the north; azimuths are in degrees clockwise from north. --out holds rose.png, .pdf, .csv (uplift,
+    slenderness and p over the azimuth), .nc, support.csv, with --azimuth blocks.csv, and result.json.
+
+    Parameters
+    ----------
+    file
+        The mesh.
+    azimuth
+        Azimuths of blocks to list, degrees: 0,45,90 or 0:165:12; their pivots, height of mass and gyration are those
+        that other commands take.
+    density
+        Density, kg/m^3; or of each part, as plinth=2700,figure=2650. Without it all is of one density.
+    support
+        Corners of the support, m, as "0.3,0.2;-0.3,0.2;0,-0.2"; by default those of the mesh near the ground.
+    tolerance
+        How far above the lowest corner others still carry, as 0.002 (m) or 0.2cm; by default a thousandth of the
+        height.
+    up
+        Axis that points up: x, y, z, -x, -y, -z, or a vector, 0.1,0,1; by default z, of glTF files y.
+    unit
+        Unit of the coordinates: m, cm, mm, in, ft, or its length in m.
+    turn
+        Degrees, clockwise seen from above, by which the mesh is turned.
+    restitution
+        Factor on the angular speed at an impact, in (0, 1]; one or two; by default from angular momentum.
+    """
+    with output.folder() as folder:
+        solid = Solid.from_mesh(
+            file,
+            density=None if density is None else _densities(density),
+            support=None if support is None else [_numbers(corner, "support") for corner in support.split(";")],
+            tolerance=None if tolerance is None else length(tolerance, "tolerance"),
+            up=_numbers(up, "up") if up is not None and "," in up else up,
+            unit=unit if unit.isalpha() else number(unit, "unit"),
+            turn=0.0 if turn is None else number(turn, "turn"),
+        )
+        rose = solid.rose()
+        e = None if restitution is None else sides(restitution, "restitution")
+        azimuths = [] if azimuth is None else values(azimuth, "azimuth").tolist()
+        blocks = [_row(at, solid.block(at, restitution=e)) for at in azimuths]
+        found: dict[str, Any] = {"solid": solid.to_dict(), **rose.to_dict(), "blocks": blocks}
+        text = [solid.summary(), rose.summary()]
+        if blocks:
+            text.append(text_table([*blocks[0]], [[*row.values()] for row in blocks]))
+        if folder is not None:
+            write_tables(folder, rose)
+            rose.to_netcdf(folder / "rose.nc")
+            if blocks:
+                import pandas as pd
+
+                write_csv(folder / "blocks.csv", pd.DataFrame(blocks))
+            write_results(folder, figures={"rose": rose.plot}, result=found)
+        print_result(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
+
+
+def _row(azimuth: float, block: Block) -> dict[str, float]:
+    """Row of a table: a block as its pivots describe it, and the parameters of both sides; with notes on it."""
+    for sentence in block_notes(block):
+        note(f"azimuth {azimuth:g}: {sentence}")
+    plus, minus = block.sides
+    squared = block.gravity * plus.radius / plus.p**2 - plus.radius**2
+    return {
+        "azimuth_deg": azimuth,
+        "pivot_plus_m": plus.radius * math.sin(plus.alpha),
+        "pivot_minus_m": minus.radius * math.sin(minus.alpha),
+        "height_of_mass_m": plus.radius * math.cos(plus.alpha),
+        "gyration_m": math.sqrt(squared),
+        **{
+            f"{name}_{sign}{unit}": getattr(side, name)
+            for name, unit in (("p", "_rad_s"), ("alpha", "_rad"), ("restitution", ""))
+            for sign, side in (("plus", plus), ("minus", minus))
+        },
+    }
+
+
+def _densities(text: str) -> float | dict[str, float]:
+    """Return one density, or those of parts by name."""
+    if "=" not in text:
+        return number(text, "density")
+    found = {}
+    for part in text.split(","):
+        name, equals, value = part.rpartition("=")
+        if not equals:
+            raise InvalidOption(f"{{}} takes a number, or PART=NUMBER with commas between, not {text!r}", "density")
+        found[name.strip()] = number(value, "density")
+    return found
+
+
+def _numbers(text: str, name: str) -> Sequence[float]:
+    """Return numbers with commas between."""
+    return [number(part, name) for part in text.split(",")]

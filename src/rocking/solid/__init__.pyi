@@ -1,0 +1,5 @@
+from .building import Region
+from .rose import Rose
+from .solid import Solid
+
+__all__ = ["Region", "Rose", "Solid"]

@@ -1,0 +1,203 @@
+"""A closed surface with its normals outwards from the triangles of a mesh, and a sentence for all that was done to it.
+
+What is inside a surface is known where its triangles make a cycle: every edge is passed as often one way as the other.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from rocking.arrays import Flags, Floats, Integers
+from rocking.errors import InvalidBlock
+from rocking.solid.moments import signed_volumes
+from rocking.tables import counted
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+#: Corners within this part of the mesh's size are one.
+_SAME: Final = 1e-8
+
+
+class Surface(NamedTuple):
+    """Corners, m, shape (n, 3), triangles, shape (m, 3), and what was mended."""
+
+    vertices: Floats
+    faces: Integers
+    mends: tuple[str, ...] = ()
+
+
+def is_closed(faces: Integers) -> bool:
+    """Whether every edge is passed as often one way as the other."""
+    return not len(_open_edges(faces))
+
+
+def joined(vertices: Floats, faces: Integers) -> Surface:
+    """Join corners at one place; leave out triangles that are none then, or are there already."""
+    low = vertices.min(axis=0)
+    size = float(np.max(vertices.max(axis=0) - low))
+    if not size > 0.0:
+        raise InvalidBlock("all corners of the mesh are at one place")
+    places = np.rint((vertices - low) / (size * _SAME)).astype(np.int64)
+    _, first, index = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    three = index.reshape(-1)[faces]
+    whole = (three[:, 0] != three[:, 1]) & (three[:, 1] != three[:, 2]) & (three[:, 2] != three[:, 0])
+    kept = three[whole]
+    # Each begins with its least corner, so that those of one orientation are equal.
+    turned = np.take_along_axis(kept, (np.argmin(kept, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    unique = np.sort(np.unique(turned, axis=0, return_index=True)[1])
+    mends = []
+    if not whole.all():
+        mends.append(f"{counted(int(np.sum(~whole)), 'face')} without area left out")
+    if len(unique) < len(kept):
+        mends.append(f"{counted(len(kept) - len(unique), 'face')} that came twice left out")
+    return Surface(vertices[first], kept[unique], tuple(mends))
+
+
+def agreeing(surface: Surface) -> Surface:
+    """Turn triangles to agree with their neighbours."""
+    vertices, faces, mends = surface
+    turned = _against_neighbours(faces)
+    if not turned.any():
+        return surface
+    said = f"{counted(int(turned.sum()), 'face')} turned to agree with the neighbours"
+    return Surface(vertices, np.where(turned[:, None], faces[:, ::-1], faces), (*mends, said))
+
+
+def closed(surface: Surface) -> Surface:
+    """Fill the holes of a surface whose triangles agree, and turn its normals outwards."""
+    vertices, faces, filled = _filled(surface.vertices, surface.faces)
+    faces, outward = _outward(vertices, faces)
+    return Surface(vertices, faces, (*surface.mends, *filled, *outward))
+
+
+def _edges(faces: Integers) -> Integers:
+    """Edges of every triangle, in its sense: shape (3 m, 2)."""
+    return np.asarray(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2))
+
+
+def _components(count: int, pairs: Integers) -> Integers:
+    """Label each of so many things by the connected ones that it is among, from pairs of neighbours."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    links: csr_array = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), (count, count)).tocsr()
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+
+
+def _against_neighbours(faces: Integers) -> Flags:
+    """Which triangles to turn, so that neighbours pass their edge in opposite senses; the fewest of each component.
+
+    Every triangle stands in a graph twice, as it is and turned; neighbours are linked as they agree. Where both of one
+    triangle are connected, the surface has one side only.
+    """
+    edges = _edges(faces)
+    _, key, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    key = key.reshape(-1)
+    order = np.argsort(key, kind="stable")
+    one, other = order[counts[key[order]] == 2].reshape(-1, 2).T
+    agree = edges[one, 0] != edges[other, 0]
+    n = len(faces)
+    if agree.all():
+        return np.zeros(n, bool)
+    left, right = one // 3, other // 3
+    crossed = np.where(agree, 0, n)
+    pairs = np.vstack([np.column_stack([left, right + crossed]), np.column_stack([left + n, right + n - crossed])])
+    label = _components(2 * n, pairs)
+    if np.any(label[:n] == label[n:]):
+        raise InvalidBlock("the surface of the mesh has one side only, as a Möbius strip: it encloses nothing")
+    patch = _components(n, np.column_stack([left, right]))
+    root = np.unique(patch, return_index=True)[1][patch]
+    turned = label[:n] != label[root]
+    share = np.bincount(patch, weights=turned) / np.bincount(patch)
+    return np.asarray(np.where(share[patch] > 0.5, ~turned, turned))
+
+
+def _open_edges(faces: Integers) -> Integers:
+    """Edges that are passed one way more often than the other, in the sense that closes them; shape (k, 2)."""
+    edges = _edges(faces)
+    undirected, key = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    net = np.bincount(key.reshape(-1), weights=np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0)).astype(np.int64)
+    closing = np.where(net[:, None] > 0, undirected[:, ::-1], undirected)
+    return np.repeat(closing, np.abs(net), axis=0)
+
+
+def _filled(vertices: Floats, faces: Integers) -> tuple[Floats, Integers, tuple[str, ...]]:
+    """Fill every hole with triangles from its edge to the mean of its corners, which is exact where it is flat."""
+    edges = _open_edges(faces)
+    if not len(edges):
+        return vertices, faces, ()
+    corners, index = np.unique(edges, return_inverse=True)
+    hole = _components(len(corners), index.reshape(-1, 2))
+    count = int(hole.max()) + 1
+    shares = np.bincount(hole)
+    middle = np.column_stack([np.bincount(hole, weights=column) for column in vertices[corners].T]) / shares[:, None]
+    of_edge = hole[index.reshape(-1, 2)[:, 0]]
+    patches = np.column_stack([edges, len(vertices) + of_edge])
+    everything = np.vstack([vertices, middle])
+    area, before = _areas(everything, patches), float(_areas(vertices, faces).sum())
+    # Least-squares planes of the edges: how far these leave them.
+    off = (vertices[corners] - middle[hole])[np.argsort(hole, kind="stable")]
+    each = np.split(off, np.cumsum(shares)[:-1])
+    rough = max(float(np.max(np.abs(rim @ np.linalg.svd(rim, full_matrices=False)[2][-1]))) for rim in each)
+    total = float(area.sum())
+    said = (
+        f"{counted(count, 'hole')} filled, {total:.3g} m^2 or {100.0 * total / (total + before):.2g} % of the surface; "
+        f"their edges are flat to {rough:.2g} m"
+    )
+    return everything, np.vstack([faces, patches]), (said,)
+
+
+def _areas(vertices: Floats, faces: Integers) -> Floats:
+    one, two, three = (vertices[faces[:, k]] for k in range(3))
+    return np.asarray(0.5 * np.linalg.norm(np.cross(two - one, three - one), axis=1))
+
+
+def _outward(vertices: Floats, faces: Integers) -> tuple[Integers, tuple[str, ...]]:
+    """Turn normals outwards; a surface inside another, whose normals point into it, is a cavity."""
+    label = _components(len(vertices), _edges(faces))[faces[:, 0]]
+    shells, label = np.unique(label, return_inverse=True)
+    label = label.reshape(-1)
+    volume = np.bincount(label, weights=signed_volumes(vertices, faces))
+    largest = int(np.argmax(np.abs(volume)))
+    mends: list[str] = []
+    sign = np.ones(len(shells))
+    if volume[largest] < 0.0:
+        mends.append("normals pointed inwards: the surface was turned inside out")
+        sign[:] = -1.0
+    cavities, apart, inner = [], 0, 0
+    for k in range(len(shells)):
+        if k == largest:
+            continue
+        place = vertices[faces[np.argmax(label == k), 0]]
+        inside = abs(_winding(vertices, faces[label == largest], place)) > 0.5
+        if sign[k] * volume[k] < 0.0:
+            if inside:
+                cavities.append(abs(float(volume[k])))
+            else:
+                sign[k] *= -1.0
+                apart += 1
+        elif inside:
+            inner += 1
+    if cavities:
+        said = "1 cavity" if len(cavities) == 1 else f"{len(cavities)} cavities"
+        mends.append(f"{said} of {sum(cavities):.3g} m^3 taken as hollow")
+    if apart:
+        mends.append(f"{counted(apart, 'separate surface')} turned inside out")
+    if inner:
+        mends.append(
+            f"{counted(inner, 'closed surface')} inside another with normals outwards counted as more of the material; "
+            "turn them if they are cavities"
+        )
+    return np.where(sign[label][:, None] < 0.0, faces[:, ::-1], faces), tuple(mends)
+
+
+def _winding(vertices: Floats, faces: Integers, place: Floats) -> float:
+    """How often a surface goes round a place: solid angles over 4 pi (Van Oosterom and Strackee 1983)."""
+    a, b, c = (vertices[faces[:, k]] - place for k in range(3))
+    la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
+    above = np.einsum("ij,ij->i", a, np.cross(b, c))
+    below = la * lb * lc + np.sum(a * b, axis=1) * lc + np.sum(b * c, axis=1) * la + np.sum(c * a, axis=1) * lb
+    return float(np.sum(np.arctan2(above, below)) / (2.0 * np.pi))

@@ -1,0 +1,185 @@
+"""How a body resists in every direction: uplift, frequency parameter and slenderness over the azimuth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.errors import InvalidOption
+from rocking.result import DatasetResult, table_of_some, variable
+from rocking.solid import support as polygons
+from rocking.tables import decimal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Azimuths unless others are asked for, degrees.
+EVERY: Final = np.arange(0.0, 360.0, 5.0)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rose(DatasetResult):
+    """Resistance of a body to rocking in every direction; from `Solid.rose`.
+
+    Its figure has the acceleration that lifts the body in each direction, and in it the support polygon about the
+    centre of mass, over the height of that: how far it reaches in a direction is that acceleration over g. Beside it
+    are slenderness and frequency parameter over the azimuth.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Over (azimuth), degrees clockwise from north: acceleration, that of the ground which lifts the body to that
+        side, in g, and overturns it where it lasts; alpha (rad), at which a tilted table overturns it; p (rad/s);
+        restitution, on leaving that side; radius R (m); rise, of the centre of mass up to the unstable balance (m). And
+        what planar rocking leaves out: coupling, products of inertia about the axis over the moment; aside, how far the
+        pivot lies to the side of the centre of mass (m); gap, how far it is from facing that of the other side (m).
+        Over (corner): east and north of the centre of mass (m), the support polygon. In its attributes weakest_azimuth
+        and weakest_acceleration, exact, and height_of_mass (m).
+    """
+
+    TABLES = MappingProxyType(
+        {
+            "rose": (
+                *("acceleration", "alpha", "p", "restitution", "radius", "rise"),
+                *("coupling", "aside", "gap"),
+            ),
+            "support": ("east", "north"),
+        }
+    )
+
+    def _headline(self) -> str:
+        data = self.data
+        weakest = f"towards {data.weakest_azimuth:.4g} deg, at {data.weakest_acceleration:.4g} g"
+        return f"{data.description}: lifted first {weakest}"
+
+    def summary(self) -> str:
+        data = self.data
+        shown = {"azimuth": "azimuth, deg", "acceleration": "uplift, g", "alpha": "alpha, rad", "p": "p, rad/s"} | {
+            "restitution": "restitution", "coupling": "coupling", "aside": "pivot aside, m"
+        }  # fmt: skip
+        rows = [*zip(*(data[name].values.tolist() for name in shown), strict=True)]
+        worst = {name: float(data[name].max()) for name in ("coupling", "aside", "gap")}
+        return "\n".join(
+            [
+                self._headline(),
+                "",
+                table_of_some([*shown.values()], rows),
+                "",
+                "planar rocking leaves out turning about the vertical and rolling over corners: over all azimuths "
+                f"products of inertia are up to {worst['coupling']:.2g} of the moment, pivots lie up to "
+                f"{worst['aside']:.2g} m to the side of the centre of mass, and those of both sides up to "
+                f"{worst['gap']:.2g} m from facing each other",
+            ]
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        data = self.data
+        names = ("azimuth", *self.TABLES["rose"])
+        return {
+            "description": data.description,
+            "weakest_azimuth_deg": data.weakest_azimuth,
+            "weakest_acceleration_g": data.weakest_acceleration,
+            "height_of_mass_m": data.height_of_mass,
+            "gravity_m_s2": data.gravity,
+            "support_m": np.column_stack([data.east.values, data.north.values]).tolist(),
+            "rose": [
+                dict(zip(names, row, strict=True))
+                for row in zip(*(data[name].values.tolist() for name in names), strict=True)
+            ],
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.rose import rose_figure
+
+        data = self.data
+        return rose_figure(
+            azimuth=data.azimuth.values,
+            acceleration=data.acceleration.values,
+            slenderness=np.rad2deg(data.alpha.values),
+            p=data.p.values,
+            support=np.column_stack([data.east.values, data.north.values]) / data.height_of_mass,
+            weakest=(data.weakest_azimuth, data.weakest_acceleration),
+            title=title or self._headline(),
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+def checked_azimuths(azimuths: ArrayLike | None) -> Floats:
+    """Return azimuths, degrees, each once from 0 to below 360 and in increasing order, or refuse them."""
+    if azimuths is None:
+        return EVERY
+    given = np.atleast_1d(checks.numbers(azimuths, "azimuths", InvalidOption))
+    if given.ndim != 1 or not given.size or not np.all(np.isfinite(given)):
+        raise InvalidOption("{} must be one finite number or more, degrees clockwise from north", "azimuths")
+    return np.unique([decimal(value) for value in np.mod(given, 360.0).tolist()])
+
+
+def rose_of(
+    polygon: Floats, height: float, inertia: Floats, gravity: float, azimuths: Floats, description: str
+) -> Rose:
+    """Return the rose of a body.
+
+    `polygon` is its support about the centre of mass, m, `height` that of the centre, m, and `inertia` the tensor about
+    it over the mass, m^2, with axes to the east, to the north and up.
+    """
+    import xarray as xr
+
+    here, there = (polygons.extents(polygon, turned) for turned in (azimuths, azimuths + 180.0))
+    radius, other = np.hypot(here.distance, height), np.hypot(there.distance, height)
+    squared, coupling = about_axes(inertia, azimuths)
+    facing, distances = polygons.edges(polygon)
+    least = int(np.argmin(distances))
+    columns = {
+        "acceleration": (here.distance / height, "ground acceleration that lifts the body to this side", "g"),
+        "alpha": (np.arctan2(here.distance, height), "slenderness, at which a tilted table overturns it", "rad"),
+        "p": (np.sqrt(gravity * radius / (squared + radius**2)), "frequency parameter", "rad/s"),
+        "restitution": (
+            (squared + height**2 - here.distance * there.distance) / (squared + other**2),
+            "factor on the angular speed on leaving this side, by angular momentum; not positive: too stocky to rock",
+            "1",
+        ),
+        "radius": (radius, "distance from the pivot to the centre of mass", "m"),
+        "rise": (radius - height, "rise of the centre of mass up to the unstable balance", "m"),
+        "coupling": (coupling, "products of inertia about the axis of rocking over the moment of inertia", "1"),
+        "aside": (here.aside, "how far the pivot lies to the side of the centre of mass", "m"),
+        "gap": (
+            np.maximum(np.maximum(here.low + there.low, -here.high - there.high), 0.0),
+            "how far the pivots of both sides are from facing each other",
+            "m",
+        ),
+    }
+    return Rose(
+        xr.Dataset(
+            {
+                **{name: variable("azimuth", values, said, unit) for name, (values, said, unit) in columns.items()},
+                "east": variable("corner", polygon[:, 0], "support, east of the centre of mass", "m"),
+                "north": variable("corner", polygon[:, 1], "support, north of the centre of mass", "m"),
+            },
+            {"azimuth": variable("azimuth", azimuths, "clockwise from north", "deg")},
+            {
+                "description": description,
+                "weakest_azimuth": float(facing[least]),
+                "weakest_acceleration": float(distances[least] / height),
+                "height_of_mass": height,
+                "gravity": gravity,
+            },
+        )
+    )
+
+
+def about_axes(inertia: Floats, azimuths: Floats) -> tuple[Floats, Floats]:
+    """Return the moments about the horizontal axes across azimuths, and products of inertia over them."""
+    towards = polygons.directions(azimuths)
+    axis = np.column_stack([towards[:, 1], -towards[:, 0], np.zeros(len(towards))])
+    torque = axis @ inertia
+    squared = np.sum(torque * axis, axis=1)
+    products = np.hypot(np.sum(torque[:, :2] * towards, axis=1), torque[:, 2])
+    return squared, products / squared

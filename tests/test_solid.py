@@ -1,0 +1,548 @@
+"""A body from a mesh is the body that its surface encloses: against closed forms, and against numeric integration."""
+
+import itertools
+import math
+import runpy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
+
+import rocking
+from rocking import Block, InvalidBlock, InvalidOption, Solid
+from rocking.solid.mending import agreeing, closed, is_closed, joined
+from rocking.solid.moments import moments
+from rocking.solid.reading import upright
+
+SCRIPT = runpy.run_path(str(Path(__file__).resolve().parents[1] / "scripts" / "ship_statue.py"))
+SIZES = (0.6, 0.4, 1.8)
+
+
+def mesh_of(corners, faces):
+    return trimesh.Trimesh(np.asarray(corners, float), np.asarray(faces), process=False)
+
+
+def box(sizes=SIZES, at=(0.0, 0.0)):
+    """A box that stands on z = 0, its middle at a place."""
+    made = trimesh.creation.box(sizes)
+    made.apply_translation([*at, 0.5 * sizes[2]])
+    return made
+
+
+def revolved(profile, at=(0.0, 0.0, 0.0)):
+    """Rings of regular polygons of 36 corners, at heights and radii."""
+    return mesh_of(*SCRIPT["revolved"](profile, at, None))
+
+
+def scene(**parts):
+    made = trimesh.Scene()
+    for name, part in parts.items():
+        made.add_geometry(part, node_name=name, geom_name=name)
+    return made
+
+
+def assert_same(one, other, rtol=1e-12):
+    np.testing.assert_allclose(one.centre[2], other.centre[2], rtol=rtol)
+    np.testing.assert_allclose(one.inertia_over_mass, other.inertia_over_mass, rtol=rtol, atol=rtol)
+    np.testing.assert_allclose(sorted(one.support.tolist()), sorted(other.support.tolist()), rtol=rtol, atol=rtol)
+
+
+def test_a_box_is_the_rectangular_block_across_its_sides():
+    solid = Solid.from_mesh(box(), density=2500.0)
+    assert solid.mass == pytest.approx(2500.0 * math.prod(SIZES), rel=1e-12)
+    for azimuth, width, deep in ((0.0, 0.4, 0.6), (90.0, 0.6, 0.4), (180.0, 0.4, 0.6), (270.0, 0.6, 0.4)):
+        block, rectangle = solid.block(azimuth), Block(width=width, height=1.8, mass=solid.mass)
+        for side, exact in zip(block.sides, rectangle.sides, strict=True):
+            for name in ("p", "alpha", "restitution", "radius", "inertia"):
+                assert getattr(side, name) == pytest.approx(getattr(exact, name), rel=1e-12), name
+        assert solid.inertia_over_mass[2, 2] == pytest.approx((width**2 + deep**2) / 12.0, rel=1e-12)
+    assert solid.weakest_azimuth in (pytest.approx(0.0), pytest.approx(180.0))
+    assert solid.mends == () == solid.notes
+
+
+def polygon_shares(count=36):
+    """Area over r^2 of a regular polygon, and its second moment about an axis over r^4."""
+    turn = 2.0 * math.pi / count
+    area = 0.5 * count * math.sin(turn)
+    return area, area * (2.0 + math.cos(turn)) / 12.0
+
+
+def integrated(profile):
+    """Volume, height of the centre, and squared radii of gyration across and up, by quadrature over the height."""
+    heights, radii = np.array(profile).T
+    area, second = polygon_shares()
+
+    def over(power, share, times):
+        parts = [
+            quad(lambda z: share * np.interp(z, heights, radii) ** power * z**times, low, high, epsabs=0.0)[0]
+            for low, high in itertools.pairwise(heights)
+            if high > low
+        ]
+        return sum(parts)
+
+    volume, about = over(2, area, 0), over(4, second, 0)
+    centre = over(2, area, 1) / volume
+    return volume, centre, about / volume + over(2, area, 2) / volume - centre**2, 2.0 * about / volume
+
+
+@pytest.mark.parametrize(
+    "profile",
+    [((0.0, 0.3), (1.4, 0.3)), ((0.0, 0.5), (1.2, 0.2)), ((0.0, 0.2), (0.3, 0.35), (0.9, 0.1))],
+    ids=["cylinder", "frustum", "vase"],
+)
+def test_a_body_of_revolution_has_the_moments_of_its_cross_sections(profile):
+    volume, centre, across, up = integrated(profile)
+    solid = Solid.from_mesh(revolved(profile, (0.7, -0.4, 0.0)))
+    assert solid.volume == pytest.approx(volume, rel=1e-12)
+    np.testing.assert_allclose(solid.centre, [0.7, -0.4, centre], rtol=1e-12)
+    np.testing.assert_allclose(solid.inertia_over_mass, np.diag([across, across, up]), rtol=1e-12, atol=1e-15)
+    radius = profile[0][1]
+    assert solid.block(10.0).sides[0].alpha == pytest.approx(math.atan2(radius, centre), rel=1e-12)
+
+
+def test_a_cylinder_of_a_circle_is_approached_as_the_square_of_its_facets():
+    radius, height = 0.3, 1.5
+    exact = Block.from_pivots((radius, radius), height / 2, math.sqrt(radius**2 / 4 + height**2 / 12))
+    for count in (32, 64, 128):
+        block = Solid.from_mesh(trimesh.creation.cylinder(radius=radius, height=height, sections=count)).block(90.0)
+        bound = (math.pi / count) ** 2
+        assert 0.0 < abs(block.sides[0].p / exact.p - 1.0) < bound
+
+
+def test_two_densities_move_the_centre_and_the_sides_differ():
+    # An L: a foot of one stone below, a post of another at its western end.
+    foot, post = box((1.0, 0.5, 0.4)), box((0.3, 0.5, 1.2), at=(-0.35, 0.0))
+    post.apply_translation([0.0, 0.0, 0.4])
+    densities = {"foot": 2000.0, "post": 2600.0}
+    solid = Solid.from_mesh(scene(foot=foot, post=post), density=densities)
+    masses = np.array([2000.0 * 0.2, 2600.0 * 0.18])
+    centres = np.array([[0.0, 0.2], [-0.35, 1.0]])
+    sizes = np.array([[1.0, 0.4], [0.3, 1.2]])
+    centre = masses @ centres / masses.sum()
+    inertia = masses @ (np.sum(sizes**2, axis=1) / 12.0 + np.sum((centres - centre) ** 2, axis=1)) / masses.sum()
+    exact = Block.from_pivots(
+        (0.5 - centre[0], 0.5 + centre[0]), centre[1], math.sqrt(inertia), mass=float(masses.sum())
+    )
+    block = solid.block(90.0)
+    for side, wanted in zip(block.sides, exact.sides, strict=True):
+        assert (side.p, side.alpha, side.restitution) == pytest.approx(
+            (wanted.p, wanted.alpha, wanted.restitution), rel=1e-12
+        )
+    assert block.sides[0].alpha > block.sides[1].alpha
+    assert solid.mass == pytest.approx(masses.sum(), rel=1e-12)
+    assert [(each.name, each.density) for each in solid.regions] == [*densities.items()]
+    # Of one density the mass cancels.
+    assert_same(Solid.from_mesh(scene(foot=foot, post=post)), Solid.from_mesh(scene(foot=foot, post=post), density=7.0))
+
+
+def test_the_opposite_azimuth_is_the_mirror_image():
+    solid = Solid.from_mesh("statue")
+    for azimuth in (0.0, 37.0, 90.0, 200.0):
+        here, there = solid.block(azimuth), solid.block(azimuth + 180.0)
+        for side, other in zip(here.sides, there.sides[::-1], strict=True):
+            assert (side.p, side.alpha, side.restitution) == pytest.approx(
+                (other.p, other.alpha, other.restitution), rel=1e-12
+            )
+
+
+def test_where_a_mesh_lies_how_it_is_turned_and_its_units_do_not_matter():
+    plain = Solid.from_mesh(box())
+    moved = box()
+    moved.apply_translation([0.0, 0.0, -37.0])
+    assert_same(Solid.from_mesh(moved), plain)
+    for unit, size in (("mm", 1e-3), ("cm", 1e-2), ("ft", 0.3048), (1e6, 1e6), (1e-6, 1e-6)):
+        other = box()
+        other.apply_scale(1.0 / size)
+        assert_same(Solid.from_mesh(other, unit=unit), plain, 1e-11)
+    tilted = box()
+    rotation = Rotation.from_rotvec([0.3, -0.2, 0.0])
+    tilted.vertices = rotation.apply(tilted.vertices) + np.array([5.0, 3.0, 2.0])
+    solid = Solid.from_mesh(tilted, up=rotation.apply([0.0, 0.0, 1.0]))
+    block, straight = solid.block(30.0), plain.block(30.0)
+    assert block.sides[0].p == pytest.approx(straight.sides[0].p, rel=1e-12)
+    assert block.sides[0].alpha == pytest.approx(straight.sides[0].alpha, rel=1e-12)
+    turned = Solid.from_mesh(box(), turn=25.0)
+    for azimuth in (0.0, 40.0, 111.0):
+        assert turned.block(azimuth + 25.0).sides[0].alpha == pytest.approx(
+            plain.block(azimuth).sides[0].alpha, rel=1e-12
+        )
+    quarter = Solid.from_mesh(box(), turn=90.0)
+    assert quarter.block(90.0).sides[0].alpha == plain.block(0.0).sides[0].alpha
+
+
+@pytest.mark.parametrize("up", ["x", "y", "z", "-x", "-y", "-z", [1.0, 2.0, -0.5], [0.0, 0.0, -3.0]])
+def test_any_axis_is_turned_up_without_a_mirror(up):
+    rotation = upright(up)
+    axis = (
+        np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1) if isinstance(up, str) else up / np.linalg.norm(up)
+    )
+    np.testing.assert_allclose(rotation @ axis, [0.0, 0.0, 1.0], atol=1e-15)
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def test_all_formats_hold_the_same_body_and_gltf_points_up_by_y(tmp_path):
+    plain = Solid.from_mesh(box())
+    for suffix in ("obj", "ply", "stl", "glb"):
+        made = box()
+        if suffix == "glb":
+            made.vertices = made.vertices @ upright("y")  # z to y
+        made.export(tmp_path / f"box.{suffix}")
+        assert_same(Solid.from_mesh(tmp_path / f"box.{suffix}"), plain, 1e-6)
+    for name, content in made.export(file_type="gltf").items():
+        (tmp_path / name).write_bytes(content)
+    assert_same(Solid.from_mesh(tmp_path / "model.gltf"), plain, 1e-6)
+    assert_same(Solid.from_mesh(str(tmp_path / "box.obj")), plain, 1e-6)
+
+
+def test_parts_of_a_scene_stand_where_their_nodes_put_them(tmp_path):
+    made = trimesh.Scene()
+    for name, height in (("low", 0.0), ("high", 1.0)):
+        place = trimesh.transformations.translation_matrix([0.0, 0.0, height])
+        made.add_geometry(box((1.0, 1.0, 1.0)), node_name=name, geom_name="cube", transform=place)
+    mirrored = np.diag([-1.0, 1.0, 1.0, 1.0])
+    mirrored[2, 3] = 2.0
+    made.add_geometry(box((1.0, 1.0, 1.0)), node_name="mirrored", geom_name="other", transform=mirrored)
+    solid = Solid.from_mesh(made, density={"low": 1.0, "high": 2.0, "mirrored": 3.0})
+    assert solid.mass == pytest.approx(6.0)
+    assert solid.centre[2] == pytest.approx((0.5 + 2 * 1.5 + 3 * 2.5) / 6.0)
+    assert solid.mends == ()
+
+
+# What is mended
+
+
+def mends_of(mesh):
+    return Solid.from_mesh(mesh).mends
+
+
+def test_normals_that_point_inwards_are_turned():
+    inverted = box()
+    inverted.invert()
+    assert_same(Solid.from_mesh(inverted), Solid.from_mesh(box()))
+    assert mends_of(inverted) == ("normals pointed inwards: the surface was turned inside out",)
+
+
+def test_faces_against_their_neighbours_are_turned():
+    mixed = box()
+    mixed.faces[[1, 4, 7]] = mixed.faces[[1, 4, 7], ::-1]
+    assert_same(Solid.from_mesh(mixed), Solid.from_mesh(box()))
+    assert mends_of(mixed) == ("3 faces turned to agree with the neighbours",)
+
+
+def test_flat_holes_are_filled_exactly_and_said_to_be():
+    plain = Solid.from_mesh(revolved(((0.0, 0.3), (1.4, 0.3))))
+    mesh = revolved(((0.0, 0.3), (1.4, 0.3)))
+    flat = np.ptp(mesh.vertices[mesh.faces][:, :, 2], axis=1) == 0.0
+    for left_out, count in ((flat & (mesh.triangles_center[:, 2] == 0.0), "1 hole"), (flat, "2 holes")):
+        opened = mesh_of(mesh.vertices, mesh.faces[~left_out])
+        solid = Solid.from_mesh(opened)
+        assert_same(solid, plain, 1e-11)
+        (said,) = solid.mends
+        assert said.startswith(f"{count} filled, ")
+        assert said.endswith("their edges are flat to 0 m") or "e-1" in said
+        area = polygon_shares()[0] * 0.3**2 * int(count[0])
+        assert f"{area:.3g} m^2" in said
+
+
+def test_a_hole_round_an_edge_is_filled_with_what_is_missing_known():
+    opened = box((1.0, 1.0, 1.0))
+    corner = np.flatnonzero(np.all(opened.vertices == [0.5, 0.5, 1.0], axis=1))
+    opened.update_faces(~np.any(np.isin(opened.faces, corner), axis=1))
+    (said,) = mends_of(opened)
+    assert "1 hole filled" in said and "flat to 0 m" not in said
+    assert 0.5 < Solid.from_mesh(opened).volume < 1.0
+
+
+def test_cavities_are_hollow_and_pieces_are_not():
+    inner = trimesh.creation.box((0.2, 0.2, 0.2))
+    inner.apply_translation([0.0, 0.0, 0.5])
+    outer, hollow = box((1.0, 1.0, 1.0)), inner.copy()
+    hollow.invert()
+    both = trimesh.util.concatenate([outer, hollow])
+    solid = Solid.from_mesh(both)
+    assert solid.volume == pytest.approx(1.0 - 0.008)
+    assert solid.mends == ("1 cavity of 0.008 m^3 taken as hollow",)
+    inverted = both.copy()
+    inverted.invert()
+    assert Solid.from_mesh(inverted).volume == pytest.approx(1.0 - 0.008)
+    core = Solid.from_mesh(trimesh.util.concatenate([outer, inner]))
+    assert core.volume == pytest.approx(1.008)
+    assert "turn them if they are cavities" in core.mends[0]
+    apart = box((0.2, 0.2, 0.2), at=(0.0, 2.0))
+    apart.invert()
+    pieces = Solid.from_mesh(trimesh.util.concatenate([outer, apart]))
+    assert pieces.volume == pytest.approx(1.008)
+    assert pieces.mends == ("1 separate surface turned inside out",)
+
+
+def test_faces_that_are_none_or_come_twice_are_left_out():
+    mesh = box()
+    faces = np.vstack([mesh.faces, [0, 0, 1], [2, 2, 2], mesh.faces[3], np.roll(mesh.faces[5], 1)])
+    solid = Solid.from_mesh(mesh_of(mesh.vertices, faces))
+    assert_same(solid, Solid.from_mesh(box()))
+    assert solid.mends == ("2 faces without area left out", "2 faces that came twice left out")
+
+
+def test_a_surface_in_several_open_parts_of_one_density_is_joined():
+    mesh = box()
+    halves = scene(
+        left=mesh_of(mesh.vertices, mesh.faces[:6]),
+        right=mesh_of(mesh.vertices, mesh.faces[6:]),
+    )
+    solid = Solid.from_mesh(halves, density=2000.0)
+    assert_same(solid, Solid.from_mesh(box()))
+    assert solid.mends == ()
+    assert [each.name for each in solid.regions] == ["left + right"]
+    assert solid.mass == pytest.approx(2000.0 * math.prod(SIZES))
+
+
+def test_random_triangles_that_are_turned_anyhow_close_again():
+    rng = np.random.default_rng(5)
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    exact = moments(np.asarray(sphere.vertices), np.asarray(sphere.faces))
+    judged = 0
+    for _ in range(20):
+        faces = np.array(sphere.faces)
+        turned = rng.random(len(faces)) < rng.random()
+        faces[turned] = faces[turned, ::-1]
+        surface = closed(agreeing(joined(np.asarray(sphere.vertices), faces[rng.permutation(len(faces))])))
+        assert is_closed(surface.faces)
+        found = moments(surface.vertices, surface.faces)
+        assert found.amount == pytest.approx(exact.amount, rel=1e-12)
+        np.testing.assert_allclose(found.second, exact.second, rtol=1e-12, atol=1e-14)
+        judged += 1
+    assert judged == 20
+
+
+# The support
+
+
+def test_only_corners_near_the_lowest_one_carry():
+    # A base whose edge is bevelled by 5 mm over 50 mm.
+    profile = ((0.0, 0.25), (0.005, 0.3), (1.5, 0.3))
+    sharp = Solid.from_mesh(revolved(profile))
+    assert np.ptp(sharp.support[:, 0]) == pytest.approx(0.5)
+    (note,) = sharp.notes
+    assert "the support would be 44 % larger" in note
+    wide = Solid.from_mesh(revolved(profile), tolerance=0.006)
+    assert np.ptp(wide.support[:, 0]) == pytest.approx(0.6)
+    assert wide.notes == ()
+    given = Solid.from_mesh(revolved(profile), support=[(0.1, 0.1), (-0.1, 0.1), (0.0, 0.0), (-0.1, -0.1), (0.1, -0.1)])
+    assert len(given.support) == 4
+    assert given.block(0.0).sides[0].alpha == pytest.approx(math.atan2(0.1, given.centre[2]))
+
+
+def test_the_rose_is_the_blocks_and_the_least_is_at_an_edge():
+    solid = Solid.from_mesh("statue", density={"plinth": 2700.0, "figure": 2650.0, "head": 2650.0})
+    azimuths = np.arange(3.0, 360.0, 30.0)
+    rose = solid.rose(azimuths)
+    for k, azimuth in enumerate(azimuths):
+        side, other = solid.block(azimuth).sides
+        assert rose.acceleration.values[k] == pytest.approx(math.tan(side.alpha), rel=1e-12)
+        for name in ("alpha", "p", "restitution", "radius"):
+            assert rose[name].values[k] == pytest.approx(getattr(side, name), rel=1e-12), name
+        assert rose.rise.values[k] == pytest.approx(side.radius - solid.centre[2], rel=1e-12)
+        assert rose.select(azimuth=(azimuth + 180.0) % 360.0).p.values[0] == pytest.approx(other.p, rel=1e-12)
+    fine = solid.rose(np.arange(0.0, 360.0, 0.5))
+    assert float(fine.acceleration.min()) == pytest.approx(rose.weakest_acceleration, rel=1e-12)
+    assert fine.azimuth.values[np.argmin(fine.acceleration.values)] == pytest.approx(rose.weakest_azimuth)
+    assert solid.rose().sizes["azimuth"] == 72
+    assert solid.rose([360.0, 0.0, -90.0]).azimuth.values.tolist() == [0.0, 270.0]
+
+
+def test_what_planar_rocking_leaves_out_is_measured():
+    # A box of which one upper corner is heavy: the axes to the east and to the north are no principal ones.
+    heavy = trimesh.creation.box((0.1, 0.1, 0.1))
+    heavy.apply_translation([0.25, 0.15, 1.9])
+    solid = Solid.from_mesh(scene(box=box(), heavy=heavy), density={"box": 1000.0, "heavy": 50000.0})
+    tensor = solid.inertia_over_mass
+    rose = solid.rose([0.0, 90.0])
+    np.testing.assert_allclose(
+        rose.coupling.values,
+        [np.hypot(tensor[0, 1], tensor[0, 2]) / tensor[0, 0], np.hypot(tensor[0, 1], tensor[1, 2]) / tensor[1, 1]],
+        rtol=1e-12,
+    )
+    assert rose.coupling.values.min() > 0.03
+    even = Solid.from_mesh(box()).rose([0.0, 30.0])
+    assert even.coupling.values[0] == pytest.approx(0.0, abs=1e-12)
+    # At 30 deg the corner at (0.3, 0.2) is the pivot: on the right of the direction, and the other one on its left.
+    aside = abs(0.3 * math.cos(math.radians(30.0)) - 0.2 * math.sin(math.radians(30.0)))
+    np.testing.assert_allclose(even.aside.values, [0.0, aside], atol=1e-12)
+    np.testing.assert_allclose(even.gap.values, [0.0, 2.0 * aside], atol=1e-12)
+
+
+def test_a_body_needs_no_mesh():
+    made = Solid.from_mesh(box(), density=1000.0)
+    again = Solid(made.support, made.centre, made.inertia_over_mass, mass=made.mass)
+    assert again.block(20.0) == made.block(20.0)
+    assert again.volume is None and again.height is None
+    assert again.summary().startswith("rigid body: 432 kg")
+    assert again.to_dict()["volume_m3"] is None
+    with pytest.raises(ValueError, match="read-only"):
+        again.centre[0] = 1.0
+
+
+# The statue that ships
+
+
+def test_the_shipped_statue_is_what_its_script_makes_and_small(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["ship_statue.py", str(tmp_path / "statue.obj")])
+    SCRIPT["main"]()
+    shipped = Path(rocking.__file__).parent / "solid" / "data" / "statue.obj"
+    assert shipped.read_bytes() == (tmp_path / "statue.obj").read_bytes()
+    assert shipped.stat().st_size < 100_000
+
+
+def test_the_statue_is_what_quadrature_over_its_cross_sections_says():
+    densities = {"plinth": 2700.0, "figure": 2650.0, "head": 2650.0}
+    solid = Solid.from_mesh("statue", density=densities)
+    x, y, z = SCRIPT["PLINTH"]
+    rows = [(x * y * z, (0.0, 0.0, 0.5 * z), np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) / 12.0)]
+    figure, head = SCRIPT["FIGURE"], (*SCRIPT["HEAD"], (SCRIPT["HEAD_TOP"], 0.0))
+    for profile, at, base in ((figure, SCRIPT["FIGURE_AT"], z), (head, SCRIPT["HEAD_AT"], z + figure[-1][0])):
+        volume, centre, across, up = integrated(profile)
+        rows.append((volume, (*at, base + centre), np.diag([across, across, up])))
+    masses = np.array([volume for volume, _, _ in rows]) * [*densities.values()]
+    centres = np.array([centre for _, centre, _ in rows])
+    centre = masses @ centres / masses.sum()
+    inertia = np.zeros((3, 3))
+    for mass, at, own in zip(masses, centres, [own for _, _, own in rows], strict=True):
+        off = at - centre
+        inertia += mass * (own + off @ off * np.eye(3) - np.outer(off, off)) / masses.sum()
+    assert solid.mass == pytest.approx(masses.sum(), rel=1e-8)
+    np.testing.assert_allclose(solid.centre, centre, rtol=1e-8)
+    np.testing.assert_allclose(solid.inertia_over_mass, inertia, rtol=1e-8, atol=1e-9)
+    assert solid.mends == ()
+
+
+# What is refused
+
+
+def flat():
+    return mesh_of([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (1, 3, 2)])
+
+
+def strip():
+    """A Möbius strip of six quadrilaterals."""
+    turns = np.arange(6) * np.pi / 3.0
+    tilt = 0.5 * turns
+    ring = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(6)])
+    off = 0.3 * np.column_stack([np.cos(tilt) * np.cos(turns), np.cos(tilt) * np.sin(turns), np.sin(tilt)])
+    corners = np.vstack([ring + off, ring - off])
+    faces = []
+    for k in range(6):
+        a, b, c, d = k, (k + 1) % 6, k + 6, (k + 1) % 6 + 6
+        if k == 5:
+            b, d = d, b
+        faces += [(a, b, d), (a, d, c)]
+    return mesh_of(corners, faces)
+
+
+def leaning():
+    """A box whose upper half lies far to the east."""
+    upper = box((0.4, 0.4, 1.0), at=(0.7, 0.0))
+    upper.apply_translation([0.0, 0.0, 0.2])
+    return scene(foot=box((0.4, 0.4, 0.2)), upper=upper)
+
+
+REFUSED = {
+    "no volume": (lambda: Solid.from_mesh(flat()), "mesh encloses no volume: it is a surface without an inside"),
+    "one side": (lambda: Solid.from_mesh(strip()), "one side only, as a Möbius strip"),
+    "one place": (lambda: Solid.from_mesh(mesh_of(np.ones((3, 3)), [(0, 1, 2)])), "are at one place"),
+    "not finite": (
+        lambda: Solid.from_mesh(mesh_of([(0, 0, 0), (1, 0, 0), (0, np.nan, 0)], [(0, 1, 2)])),
+        "corners that are not finite",
+    ),
+    "does not stand": (
+        lambda: Solid.from_mesh(leaning()),
+        r"does not stand: its centre of mass lies 0\.383 m outside its support, towards 90 deg",
+    ),
+    "a ball": (lambda: Solid.from_mesh(trimesh.creation.icosphere()), "stands on a point or a line"),
+    "support beyond": (
+        lambda: Solid.from_mesh(box(), support=[(0.35, 0.2), (-0.3, 0.2), (-0.3, -0.2)]),
+        r"support reaches 0\.05 m beyond the outline of the mesh, from -0\.3 m to 0\.3 m in the east",
+    ),
+    "support on a line": (
+        lambda: Solid.from_mesh(box(), support=[(0.1, 0.1), (0.0, 0.0), (-0.1, -0.1)]),
+        "support must have three corners or more that are not on one line",
+    ),
+    "support of numbers": (lambda: Solid.from_mesh(box(), support=[0.1, 0.2]), "support must be corners of a polygon"),
+    "density of no part": (
+        lambda: Solid.from_mesh("statue", density={"plint": 2700.0}),
+        "density has a part 'plint', which the mesh does not have; did you mean plinth",
+    ),
+    "density missing": (
+        lambda: Solid.from_mesh("statue", density={"plinth": 2700.0, "head": 1.0}),
+        "density is missing for figure; its parts are figure, head, plinth",
+    ),
+    "density": (lambda: Solid.from_mesh(box(), density=-1.0), "density must be a positive number, in kg/m"),
+    "unit": (lambda: Solid.from_mesh(box(), unit="inch"), "unit must be one of m, cm, mm, in, ft"),
+    "up": (lambda: Solid.from_mesh(box(), up="north"), "up must be one of x, y, z"),
+    "up of zero": (lambda: Solid.from_mesh(box(), up=[0.0, 0.0, 0.0]), "up must be x, y or z, or a vector"),
+    "tolerance": (lambda: Solid.from_mesh(box(), tolerance=0.0), "tolerance must be a positive number, in m"),
+    "turn": (lambda: Solid.from_mesh(box(), turn=math.nan), "turn must be a finite number"),
+    "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
+    "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),
+    "no mesh": (lambda: Solid.from_mesh(3.0), "mesh must be text or a path, not 3"),
+    "inertia": (
+        lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, 1), np.diag([1.0, 1.0, 3.0])),
+        "inertia_over_mass is the tensor of no body",
+    ),
+    "centre": (lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 1), np.eye(3)), r"centre must be finite numbers of shape"),
+    "centre below": (lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, -1), np.eye(3)), "height of the centre of mass"),
+    "azimuth": (lambda: Solid.from_mesh("statue").block(math.inf), "azimuth must be a finite number"),
+    "stocky": (lambda: Solid.from_mesh(box((2.0, 2.0, 0.3))).block(0.0), "too stocky to rock that way"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_no_body_is_refused_in_one_sentence(case):
+    make, sentence = REFUSED[case]
+    with pytest.raises(InvalidBlock, match=sentence) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("azimuths", [[], [math.nan], "north", [[0.0]]])
+def test_azimuths_are_numbers(azimuths):
+    with pytest.raises(InvalidOption, match="azimuths must be"):
+        Solid.from_mesh("statue").rose(azimuths)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+         "property float z\nend_header\n0 0 0\n", "holds no faces"),
+        ("nothing.obj", "# nothing\n", "holds no faces"),
+        ("text.stl", "hello", "holds no faces"),
+        ("text.ply", "hello", "cannot be read: "),
+        ("text.glb", "hello", "cannot be read: "),
+        ("block.xyzw", "hello", "cannot be read: is of no format that trimesh reads"),
+        ("plain", "hello", "cannot be read: is of no format that trimesh reads"),
+    ],
+)  # fmt: skip
+def test_a_file_without_a_mesh_is_refused_by_its_name(tmp_path, name, content, sentence):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(InvalidBlock, match=sentence) as caught:
+        Solid.from_mesh(tmp_path / name)
+    assert caught.value.path == str(tmp_path / name)
+    assert "\n" not in str(caught.value)
+
+
+def test_without_trimesh_it_is_said_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(InvalidOption, match=r"pip install 'rocking\[mesh\]'"):
+        Solid.from_mesh("statue")
+
+
+@pytest.mark.parametrize(("unit", "noted"), [("m", 0), ("mm", 1), (1000.0, 1)])
+def test_a_body_of_no_likely_size_is_noted(unit, noted):
+    notes = Solid.from_mesh(box(), unit=unit).notes
+    assert len(notes) == noted
+    assert all("are its coordinates in metres?" in note for note in notes)
