@@ -1,4 +1,4 @@
-"""Published results of impact dynamics, redrawn: chattering and sticking of an oscillator against 40 digits."""
+"""Published results of impact dynamics, redrawn: orbits of a slender block, an oscillator that sticks to its stop."""
 
 import math
 from typing import NamedTuple
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from oracles import closed_orbits, sticking_oscillator
 
+import rocking
 from rocking import dynamics, pulses
 
 UNIT = 1.0 / (2.0 * math.pi)  # natural frequency of the oscillators, Hz: 1 rad/s
@@ -173,3 +174,93 @@ def test_speeds_of_orbits_with_one_impact_are_half_an_ellipse_over_the_place_of_
     lower = speeds < fold.orbit.response.impacts["speed_after"][0] * places / fold.value
     assert np.sum(beyond & lower) >= 3 and np.sum(beyond & ~lower) >= 3
     assert np.array_equal(branch.is_stable[chosen][beyond], ~lower[beyond])
+
+
+# --- Hogan's orbits of a slender block --------------------------------------------------------------------------
+
+P, ALPHA = 1.0, 0.1
+
+#: Forcing frequency over p, restitution, and periods of the motion in which the block hits the ground twice.
+HOGAN = [(3.0, 0.925, 1), (3.0, 0.925, 3), (4.0, 0.85, 3), (2.0, 0.8, 1)]
+
+
+def slender(ratio, restitution, m):
+    """Block, its orbits in closed form, and what makes (block, motion) of the peak acceleration over g alpha."""
+    block = rocking.Block.from_parameters(p=P, alpha=ALPHA, restitution=restitution)
+    frequency = ratio * P * UNIT
+    exact = closed_orbits.Block(P, ALPHA, restitution, frequency, block.gravity, m)
+    unit = block.gravity * ALPHA
+    return exact, unit, lambda level: (block, pulses.sine(level * unit, frequency, cycles=1))
+
+
+@pytest.mark.parametrize(("ratio", "restitution", "m"), HOGAN)
+def test_asymmetric_orbits_double_where_their_two_equations_say(ratio, restitution, m):
+    """The orbit of the closed form comes back, and a multiplier of the map is -1 there."""
+    exact, unit, family = slender(ratio, restitution, m)
+    amplitude, phase, speed = exact.flip
+    assert amplitude > exact.amplitude(exact.breaking)
+    strobe = dynamics.stroboscopic_map(*family(amplitude / unit), model="linear")
+    state = strobe.from_impacts([phase / (ratio * P), speed])
+    after, change = strobe.derivative(state, m)
+    assert after == pytest.approx(state, abs=1e-10)
+    assert np.linalg.det(change + np.eye(2)) == pytest.approx(0.0, abs=1e-8)
+    assert np.linalg.det(change) == pytest.approx(restitution**4, rel=1e-8)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("ratio", "restitution", "m"), HOGAN)
+def test_branches_of_a_slender_block_bifurcate_where_closed_forms_say(ratio, restitution, m):
+    """The first fold is sharp beside the range of the parameter, and an impact there is near the start of a period."""
+    exact, unit, family = slender(ratio, restitution, m)
+    fold, breaking = (exact.amplitude(each) / unit for each in (exact.fold, exact.breaking))
+    flip = exact.flip[0] / unit
+    below, level = 0.97 * breaking, 0.5 * (breaking + flip)
+
+    def orbits_at(level):
+        found = dynamics.periodic_orbits(*family(level), period=m, model="linear")
+        return [each for each in found if each.is_stable and each.period == m and each.impacts == 2.0]
+
+    (whole,) = (each for each in orbits_at(below) if each.symmetric)
+    one_sided = next(each for each in orbits_at(level) if not each.symmetric)
+    symmetric = dynamics.continue_orbit(whole, family, below, (0.5 * fold, 1.05 * breaking), step=0.2)
+    kinds = {each.kind: each.value for each in symmetric.bifurcations}
+    assert kinds["fold"] == pytest.approx(fold, rel=1e-9)
+    assert kinds["symmetry breaking"] == pytest.approx(breaking, rel=1e-9)
+    other = dynamics.continue_orbit(one_sided, family, level, (0.9 * breaking, 1.1 * flip), step=0.2)
+    kinds = {each.kind: each.value for each in other.bifurcations}
+    assert kinds["symmetry breaking"] == pytest.approx(breaking, rel=1e-9)
+    assert kinds["flip"] == pytest.approx(flip, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "restitution"),
+    [
+        (3.0, 0.925),
+        *(pytest.param(*each, marks=pytest.mark.thorough) for each in ((5.0, 0.9), (2.0, 0.8), (8.0, 0.95))),
+    ],
+)
+def test_courses_lead_from_one_balance_to_the_other_from_the_heteroclinic_amplitude_on(ratio, restitution):
+    """Blocks start on the unstable manifold of the orbit at the balance of side +, and hit the ground at all phases."""
+    exact, _, _ = slender(ratio, restitution, 1)
+    block = rocking.Block.from_parameters(p=P, alpha=ALPHA, restitution=restitution)
+    w, frequency, before = ratio * P, ratio * P * UNIT, 3.0 / P
+    best = math.atan2(1.0 + restitution, ratio * (1.0 - restitution))
+    phases = best + np.concatenate([np.linspace(-0.2, 0.2, 41), np.linspace(0.3, 2.0 * math.pi - 0.3, 20)])
+    found = {}
+    for change in (-1e-4, 1e-4):
+        amplitude = exact.heteroclinic * (1.0 + change)
+        forced = P * P * amplitude / (block.gravity * (w * w + P * P))
+        overturned = 0
+        for phase in phases:
+            start = phase - w * before
+            away = (ALPHA + forced * math.sin(phase)) * math.exp(-P * before)
+            response = rocking.simulate(
+                block, pulses.sine(amplitude, frequency, cycles=25.0 * frequency / P, phase=start), model="linear",
+                initial_rotation=ALPHA + forced * math.sin(start) - away,
+                initial_velocity=forced * w * math.cos(start) - P * away,
+            )  # fmt: skip
+            times = response.impacts["time"]
+            assert times[0] == pytest.approx(before, abs=1e-6)
+            overturned += bool(response.overturned) and len(times) == 1
+        found[change] = overturned
+    assert found[-1e-4] == 0 < found[1e-4]

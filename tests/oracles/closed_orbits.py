@@ -182,15 +182,15 @@ class Block:
             guess = self.amplitude(speed), math.atan2(self.forced(speed)[0], self.forced(speed)[1])
 
         def misses(unknown):
-            (first, second), _ = self._passed(share, *unknown)
+            (first, second), *_ = self._passed(share, *unknown)
             return first + second, (first - second) / (share - 0.5)
 
-        found = fsolve(misses, guess, xtol=1e-13)
+        found, *_ = fsolve(misses, guess, xtol=1e-13, full_output=True)
         assert np.max(np.abs(misses(found))) < 1e-9 * self.alpha * self.p, "no orbit was found"
         return found
 
     def _passed(self, share, amplitude, phase):
-        """By how much the speeds at both impacts miss the law, and the derivative over the whole period."""
+        """By how much the speeds at both impacts miss the law, the derivative over the period, and the first speed."""
         e, p, w = self.restitution, self.p, self._w
         forced = p * p * amplitude / (self.gravity * (w * w + p * p))
         starts, ends, change, time = [], [], np.eye(2), phase / w
@@ -206,16 +206,16 @@ class Block:
             jump = np.array([[e, 0.0], [(beyond - e * before) / (sign * ends[-1]), e]])
             change = jump @ np.array([[cosh, sinh / p], [p * sinh, cosh]]) @ change
             time = after
-        return (starts[1] + e * ends[0], starts[0] + e * ends[1]), change
+        return (starts[1] + e * ends[0], starts[0] + e * ends[1]), change, starts[0]
 
     @property
     def flip(self):
-        """Peak ground acceleration at which the orbits that are not symmetric have a multiplier -1."""
+        """Orbit, not symmetric, with a multiplier -1: amplitude, phase of an impact onto side +, and speed after it."""
 
         def trace(share):
             return float(np.trace(self._passed(share, *known)[1])) + 1.0 + self.restitution**4
 
-        low, known = 0.5, None
+        low, high, known = 0.5, math.nan, None
         for share in np.arange(0.502, 0.9, 0.002):
             known = self.asymmetric(share, known)
             if trace(share) < 0.0:
@@ -226,4 +226,5 @@ class Block:
             share = 0.5 * (low + high)
             known = self.asymmetric(share, known)
             low, high = (share, high) if trace(share) > 0.0 else (low, share)
-        return known[0]
+        amplitude, phase = known
+        return float(amplitude), float(phase), float(self._passed(share, amplitude, phase)[2])
