@@ -9,6 +9,9 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+from scipy.optimize import fsolve
+
 
 class Ball(NamedTuple):
     """A ball that hits the table once every n periods; levels are the table's peak acceleration over g."""
@@ -161,3 +164,67 @@ class Block:
     def breaking(self):
         """Speed at which a multiplier is -1: beyond it the orbit is no longer stable as a symmetric one."""
         return self.speed_with(-1.0 - self.restitution**2)
+
+    @property
+    def heteroclinic(self):
+        """Peak ground acceleration from which courses lead from near the balance of a side to that of the other."""
+        e, p, w = self.restitution, self.p, self._w
+        forced = p * self.alpha * (1.0 - e) / math.hypot(p * (1.0 + e), w * (1.0 - e))
+        return forced * (w**2 + p**2) * self.gravity / p**2
+
+    def asymmetric(self, share, guess=None):
+        """Amplitude, and the phase of an impact onto side +, of the orbit that is on that side for a share of the time.
+
+        The arcs on both sides then last share T and (1 - share) T, T = m periods; without a guess, near the symmetric.
+        """
+        if guess is None:
+            speed = self.breaking
+            guess = self.amplitude(speed), math.atan2(self.forced(speed)[0], self.forced(speed)[1])
+
+        def misses(unknown):
+            (first, second), *_ = self._passed(share, *unknown)
+            return first + second, (first - second) / (share - 0.5)
+
+        found, *_ = fsolve(misses, guess, xtol=1e-13, full_output=True)
+        assert np.max(np.abs(misses(found))) < 1e-9 * self.alpha * self.p, "no orbit was found"
+        return found
+
+    def _passed(self, share, amplitude, phase):
+        """By how much the speeds at both impacts miss the law, the derivative over the period, and the first speed."""
+        e, p, w = self.restitution, self.p, self._w
+        forced = p * p * amplitude / (self.gravity * (w * w + p * p))
+        starts, ends, change, time = [], [], np.eye(2), phase / w
+        for sign, length in ((1.0, 2.0 * self._h * share), (-1.0, 2.0 * self._h * (1.0 - share))):
+            after = time + length
+            cosh, sinh = math.cosh(p * length), math.sinh(p * length)
+            even = -self.alpha - sign * forced * math.sin(w * time)
+            odd = -(self.alpha + sign * forced * math.sin(w * after) + even * cosh) / sinh
+            starts.append(p * odd + sign * forced * w * math.cos(w * time))
+            ends.append(p * (even * sinh + odd * cosh) + sign * forced * w * math.cos(w * after))
+            push = p * p * amplitude / self.gravity * math.sin(w * after)
+            before, beyond = -sign * p * p * self.alpha - push, sign * p * p * self.alpha - push
+            jump = np.array([[e, 0.0], [(beyond - e * before) / (sign * ends[-1]), e]])
+            change = jump @ np.array([[cosh, sinh / p], [p * sinh, cosh]]) @ change
+            time = after
+        return (starts[1] + e * ends[0], starts[0] + e * ends[1]), change, starts[0]
+
+    @property
+    def flip(self):
+        """Orbit, not symmetric, with a multiplier -1: amplitude, phase of an impact onto side +, and speed after it."""
+
+        def trace(share):
+            return float(np.trace(self._passed(share, *known)[1])) + 1.0 + self.restitution**4
+
+        low, high, known = 0.5, math.nan, None
+        for share in np.arange(0.502, 0.9, 0.002):
+            known = self.asymmetric(share, known)
+            if trace(share) < 0.0:
+                high = share
+                break
+            low = share
+        for _ in range(50):
+            share = 0.5 * (low + high)
+            known = self.asymmetric(share, known)
+            low, high = (share, high) if trace(share) > 0.0 else (low, share)
+        amplitude, phase = known
+        return float(amplitude), float(phase), float(self._passed(share, amplitude, phase)[2])

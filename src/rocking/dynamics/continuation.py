@@ -40,8 +40,8 @@ _COSINE: Final = 0.97
 #: Speed of the slowest impact, over the scale, from which grazing is extrapolated.
 _SLOW: Final = 2e-3
 
-#: Share of the parameter in a tangent, below which the start of a period is not moved.
-_ALONG: Final = 0.05
+#: Step along a tangent that shows where it leads after the start of a period has been moved.
+_AHEAD: Final = 1e-6
 
 #: Points after which a branch may have come back to where it began.
 _ROUND: Final = 12
@@ -269,12 +269,14 @@ class _Walk(Location):
     def move_start(self) -> None:
         """Move the start of the period where an impact is near it."""
         equations, z = self.equations.moved(self.z, self.course)
-        # Near a fold the branch is along the plane of one parameter: a later point will do.
-        if equations is self.equations or abs(self.tangent[2]) < _ALONG:
+        if equations is self.equations:
             return
-        found = equations.solved(z, AT_VALUE)
+        # At a fold the parameter does not say where the branch leads: the course a little ahead does.
+        onwards = self.equations.later(self.z + _AHEAD * self.tangent, equations.shift) - z
+        onwards /= np.linalg.norm(onwards)
+        found = equations.solved(z, onwards)
         if found is not None:
-            tangent = found.tangent(self.tangent[2] * AT_VALUE)
+            tangent = found.tangent(onwards)
             self.equations = equations
             self.go_to(found.z, tangent, found.tests(tangent))
 

@@ -219,8 +219,7 @@ class OrbitEquations:
 
     def moved(self, z: Floats, course: Course) -> tuple[OrbitEquations, Floats]:
         """Equations with a start of the period that no impact is near, and the same orbit in these."""
-        state, value = self.physical(z)
-        _, motion = self.family(value)
+        _, motion = self.family(self.physical(z)[1])
         starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
         phases = np.mod(course.phases + starts[self.shift], period)
         if not len(phases):
@@ -230,9 +229,15 @@ class OrbitEquations:
         best = int(np.argmax(nearest))
         if nearest[self.shift] > _TOO_NEAR * period or nearest[best] <= nearest[self.shift]:
             return self, z
-        response = response_of(self.strobe(value), state, self.period)
-        later = response.states(float(np.mod(starts[best] - starts[self.shift], period)))[:2]
-        return replace(self, shift=best), np.append(later, value) / self.sizes
+        return replace(self, shift=best), self.later(z, best)
+
+    def later(self, z: Floats, shift: int) -> Floats:
+        """Numbers of the same course where a period starts at another breakpoint of the motion."""
+        state, value = self.physical(z)
+        _, motion = self.family(value)
+        time = float(np.mod(motion.breakpoints[shift] - motion.breakpoints[self.shift], motion.duration))
+        after = response_of(self.strobe(value), state, self.period).states(time)[:2]
+        return np.append(after, value) / self.sizes
 
 
 def tangent_of(jacobian: Floats, like: Floats) -> Floats:

@@ -1,0 +1,322 @@
+"""Make the tables and figures of published impact dynamics in docs/theory/orbits.md and docs/howto/bifurcation.md.
+
+Run ``python scripts/dynamics_pages.py`` from the repository's root (two minutes); tests compare what it computes with
+closed forms.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import rocking
+from rocking import dynamics
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, REST, add_labels, add_legend, figure_for, handles_of
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+TABLES = DOCS / "_tables"
+IMAGES = DOCS / "_static"
+DOTS_PER_INCH = 110
+
+#: The block of Hogan's orbits, forced at three times its frequency parameter; what it hits the ground twice in.
+HOGAN_BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.1, restitution=0.925)
+HOGAN_RATIO = 3.0
+ORBITS = {1: "one period", 3: "three periods"}
+
+#: Height over width of the blocks that are compared, their frequency parameter, and the forcing frequency over that.
+SLENDERNESSES = (2.0, 3.0, 5.0, 8.0)
+P, RATIO = 2.0, 5.0
+#: Where the resultant of the contact acts, as a share of the half-width: at the corner as Housner has it, or nearer.
+CONTACTS = {1.0: "at the corner", 0.7: "at 0.7 of the half-width"}
+#: Amplitude over that of uplift at which basins and exponents are found, and amplitudes of the diagrams.
+LEVEL = 2.0
+LEVELS = np.linspace(1.02, 5.4, 220)
+
+#: Restitutions of the oscillators that stick.
+RESTITUTIONS = (0.5, 0.8, 0.9)
+
+
+def main() -> None:
+    """Write all tables and images."""
+    TABLES.mkdir(exist_ok=True)
+    branches = hogan_branches()
+    rows = restitution_rows()
+    tables = {"orbits-slender.txt": hogan_table(branches), "restitution-orbits.txt": restitution_table(rows)}
+    for name, text in tables.items():
+        (TABLES / name).write_text(text, encoding="utf-8")
+    figures = {
+        "orbits-slender.png": hogan_figure(branches),
+        "restitution-orbits.png": restitution_figure(rows),
+        "sticking.png": sticking_figure(),
+    }
+    for name, figure in figures.items():
+        figure.savefig(IMAGES / name, dpi=DOTS_PER_INCH, pil_kwargs={"optimize": True})
+        sys.stdout.write(f"{IMAGES / name}: {(IMAGES / name).stat().st_size // 1000} kB\n")
+
+
+# --- Hogan's orbits ---------------------------------------------------------------------------------------------
+
+
+def shaken(block, ratio, model="linear"):
+    """Return what makes (block, motion) of the peak acceleration over that of uplift."""
+    lifts = block.uplift_thresholds(model)[0]
+    frequency = ratio * block.p / (2.0 * math.pi)
+    return lambda level: (block, rocking.pulses.sine(level * lifts, frequency, cycles=1))
+
+
+def stable_orbits(family, level, period, model):
+    """Stable orbits with two impacts in so many periods."""
+    found = dynamics.periodic_orbits(*family(level), period=period, model=model)
+    return [each for each in found if each.is_stable and each.period == period and each.impacts == 2.0]
+
+
+def hogan_branches():
+    """Branches of the symmetric and of an asymmetric orbit, by the periods that these take."""
+    family, found = shaken(HOGAN_BLOCK, HOGAN_RATIO), {}
+    for period, (below, above, top) in {1: (5.0, 6.0, 8.0), 3: (0.6, 0.7, 0.8)}.items():
+        whole = next(each for each in stable_orbits(family, below, period, "linear") if each.symmetric)
+        other = next(each for each in stable_orbits(family, above, period, "linear") if not each.symmetric)
+        found[period] = (
+            dynamics.continue_orbit(whole, family, below, (0.01, top)),
+            dynamics.continue_orbit(other, family, above, (0.01, top)),
+        )
+    return found
+
+
+def values_of(branch):
+    """Values of the parameter at the bifurcations of a branch, by kind."""
+    return {each.kind: each.value for each in branch.bifurcations}
+
+
+def hogan_table(branches):
+    """Amplitudes at which the orbits begin, lose their symmetry, and double."""
+    rows = []
+    for period, (whole, other) in branches.items():
+        first, second = values_of(whole), values_of(other)
+        values = first["fold"], first["symmetry breaking"], second["symmetry breaking"], second["flip"]
+        rows.append((ORBITS[period], *(f"{value:.10f}" for value in values)))
+    return markdown(("orbit of", "fold", "symmetry lost", "asymmetric orbits begin", "period doubles"), rows)
+
+
+def heteroclinic(ratio, restitution):
+    """Amplitude over that of uplift from which courses lead from one balance to the other."""
+    return (1.0 + ratio**2) * (1.0 - restitution) / math.hypot(1.0 + restitution, ratio * (1.0 - restitution))
+
+
+def hogan_figure(branches):
+    """Branches of both orbits, and the states at the starts of periods on the way to chaos."""
+    block, family = HOGAN_BLOCK, shaken(HOGAN_BLOCK, HOGAN_RATIO)
+    alpha, restitution = block.alpha, block.restitution
+    start = next(each for each in stable_orbits(family, 4.5, 1, "linear") if each.symmetric).state
+    diagram = dynamics.bifurcation_diagram(
+        family, np.linspace(4.5, 7.3, 561), start * [1.0, 1.0001], transient=600, kept=48, model="linear",
+    ).data  # fmt: skip
+    with figure_for(None, (7.4, 3.5)) as drawn:
+        left, right = drawn.subplots(1, 2)
+        for curve, (period, pair) in zip(CURVES, branches.items(), strict=False):
+            for number, branch in enumerate(pair):
+                for stable in (True, False):
+                    shown = np.where(branch.is_stable == stable, branch.peaks / alpha, np.nan)
+                    name = f"{ORBITS[period]}, {'stable' if stable else 'unstable'}" if number == 0 else None
+                    left.plot(
+                        branch.values, shown, color=curve["color"], label=name,
+                        linestyle="-" if stable else (0, (2, 1.5)), linewidth=1.4 if stable else 0.9,
+                    )  # fmt: skip
+                for each in branch.bifurcations:
+                    if each.kind in (("fold", "symmetry breaking") if number == 0 else ("flip",)):
+                        near = np.argmin(
+                            np.hypot(np.log(branch.values / each.value), 0.0)
+                            + 10.0 * np.linalg.norm(branch.states - each.orbit.state, axis=1)
+                        )
+                        mark = {"fold": "o", "symmetry breaking": "D", "flip": "s"}[each.kind]
+                        left.plot(
+                            each.value,
+                            branch.peaks[near] / alpha,
+                            mark,
+                            color=INK,
+                            markersize=4.5,
+                            markerfacecolor="white",
+                            zorder=4,
+                        )
+        for mark, name in (("o", "fold"), ("D", "symmetry lost"), ("s", "period doubles")):
+            left.plot([], [], mark, color=INK, markersize=4.5, markerfacecolor="white", label=name)
+        left.axvline(heteroclinic(HOGAN_RATIO, restitution), color=GROUND, linewidth=1.0, label="heteroclinic")
+        left.axvline(1.0, color=GROUND, linewidth=1.0, linestyle=(0, (1, 1.5)), label="uplift")
+        left.set_xscale("log")
+        add_labels(left, "peak acceleration over that of uplift", "largest rotation over the slenderness")
+        dots = diagram.coordinate.values[0, :, 0] / alpha
+        right.plot(np.repeat(diagram.value.values, dots.shape[1]), dots.ravel(), ".", color=INK, markersize=0.8)
+        for value in (values_of(branches[1][0])["symmetry breaking"], values_of(branches[1][1])["flip"]):
+            right.axvline(
+                value, color=ABOVE, linewidth=0.8, linestyle=(0, (4, 2)), label="closed form" if value < 6 else None
+            )
+        add_labels(
+            right, "peak acceleration over that of uplift", "rotation at the start of a period, over the slenderness"
+        )
+        add_legend(drawn, None, handles_of(left, right))
+    return drawn
+
+
+# --- another restitution ----------------------------------------------------------------------------------------
+
+
+def restitution_of(slenderness, contact):
+    """Restitution of a rectangle that turns about points at a share of its half-width while it changes its side."""
+    share = math.sin(math.atan(1.0 / slenderness)) ** 2
+    return (4.0 - 3.0 * share * (1.0 + contact**2)) / (4.0 - 3.0 * share * (1.0 - contact**2))
+
+
+def restitution_rows():
+    """Compare blocks with both restitutions: numbers by slenderness and contact."""
+    return {
+        (slenderness, contact): compared(slenderness, contact) for slenderness in SLENDERNESSES for contact in CONTACTS
+    }
+
+
+def compared(slenderness, contact):
+    """Numbers of one block."""
+    restitution = restitution_of(slenderness, contact)
+    block = rocking.Block.from_parameters(p=P, alpha=math.atan(1.0 / slenderness), restitution=restitution)
+    family = shaken(block, RATIO, "nonlinear")
+    (rest,) = (each for each in dynamics.periodic_orbits(*family(1.002), starts=[[0.0, 0.0]]) if each.rests)
+    lost = values_of(dynamics.continue_orbit(rest, family, 1.002, (0.9, 2.0)))["loss of complete chattering"]
+    whole = next(each for each in stable_orbits(family, 1.0, 1, "nonlinear") if each.symmetric)
+    branch = dynamics.continue_orbit(whole, family, 1.0, (0.005, 32.0), step=0.02)
+    # Orbits with two impacts a period settle by the restitution squared in each.
+    transient = math.ceil(-20.0 / math.log(restitution))
+    diagram = dynamics.bifurcation_diagram(family, LEVELS, [0.0, 0.0], direction="afresh", transient=transient).data
+    period, theta = diagram.period.values[0, :, 0], np.linspace(-block.alpha, block.alpha, 61)
+    found = dynamics.basins(*family(LEVEL), theta, P * theta, progress=False)
+    shares = zip(found.attractor.values, found.share.values, strict=True)
+    exponents = [dynamics.lyapunov_exponents(*family(level), [0.0, 0.0], 2000, transient=transient).largest
+                 for level in LEVELS[period != -1][::8]]  # fmt: skip
+    return {
+        "restitution": restitution,
+        "lost": lost,
+        **values_of(branch),
+        "overturns": LEVELS[period == -1][0],
+        "other": np.mean(period[period != -1] != 1),
+        "stays": sum(float(share) for name, share in shares if "overturns" not in name),
+        "exponent": np.nanmax(exponents),
+    }
+
+
+def restitution_table(rows):
+    """Numbers as Markdown."""
+    lines = []
+    for (slenderness, contact), row in rows.items():
+        lines.append((
+            f"{slenderness:g}", CONTACTS[contact], f"{row['restitution']:.4f}", f"{row['fold']:.4f}",
+            f"{row['lost']:.5f}", f"{row['symmetry breaking']:.2f}", f"{row['overturns']:.2f}",
+            f"{100.0 * row['other']:.0f}", f"{100.0 * row['stays']:.1f}", f"{row['exponent']:.3f}",
+        ))  # fmt: skip
+    head = (
+        "height over width", "contact", "restitution", "orbits begin", "chattering lost", "symmetry lost",
+        "overturns from rest", "longer periods, %", "stays, %", "largest exponent",
+    )  # fmt: skip
+    return markdown(head, lines)
+
+
+def restitution_figure(rows):
+    """Amplitudes, and shares of states that stay, against the slenderness."""
+    with figure_for(None, (7.4, 3.2)) as drawn:
+        left, right = drawn.subplots(1, 2)
+        looks = {1.0: {"linestyle": "-"}, 0.7: {"linestyle": (0, (4, 2)), "markerfacecolor": "white"}}
+        marks = {"fold": ("orbits begin", "o", INK), "overturns": ("overturns from rest", "s", ABOVE)}
+        for contact, look in looks.items():
+            of = [rows[slenderness, contact] for slenderness in SLENDERNESSES]
+            for key, (name, mark, color) in marks.items():
+                left.plot(
+                    SLENDERNESSES,
+                    [row[key] for row in of],
+                    mark,
+                    color=color,
+                    markersize=4.5,
+                    label=f"{name}, contact {CONTACTS[contact]}",
+                    **look,
+                )
+            left.plot(
+                SLENDERNESSES,
+                [row["lost"] - 1.0 for row in of],
+                "D",
+                color=CURVES[2]["color"],
+                markersize=4.5,
+                label=f"chattering lost, less 1, contact {CONTACTS[contact]}",
+                **look,
+            )
+            right.plot(SLENDERNESSES, [100.0 * row["stays"] for row in of], "o", color=INK, markersize=4.5, **look)
+        left.set_yscale("log")
+        right.set_ylim(0.0, None)
+        add_labels(left, "height over width", "acceleration over that of uplift")
+        add_labels(right, "height over width", "states that never overturn (%)")
+        add_legend(drawn, None, handles_of(left))
+    return drawn
+
+
+# --- an oscillator that sticks ----------------------------------------------------------------------------------
+
+
+def oscillating(restitution, frequency, cycles=1):
+    """Budd and Dux's oscillator with its stop at zero, and the forcing cos(w t); both per unit of time."""
+    body = dynamics.ImpactOscillator(1.0 / (2.0 * math.pi), restitution)
+    return body, rocking.pulses.sine(1.0, frequency / (2.0 * math.pi), cycles=cycles, phase=0.5 * math.pi)
+
+
+def sticking(restitution, frequency):
+    """Share of a period for which the mass rests after the first release; 0 where it does not rest in that period."""
+    body, motion = oscillating(restitution, frequency, 2)
+    rests = dynamics.simulate(body, motion, duration=motion.duration).rest_intervals
+    period = 0.5 * motion.duration
+    return (rests[1, 1] - rests[1, 0]) / period if len(rests) > 1 and rests[1, 0] < rests[0, 1] + period else 0.0
+
+
+def lost_at(restitution, low, high):
+    """Frequency from which the mass no longer rests."""
+    while high - low > 1e-14:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if sticking(restitution, middle) > 0.0 else (low, middle)
+    return 0.5 * (low + high)
+
+
+def sticking_figure():
+    """Draw a course with chattering and rest, the time of rest by frequency, and impacts beyond the boundary."""
+    ends = {0.5: lost_at(0.5, 0.55, 0.65), 0.8: lost_at(0.8, 0.32, 0.36), 0.9: lost_at(0.9, 0.19, 0.22)}
+    with figure_for(None, (7.6, 2.9)) as drawn:
+        course, rests, beyond = drawn.subplots(1, 3)
+        body, motion = oscillating(0.8, 0.3, 2)
+        response = dynamics.simulate(body, motion, duration=motion.duration)
+        times, period = np.linspace(0.0, motion.duration, 3001), 0.5 * motion.duration
+        course.plot(times / period, -response.states(times)[:, 0], color=INK, linewidth=1.1)
+        for first, last in response.rest_intervals / period:
+            course.axvspan(first, last, color=REST, linewidth=0.0)
+        add_labels(course, "time (periods of the forcing)", "x (amplitude of the force over the stiffness)")
+        for curve, (restitution, end) in zip(CURVES, ends.items(), strict=False):
+            frequencies = np.append(np.linspace(0.05, end, 240)[:-1], end - np.geomspace(1e-3, 1e-9, 25))
+            shares = [sticking(restitution, frequency) for frequency in frequencies]
+            rests.plot(frequencies, shares, label=f"restitution {restitution:g}", **curve)
+            rests.plot(end, 0.0, "o", color=curve["color"], markersize=4.0, clip_on=False)
+        rests.set_ylim(0.0, None)
+        add_labels(rests, "frequency of the forcing over the natural one", "share of the period at rest")
+        away = np.geomspace(3e-8, 1e-3, 300)
+        counts = []
+        for distance in away:
+            strobe = dynamics.stroboscopic_map(*oscillating(0.5, ends[0.5] + distance))
+            counts.append(strobe.followed(strobe([[0.0, 0.0]], 100)[0], 1)[2])
+        beyond.plot(away, counts, drawstyle="steps-mid", **CURVES[0])
+        beyond.set_xscale("log")
+        add_labels(beyond, "frequency beyond the boundary", "impacts in a period")
+        add_legend(drawn, None, handles_of(rests))
+    return drawn
+
+
+def markdown(heading, rows):
+    """Write a table as Markdown, numbers to the right."""
+    lines = [heading, ("---", *["---:"] * (len(heading) - 1)), *rows]
+    return "".join("| " + " | ".join(str(cell) for cell in line) + " |\n" for line in lines)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,325 @@
+"""Published results of impact dynamics, redrawn: orbits of a slender block, an oscillator that sticks to its stop."""
+
+import importlib.util
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import mpmath as mp
+import numpy as np
+import pytest
+from oracles import closed_orbits, sticking_oscillator
+
+import rocking
+from rocking import dynamics, pulses
+
+UNIT = 1.0 / (2.0 * math.pi)  # natural frequency of the oscillators, Hz: 1 rad/s
+
+#: Restitution and place of the stop, sigma, of Budd and Dux's oscillator, x'' + x = cos(w t), x < sigma; and to two
+#: digits the frequency up to which complete chattering is looked for.
+STICKING = [
+    (0.5, 0.0, 0.61), (0.5, -0.3, 0.82), (0.5, 0.3, 0.47),
+    (0.8, 0.0, 0.34), (0.8, -0.3, 0.36), (0.8, 0.3, 0.25),
+    (0.9, 0.0, 0.21), (0.9, -0.3, 0.28), (0.9, 0.3, 0.14),
+]  # fmt: skip
+
+
+def oscillator(restitution, sigma):
+    """Return its mirror image, y = -x: y > -sigma."""
+    return dynamics.ImpactOscillator(UNIT, restitution, stop=sigma)
+
+
+def forcing(frequency, cycles=1):
+    return pulses.sine(1.0, frequency * UNIT, cycles=cycles, phase=0.5 * math.pi)
+
+
+class Sticking(NamedTuple):
+    """How long the mass rests in the period after it has left the stop, and the bracket on its rest since then."""
+
+    time: float
+    bracket: tuple[float, float] | None
+
+
+def sticking(restitution, sigma, frequency):
+    motion = forcing(frequency, 2)
+    response = dynamics.simulate(
+        oscillator(restitution, sigma), motion, duration=motion.duration, initial_position=-sigma
+    )
+    (_, release), *later = response.rest_intervals
+    if not later or later[0][0] > release + 0.5 * motion.duration:
+        return Sticking(0.0, None)
+    (start, end), row = later[0], response.chattering[0]
+    return Sticking(end - start, (row["lower"] - release, row["upper"] - release))
+
+
+def boundary(restitution, sigma, about):
+    """Frequency beyond which it does not rest in the period after its release."""
+    low, high = 0.95 * about, 1.05 * about
+    assert sticking(restitution, sigma, low).time > 0.0 == sticking(restitution, sigma, high).time
+    for _ in range(36):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if sticking(restitution, sigma, middle).time else (low, middle)
+    return 0.5 * (low + high)
+
+
+@pytest.mark.parametrize(
+    ("restitution", "sigma", "frequency"),
+    [(0.5, -0.3, 0.6), (0.8, 0.0, 0.3),
+     *(pytest.param(*each, marks=pytest.mark.thorough)
+       for each in ((0.8, 0.0, 0.344), (0.9, 0.3, 0.1), (0.5, 0.0, 0.05), (0.9, -0.3, 0.28), (0.5, 0.3, 0.47)))],
+)  # fmt: skip
+def test_chattering_of_the_oscillator_ends_within_its_proven_bracket(restitution, sigma, frequency):
+    found = sticking(restitution, sigma, frequency)
+    with mp.workdps(40):
+        exact = sticking_oscillator.Oscillator(restitution, sigma, frequency)
+        ends = exact.rest(1e-8) - exact.release
+        period = 2 * mp.pi / frequency
+    lower, upper = found.bracket
+    rounding = 8.0 * np.spacing(float(period))
+    assert lower - rounding <= float(ends) <= upper + rounding and upper - lower < 1e-9
+    assert found.time == pytest.approx(float(period - ends), abs=upper - lower + rounding)
+
+
+@pytest.mark.parametrize(
+    ("restitution", "sigma", "about"),
+    [STICKING[0], *(pytest.param(*each, marks=pytest.mark.thorough) for each in STICKING[1:])],
+)
+def test_complete_chattering_is_lost_where_forty_digits_say(restitution, sigma, about):
+    """The mass would come to rest at the instant of its release: nothing is left of the time in which it sticks."""
+    found = boundary(restitution, sigma, about)
+    with mp.workdps(40):
+        below, above = (sticking_oscillator.Oscillator(restitution, sigma, found + d) for d in (-1e-11, 1e-11))
+        assert below.is_complete() and not above.is_complete()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("restitution", "sigma", "about"), STICKING[::4])
+def test_a_branch_of_orbits_that_stick_ends_at_that_boundary(restitution, sigma, about):
+    def family(frequency):
+        return oscillator(restitution, sigma), forcing(frequency)
+
+    known = boundary(restitution, sigma, about)
+    start = 0.9 * known
+    (orbit,) = (each for each in dynamics.periodic_orbits(*family(start), starts=[[-sigma, 0.0]]) if each.rests)
+    branch = dynamics.continue_orbit(orbit, family, start, (0.85 * known, 1.1 * known))
+    (lost,) = branch.bifurcations
+    assert branch.ends[1] == lost.kind == "loss of complete chattering"
+    assert lost.value == pytest.approx(known, abs=1e-11)
+    assert np.all(branch.multipliers == 0.0)
+
+
+def test_an_orbit_that_sticks_forgets_everything():
+    """Its derivative is exactly zero, and states around it lead to the same state, at a distance as well as near."""
+    judged = 0
+    for restitution, sigma, frequency in ((0.8, 0.0, 0.3), (0.5, -0.3, 0.6)):
+        body, motion = oscillator(restitution, sigma), forcing(frequency)
+        (orbit,) = (each for each in dynamics.periodic_orbits(body, motion, starts=[[-sigma, 0.0]]) if each.rests)
+        assert orbit.impacts == math.inf and orbit.multipliers.tolist() == [0.0, 0.0]
+        strobe = dynamics.stroboscopic_map(body, motion)
+        near = orbit.state + np.array([[0.0, 0.0], [1e-3, 0.0], [0.0, -1e-3], [-1e-3, 1e-3], [1e-8, 1e-8]])
+        after, change = strobe.derivative(near, 2)
+        assert not np.any(change)
+        assert np.all(np.abs(after - orbit.state) < 1e-13)
+        judged += len(near)
+    assert judged == 10
+
+
+@pytest.mark.parametrize(("restitution", "about"), [(0.5, 0.61), pytest.param(0.8, 0.34, marks=pytest.mark.thorough)])
+def test_the_time_of_sticking_vanishes_with_the_exponent_of_its_scale(restitution, about):
+    known = boundary(restitution, 0.0, about)
+    factor, h = sticking_oscillator.growth(restitution), 1e-7
+    long, short = (sticking(restitution, 0.0, known - d).time for d in (h * factor, h))
+    assert math.log(long / short) / math.log(factor) == pytest.approx(
+        sticking_oscillator.exponent(restitution), abs=5e-5
+    )
+
+
+def test_beyond_that_boundary_attractors_come_in_a_cascade_with_one_impact_more_each():
+    """At distances whose ratio is the factor of the scale, as Dankowicz and Fotsch (2017) predict a cascade."""
+    known = boundary(0.5, 0.0, 0.61)
+    impacts = []
+    for k in range(12):
+        beyond = 6e-4 * sticking_oscillator.growth(0.5) ** -k
+        strobe = dynamics.stroboscopic_map(oscillator(0.5, 0.0), forcing(known + beyond))
+        (state,) = strobe([[0.0, 0.0]], 100)
+        after, _, count = strobe.followed(state, 1)
+        assert np.max(np.abs(after - state)) < 1e-10
+        impacts.append(count)
+    assert impacts == list(range(10, 22))
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("frequency", "tilted"), [(1.6, 1.0), (2.5, -1.0)])
+def test_speeds_of_orbits_with_one_impact_are_half_an_ellipse_over_the_place_of_the_stop(frequency, tilted):
+    """As F. Dux found (1992): centred on the origin, and tilted to one side below the frequency 2, to the other above.
+
+    The lower branch is unstable, and meets the upper one, which is stable there, in a fold.
+    """
+    exact = closed_orbits.Oscillator(UNIT, 0.8, 0.0, 1.0, frequency * UNIT)
+
+    motion = forcing(frequency)
+
+    def family(sigma):
+        return oscillator(0.8, sigma), motion
+
+    (orbit,) = (each for each in dynamics.periodic_orbits(*family(0.0)) if each.impacts == 1.0)
+    branch = dynamics.continue_orbit(orbit, family, 0.0, (-5.0, 5.0), step=0.3)
+    chosen = np.arange(0, len(branch), 2)
+    speeds = np.array([branch.orbit(k).response.impacts["speed_after"][0] for k in chosen])
+    places, share = branch.values[chosen], speeds / exact.beta
+    ellipse = ((places + share) ** 2 + (exact.gamma * share) ** 2) * (1.0 - frequency**2) ** 2
+    assert len(chosen) >= 15 and ellipse == pytest.approx(1.0, abs=1e-9)
+    (fold,) = (each for each in branch.bifurcations if each.kind == "fold")
+    assert fold.value == pytest.approx(tilted * math.hypot(1.0, 1.0 / exact.gamma) / abs(1.0 - frequency**2), rel=1e-9)
+    # Away from the fold, the upper branch has the higher speed at the same place of the stop.
+    beyond = (tilted * places > 0.6 * abs(fold.value)) & (tilted * places < 0.99 * abs(fold.value))
+    lower = speeds < fold.orbit.response.impacts["speed_after"][0] * places / fold.value
+    assert np.sum(beyond & lower) >= 3 and np.sum(beyond & ~lower) >= 3
+    assert np.array_equal(branch.is_stable[chosen][beyond], ~lower[beyond])
+
+
+# --- Hogan's orbits of a slender block --------------------------------------------------------------------------
+
+P, ALPHA = 1.0, 0.1
+
+#: Forcing frequency over p, restitution, and periods of the motion in which the block hits the ground twice.
+HOGAN = [(3.0, 0.925, 1), (3.0, 0.925, 3), (4.0, 0.85, 3), (2.0, 0.8, 1)]
+
+
+def slender(ratio, restitution, m):
+    """Block, its orbits in closed form, and what makes (block, motion) of the peak acceleration over g alpha."""
+    block = rocking.Block.from_parameters(p=P, alpha=ALPHA, restitution=restitution)
+    frequency = ratio * P * UNIT
+    exact = closed_orbits.Block(P, ALPHA, restitution, frequency, block.gravity, m)
+    unit = block.gravity * ALPHA
+    return exact, unit, lambda level: (block, pulses.sine(level * unit, frequency, cycles=1))
+
+
+@pytest.mark.parametrize(("ratio", "restitution", "m"), HOGAN)
+def test_asymmetric_orbits_double_where_their_two_equations_say(ratio, restitution, m):
+    """The orbit of the closed form comes back, and a multiplier of the map is -1 there."""
+    exact, unit, family = slender(ratio, restitution, m)
+    amplitude, phase, speed = exact.flip
+    assert amplitude > exact.amplitude(exact.breaking)
+    strobe = dynamics.stroboscopic_map(*family(amplitude / unit), model="linear")
+    state = strobe.from_impacts([phase / (ratio * P), speed])
+    after, change = strobe.derivative(state, m)
+    assert after == pytest.approx(state, abs=1e-10)
+    assert np.linalg.det(change + np.eye(2)) == pytest.approx(0.0, abs=1e-8)
+    assert np.linalg.det(change) == pytest.approx(restitution**4, rel=1e-8)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("ratio", "restitution", "m"), HOGAN)
+def test_branches_of_a_slender_block_bifurcate_where_closed_forms_say(ratio, restitution, m):
+    """The first fold is sharp beside the range of the parameter, and an impact there is near the start of a period."""
+    exact, unit, family = slender(ratio, restitution, m)
+    fold, breaking = (exact.amplitude(each) / unit for each in (exact.fold, exact.breaking))
+    flip = exact.flip[0] / unit
+    below, level = 0.97 * breaking, 0.5 * (breaking + flip)
+
+    def orbits_at(level):
+        found = dynamics.periodic_orbits(*family(level), period=m, model="linear")
+        return [each for each in found if each.is_stable and each.period == m and each.impacts == 2.0]
+
+    (whole,) = (each for each in orbits_at(below) if each.symmetric)
+    one_sided = next(each for each in orbits_at(level) if not each.symmetric)
+    symmetric = dynamics.continue_orbit(whole, family, below, (0.5 * fold, 1.05 * breaking), step=0.2)
+    kinds = {each.kind: each.value for each in symmetric.bifurcations}
+    assert kinds["fold"] == pytest.approx(fold, rel=1e-9)
+    assert kinds["symmetry breaking"] == pytest.approx(breaking, rel=1e-9)
+    other = dynamics.continue_orbit(one_sided, family, level, (0.9 * breaking, 1.1 * flip), step=0.2)
+    kinds = {each.kind: each.value for each in other.bifurcations}
+    assert kinds["symmetry breaking"] == pytest.approx(breaking, rel=1e-9)
+    assert kinds["flip"] == pytest.approx(flip, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "restitution"),
+    [
+        (3.0, 0.925),
+        *(pytest.param(*each, marks=pytest.mark.thorough) for each in ((5.0, 0.9), (2.0, 0.8), (8.0, 0.95))),
+    ],
+)
+def test_courses_lead_from_one_balance_to_the_other_from_the_heteroclinic_amplitude_on(ratio, restitution):
+    """Blocks start on the unstable manifold of the orbit at the balance of side +, and hit the ground at all phases."""
+    exact, _, _ = slender(ratio, restitution, 1)
+    block = rocking.Block.from_parameters(p=P, alpha=ALPHA, restitution=restitution)
+    w, frequency, before = ratio * P, ratio * P * UNIT, 3.0 / P
+    best = math.atan2(1.0 + restitution, ratio * (1.0 - restitution))
+    phases = best + np.concatenate([np.linspace(-0.2, 0.2, 41), np.linspace(0.3, 2.0 * math.pi - 0.3, 20)])
+    found = {}
+    for change in (-1e-4, 1e-4):
+        amplitude = exact.heteroclinic * (1.0 + change)
+        forced = P * P * amplitude / (block.gravity * (w * w + P * P))
+        overturned = 0
+        for phase in phases:
+            start = phase - w * before
+            away = (ALPHA + forced * math.sin(phase)) * math.exp(-P * before)
+            response = rocking.simulate(
+                block, pulses.sine(amplitude, frequency, cycles=25.0 * frequency / P, phase=start), model="linear",
+                initial_rotation=ALPHA + forced * math.sin(start) - away,
+                initial_velocity=forced * w * math.cos(start) - P * away,
+            )  # fmt: skip
+            times = response.impacts["time"]
+            assert times[0] == pytest.approx(before, abs=1e-6)
+            overturned += bool(response.overturned) and len(times) == 1
+        found[change] = overturned
+    assert found[-1e-4] == 0 < found[1e-4]
+
+
+# --- the tables of the pages ------------------------------------------------------------------------------------
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def script():
+    specification = importlib.util.spec_from_file_location("dynamics_pages", ROOT / "scripts" / "dynamics_pages.py")
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def rows_of(table):
+    lines = (ROOT / "docs" / "_tables" / table).read_text("utf-8").splitlines()[2:]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def test_the_table_of_a_slender_block_holds_the_closed_forms():
+    rows = rows_of("orbits-slender.txt")
+    assert len(rows) == 2
+    for row, m in zip(rows, (1, 3), strict=True):
+        exact, unit, _ = slender(3.0, 0.925, m)
+        breaking = exact.amplitude(exact.breaking)
+        wanted = exact.amplitude(exact.fold), breaking, breaking, exact.flip[0]
+        assert [float(cell) for cell in row[1:]] == pytest.approx([each / unit for each in wanted], abs=1e-10)
+
+
+@pytest.mark.parametrize("every", [7, pytest.param(1, marks=pytest.mark.thorough)])
+def test_the_table_of_restitutions_holds_what_blocks_do(script, every):
+    """Just below where chattering is lost a block that has rested forgets that, above it does not; and it overturns."""
+    rows = rows_of("restitution-orbits.txt")
+    contacts = {words: contact for contact, words in script.CONTACTS.items()}
+    judged = 0
+    for slenderness, words, restitution, begins, lost, _, overturns, *_ in rows[::every]:
+        contact, factor = contacts[words], float(restitution)
+        exact = script.restitution_of(float(slenderness), contact)
+        assert factor == pytest.approx(exact, abs=5e-5)
+        block = rocking.Block.from_parameters(p=script.P, alpha=math.atan(1.0 / float(slenderness)), restitution=exact)
+        family = script.shaken(block, script.RATIO, "nonlinear")
+        for change, forgets in ((-1e-5, True), (1e-5, False)):
+            strobe = dynamics.stroboscopic_map(*family(float(lost) + change))
+            _, derivative = strobe.derivative(strobe([0.0, 0.0]))
+            assert np.any(derivative) != forgets
+        (level,) = script.LEVELS[np.abs(script.LEVELS - float(overturns)) < 5e-3]
+        assert np.isnan(dynamics.stroboscopic_map(*family(level))([0.0, 0.0], 2500)).all()
+        assert float(begins) < 1.0 < float(lost)
+        judged += 1
+    assert judged == {7: 2, 1: 8}[every] and len(rows) == 8
+
+
+@pytest.mark.slow
+def test_a_row_of_the_table_of_restitutions_is_what_the_script_makes(script):
+    row = script.restitution_table({(8.0, 0.7): script.compared(8.0, 0.7)}).splitlines()[2]
+    assert row in (ROOT / "docs" / "_tables" / "restitution-orbits.txt").read_text("utf-8").splitlines()
