@@ -177,6 +177,21 @@ def test_many_restrained_blocks_are_those_one_by_one():
     assert len(many.select(slice(2, 5))) == 3
 
 
+def test_maps_take_restraints_but_no_tendon_that_yields():
+    column = Block(width=0.5, height=3.0, mass=4000.0)
+    sine = rocking.pulses.sine(2.5, 1.5, cycles=1)
+    tied = RestrainedBlock(column, Tendon(3e5, prestress=1e3), Damper(2e3))
+    strobe = rocking.dynamics.stroboscopic_map(tied, sine)
+    start, h = np.array([0.02, 0.1]), 1e-6
+    end, change = strobe.derivative(start)
+    for k in range(2):
+        step = np.eye(2)[k] * h
+        assert change[:, k] == pytest.approx((strobe(start + step) - strobe(start - step)) / (2.0 * h), rel=1e-5)
+    assert np.all(strobe(start) == end)
+    with pytest.raises(InvalidBlock, match="a tendon that yields remembers"):
+        rocking.dynamics.stroboscopic_map(RestrainedBlock(column, Tendon(3e5, strength=1e3)), sine)
+
+
 def test_what_is_known_in_closed_form():
     column = Block(width=0.5, height=3.0, mass=4000.0)
     free = column.uplift_thresholds()

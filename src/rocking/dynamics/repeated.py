@@ -15,7 +15,7 @@ from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.simulation import model_of
-from rocking.errors import InvalidMotion, InvalidOption
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
 from rocking.kernels.periodic import Fate, Setting, step_rows
@@ -49,6 +49,8 @@ class Repeated:
         self.period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
         limits = self.treatment.limits(self.bodies, self.motion, self.model)
         self._records = self.bodies.kernel_records(self.model, limits)
+        if np.any(self._records["yielding"]):
+            raise InvalidBlock("a tendon that yields remembers; maps know what position and velocity tell")
         self._ground = repeated(self.motion, self.body.gravity)
         rows = step_rows(self._ground, self._records[0])
         self._steps = rows if self.model == "linear" else rows[:, :0]

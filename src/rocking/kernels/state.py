@@ -132,7 +132,7 @@ STATE = _record(
 )  # fmt: skip
 
 #: A step of a response: the state at its start, as `expand` takes it. Elsewhere a side is +1 or -1, and 0 at rest.
-NODE_ROW = _record(time="f8", piece="i8", offset="f8", side="i8", u="f8", v="f8", law="i8", plastic="f8")
+NODE_ROW = _record(time="f8", piece="i8", offset="f8", side="i4", law="i4", u="f8", v="f8")
 IMPACT_ROW = _record(time="f8", side="i8", speed_before="f8", speed_after="f8")
 EVENT_ROW = _record(time="f8", kind="i8", side="i8")
 SEQUENCE_ROW = _record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8")
@@ -240,7 +240,6 @@ def write_node(ground: Ground, rules: Record, table: Records, state: Record) -> 
     row.u = state.u
     row.v = state.v
     row.law = state.law
-    row.plastic = state.plastic
     state.nodes += 1
 
 

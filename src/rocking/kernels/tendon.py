@@ -17,7 +17,7 @@ import numpy as np
 from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.events import first_root
-from rocking.kernels.state import Record, TendonLaw
+from rocking.kernels.state import Record, Records, TendonLaw
 
 #: Distance from a level, relative to it, that is rounding.
 _ROUNDING = 2.0**-44
@@ -114,9 +114,19 @@ def first_of(d: Floats, order: int, h: float) -> float:
 
 
 @inlined
+def plastic_after(block: Record, rules: Record, nodes: Records, row: int, before: float) -> float:
+    """Plastic elongation at a node of a response, from that at the node before it; of the first node from itself."""
+    node = nodes[row]
+    turns = row > 0 and node.law == TendonLaw.ELASTIC and nodes[row - 1].law == TendonLaw.PLASTIC
+    if turns or (row == 0 and node.side >= 0):
+        return max(0.0, elongation_at(block, rules.nonlinear, node.side, node.u) - block.yields)
+    return before
+
+
+@inlined
 def change_law(block: Record, rules: Record, state: Record, law: int, u: float) -> None:
     """Change the law of a block at a rotation."""
     if state.law == TendonLaw.PLASTIC:
-        state.plastic = elongation_at(block, rules.nonlinear, state.side, u) - block.yields
+        state.plastic = max(0.0, elongation_at(block, rules.nonlinear, state.side, u) - block.yields)
     state.law = law
     adopt(block, law, state.plastic)

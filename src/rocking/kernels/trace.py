@@ -17,7 +17,7 @@ from rocking.kernels.events import first_root
 from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, start_of, vertical_of
 from rocking.kernels.recurrences import INTEGRATED_TWICE, variation_coefficients
 from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, records
-from rocking.kernels.tendon import adopt, law_of_standing
+from rocking.kernels.tendon import adopt, law_of_standing, plastic_after
 
 #: Nodes of a response before its march.
 NO_NODES = records(0, NODE_ROW)
@@ -49,6 +49,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
     ground, block, rules, nodes = trail
     expanded = -1
     order = 0
+    known, plastic = -1, 0.0  # of a tendon that yields
     landing = np.inf
     for k in range(times.shape[0]):
         row = rows[k]
@@ -60,7 +61,11 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
             continue
         if row != expanded:
             if block.yielding:
-                adopt(block, node.law, node.plastic)
+                first, plastic = (known + 1, plastic) if row > known else (0, 0.0)
+                for each in range(first, row + 1):
+                    plastic = plastic_after(block, rules, nodes, each, plastic)
+                known = row
+                adopt(block, node.law, plastic)
             left = np.inf if last else nodes[row + 1].time - node.time
             order, h, _ = expand(ground, block, rules, scratch, node, left)
             landing = np.inf
@@ -108,26 +113,29 @@ def vary(
     """
     nodes = trail.nodes
     impact_count = event_count = 0
-    dp = 0.0  # of the plastic elongation of a tendon
+    plastic = dp = 0.0  # elongation of a tendon for good, and its variation
     du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
     dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
     at_peak = du
     for k in range(nodes.shape[0]):
         node = nodes[k]
         if trail.block.yielding:
-            adopt(trail.block, node.law, node.plastic)
+            plastic = plastic_after(trail.block, trail.rules, nodes, k, plastic)
+            adopt(trail.block, node.law, plastic)
         if k + 1 == nodes.shape[0]:
             if node.side >= 0 and event_count < events.shape[0]:
                 events[event_count] = -du / node.v
             break
         following = nodes[k + 1]
         if node.side < 0:
-            events[event_count] = uplift_shift(trail, following, quantity, dp)
+            events[event_count] = uplift_shift(
+                trail, following, quantity, restoring_by_tendon(trail.block, following.side, plastic, dp)
+            )
             event_count += 1
             du = dv = 0.0
         elif following.side < 0:
             shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
-            events[event_count] = rest_shift(trail, node, quantity, (dv, shift, dp), following)
+            events[event_count] = rest_shift(trail, node, quantity, (dv, shift, plastic, dp), following)
             event_count += 1
         else:
             order = expand_variation(trail, scratch, work, node, quantity, (du, dv, dp), following.time - node.time)
@@ -257,15 +265,15 @@ def saltation(
 
 
 @inlined
-def uplift_shift(trail: Trail, node: Record, quantity: int, plastic: float) -> float:
-    """Shift of the uplift with which a node begins; ``plastic``: variation of a tendon's plastic elongation."""
+def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) -> float:
+    """Shift of the uplift with which a node begins; ``by_tendon``: see `restoring_by_tendon`."""
     ground, block, rules, _ = trail
     threshold = block.threshold[node.side]
     push = -push_at(ground, block, node.side, node.piece, node.offset)
     rate = -push_rate(ground, block, node.side, node.piece, node.offset)
     if abs(push - threshold - block.hold[node.side]) > _JUMP * (abs(threshold) + abs(block.hold[node.side])):
         return 0.0
-    slackening = restoring_by_tendon(block, node, node.side, plastic) / (block.gain[node.side] * rate)
+    slackening = by_tendon / (block.gain[node.side] * rate)
     if quantity == Quantity.MOTION:
         return -push / rate + slackening
     if quantity == Quantity.SLENDERNESS:
@@ -278,11 +286,11 @@ def uplift_shift(trail: Trail, node: Record, quantity: int, plastic: float) -> f
 
 
 @inlined
-def restoring_by_tendon(block: Record, node: Record, side: int, plastic: float) -> float:
-    """Change of the restoring acceleration at zero rotation with a tendon's plastic elongation."""
-    if not block.yielding or law_of_standing(block, node.plastic) == TendonLaw.SLACK:
+def restoring_by_tendon(block: Record, side: int, plastic: float, change: float) -> float:
+    """Change of the restoring acceleration at zero rotation with that of a tendon's plastic elongation."""
+    if not block.yielding or law_of_standing(block, plastic) == TendonLaw.SLACK:
         return 0.0
-    return -block.tendon[side] * plastic
+    return -block.tendon[side] * change
 
 
 @inlined
@@ -300,22 +308,24 @@ def push_rate(ground: Ground, block: Record, side: int, piece: int, offset: floa
 
 
 @inlined
-def rest_shift(trail: Trail, node: Record, quantity: int, changes: Three, rest: Record) -> float:
+def rest_shift(
+    trail: Trail, node: Record, quantity: int, changes: tuple[float, float, float, float], rest: Record
+) -> float:
     """Shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
 
     ``changes``: variation of the velocity after the impact with which the node begins, at the unchanged time, shift of
-    that impact, and variation of a tendon's plastic elongation. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i
-    e_j), with v and g at the impact.
+    that impact, and a tendon's plastic elongation with its variation. The time to rest is
+    T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g at the impact.
     """
-    dv, shift, plastic = changes
+    dv, shift, plastic, dp = changes
     if rest.time == node.time:
         return shift
     block, i = trail.block, node.side
     j = block.entered[i]
     g_i = restoring(trail.ground, block, i, node.piece, node.offset)
     g_j = restoring(trail.ground, block, j, node.piece, node.offset)
-    dg_i = restoring_shift(trail, node, i, quantity, shift) + restoring_by_tendon(block, node, i, plastic)
-    dg_j = restoring_shift(trail, node, j, quantity, shift) + restoring_by_tendon(block, node, j, plastic)
+    dg_i = restoring_shift(trail, node, i, quantity, shift) + restoring_by_tendon(block, i, plastic, dp)
+    dg_j = restoring_shift(trail, node, j, quantity, shift) + restoring_by_tendon(block, j, plastic, dp)
     e_i, e_j = block.restitution[i], block.restitution[j]
     de = 1.0 if quantity == Quantity.RESTITUTION else 0.0
     per_speed = 2.0 * (1.0 / g_i + e_i / g_j)
