@@ -75,7 +75,7 @@ class Bifurcation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch(DrawnResult, TableResult):
-    """Periodic orbits along a parameter, made by `continue_orbit`.
+    """Periodic orbits along a parameter, made by `continue_orbit` and `switch_branch`.
 
     Attributes
     ----------
@@ -83,6 +83,8 @@ class Branch(DrawnResult, TableResult):
         Makes body and motion of the parameter.
     name, unit : str
         What the parameter is.
+    limits : (float, float)
+        Range of the parameter in which it was followed.
     period : int
         Period of the orbits, in periods of the motion.
     values : ndarray, shape (n,)
@@ -109,6 +111,7 @@ class Branch(DrawnResult, TableResult):
     unit: str
     model: Model
     treatment: Treatment
+    limits: tuple[float, float]
     period: int
     values: Floats
     states: Floats

@@ -34,8 +34,10 @@ _NEAR: Final = 1e-5
 #: Steps that are tried for each point.
 _TRIALS: Final = 4
 
-#: Least cosine between one tangent and the next.
+#: Least cosine between one tangent and the next, and the longest step in which less than that may mean that the branch
+#: ends; in a longer one it bends.
 _COSINE: Final = 0.97
+_SHARP: Final = 1e-3
 
 #: Speed of the slowest impact, over the scale, from which grazing is extrapolated.
 _SLOW: Final = 2e-3
@@ -116,9 +118,7 @@ def continue_orbit(
     fold 10.47197551
     flip 15.26823701
     """
-    low, high = (checks.finite(each, "limits", InvalidOption) for each in _pair(limits))
-    if not low < high:
-        raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
+    low, high = range_of(limits)
     start = checks.within(value, "value", InvalidOption, low, high)
     longest = checks.positive(step, "step", InvalidOption)
     count = checks.whole(most, "most", InvalidOption, least=1)
@@ -127,7 +127,7 @@ def continue_orbit(
     backward, forward = (_followed(equations, z, each, (low, high), longest, count) for each in (-1.0, 1.0))
     points = [*reversed(backward.points), *forward.points[1:]]
     return Branch(
-        family, name, unit, orbit.model, orbit.treatment, orbit.period,
+        family, name, unit, orbit.model, orbit.treatment, (low, high), orbit.period,
         np.array([each.value for each in points]),
         np.array([each.state for each in points]),
         np.array([each.multipliers for each in points]),
@@ -189,6 +189,8 @@ class _Walk(Location):
     #: How far ahead there is no point of this kind, as far as is known, and successful steps since that was found.
     ahead: float = math.inf
     successes: int = 0
+    #: Whether the last step failed only as it led too far from the tangent.
+    turned: bool = False
 
     def __post_init__(self) -> None:
         self.written = self.z
@@ -202,8 +204,7 @@ class _Walk(Location):
             return end
         found = self.next()
         if found is None:
-            self.ahead, self.step, self.successes = self.step, 0.5 * self.step, 0
-            self.tangent = equations.tangent(self.z, self.tangent)
+            self.shorten()
             return ""
         solved, at_limit = found
         new, tangent = solved.z, solved.tangent(self.tangent)
@@ -238,13 +239,20 @@ class _Walk(Location):
             self.step = min(self.step * _LONGER, self.longest)
         return ""
 
+    def shorten(self) -> None:
+        """Try half the step that failed; there is no point of this kind at its end, unless the branch bends."""
+        if not (self.turned and self.step > _SHARP):
+            self.ahead, self.successes = self.step, 0
+        self.step *= 0.5
+        self.tangent = self.equations.tangent(self.z, self.tangent)
+
     def go_to(self, z: Floats, tangent: Floats, tests: Tests) -> None:
         """Go to another point."""
         self.z, self.tangent, self.tests = z, tangent, tests
 
     def next(self) -> tuple[Solved, bool] | None:
         """Return the next point where a step leads to one of the same kind, and whether at a limit."""
-        equations, z, tangent = self.equations, self.z, self.tangent
+        equations, z, tangent, self.turned = self.equations, self.z, self.tangent, False
         found = equations.solved(z + self.step * tangent, tangent)
         if found is None:
             return None
@@ -259,7 +267,8 @@ class _Walk(Location):
                 return None
         onwards = found.tangent(tangent)
         # Far from the prediction it is another branch.
-        if np.linalg.norm(found.z - z) > 2.0 * self.step or onwards @ tangent < _COSINE:
+        self.turned = bool(np.linalg.norm(found.z - z) > 2.0 * self.step or onwards @ tangent < _COSINE)
+        if self.turned:
             return None
         before, after = self.tests, found.tests(onwards)
         if before.at_one * after.at_one < 0.0 and before.at_minus_one * after.at_minus_one < 0.0:
@@ -284,8 +293,12 @@ def _point(equations: OrbitEquations, z: Floats, peak: float) -> _Point:
     return _Point(equations.physical(z)[1], equations.at_start(z), equations.multipliers(z), peak)
 
 
-def _pair(limits: Sequence[float]) -> Sequence[float]:
+def range_of(limits: Sequence[float]) -> tuple[float, float]:
+    """Return a range of the parameter, checked."""
     values = checks.several(limits, "limits", InvalidOption)
     if len(values) != 2:
         raise InvalidOption("{} must be (lower, higher)", "limits")
-    return values
+    low, high = (checks.finite(each, "limits", InvalidOption) for each in values)
+    if not low < high:
+        raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
+    return low, high

@@ -102,7 +102,8 @@ def joined(here: Location, new: Floats) -> Bifurcation:
     for share in _WIDER if even or is_mirrored(equations.strobe(equations.physical(middle)[1])) else ():
         with contextlib.suppress(_Missed, ValueError):
             near = _root(solve, test, middle[2] - share, middle[2] + share)
-            return here.bifurcation(FLIP if even else SYMMETRY, near[0].z, [each.z[2] for each in near])
+            found = here.bifurcation(FLIP if even else SYMMETRY, near[0].z, [each.z[2] for each in near])
+            return found._replace(orbit=parent.orbit(near[0].z))
     return here.bifurcation(BRANCHES, middle, [here.z[2], new[2]])
 
 
