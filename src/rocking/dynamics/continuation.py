@@ -45,8 +45,9 @@ _SLOW: Final = 2e-3
 #: Share of the parameter in a tangent, below which the start of a period is not moved.
 _ALONG: Final = 0.05
 
-#: Points after which a branch may have come back to where it began.
+#: Points after which a branch may have come back to where it began, and how far from that it may pass, over the step.
 _ROUND: Final = 12
+_BESIDE: Final = 0.1
 
 
 def continue_orbit(
@@ -124,7 +125,10 @@ def continue_orbit(
     count = checks.whole(most, "most", InvalidOption, least=1)
     equations = OrbitEquations.of(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
-    backward, forward = (_followed(equations, z, each, (low, high), longest, count) for each in (-1.0, 1.0))
+    backward = _followed(equations, z, -1.0, (low, high), longest, count)
+    # What has come back to where it began is all there is.
+    onwards = backward.end != CLOSED
+    forward = _followed(equations, z, 1.0, (low, high), longest, count) if onwards else _Path([], [], CLOSED)
     points = [*reversed(backward.points), *forward.points[1:]]
     return Branch(
         family, name, unit, orbit.model, orbit.treatment, (low, high), orbit.period,
@@ -172,7 +176,7 @@ def _followed(
     for _ in range(_TRIALS * most):
         if len(path.points) >= most:
             break
-        end = walk.advance(path, first=found.z)
+        end = walk.advance(path)
         walk.equations.for_step(walk.step)
         if end:
             return path._replace(end=end)
@@ -195,7 +199,7 @@ class _Walk(Location):
     def __post_init__(self) -> None:
         self.written = self.z
 
-    def advance(self, path: _Path, first: Floats) -> str:
+    def advance(self, path: _Path) -> str:
         """Take a step along the branch, or find that it is too long; returns why the branch ends, if it does."""
         equations = self.equations
         if self.ahead < LEAST_STEP:
@@ -230,7 +234,7 @@ class _Walk(Location):
         if not equations.kind.rests and course.slowest < min(_SLOW * equations.sizes[1], before.slowest):
             path.bifurcations.append(vanishing(self, before, length))
             return GRAZING
-        if len(path.points) > _ROUND and equations.shift == 0 and np.max(np.abs(new - first)) < length:
+        if self.has_returned(path):
             return CLOSED
         self.move_start()
         if self.ahead < math.inf:
@@ -238,6 +242,21 @@ class _Walk(Location):
         elif solved.steps <= _QUICK:
             self.step = min(self.step * _LONGER, self.longest)
         return ""
+
+    def has_returned(self, path: _Path) -> bool:
+        """Whether the branch has passed its first point again, in the direction in which it left it."""
+        if len(path.points) <= _ROUND:
+            return False
+        first, second, before, last = (
+            np.append(each.state, each.value) / self.equations.sizes
+            for each in (path.points[0], path.points[1], path.points[-2], path.points[-1])
+        )
+        step, left = last - before, second - first
+        size = float(np.linalg.norm(step))
+        share = float((first - before) @ step) / size**2
+        beside = float(np.linalg.norm(first - before - share * step))
+        same_way = float(step @ left) > _COSINE * size * float(np.linalg.norm(left))
+        return 0.0 <= share <= 1.0 and beside < _BESIDE * size and same_way
 
     def shorten(self) -> None:
         """Try half the step that failed; there is no point of this kind at its end, unless the branch bends."""
