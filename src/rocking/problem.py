@@ -106,7 +106,16 @@ def set_start(
     side = np.where((sign < 0.0) | at_other, 1, 0)
     at_rest = (u == 0.0) & (v == 0.0)
     states["side"] = np.where(at_rest, np.where(facing, -1 - side, state.AT_REST), side)
-    states["u"], states["v"], states["peak"] = u, v, u
+    states["u"], states["v"], states["peak"] = u, v, np.where(at_other, records["fallen"], u)
+
+
+def highest(states: state.Records, records: state.Records, stops: Floats) -> Floats:
+    """Peaks of coordinates, from those in the frame of side +: at a second stop exactly its own.
+
+    One at the second stop has been across from the first.
+    """
+    at_other = records["facing"] & (states["peak"] >= records["fallen"])
+    return np.where(at_other, stops[..., 1], states["peak"] + stops[..., 0])
 
 
 def _refuse_behind(coordinate: Coordinate, at: Floats, behind: Flags, stops: Floats, facing: Flags) -> None:

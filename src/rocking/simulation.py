@@ -18,7 +18,7 @@ from rocking.kernels.march import follow
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
-from rocking.problem import ground_of, one_body, rules_of, set_start
+from rocking.problem import ground_of, highest, one_body, rules_of, set_start
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
 
@@ -116,7 +116,7 @@ def simulate(
         overturned=overturned,
         unfinished=ending == state.Ending.UNFINISHED,
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
-        peak_rotation=math.nan if trail.block["facing"] else float(start["peak"]) + block.stops[0],
+        peak_rotation=float(highest(start, trail.block, np.array(block.stops))),
         peak_time=float(start["peak_time"]),
         duration=float(start["end"]),
         events=_events(events),

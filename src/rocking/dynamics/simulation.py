@@ -36,7 +36,7 @@ class Response(rocking.response.Response):
 
     @property
     def peak_position(self) -> float:
-        """Highest position, m; NaN between two stops."""
+        """Highest position, m: that of the second stop, exactly, once the body has been there."""
         return self.peak_rotation
 
     def position(self, time: ArrayLike) -> Floats:
@@ -179,7 +179,7 @@ def simulate_many(
     Returns
     -------
     xarray.Dataset
-        As `rocking.simulate_many`, with ``peak_position`` (m; NaN between two stops).
+        As `rocking.simulate_many`, with ``peak_position`` (m), the highest.
 
     Raises
     ------

@@ -293,7 +293,7 @@ def integrate(
         overturned=bool(u[-1] >= record["fallen"] and not record["facing"]),
         rests=rests,
         impact_times=impacts,
-        peak=math.nan if record["facing"] else float(u.max()) + one.stops[0],
+        peak=float(u.max()) + one.stops[0],
         penetration=max(0.0, -float(u.min()), float(u.max() - record["fallen"]) if record["facing"] else 0.0),
     )
 
