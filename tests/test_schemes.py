@@ -256,6 +256,26 @@ def test_between_two_stops_the_peak_is_that_of_the_stop_that_is_reached():
         assert outcome.position_error < 0.1 * found.largest
 
 
+@pytest.mark.parametrize(
+    ("start", "argument"),
+    [
+        ({"initial_position": 2.0}, "initial_position"),
+        ({"initial_position": math.nan}, "initial_position"),
+        ({"initial_position": 0.01, "initial_velocity": 2e6}, "initial_velocity"),
+    ],
+)
+@pytest.mark.parametrize("body", [BLOCK, dynamics.ImpactOscillator(1.0, 0.5, stop=0.0, second_stop=1.0)])
+def test_a_start_that_cannot_be_is_refused_by_the_name_it_was_given_by(body, start, argument):
+    motion = rocking.pulses.sine(1.0, 1.0, cycles=1)
+    for call in (
+        lambda: compare_schemes(body, motion, schemes=["velocity=1e-3"], **start),
+        lambda: dynamics.integrate(body, motion, dynamics.MoreauJean(1e-3), 1.0, **start),
+    ):
+        with pytest.raises(rocking.InvalidOption) as caught:
+            call()
+        assert caught.value.argument == argument and str(caught.value).startswith(argument)
+
+
 def test_the_processor_time_is_measured_where_it_is_asked_for():
     schemes = ["velocity=1e-3", "moreau-jean=1e-3"]
     found = compare_schemes(BLOCK, sine(1.05), schemes=schemes, model="linear", repetitions=2)

@@ -275,7 +275,7 @@ def integrate(
             *("step",),
             value=h,
         )
-    start = started(one, records, position_at_start(one, initial_position), initial_velocity)
+    start = started(alone, records, position_at_start(one, initial_position), initial_velocity, "initial_position")
     rows = np.zeros((count + 1, stepping.COLUMNS))
     rows = rows[: scheme._follow((ground_of(motion, one.gravity), record, rules, start), rows)]
     times: Floats = h * np.arange(len(rows), dtype=np.float64)
