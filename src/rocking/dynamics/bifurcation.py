@@ -332,14 +332,10 @@ class _Work:
             strobe = self.mapped(k)
             at = self.first if self.afresh else self.before(w, k)
             at = _in_front(strobe, np.where(np.isnan(at), self.first, at))
-            if self.transient:
-                at = strobe(at, self.transient)
-            moves = ~np.isnan(at[:, 0])
-            if moves.any():
-                self.states[w, k, moves] = strobe.orbit(at[moves], self.kept)[:, 1:]
+            self.states[w, k] = settled_states(strobe, at, self.transient, self.kept)
             now = self.states[w, k, :, -1]
             for s in np.flatnonzero(~np.isnan(now[:, 0])):
-                period = _period_of(self.states[w, k, s])
+                period = period_of(self.states[w, k, s])
                 self.period[w, k, s] = period
                 if period:
                     self.impacts[w, k, s] = strobe.followed(now[s], period)[2]
@@ -385,7 +381,17 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
     return np.stack([inside, np.where(held, 0.0, states[:, 1])], axis=-1)
 
 
-def _period_of(states: Floats) -> int:
+def settled_states(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> Floats:
+    """States at the starts of some periods after others, shape (n, kept, 2); NaN from where a body overturns."""
+    states = np.full((len(at), kept, 2), np.nan)
+    now = strobe(at, transient) if transient else at
+    moves = ~np.isnan(now[:, 0])
+    if moves.any():
+        states[moves] = strobe.orbit(now[moves], kept)[:, 1:]
+    return states
+
+
+def period_of(states: Floats) -> int:
     """Period of an orbit from its kept states; 0 where none comes back for half of them, or it is still settling."""
     size = np.abs(states).max(axis=0) + np.finfo(float).tiny
 
