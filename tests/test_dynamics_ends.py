@@ -103,6 +103,23 @@ def test_rest_starts_where_a_threshold_on_the_speed_is_reached():
     assert certified.values.max() == 8.0
 
 
+def test_a_ball_that_keeps_no_speed_rests_up_to_a_level_in_closed_form():
+    """It hits once a period where cos(phase) is pi over the level, and stays if the table presses there."""
+    dull = dynamics.BouncingBall(0.0, gravity=G)
+
+    def family(level):
+        return dull, pulses.sine(level * G, TABLE, cycles=1)
+
+    (rests,) = dynamics.periodic_orbits(*family(3.2), starts=64)
+    branch = dynamics.continue_orbit(rests, family, 3.2, (3.15, 3.4), step=0.2)
+    assert branch.bifurcations[-1].value == pytest.approx(math.hypot(1.0, math.pi), abs=1e-9)
+    # Beyond, it leaves at once, and a multiplier is not zero: that of any restitution, with none.
+    (leaves,) = dynamics.periodic_orbits(*family(3.5), starts=64)
+    assert not leaves.rests and leaves.impacts == 1.0
+    trace = closed_orbits.Ball(0.0, 1).trace(3.5, stable=True)
+    assert leaves.multipliers.tolist() == pytest.approx([trace, 0.0], abs=1e-9)
+
+
 def peak_of(exact, speed):
     """Greatest rotation of a linear block with this speed after impacts, from its arc in closed form."""
     p, alpha, e, w = exact.p, exact.alpha, exact.restitution, 2.0 * math.pi * exact.shaking
