@@ -40,10 +40,11 @@ def test_basin_prints_shares_and_writes_what_it_says(run, tmp_path):
         ("sine:amplitude=2.5,frequency=1", "frequency:1:2:5", "frequency (Hz)"),
     ],
 )
-def test_bifurcation_json_is_the_diagram(run, pulse, along, parameter):
+def test_bifurcation_json_is_the_diagram(run, tmp_path, pulse, along, parameter):
     arguments = ["--pulse", pulse, "--along", along, "--start", "0.02,0.1", "--kept", "8", "--json"]
-    code, out, err = run("bifurcation", *arguments, *BLOCK, "--direction", "up")
-    assert (code, err) == (0, "")
+    for _ in range(2):  # the second time from the folder
+        code, out, err = run("bifurcation", *arguments, *BLOCK, "--direction", "up", "--folder", tmp_path / "kept")
+        assert (code, err) == (0, "")
     result = json.loads(out)
     assert result["parameter"] == parameter and result["direction"] == ["up"]
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)

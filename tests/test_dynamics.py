@@ -15,9 +15,9 @@ G = 9.81
 
 
 def integrated(body, motion, end, position, velocity):
-    """Impact times and speeds, and the state at the end (None: it chatters), by DOP853 restarted at each impact."""
+    """Impact times and speeds, state at the end (None: it chatters), highest position; DOP853 from each impact on."""
     stiffness, damping, pull, low, high = body.law
-    times, speeds, t, x, v = [], [], 0.0, position, velocity
+    times, speeds, t, x, v, peak = [], [], 0.0, position, velocity, position
 
     def rates(time, y):
         return [y[1], stiffness * y[0] - damping * y[1] - pull - float(motion.acceleration(time))]
@@ -28,9 +28,12 @@ def integrated(body, motion, end, position, velocity):
     def at_high(_, y):
         return (high if math.isfinite(high) else 1e9) - y[0]
 
-    events = [at_low, at_high]
+    def turns(_, y):
+        return y[1]
+
+    events = [at_low, at_high, turns]
     for event in events:
-        event.terminal, event.direction = True, -1
+        event.terminal, event.direction = event is not turns, -1
     grid = np.unique(np.append(motion.breakpoints[motion.breakpoints < end], end))
     for piece_end in grid[1:] if grid[0] == 0.0 else grid:
         while t < piece_end:
@@ -38,14 +41,15 @@ def integrated(body, motion, end, position, velocity):
                 rates, (t, piece_end), [x, v], "DOP853", rtol=1e-12, atol=1e-14, events=events, max_step=0.02
             )
             t, (x, v) = found.t[-1], found.y[:, -1]
+            peak = max(peak, *(high if len(found.t_events[1]) else x, *found.y_events[2].reshape(-1, 2)[:, 0]))
             if found.status == 1:
                 times.append(t)
                 speeds.append(abs(v))
                 x = low if len(found.t_events[0]) else high
                 v = -body.restitution * v
                 if abs(v) < 2e-2:  # of shorter arcs it misses roots
-                    return times[:-1], speeds[:-1], None
-    return times, speeds, (x, v)
+                    return times[:-1], speeds[:-1], None, peak
+    return times, speeds, (x, v), peak
 
 
 def drawn(seed):
@@ -66,11 +70,11 @@ def drawn(seed):
 
 
 def test_impacts_are_those_of_an_independent_integration():
-    impacts = ends = 0  # slow impacts multiply the error of their times
+    impacts = ends = between = reached = 0  # slow impacts multiply the error of their times
     for seed in range(40):
         body, motion, position, velocity = drawn(seed)
         end = motion.end
-        times, speeds, last = integrated(body, motion, end, position, velocity)
+        times, speeds, last, peak = integrated(body, motion, end, position, velocity)
         found = dynamics.simulate(body, motion, duration=end, initial_position=position, initial_velocity=velocity)
         known = list(zip(times, speeds, strict=True))
         if len(found.chattering):  # closed by proof before the speed is small
@@ -85,9 +89,12 @@ def test_impacts_are_those_of_an_independent_integration():
             assert len(found.impacts) == len(known)
             assert found.position(end) == pytest.approx(last[0], abs=1e-10)
             assert found.velocity(end) == pytest.approx(last[1], abs=1e-9)
-            ends += 1
+            assert found.peak_position == pytest.approx(peak, abs=1e-10) and not math.isnan(peak)
+            two = math.isfinite(body.law.high)
+            ends, between, reached = ends + 1, between + two, reached + (two and peak == body.law.high)
+            assert ("at the stop" in found.summary()) == (two and peak == body.law.high)
         impacts += len(known)
-    assert impacts > 200 and ends > 20
+    assert impacts > 200 and ends > 20 and between >= 8 and 3 <= reached < between
 
 
 def rest_by_following(body, acceleration, speed):
@@ -169,7 +176,7 @@ def test_many_bodies_as_one_by_one():
             judged += 1
     assert judged == 8
     two = dynamics.simulate_many(dynamics.InvertedPendulum(3.0, 0.1, 0.5), motions[0])
-    assert np.isnan(two.peak_position.values).all() and two.impacts.values.min() > 0
+    assert two.peak_position.values.tolist() == [[0.1]] and two.impacts.values.min() > 0
 
 
 @pytest.mark.parametrize(

@@ -194,6 +194,31 @@ def test_an_interrupt_keeps_what_was_computed_and_a_folder_goes_on(tmp_path, mon
         dynamics.basins(BLOCK, SHAKING, x, v, 100, folder=tmp_path / "kept")
 
 
+def test_an_interrupted_erosion_goes_on_in_its_folder(tmp_path, monkeypatch):
+    x, v = np.linspace(-0.2, 0.2, 12), np.linspace(-0.4, 0.4, 11)
+    whole = dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0, 1.5], x, v, 40)
+    follow, calls = basin_grid.Grid._follow, []
+
+    def interrupted(self, cells):
+        calls.append(len(cells))
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        follow(self, cells)
+
+    monkeypatch.setattr(basin_grid.Grid, "_follow", interrupted)
+    part = dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0, 1.5], x, v, 40, folder=tmp_path)
+    assert part.factor.values.tolist() == [0.5] and part.data.identical(whole.data.isel(factor=[0]))
+    again = dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0, 1.5], x, v, 40, folder=tmp_path)
+    assert len(calls) == 4 and again.data.identical(whole.data)
+    more = dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.2, 1.5], x, v, 40, folder=tmp_path)
+    assert len(calls) == 5 and more.safe.values[[0, 2]].tolist() == whole.safe.values[[0, 2]].tolist()
+    with pytest.raises(InvalidOption, match="something else"):
+        dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5], x, v, 41, folder=tmp_path)
+    calls[:] = [0]
+    with pytest.raises(KeyboardInterrupt):  # nothing was reached
+        dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0], x, v, 40)
+
+
 def test_what_rests_is_an_attractor_and_a_chaotic_state_has_not_settled():
     still = dynamics.basins(BLOCK, pulses.sine(1.0, 1.0, cycles=1), np.linspace(-1e-3, 1e-3, 9), [0.0])
     assert still.attractor.values.tolist() == ["rest"] and still.share.values == [1.0]

@@ -88,6 +88,32 @@ def test_the_derivative_is_that_of_finite_differences_and_zero_after_a_rest(name
     assert np.count_nonzero(same & ~rests) > 10
 
 
+@pytest.mark.parametrize(
+    ("body", "motion", "chattering", "size"),
+    [
+        (dynamics.BouncingBall(0.0, gravity=10.0), (25.0, 5.0), "certified", (0.3, 1.0)),
+        (dynamics.InvertedPendulum(3.0, 0.1, 0.0), (30.0, 5.0), "certified", (0.1, 2.5)),
+        (Block.from_parameters(p=2.0, alpha=0.2, restitution=0.5), (9.0, 2.0), "velocity=0.5", (0.15, 0.3)),
+    ],
+)
+def test_a_rest_that_the_ground_ends_at_once_is_not_forgotten(body, motion, chattering, size):
+    """An impact that leaves no speed where the ground draws back: when the body leaves depends on when it came."""
+    strobe = dynamics.stroboscopic_map(body, pulses.sine(*motion, cycles=1), chattering=chattering)
+    given = np.random.default_rng(5).uniform(-0.99, 0.99, (120, 2)) * size
+    if isinstance(body, dynamics.BouncingBall):
+        given[:, 0] = np.abs(given[:, 0]) + 1e-3
+    _, change = strobe.derivative(given)
+    differences = {}
+    for step in (1e-6, 2e-6):
+        columns = [(strobe(given + step * each) - strobe(given - step * each)) / (2.0 * step) for each in np.eye(2)]
+        differences[step] = np.stack(columns, axis=-1)
+    smooth = np.all(np.abs(differences[1e-6] - differences[2e-6]) < 1e-6, axis=(1, 2))
+    assert change[smooth] == pytest.approx(differences[1e-6][smooth], rel=1e-6, abs=1e-6)
+    # After such an impact nothing but its time is left of the state before: one multiplier is zero, the other is not.
+    flat = np.abs(np.linalg.det(change)) < 1e-12
+    assert np.count_nonzero(smooth & flat & np.any(change != 0.0, axis=(1, 2))) >= 10
+
+
 def test_area_shrinks_by_the_square_of_the_restitution_at_each_impact_and_by_damping():
     damped = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)
     body, motion = damped, pulses.sine(3.0, 1.3, cycles=1)

@@ -702,7 +702,7 @@ def test_a_diagram_is_read_by_keys_and_swept_over_the_frequency(opened):
     found = query_of(page)
     assert found["sweep"] == "omega" and "sweep_from" not in found
     assert page.text("#sweep-at").startswith("Frequency of the pulse")
-    assert "omega_values = np.linspace(0.5, 8.0, 100)" in page.text("#python")
+    assert "case, np.linspace(0.5, 8.0, 100), (0.0, 0.0)" in page.text("#python")
 
 
 def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
@@ -722,13 +722,15 @@ def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
     ran = runpy.run_path(str(script))["found"]
     judged = 0
     for a, direction, rotation, velocity in rows[1:]:
-        states = ran[direction, float(a)]
+        at = ran.data.sel(direction=direction, value=float(a), start=0)
+        states = np.stack([at.coordinate.values, at.velocity.values], axis=-1)
         if rotation:
             assert [float(rotation), float(velocity)] in states.tolist()
         else:
             assert np.isnan(states[-1]).all()
         judged += 1
-    assert judged >= 200 and {direction for direction, _ in ran} == {row[1] for row in rows[1:]} == {"up", "down"}
+    assert judged >= 200 and {*ran.direction.values} == {row[1] for row in rows[1:]} == {"up", "down"}
+    assert page.text("#command").startswith("rocking bifurcation --pulse sine:frequency=2.0 --along amplitude:")
 
 
 def test_a_mistake_in_a_sweep_is_marked_there(opened):

@@ -1,15 +1,17 @@
 """The explorer's periodic view: what a case settles on and its sweeps, against long simulations and its own script."""
 
+import json
 import math
 import re
 import runpy
+import shlex
 
 import numpy as np
 import pytest
 
 import rocking
 from rocking.errors import InvalidOption
-from rocking.explorer.code import sweep_as_python
+from rocking.explorer.code import sweep_as_command, sweep_as_python
 from rocking.explorer.inputs import read_case
 from rocking.explorer.periodic import KEPT, LONGEST, nearest_sine, orbit, sine_of
 from rocking.explorer.sweeps import part_payload, parts, sweep_of, texts_at
@@ -199,17 +201,51 @@ def test_a_sweep_is_what_its_script_computes(texts, asked, tmp_path):
     script = tmp_path / "sweep.py"
     script.write_text(sweep_as_python(sweep), "utf-8")
     ran = runpy.run_path(str(script))["found"]
-    assert len(found) == len(ran) == 48
+    assert len(found) == ran.period.size == 48
     overturned = periodic = 0
     for (direction, index), each in found.items():
-        states = ran[direction, sweep.axis.values[index]]
-        assert states.shape == (KEPT, 2)
+        at = ran.data.sel(direction=direction, start=0).isel(value=index)
+        states = np.stack([at.coordinate.values, at.velocity.values], axis=-1)
+        assert at.value == sweep.axis.values[index] and states.shape == (KEPT, 2)
+        assert at.period == (each.period if len(each.states) else -1)
         overturned += not len(each.states)
         periodic += each.period > 0
         assert np.isnan(states[-1]).all() == (not len(each.states))
         assert np.array_equal(states[KEPT - len(each.states) :], each.states)
     assert periodic >= 15 and periodic + overturned >= 24
     assert overturned >= 3 or "model" in texts or "scale" in texts
+
+
+@pytest.mark.parametrize(
+    ("texts", "asked", "most"),
+    [
+        ({}, {"sweep": "a", "sweep_from": "1.2", "sweep_to": "6"}, 0),
+        (
+            {**ECCENTRIC, "model": "linear", "scale": "-1.1"},
+            {"sweep": "omega", "sweep_from": "2.5", "sweep_to": "5"},
+            1,
+        ),
+    ],
+)
+def test_a_sweep_is_what_its_command_prints(run, texts, asked, most):
+    case = case_of("sine:amplitude=0.9g,frequency=2,cycles=3,phase=20deg", **texts)
+    sweep = sweep_of(case, {**asked, "sweep_points": "12"})
+    program, *arguments = shlex.split(sweep_as_command(sweep))
+    code, out, err = run(*arguments, "--json")
+    assert (program, code, err) == ("rocking", 0, "")
+    result, found = json.loads(out), swept(sweep)
+    name = "amplitude" if sweep.axis.name == "a" else "frequency"
+    values = [getattr(sweep.sine_at(float(value)), name) for value in sweep.axis.values]
+    assert result["value"] == pytest.approx(values, rel=1e-14) and result["kept"] == KEPT
+    periods = {(way, k): period[0] for way, row in zip(result["direction"], result["period"], strict=True)
+               for k, period in enumerate(row)}  # fmt: skip
+    assert len(periods) == 24
+    assert periods == {at: each.period if len(each.states) else -1 for at, each in found.items()}
+
+
+@pytest.mark.parametrize("texts", [{"gravity": "9.81"}, {"chattering": "velocity=0.01"}])
+def test_a_sweep_that_the_command_line_does_not_take_has_no_command(texts):
+    assert sweep_as_command(sweep_of(case_of(sine(3.0), **texts), {})) is None
 
 
 def test_a_sweep_depends_on_its_direction():

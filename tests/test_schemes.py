@@ -244,15 +244,36 @@ def test_a_ball_is_compared_as_a_block_is():
     assert found.certified.response.body == ball
 
 
-def test_between_two_stops_there_is_no_peak_to_compare():
+def test_between_two_stops_the_peak_is_that_of_the_stop_that_is_reached():
     pendulum = dynamics.InvertedPendulum(2.0, 0.05, 0.6)
     motion = rocking.pulses.sine(1.5, 1.0, cycles=3)
     found = compare_schemes(pendulum, motion, schemes=["bypass=1e-4", "moreau-jean=1e-4", "schatzman-paoli=1e-4"])
     assert len(found.certified.rests) > 0
     assert found.largest == pytest.approx(0.05)
+    assert found.certified.response.peak_position == 0.05
     for outcome in found.outcomes:
-        assert math.isnan(outcome.peak_error)
+        assert abs(outcome.peak_error) <= outcome.penetration / 0.05 + 1e-12 < 0.01
         assert outcome.position_error < 0.1 * found.largest
+
+
+@pytest.mark.parametrize(
+    ("start", "argument"),
+    [
+        ({"initial_position": 2.0}, "initial_position"),
+        ({"initial_position": math.nan}, "initial_position"),
+        ({"initial_position": 0.01, "initial_velocity": 2e6}, "initial_velocity"),
+    ],
+)
+@pytest.mark.parametrize("body", [BLOCK, dynamics.ImpactOscillator(1.0, 0.5, stop=0.0, second_stop=1.0)])
+def test_a_start_that_cannot_be_is_refused_by_the_name_it_was_given_by(body, start, argument):
+    motion = rocking.pulses.sine(1.0, 1.0, cycles=1)
+    for call in (
+        lambda: compare_schemes(body, motion, schemes=["velocity=1e-3"], **start),
+        lambda: dynamics.integrate(body, motion, dynamics.MoreauJean(1e-3), 1.0, **start),
+    ):
+        with pytest.raises(rocking.InvalidOption) as caught:
+            call()
+        assert caught.value.argument == argument and str(caught.value).startswith(argument)
 
 
 def test_the_processor_time_is_measured_where_it_is_asked_for():

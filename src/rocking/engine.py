@@ -25,7 +25,7 @@ from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
-from rocking.problem import ground_of, rules_of, set_start, step_of
+from rocking.problem import ground_of, highest, rules_of, set_start, step_of
 from rocking.treatment import Treatment
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
@@ -239,7 +239,7 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
         _march_together(ground, rules, (records, states), chosen, step, substeps)
     _march_on(ground, rules, records, states, stop)
     outcomes = _outcomes(states, task.motion.end)
-    outcomes["peak_rotation"] += np.where(records["facing"], np.nan, bodies.stops[:, 0])
+    outcomes["peak_rotation"] = highest(states, records, bodies.stops)
     outcomes["complete_chattering"] = complete_chattering(ground, records, states)
     return outcomes
 

@@ -10,9 +10,9 @@ from typing import cast
 import numpy as np
 
 from rocking import checks
-from rocking.arrays import Flags, Floats
+from rocking.arrays import Floats
 from rocking.block import Block, Blocks, one_block
-from rocking.body import KINDS, Bodies, Body, Coordinate
+from rocking.body import KINDS, Bodies, Body
 from rocking.constants import MODELS, Model
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
@@ -20,6 +20,9 @@ from rocking.kernels.ground import Ground
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.treatment import Treatment
+
+#: Fastest initial velocity, rad/s or m/s: beyond all sense, and squares and fourth powers of it are far from overflow.
+_FASTEST = 1e6
 
 
 @functools.lru_cache(maxsize=8)
@@ -75,57 +78,93 @@ def set_start(
     bodies: Bodies,
     coordinate: float | Floats | None,
     rate: float | Floats,
+    name: str | None = None,
 ) -> None:
     """Set the states of bodies at time zero, which are at rest, to coordinates and their rates.
 
     There is one body for each state, or one for all. Without a coordinate it is zero, or the stop where zero is behind
-    it.
+    it. ``name`` is what a caller calls the coordinate, by default as "initial_rotation".
 
     Raises
     ------
     InvalidOption
-        If a body cannot be there.
+        If a body cannot be there, or a number is not finite or beyond all sense.
     """
     stops, facing, one_sided = bodies.stops, records["facing"], records["entered"][:, 0] == 0
-    if not np.any(stops) and (coordinate is None or np.all(coordinate == 0.0)) and np.all(rate == 0.0):
+    if (
+        not isinstance(rate, np.ndarray)
+        and rate == 0.0
+        and (coordinate is None or coordinate == 0.0)
+        and not stops.any()
+    ):
         return
     if coordinate is None:
         coordinate = np.clip(0.0, stops[:, 0], np.where(facing, stops[:, 1], np.inf))
-    at, speed = np.broadcast_arrays(np.asarray(coordinate, dtype=float), np.asarray(rate, dtype=float))
+    if not isinstance(rate, np.ndarray):  # arrays have been checked; in them a body may have fallen
+        _check_start(coordinate, rate, records, bodies, name)
+    at, speed = np.asarray(coordinate, dtype=float), np.asarray(rate, dtype=float)
     from_plus = at - stops[:, 0]
     sign = np.where(one_sided, 1.0, np.sign(np.where(from_plus == 0.0, speed, from_plus)))
     at_other = facing & (at == stops[:, 1])
     u, v = np.where(at_other, 0.0, sign * from_plus), np.where(at_other, -speed, sign * speed)
-    _refuse_behind(
-        bodies[0].coordinate, at, one_sided & ((u < 0.0) | (facing & (u > records["fallen"]))), stops, facing
-    )
-    into = one_sided & (u == 0.0) & (v < 0.0)
-    if np.any(into):
-        worst = float(np.broadcast_to(speed, into.shape)[into][0])
-        raise InvalidOption(
-            f"{{}} = {worst:g} leads from the stop into it; change its sign, or {{}}",
-            "initial_velocity",
-            f"initial_{bodies[0].coordinate.name}",
-            value=worst,
-        )
+    wrong = one_sided & ((u < 0.0) | (facing & (u > records["fallen"])) | ((u == 0.0) & (v < 0.0)))
+    if np.any(wrong):
+        _refuse_behind(bodies, int(np.argmax(wrong)), at, speed, u, name)
     side = np.where((sign < 0.0) | at_other, 1, 0)
     at_rest = (u == 0.0) & (v == 0.0)
     states["side"] = np.where(at_rest, np.where(facing, -1 - side, state.AT_REST), side)
-    states["u"], states["v"], states["peak"] = u, v, u
+    states["u"], states["v"], states["peak"] = u, v, np.where(at_other, records["fallen"], u)
 
 
-def _refuse_behind(coordinate: Coordinate, at: Floats, behind: Flags, stops: Floats, facing: Flags) -> None:
-    """Refuse to start where a body cannot be."""
-    if not np.any(behind):
+def highest(states: state.Records, records: state.Records, stops: Floats) -> Floats:
+    """Peaks of coordinates, from those in the frame of side +: at a second stop exactly its own.
+
+    One at the second stop has been across from the first.
+    """
+    at_other = records["facing"] & (states["peak"] >= records["fallen"])
+    return np.where(at_other, stops[..., 1], states["peak"] + stops[..., 0])
+
+
+def _check_start(
+    coordinate: float | Floats, rate: float, records: state.Records, bodies: Bodies, name: str | None
+) -> None:
+    """Check the coordinate and the rate of one body, or of all; numbers of Python's own are the quickest to check."""
+    plain = type(coordinate) is float and type(rate) is float and math.isfinite(coordinate) and abs(rate) <= _FASTEST
+    fallen = np.where(records["facing"], np.inf, records["fallen"]).min()
+    if plain and abs(coordinate) < fallen:
         return
-    k = int(np.argmax(behind))
-    low, high = np.broadcast_to(stops, (len(behind), 2))[k]
-    where = f"from {low:g} to {high:g}" if np.broadcast_to(facing, behind.shape)[k] else f"at least {low:g}"
-    value = float(np.broadcast_to(at, behind.shape)[k])
+    kind = bodies[0].coordinate
+    called = name or f"initial_{kind.name}"
+    u = float(coordinate[0]) if isinstance(coordinate, np.ndarray) else checks.finite(coordinate, called, InvalidOption)
+    v = checks.finite(rate, "initial_velocity", InvalidOption)
+    if abs(v) > _FASTEST:
+        raise InvalidOption(
+            f"{{}} must be at most {_FASTEST:g} {kind.unit}/s in size, not {v:g}", "initial_velocity", value=v
+        )
+    if abs(u) >= fallen:
+        limit = "pi/2" if fallen == 0.5 * math.pi else f"{fallen:g}"
+        hint = checks.hint_of_degrees(u) if kind.unit == "rad" else ""
+        raise InvalidOption(
+            f"{{}} must be below {limit} {kind.unit} in size, not {u:g}{hint}", called, value=coordinate
+        )
+
+
+def _refuse_behind(bodies: Bodies, k: int, at: Floats, speed: Floats, u: Floats, name: str | None) -> None:
+    """Refuse to start where body k cannot be, or into its stop."""
+    body = bodies[min(k, len(bodies) - 1)]
+    called = name or f"initial_{body.coordinate.name}"
+    value, fast = (float(np.broadcast_to(each, u.shape)[k]) for each in (at, speed))
+    if u[k] == 0.0:
+        raise InvalidOption(
+            f"{{}} = {fast:g} leads from the stop into it; change its sign, or {{}}",
+            "initial_velocity",
+            called,
+            value=fast,
+        )
+    low, high = body.stops
+    where = f"from {low:g} to {high:g}" if high > low else f"at least {low:g}"
     raise InvalidOption(
-        f"{{}} must be {where} {coordinate.unit}, in front of the body's stop, not {value:g}",
-        f"initial_{coordinate.name}",
-        value=value,
+        f"{{}} must be {where} {body.coordinate.unit}, in front of the body's stop, not {value:g}", called, value=value
     )
 
 

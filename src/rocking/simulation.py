@@ -7,8 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking import checks
-from rocking.body import Body
+from rocking.body import Bodies, Body
 from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import Model
 from rocking.engine import SLICE, slices
@@ -18,7 +17,7 @@ from rocking.kernels.march import follow
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
-from rocking.problem import ground_of, one_body, rules_of, set_start
+from rocking.problem import ground_of, highest, one_body, rules_of, set_start
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
 
@@ -31,9 +30,6 @@ _KINDS = np.array(["uplift", "rest", "overturn"])
 
 #: Rows of the first table per piece of the motion.
 _FIRST_ROWS = 1.25
-
-#: Fastest initial velocity, rad/s: beyond all sense, and squares and fourth powers of it are far from overflow.
-_FASTEST = 1e6
 
 
 def simulate(
@@ -97,12 +93,25 @@ def simulate(
     >>> response.overturned, len(response.impacts) > 50, f"{response.events['time'][-1]:.6f}"
     (False, True, '4.235818')
     """
+    return response_to(block, motion, model, chattering, duration, (initial_rotation, initial_velocity))
+
+
+def response_to(
+    block: Body,
+    motion: Motion | None,
+    model: Model,
+    chattering: str | Treatment,
+    duration: float | None,
+    initial: tuple[float, float],
+    name: str | None = None,
+) -> Response:
+    """Response as of `simulate`, to a caller that has another name for the initial coordinate."""
     announce(SIMULATIONS)
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
     rules = rules_of(alone, model, how, duration, record=True)
     records = alone.kernel_records(model, how.limits(alone, motion, model))
     trail = Trail(ground_of(motion, block.gravity), records[0], rules, NO_NODES)
-    start = started(block, records, initial_rotation, initial_velocity)
+    start = started(alone, records, *initial, name)
     ending, table = _marched(trail, start)
     if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
@@ -116,7 +125,7 @@ def simulate(
         overturned=overturned,
         unfinished=ending == state.Ending.UNFINISHED,
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
-        peak_rotation=math.nan if trail.block["facing"] else float(start["peak"]) + block.stops[0],
+        peak_rotation=float(highest(start, trail.block, np.array(block.stops))),
         peak_time=float(start["peak_time"]),
         duration=float(start["end"]),
         events=_events(events),
@@ -147,29 +156,13 @@ def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     return state.Ending.UNFINISHED, table
 
 
-def started(body: Body, records: state.Records, rotation: float, velocity: float) -> state.Record:
-    """State of a body at time zero, of which ``records`` has the one record."""
+def started(
+    bodies: Bodies, records: state.Records, rotation: float, velocity: float, name: str | None = None
+) -> state.Record:
+    """State at time zero of one body, of which there are ``bodies`` and ``records``; ``name`` as of `set_start`."""
     states = state.new_states(1, 0)
-    if rotation == 0.0 and velocity == 0.0 and not any(body.stops):  # at rest, as new states are
-        return states[0]
-    _check_start(body, float(records["fallen"][0]), bool(records["facing"][0]), rotation, velocity)
-    set_start(states, records, body.alone(), rotation, velocity)
+    set_start(states, records, bodies, rotation, velocity, name)
     return states[0]
-
-
-def _check_start(body: Body, fallen: float, facing: bool, rotation: float, velocity: float) -> None:
-    """Check that a simulation may start from a coordinate and a velocity."""
-    name, unit = f"initial_{body.coordinate.name}", body.coordinate.unit
-    u = checks.finite(rotation, name, InvalidOption)
-    v = checks.finite(velocity, "initial_velocity", InvalidOption)
-    if abs(v) > _FASTEST:
-        raise InvalidOption(
-            f"{{}} must be at most {_FASTEST:g} {unit}/s in size, not {v:g}", "initial_velocity", value=v
-        )
-    if abs(u) >= fallen and not facing:
-        limit = "pi/2" if fallen == 0.5 * math.pi else f"{fallen:g}"
-        hint = checks.hint_of_degrees(u) if unit == "rad" else ""
-        raise InvalidOption(f"{{}} must be below {limit} {unit} in size, not {u:g}{hint}", name, value=rotation)
 
 
 def _public(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:

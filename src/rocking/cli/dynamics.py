@@ -32,6 +32,10 @@ from rocking.tables import cell, counted, text_table
 #: Cells of a basin along each axis.
 _CELLS = 200
 
+KEPT = Annotated[
+    Path | None, Parameter(help="Where to keep what was computed, again and again; the same call goes on there.")
+]
+
 
 def orbits(
     *,
@@ -86,6 +90,7 @@ def bifurcation(
     direction: Direction = "both",
     transient: int = 200,
     kept: int = 64,
+    folder: KEPT = None,
     body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -115,7 +120,7 @@ def bifurcation(
     name, quantity, rest = shaking.parameter(along, "amplitude:0.1g:0.5g:101")
     unit = shaking.family.unit(name).replace("^2", "²")
     levels = checks.axis(values(rest, "along", quantity), "along", InvalidOption)
-    with output.folder() as folder:
+    with output.folder() as place:
         found = bifurcation_diagram(
             lambda value: (moving, shaking.motion(**{name: value})),
             levels,
@@ -125,8 +130,9 @@ def bifurcation(
             kept=kept,
             parameter=f"{name} ({unit})" if unit else name,
             model=model.equation,
+            folder=folder,
         )
-        deliver(found, "bifurcation", folder=folder, as_json=output.as_json)
+        deliver(found, "bifurcation", folder=place, as_json=output.as_json)
 
 
 def basin(
@@ -140,9 +146,7 @@ def basin(
         str | None, written("Velocities, rad/s or m/s; by default up to p times the slenderness, or what is natural.")
     ] = None,
     periods: int = 200,
-    folder: Annotated[
-        Path | None, Parameter(help="Where to keep what was computed, again and again; the same call goes on there.")
-    ] = None,
+    folder: KEPT = None,
     body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -15,15 +12,14 @@ from numpy.typing import NDArray
 from rocking.arrays import Floats, Integers
 from rocking.constants import VERSION
 from rocking.dynamics.attractors import Known
+from rocking.dynamics.kept import Kept, key_of
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.repeated import described, parts_of
 from rocking.engine import in_threads
-from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.periodic import Fate, settle
-from rocking.progress import Progress, note
+from rocking.progress import Progress
 from rocking.result import variable
-from rocking.tables import write_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,18 +27,15 @@ if TYPE_CHECKING:
 #: What a cell is, before attractors are sorted: 3 + k belongs to attractor k.
 NOT_REACHED: Final = -1
 
-_TO_PLUS, _TO_MINUS, _UNSETTLED = 0, 1, 2
+TO_PLUS, TO_MINUS, _UNSETTLED = 0, 1, 2
 
 _FIRST: Final = 3
 
 NAMES: Final = ("overturns to side +", "overturns to side -", "not settled")
 
-#: Cells of the coarsest pass, at least; cells between two looks for attractors; and seconds between two savings.
+#: Cells of the coarsest pass, at least, and cells between two looks for attractors.
 _COARSEST: Final = 400
-
 _BATCH: Final = 16_384
-
-_BETWEEN_SAVINGS: Final = 20.0
 
 
 class Grid:
@@ -54,38 +47,29 @@ class Grid:
         self.outcome = np.full(len(x) * len(v), NOT_REACHED, dtype=np.int16)
         self.taken = np.zeros(len(x) * len(v), dtype=np.int32)
         self.known = Known(strobe, self.size)
-        self.file: Path | None = None
+        self.kept: Kept | None = None
         strobe._states(self._states(np.array([0, len(x) * len(v) - 1])))  # a start behind a stop is refused at once
 
-    def keep_in(self, folder: Path) -> None:
+    def keep_in(self, folder: str | Path) -> None:
         """Go on from what a folder holds, and keep what is computed there."""
-        folder.mkdir(parents=True, exist_ok=True)
-        self.file = folder / "basins.npz"
-        if not self.file.exists():
-            return
-        with np.load(self.file) as kept:
-            if kept["key"].item() != self._key():
-                raise InvalidOption("{} holds basins of something else; give another one", "folder", value=str(folder))
-            self.outcome, self.taken = kept["outcome"], kept["taken"]
-            self.known = Known(self.strobe, self.size, kept["attractors"])
+        self.kept = Kept(folder, "basins", key_of([self.strobe], self.x, self.v, self.periods))
+        if found := self.kept.arrays():
+            self.outcome, self.taken = found["outcome"], found["taken"]
+            self.known = Known(self.strobe, self.size, [*found["attractors"]])
 
     def run(self, progress: bool | None) -> None:
-        """Follow all cells that are not done; an interrupt ends it."""
+        """Follow all cells that are not done; what an interrupt leaves is kept where there is a folder."""
         done = int(np.count_nonzero(self.outcome != NOT_REACHED))
-        saved = time.monotonic()
-        with Progress("basins", self.outcome.size, show=progress, done=done) as bar:
-            try:
+        try:
+            with Progress("basins", self.outcome.size, show=progress, done=done) as bar:
                 for cells in self._batches():
                     self._follow(cells)
                     bar.advance(len(cells))
-                    if time.monotonic() - saved > _BETWEEN_SAVINGS:
-                        self._save()
-                        saved = time.monotonic()
-            except KeyboardInterrupt:
-                if np.all(self.outcome == NOT_REACHED):
-                    raise
-                note("interrupted: the basins hold the cells that were reached")
-        self._save()
+                    if self.kept is not None and self.kept.is_due:
+                        self._save(self.kept)
+        finally:
+            if self.kept is not None:
+                self._save(self.kept)
 
     def _batches(self) -> Iterator[Integers]:
         """Cells that are not done, coarse to fine; which ones go together does not depend on what is done."""
@@ -125,35 +109,16 @@ class Grid:
         inside = found >= 0
         outcome[inside] = _FIRST + self.known.owner[found[inside]]
         over = made["ending"] == Fate.OVERTURNED
-        outcome[over] = np.where(made["side"][over] > 0, _TO_MINUS, _TO_PLUS)
+        outcome[over] = np.where(made["side"][over] > 0, TO_MINUS, TO_PLUS)
         left = np.flatnonzero(~inside & ~over & (made["ending"] != Fate.UNFINISHED))
         ends = strobe._coordinates(made["u"][left], made["v"][left], made["side"][left])
         later = self.known.settle(ends)
         outcome[left] = np.where(later >= 0, _FIRST + later, _UNSETTLED)
         self.taken[cells], self.outcome[cells] = taken, outcome
 
-    def _key(self) -> str:
-        """Fingerprint of the problem."""
-        strobe = self.strobe
-        whole = hashlib.sha256()
-        for array in (strobe._ground.pieces, strobe._records, self.x, self.v):
-            whole.update(np.ascontiguousarray(array).tobytes())
-        whole.update(f"{VERSION} {strobe.model} {strobe.treatment} {self.periods}".encode())
-        return whole.hexdigest()
-
-    def _save(self) -> None:
-        if self.file is None:
-            return
-        packed = io.BytesIO()
+    def _save(self, kept: Kept) -> None:
         starts = [attractor.states[0] for attractor in self.known.attractors]
-        np.savez_compressed(
-            packed,
-            key=np.array(self._key()),
-            outcome=self.outcome,
-            taken=self.taken,
-            attractors=np.array(starts).reshape(-1, 2),
-        )
-        write_bytes(self.file, packed.getvalue())
+        kept.save(outcome=self.outcome, taken=self.taken, attractors=np.array(starts).reshape(-1, 2))
 
     def dataset(self) -> xr.Dataset:
         """Everything that was found, attractors in the order of their shares, then what is none."""

@@ -15,10 +15,11 @@ from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.basin_grid import NAMES, NOT_REACHED, Grid
 from rocking.dynamics.basin_measures import basin_entropy, uncertainty_exponent
-from rocking.dynamics.maps import stroboscopic_map
+from rocking.dynamics.maps import StroboscopicMap
 from rocking.engine import cores
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
+from rocking.progress import note
 from rocking.result import DatasetResult
 from rocking.tables import counted, text_table
 from rocking.treatment import Treatment
@@ -221,13 +222,34 @@ def basins(
     overturns to side -: 0.52
     overturns to side +: 0.12
     """
-    strobe = stroboscopic_map(body, motion, model=model, chattering=chattering)
+    work = grid_of(body, motion, positions, velocities, periods, model, chattering, folder, threads)
+    try:
+        work.run(progress)
+    except KeyboardInterrupt:
+        if np.all(work.outcome == NOT_REACHED):
+            raise
+        note("interrupted: the basins hold the cells that were reached")
+    return Basins(work.dataset())
+
+
+def grid_of(
+    body: Body,
+    motion: Motion,
+    positions: ArrayLike,
+    velocities: ArrayLike,
+    periods: int,
+    model: Model | None,
+    chattering: str | Treatment,
+    folder: str | Path | None,
+    threads: int | None,
+) -> Grid:
+    """Grid of initial states that `basins` follows, checked, with what the folder holds of it."""
+    strobe = StroboscopicMap(body, motion, model, chattering)
     x, v = checks.axis(positions, "positions", InvalidOption), checks.axis(velocities, "velocities", InvalidOption)
     checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
     most = checks.whole(periods, "periods", InvalidOption, least=1)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     work = Grid(strobe, x, v, most, cores() if count is None else count)
     if folder is not None:
-        work.keep_in(checks.path(folder, "folder", InvalidOption))
-    work.run(progress)
-    return Basins(work.dataset())
+        work.keep_in(folder)
+    return work

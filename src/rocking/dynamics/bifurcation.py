@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -16,6 +17,7 @@ from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import VERSION, Model
 from rocking.dynamics.attractors import RETURN
+from rocking.dynamics.kept import Kept, key_of
 from rocking.dynamics.maps import StroboscopicMap, stroboscopic_map
 from rocking.dynamics.repeated import described
 from rocking.engine import in_threads
@@ -165,6 +167,7 @@ def bifurcation_diagram(
     parameter: str = "parameter",
     model: Model | None = None,
     chattering: str | Treatment = "certified",
+    folder: str | Path | None = None,
     progress: bool | None = None,
 ) -> BifurcationDiagram:
     """Follow orbits of a body under periodic motion as a parameter changes, and keep where they settle.
@@ -190,6 +193,8 @@ def bifurcation_diagram(
         As for `stroboscopic_map`.
     chattering : str or treatment
         As for `rocking.simulate`.
+    folder : str or pathlib.Path, optional
+        Where to keep what was computed, again and again; a call with the same arguments goes on from there.
     progress : bool, optional
         Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
@@ -203,7 +208,7 @@ def bifurcation_diagram(
     InvalidMotion, InvalidBlock
         If the function returns something else than a body and a motion.
     InvalidOption
-        If an argument is out of its range, or a state is behind a stop.
+        If an argument is out of its range, a state is behind a stop, or the folder holds a diagram of something else.
 
     Notes
     -----
@@ -235,10 +240,9 @@ def bifurcation_diagram(
     checks.grid_size({"values": levels.size, "starts": len(first), "kept": count}, InvalidOption)
 
     work = _Work(case, levels, first, way, (before, count), model, chattering)
-    with Progress("bifurcation diagram", len(work.ways) * levels.size, show=progress) as bar:
-        for items in work.items():
-            for done in in_threads(work.follow, items):
-                bar.advance(done)
+    if folder is not None:
+        work.keep_in(folder)
+    work.run(progress)
     return BifurcationDiagram(work.dataset(name))
 
 
@@ -262,10 +266,45 @@ class _Work:
         shape = len(self.ways), levels.size, len(first)
         self.states = np.full((*shape, self.kept, 2), np.nan)
         self.period, self.impacts = np.full(shape, -1), np.full(shape, -1)
-        self.now = np.tile(first, (len(self.ways), 1, 1))
+        self.done = 0
+        self.file: Kept | None = None
         self.ends = [self.mapped(0), self.mapped(levels.size - 1)]
         for strobe in self.ends:
             strobe._states(first)  # a start behind a stop is refused
+
+    def keep_in(self, folder: str | Path) -> None:
+        """Go on from what a folder holds, and keep what is computed there."""
+        maps = (self.mapped(k) for k in range(self.levels.size))
+        key = key_of(maps, self.levels, self.first, self.ways, self.transient, self.kept)
+        self.file = Kept(folder, "bifurcation diagram", key)
+        if found := self.file.arrays():
+            self.states, self.period, self.impacts = (found[name] for name in ("states", "period", "impacts"))
+            self.done = int(found["done"])
+
+    def run(self, progress: bool | None) -> None:
+        """Follow the orbits at all values that are not done; where there is a folder an interrupt leaves them there."""
+        portions = [*self.items()]
+        before = sum(len(values) for items in portions[: self.done] for _, values in items)
+        try:
+            with Progress("bifurcation diagram", len(self.ways) * self.levels.size, show=progress, done=before) as bar:
+                for items in portions[self.done :]:
+                    for done in in_threads(self.follow, items):
+                        bar.advance(done)
+                    self.done += 1
+                    if self.file is not None and self.file.is_due:
+                        self.save(self.file)
+        finally:
+            if self.file is not None:
+                self.save(self.file)
+
+    def save(self, file: Kept) -> None:
+        """Keep what was found."""
+        file.save(states=self.states, period=self.period, impacts=self.impacts, done=np.array(self.done))
+
+    def before(self, w: int, k: int) -> Floats:
+        """States at the value before one, in one direction; at the first value the initial ones."""
+        last = k + (1 if self.ways[w] == "down" else -1)
+        return self.states[w, last, :, -1] if 0 <= last < self.levels.size else self.first
 
     def mapped(self, k: int) -> StroboscopicMap:
         """Map at a value of the parameter."""
@@ -291,19 +330,15 @@ class _Work:
         w, values = item
         for k in values:
             strobe = self.mapped(k)
-            at = self.first if self.afresh else np.where(np.isnan(self.now[w]), self.first, self.now[w])
-            at = _in_front(strobe, at)
-            if self.transient:
-                at = strobe(at, self.transient)
-            moves = ~np.isnan(at[:, 0])
-            if moves.any():
-                self.states[w, k, moves] = strobe.orbit(at[moves], self.kept)[:, 1:]
-            self.now[w] = self.states[w, k, :, -1]
-            for s in np.flatnonzero(~np.isnan(self.now[w, :, 0])):
-                period = _period_of(self.states[w, k, s])
+            at = self.first if self.afresh else self.before(w, k)
+            at = _in_front(strobe, np.where(np.isnan(at), self.first, at))
+            self.states[w, k] = settled_states(strobe, at, self.transient, self.kept)
+            now = self.states[w, k, :, -1]
+            for s in np.flatnonzero(~np.isnan(now[:, 0])):
+                period = period_of(self.states[w, k, s])
                 self.period[w, k, s] = period
                 if period:
-                    self.impacts[w, k, s] = strobe.followed(self.now[w, s], period)[2]
+                    self.impacts[w, k, s] = strobe.followed(now[s], period)[2]
         return len(values)
 
     def dataset(self, parameter: str) -> xr.Dataset:
@@ -346,7 +381,17 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
     return np.stack([inside, np.where(held, 0.0, states[:, 1])], axis=-1)
 
 
-def _period_of(states: Floats) -> int:
+def settled_states(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> Floats:
+    """States at the starts of some periods after others, shape (n, kept, 2); NaN from where a body overturns."""
+    states = np.full((len(at), kept, 2), np.nan)
+    now = strobe(at, transient) if transient else at
+    moves = ~np.isnan(now[:, 0])
+    if moves.any():
+        states[moves] = strobe.orbit(now[moves], kept)[:, 1:]
+    return states
+
+
+def period_of(states: Floats) -> int:
     """Period of an orbit from its kept states; 0 where none comes back for half of them, or it is still settling."""
     size = np.abs(states).max(axis=0) + np.finfo(float).tiny
 

@@ -33,7 +33,7 @@ SYMMETRY: Final = "symmetry breaking"
 BRANCHES: Final = "branch point"
 GRAZING: Final = "grazing"
 CHATTERING: Final = "loss of complete chattering"
-REST: Final = "start of complete chattering"
+REST: Final = "start of rest"
 UPLIFT: Final = "uplift"
 OVERTURNING: Final = "overturning"
 
@@ -50,13 +50,14 @@ class Bifurcation(NamedTuple):
     Attributes
     ----------
     kind : str
-        "fold", "flip", "symmetry breaking", "branch point", "grazing", "loss of complete chattering", "start of
-        complete chattering", "uplift" or "overturning".
+        "fold", "flip", "symmetry breaking", "branch point" (where another branch crosses), "grazing", "loss of complete
+        chattering", "uplift", "overturning", or "start of rest" (by a treatment that imposes one: complete chattering
+        begins on no branch, whose orbits have finitely many impacts).
     value : float
         The parameter there.
     bracket : (float, float)
-        Values of the parameter between which it lies; where the speed of an impact vanishes, the lowest and highest of
-        three extrapolations.
+        Values of the parameter between which it lies: of a branch point those of the points before and after it; where
+        the speed of an impact vanishes, the lowest and highest of three extrapolations.
     orbit : PeriodicOrbit
         The orbit there: the last one on the branch where that ends.
 
@@ -75,7 +76,7 @@ class Bifurcation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch(DrawnResult, TableResult):
-    """Periodic orbits along a parameter, made by `continue_orbit`.
+    """Periodic orbits along a parameter, made by `continue_orbit` and `switch_branch`.
 
     Attributes
     ----------
@@ -83,6 +84,8 @@ class Branch(DrawnResult, TableResult):
         Makes body and motion of the parameter.
     name, unit : str
         What the parameter is.
+    limits : (float, float)
+        Range of the parameter in which it was followed.
     period : int
         Period of the orbits, in periods of the motion.
     values : ndarray, shape (n,)
@@ -109,6 +112,7 @@ class Branch(DrawnResult, TableResult):
     unit: str
     model: Model
     treatment: Treatment
+    limits: tuple[float, float]
     period: int
     values: Floats
     states: Floats

@@ -34,8 +34,10 @@ _NEAR: Final = 1e-5
 #: Steps that are tried for each point.
 _TRIALS: Final = 4
 
-#: Least cosine between one tangent and the next.
+#: Least cosine between one tangent and the next, and the longest step in which less than that may mean that the branch
+#: ends; in a longer one it bends.
 _COSINE: Final = 0.97
+_SHARP: Final = 1e-3
 
 #: Speed of the slowest impact, over the scale, from which grazing is extrapolated.
 _SLOW: Final = 2e-3
@@ -43,8 +45,9 @@ _SLOW: Final = 2e-3
 #: Step along a tangent that shows where it leads after the start of a period has been moved.
 _AHEAD: Final = 1e-6
 
-#: Points after which a branch may have come back to where it began.
+#: Points after which a branch may have come back to where it began, and how far from that it may pass, over the step.
 _ROUND: Final = 12
+_BESIDE: Final = 0.1
 
 
 def continue_orbit(
@@ -116,18 +119,19 @@ def continue_orbit(
     fold 10.47197551
     flip 15.26823701
     """
-    low, high = (checks.finite(each, "limits", InvalidOption) for each in _pair(limits))
-    if not low < high:
-        raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
+    low, high = range_of(limits)
     start = checks.within(value, "value", InvalidOption, low, high)
     longest = checks.positive(step, "step", InvalidOption)
     count = checks.whole(most, "most", InvalidOption, least=1)
     equations = OrbitEquations.of(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
-    backward, forward = (_followed(equations, z, each, (low, high), longest, count) for each in (-1.0, 1.0))
+    backward = _followed(equations, z, -1.0, (low, high), longest, count)
+    # What has come back to where it began is all there is.
+    onwards = backward.end != CLOSED
+    forward = _followed(equations, z, 1.0, (low, high), longest, count) if onwards else _Path([], [], CLOSED)
     points = [*reversed(backward.points), *forward.points[1:]]
     return Branch(
-        family, name, unit, orbit.model, orbit.treatment, orbit.period,
+        family, name, unit, orbit.model, orbit.treatment, (low, high), orbit.period,
         np.array([each.value for each in points]),
         np.array([each.state for each in points]),
         np.array([each.multipliers for each in points]),
@@ -172,7 +176,7 @@ def _followed(
     for _ in range(_TRIALS * most):
         if len(path.points) >= most:
             break
-        end = walk.advance(path, first=found.z)
+        end = walk.advance(path)
         walk.equations.for_step(walk.step)
         if end:
             return path._replace(end=end)
@@ -189,11 +193,13 @@ class _Walk(Location):
     #: How far ahead there is no point of this kind, as far as is known, and successful steps since that was found.
     ahead: float = math.inf
     successes: int = 0
+    #: Whether the last step failed only as it led too far from the tangent.
+    turned: bool = False
 
     def __post_init__(self) -> None:
         self.written = self.z
 
-    def advance(self, path: _Path, first: Floats) -> str:
+    def advance(self, path: _Path) -> str:
         """Take a step along the branch, or find that it is too long; returns why the branch ends, if it does."""
         equations = self.equations
         if self.ahead < LEAST_STEP:
@@ -202,8 +208,7 @@ class _Walk(Location):
             return end
         found = self.next()
         if found is None:
-            self.ahead, self.step, self.successes = self.step, 0.5 * self.step, 0
-            self.tangent = equations.tangent(self.z, self.tangent)
+            self.shorten()
             return ""
         solved, at_limit = found
         new, tangent = solved.z, solved.tangent(self.tangent)
@@ -229,7 +234,7 @@ class _Walk(Location):
         if not equations.kind.rests and course.slowest < min(_SLOW * equations.sizes[1], before.slowest):
             path.bifurcations.append(vanishing(self, before, length))
             return GRAZING
-        if len(path.points) > _ROUND and equations.shift == 0 and np.max(np.abs(new - first)) < length:
+        if self.has_returned(path):
             return CLOSED
         self.move_start()
         if self.ahead < math.inf:
@@ -238,13 +243,35 @@ class _Walk(Location):
             self.step = min(self.step * _LONGER, self.longest)
         return ""
 
+    def has_returned(self, path: _Path) -> bool:
+        """Whether the branch has passed its first point again, in the direction in which it left it."""
+        if len(path.points) <= _ROUND:
+            return False
+        first, second, before, last = (
+            np.append(each.state, each.value) / self.equations.sizes
+            for each in (path.points[0], path.points[1], path.points[-2], path.points[-1])
+        )
+        step, left = last - before, second - first
+        size = float(np.linalg.norm(step))
+        share = float((first - before) @ step) / size**2
+        beside = float(np.linalg.norm(first - before - share * step))
+        same_way = float(step @ left) > _COSINE * size * float(np.linalg.norm(left))
+        return 0.0 <= share <= 1.0 and beside < _BESIDE * size and same_way
+
+    def shorten(self) -> None:
+        """Try half the step that failed; there is no point of this kind at its end, unless the branch bends."""
+        if not (self.turned and self.step > _SHARP):
+            self.ahead, self.successes = self.step, 0
+        self.step *= 0.5
+        self.tangent = self.equations.tangent(self.z, self.tangent)
+
     def go_to(self, z: Floats, tangent: Floats, tests: Tests) -> None:
         """Go to another point."""
         self.z, self.tangent, self.tests = z, tangent, tests
 
     def next(self) -> tuple[Solved, bool] | None:
         """Return the next point where a step leads to one of the same kind, and whether at a limit."""
-        equations, z, tangent = self.equations, self.z, self.tangent
+        equations, z, tangent, self.turned = self.equations, self.z, self.tangent, False
         found = equations.solved(z + self.step * tangent, tangent)
         if found is None:
             return None
@@ -259,7 +286,8 @@ class _Walk(Location):
                 return None
         onwards = found.tangent(tangent)
         # Far from the prediction it is another branch.
-        if np.linalg.norm(found.z - z) > 2.0 * self.step or onwards @ tangent < _COSINE:
+        self.turned = bool(np.linalg.norm(found.z - z) > 2.0 * self.step or onwards @ tangent < _COSINE)
+        if self.turned:
             return None
         before, after = self.tests, found.tests(onwards)
         if before.at_one * after.at_one < 0.0 and before.at_minus_one * after.at_minus_one < 0.0:
@@ -286,8 +314,12 @@ def _point(equations: OrbitEquations, z: Floats, peak: float) -> _Point:
     return _Point(equations.physical(z)[1], equations.at_start(z), equations.multipliers(z), peak)
 
 
-def _pair(limits: Sequence[float]) -> Sequence[float]:
+def range_of(limits: Sequence[float]) -> tuple[float, float]:
+    """Return a range of the parameter, checked."""
     values = checks.several(limits, "limits", InvalidOption)
     if len(values) != 2:
         raise InvalidOption("{} must be (lower, higher)", "limits")
-    return values
+    low, high = (checks.finite(each, "limits", InvalidOption) for each in values)
+    if not low < high:
+        raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
+    return low, high

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +14,12 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import VERSION, Model
-from rocking.dynamics.basin_maps import basins
-from rocking.dynamics.repeated import described
+from rocking.dynamics.basin_grid import TO_MINUS, TO_PLUS, Grid
+from rocking.dynamics.basin_maps import grid_of
+from rocking.dynamics.repeated import described, one_period
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import one_motion
-from rocking.progress import Progress
+from rocking.progress import Progress, note
 from rocking.result import DatasetResult, table_of_some, variable
 from rocking.treatment import Treatment
 
@@ -88,6 +89,7 @@ def safe_basin_erosion(
     *,
     model: Model | None = None,
     chattering: str | Treatment = "certified",
+    folder: str | Path | None = None,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> BasinErosion:
@@ -109,6 +111,9 @@ def safe_basin_erosion(
         As for `stroboscopic_map`.
     chattering : str or treatment
         As for `rocking.simulate`.
+    folder : str or pathlib.Path, optional
+        Where to keep what was computed, again and again, each factor in a folder of its own; a call with the same
+        arguments goes on from there, and one with other factors takes those that it finds.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional
@@ -117,14 +122,14 @@ def safe_basin_erosion(
     Returns
     -------
     BasinErosion
-        Shares of the states that do not overturn.
+        Shares of the states that do not overturn; after an interrupt, for the factors that were reached.
 
     Raises
     ------
     InvalidMotion
         If the motion is none, or has no length.
     InvalidOption
-        If an argument is out of its range.
+        If an argument is out of its range, or the folder holds basins of something else.
 
     References
     ----------
@@ -145,26 +150,27 @@ def safe_basin_erosion(
     import xarray as xr
 
     levels = checks.increasing_numbers(factors, "factors", InvalidOption)
-    unit = one_motion(motion)
-    shares, about, cells = np.empty((len(levels), 2)), {}, 0
-    with Progress("eroding", len(levels), show=progress) as bar:
-        for k, factor in enumerate(levels):
-            scaled = unit if unit is None else unit.scaled(float(factor))
-            found = basins(
-                body,
-                scaled,  # type: ignore[arg-type]
-                positions,
-                velocities,
-                periods,
-                model=model,
-                chattering=chattering,
-                threads=threads,
-                progress=False,
-            )
-            by_name = dict(zip(found.attractor.values.tolist(), found.share.values.tolist(), strict=True))
-            shares[k] = [by_name.get(f"overturns to side {sign}", 0.0) for sign in "+-"]
-            about, cells = found.data.attrs, found.outcome.size
-            bar.advance()
+    unit = one_period(motion)
+    place = None if folder is None else checks.path(folder, "folder", InvalidOption)
+    found: list[Grid] = []
+    try:
+        with Progress("eroding", len(levels), show=progress) as bar:
+            for factor in levels.tolist():
+                inside = None if place is None else place / f"factor-{factor!r}"
+                grid = grid_of(
+                    body, unit.scaled(factor), positions, velocities, periods, model, chattering, inside, threads
+                )
+                grid.run(progress=False)
+                found.append(grid)
+                bar.advance()
+    except KeyboardInterrupt:
+        if not found:
+            raise
+        note("interrupted: the erosion holds the factors that were reached")
+    levels, cells = levels[: len(found)], found[0].outcome.size
+    shares = (
+        np.array([[np.count_nonzero(each.outcome == way) for way in (TO_PLUS, TO_MINUS)] for each in found]) / cells
+    )
     safe: Floats = 1.0 - shares.sum(axis=1)
     error = np.sqrt(np.maximum(safe * (1.0 - safe), 0.0) / cells)
     return BasinErosion(
@@ -178,10 +184,10 @@ def safe_basin_erosion(
             {"factor": variable("factor", levels, "factor on the motion", "1")},
             {
                 "program": f"rocking {VERSION}",
-                "body": about["body"],
-                "motion": described(unit),  # type: ignore[arg-type]
-                "model": about["model"],
-                "most_periods": about["most_periods"],
+                "body": described(found[0].strobe.body),
+                "motion": described(unit),
+                "model": found[0].strobe.model,
+                "most_periods": found[0].periods,
                 "cells": cells,
             },
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -40,6 +39,9 @@ _BEYOND: Final = (0.0, *np.geomspace(1e-12, 1e-4, 9).tolist())
 
 #: Points from which grazing is extrapolated.
 _EXTRAPOLATED: Final = 6
+
+#: Points from which the crossing of two branches is interpolated.
+_CROSSING: Final = 4
 
 #: Shares of the range of the parameter within which the orbits are sought from which a branch bifurcates.
 _WIDER: Final = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
@@ -82,9 +84,14 @@ def _located(kind: str, here: Location, new: Floats, value_of: Callable[[Tests],
     def test(solved: Solved) -> float:
         return value_of(solved.tests(solved.tangent(tangent)))
 
-    with contextlib.suppress(_Missed, ValueError):
-        near = _root(solve, test, 0.0, float(tangent @ (new - z)))
-        yield here.bifurcation(kind, near[0].z, [each.z[2] for each in near])
+    points, reached = _towards_root(solve, test, 0.0, float(tangent @ (new - z)))
+    if not reached and len(points) > 1:
+        # Where branches cross the equations are singular.
+        value = _at_zero([each for _, each in points[:_CROSSING]], [each.z[2] for each, _ in points[:_CROSSING]])
+        found = here.bifurcation(kind, points[0][0].z, [z[2], new[2]])
+        yield found._replace(value=float(value * here.equations.sizes[2]))
+    elif reached:
+        yield here.bifurcation(kind, points[0][0].z, [each.z[2] for each, _ in points[:2]])
 
 
 def joined(here: Location, new: Floats) -> Bifurcation:
@@ -100,9 +107,11 @@ def joined(here: Location, new: Floats) -> Bifurcation:
         return solved.tests(AT_VALUE).at_minus_one
 
     for share in _WIDER if even or is_mirrored(equations.strobe(equations.physical(middle)[1])) else ():
-        with contextlib.suppress(_Missed, ValueError):
-            near = _root(solve, test, middle[2] - share, middle[2] + share)
-            return here.bifurcation(FLIP if even else SYMMETRY, near[0].z, [each.z[2] for each in near])
+        points, reached = _towards_root(solve, test, middle[2] - share, middle[2] + share)
+        if reached:
+            near = [each.z for each, _ in points[:2]]
+            found = here.bifurcation(FLIP if even else SYMMETRY, near[0], [each[2] for each in near])
+            return found._replace(orbit=parent.orbit(near[0]))
     return here.bifurcation(BRANCHES, middle, [here.z[2], new[2]])
 
 
@@ -150,28 +159,36 @@ def _reason(here: Location, beyond: Floats) -> str:
     return GRAZING if kind.rests else LOST
 
 
-class _Missed(Exception):
-    """There is no point of the branch where one was looked for."""
-
-
-def _root(
+def _towards_root(
     solve: Callable[[float], Solved | None], test: Callable[[Solved], float], low: float, high: float
-) -> tuple[Solved, Solved]:
-    """Return the two points of a branch that are nearest to a root of a test function, the nearest first."""
+) -> tuple[list[tuple[Solved, float]], bool]:
+    """Return points of a branch with values of a test function, the nearest to its root first, and whether it is there.
+
+    None where it does not change its sign. The search ends where there is no point to be found.
+    """
     from scipy.optimize import brentq
 
-    found: dict[float, Solved] = {}
+    found: dict[float, tuple[Solved, float]] = {}
 
     def tested(at: float) -> float:
         solved = solve(at)
         if solved is None:
             raise _Missed
-        found[at] = solved
-        return test(solved)
+        found[at] = solved, test(solved)
+        return found[at][1]
 
-    root = brentq(tested, low, high, xtol=1e-16, rtol=1e-15)
-    nearest, next_ = sorted(found, key=lambda at: abs(at - root))[:2]
-    return found[nearest], found[next_]
+    try:
+        root = brentq(tested, low, high, xtol=1e-16, rtol=1e-15)
+    except ValueError:
+        return [], False
+    except _Missed:
+        signs = {each > 0.0 for _, each in found.values()}
+        return sorted(found.values(), key=lambda each: abs(each[1])) if len(signs) > 1 else [], False
+    return [found[at] for at in sorted(found, key=lambda at: abs(at - root))], True
+
+
+class _Missed(Exception):
+    """There is no point of the branch where one was looked for."""
 
 
 def _at_zero(x: Sequence[float], y: Sequence[float]) -> float:

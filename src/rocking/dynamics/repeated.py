@@ -42,7 +42,7 @@ class Repeated:
     """A body under a motion that repeats for ever, as kernels take both."""
 
     def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | Treatment) -> None:
-        self.body, self.motion = one_body(body), _one_period(motion)
+        self.body, self.motion = one_body(body), one_period(motion)
         self.bodies = self.body.alone()
         self.model: Model = model_of(self.body, model)
         self.treatment = treatment(chattering)
@@ -183,7 +183,8 @@ def described(what: Body | Motion) -> str:
     return ", ".join([what.description, *dict.fromkeys(map(str, what.sides))])
 
 
-def _one_period(motion: Motion) -> Motion:
+def one_period(motion: Motion | None) -> Motion:
+    """Return one period of a motion, or say that it is none."""
     given = one_motion(motion)
     if given is None:
         raise InvalidMotion("one period of the motion is needed, as rocking.pulses.sine(a, f, cycles=1), not None")

@@ -19,7 +19,7 @@ from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, one_motion
-from rocking.simulation import simulate as simulate_body
+from rocking.simulation import response_to
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Response(rocking.response.Response):
 
     @property
     def peak_position(self) -> float:
-        """Highest position, m; NaN between two stops."""
+        """Highest position, m: that of the second stop, exactly, once the body has been there."""
         return self.peak_rotation
 
     def position(self, time: ArrayLike) -> Floats:
@@ -134,15 +134,8 @@ def simulate(
     '1.800000000000'
     """
     body, motion = _one_body(body), _along_one_line(one_motion(motion))
-    found = simulate_body(
-        body,
-        motion,
-        model="linear",
-        chattering=chattering,
-        duration=_duration(body, motion, duration),
-        initial_rotation=position_at_start(body, initial_position),
-        initial_velocity=initial_velocity,
-    )
+    at = position_at_start(body, initial_position)
+    found = response_to(body, motion, "linear", chattering, _duration(body, motion, duration), (at, initial_velocity))
     return Response(**{entry.name: getattr(found, entry.name) for entry in fields(found)})
 
 
@@ -179,7 +172,7 @@ def simulate_many(
     Returns
     -------
     xarray.Dataset
-        As `rocking.simulate_many`, with ``peak_position`` (m; NaN between two stops).
+        As `rocking.simulate_many`, with ``peak_position`` (m), the highest.
 
     Raises
     ------
@@ -232,10 +225,9 @@ def simulate_any(
             body, motion, chattering=chattering, duration=duration,
             initial_position=initial_position, initial_velocity=initial_velocity,
         )  # fmt: skip
-    return simulate_body(
-        body, motion, model=model, chattering=chattering, duration=duration,
-        initial_rotation=initial_position, initial_velocity=initial_velocity,
-    )  # fmt: skip
+    return response_to(
+        body, motion, model, chattering, duration, (initial_position, initial_velocity), "initial_position"
+    )
 
 
 def model_of(body: Body, model: Model | None) -> Model:

@@ -275,7 +275,7 @@ def integrate(
             *("step",),
             value=h,
         )
-    start = started(one, records, position_at_start(one, initial_position), initial_velocity)
+    start = started(alone, records, position_at_start(one, initial_position), initial_velocity, "initial_position")
     rows = np.zeros((count + 1, stepping.COLUMNS))
     rows = rows[: scheme._follow((ground_of(motion, one.gravity), record, rules, start), rows)]
     times: Floats = h * np.arange(len(rows), dtype=np.float64)
@@ -293,7 +293,7 @@ def integrate(
         overturned=bool(u[-1] >= record["fallen"] and not record["facing"]),
         rests=rests,
         impact_times=impacts,
-        peak=math.nan if record["facing"] else float(u.max()) + one.stops[0],
+        peak=float(u.max()) + one.stops[0],
         penetration=max(0.0, -float(u.min()), float(u.max() - record["fallen"]) if record["facing"] else 0.0),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import shlex
+from collections.abc import Mapping
 from typing import Any, Final
 
 from rocking.analysis.overturning import PULSES
@@ -68,22 +69,17 @@ from rocking import dynamics
 block = rocking.{block}
 
 
-def settled(start, {name}):
-    \"\"\"States at the starts of {kept} periods, after {passed} others; NaN after an overturning.\"\"\"
-    motion = {motion}
-    rock = dynamics.stroboscopic_map(block, motion{options})
-    return rock.orbit(start, {last})[-{kept}:]
+def case({name}):
+    return block, {motion}
 
 
-print(settled(({rotation!r}, {velocity!r}), {at!r}))
+rock = dynamics.stroboscopic_map(*case({at!r}){options})
+print(rock.orbit(({rotation!r}, {velocity!r}), {last})[-{kept}:])
 
-{name}_values = {values}
-found = {{}}
-for direction, order in (("up", 1), ("down", -1)):
-    start = (0.0, 0.0)
-    for {name} in {name}_values[::order]:
-        states = found[direction, {name}] = settled(start, {name})
-        start = (0.0, 0.0) if np.isnan(states[-1, 0]) else states[-1]
+found = dynamics.bifurcation_diagram(
+    case, {values}, (0.0, 0.0), direction="both", transient={transient}, kept={kept}, parameter={name!r}{options}
+)
+print(found.summary())
 """
 
 
@@ -136,9 +132,8 @@ def case_as_command(case: Case) -> str | None:
     """
     if not case.words or "gravity" in case.texts:
         return None
-    options = [name for name in NAMES if name in case.texts and name not in ("motion", "vertical")]
-    each = ([f"--{name.replace('_', '-')}", case.texts[name]] for name in options)
-    return shlex.join(["rocking", "simulate", *case.words, *itertools.chain.from_iterable(each)])
+    options = {name: case.texts[name] for name in NAMES if name in case.texts and name not in ("motion", "vertical")}
+    return _command(["rocking", "simulate", *case.words], options)
 
 
 def map_as_python(grid: MapGrid, quantity: str) -> str:
@@ -179,10 +174,9 @@ def map_as_command(grid: MapGrid) -> str | None:
         "amplitudes": _range(grid.y),
         "frequencies": _range(grid.x),
         **{each: value for each, value in written.items() if each not in ("amplitude", "frequency")},
-        **{each: texts[each] for each in NAMES if each in {*BLOCK_NAMES, "model"} and each in texts},
+        **_block_options(texts),
     }
-    words = ((f"--{each.replace('_', '-')}", value) for each, value in options.items())
-    return shlex.join(["rocking", "map", name, *itertools.chain.from_iterable(words)])
+    return _command(["rocking", "map", name], options)
 
 
 def map_as_code(grid: MapGrid) -> dict[str, Any]:
@@ -209,9 +203,42 @@ def sweep_as_python(sweep: Sweep) -> str:
         rotation=case.initial_rotation,
         velocity=case.initial_velocity,
         kept=KEPT,
-        passed=PASSED,
+        transient=PASSED - 1,
         last=PASSED + KEPT - 1,
     )
+
+
+def sweep_as_command(sweep: Sweep) -> str | None:
+    """Write a sweep as a command; None for what the command line does not take."""
+    texts, sine = sweep.case.texts, sweep.sine
+    if texts.keys() & {"gravity", "chattering"}:
+        return None
+    name = {"a": "amplitude", "omega": "frequency"}[sweep.axis.name]
+    first, last = (float(getattr(sweep.sine_at(float(sweep.axis.values[k])), name)) for k in (0, -1))
+    fixed = {each: value for each, value in sine._asdict().items() if each not in (name, "cycles") and value}
+    options: dict[str, str] = {
+        "pulse": "sine:" + ",".join(f"{each}={value!r}" for each, value in fixed.items()),
+        "along": f"{name}:{first!r}:{last!r}:{len(sweep.axis.values)}",
+        "start": "0,0",
+        "transient": str(PASSED - 1),
+        **_block_options(texts),
+    }
+    return _command(["rocking", "bifurcation"], options)
+
+
+def sweep_as_code(sweep: Sweep) -> dict[str, Any]:
+    """Return the script and the command of a sweep."""
+    return {"python": sweep_as_python(sweep), "command": sweep_as_command(sweep)}
+
+
+def _block_options(texts: Mapping[str, str]) -> dict[str, str]:
+    """Options that describe the block and its model."""
+    return {each: texts[each] for each in NAMES if each in {*BLOCK_NAMES, "model"} and each in texts}
+
+
+def _command(words: list[str], options: Mapping[str, str]) -> str:
+    given = ((f"--{each.replace('_', '-')}", value) for each, value in options.items())
+    return shlex.join([*words, *itertools.chain.from_iterable(given)])
 
 
 def _is_overturning_map(grid: MapGrid) -> bool:

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.arrays import Floats
+from rocking.dynamics.bifurcation import period_of, settled_states
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
+from rocking.dynamics.orbits import multipliers_of
 from rocking.explorer.inputs import Case, arguments_of, is_pulse, pulse_of
 from rocking.explorer.payload import Payload
 from rocking.motion import pulses
@@ -21,9 +23,8 @@ from rocking.simulation import simulate
 PASSED: Final = 300
 KEPT: Final = 64
 
-#: Longest period that is looked for; states that differ by less than this over slenderness are the same.
+#: Longest period that `period_of` finds in the kept states.
 LONGEST: Final = KEPT // 2
-_SAME: Final = 1e-6
 
 #: Periods after which a case is said to have none, and states of it that are drawn then.
 _PATIENCE: Final = 8000
@@ -118,30 +119,20 @@ def map_of(case: Case, sine: Sine) -> StroboscopicMap:
 
 def settled(rock: StroboscopicMap, start: ArrayLike, periods: int, kept: int = KEPT) -> Settled:
     """Return what a state becomes within so many periods."""
-    orbit = rock.orbit(start, periods)
-    if np.isnan(orbit[-1, 0]):
+    first, count = np.asarray(start, dtype=float), min(kept, periods)
+    last = settled_states(rock, first[None], periods - count, count)[0]
+    if np.isnan(last[-1, 0]):
+        orbit = rock.orbit(first, periods)
         after = int(np.argmax(np.isnan(orbit[:, 0])))
         _, fate, _ = rock.followed(orbit[after - 1])
-        first = max(0, after - LONGEST)
-        return Settled(np.empty((0, 2)), 0, False, Fate(int(fate)), after, (orbit[first], after - first))
-    last = orbit[-kept:]
-    period = _period_of(last, rock)
+        earlier = max(0, after - LONGEST)
+        return Settled(np.empty((0, 2)), 0, False, Fate(int(fate)), after, (orbit[earlier], after - earlier))
+    period = period_of(last[-KEPT:])
     _, fate, _ = rock.followed(last[-1])
     rests = period > 0 and not np.any(rock.derivative(last[-1], period)[1])
-    count = period or LONGEST
+    drawn = period or LONGEST
     states = last[-period:] if period else last
-    return Settled(states, period, rests, Fate(int(fate)), periods, (last[-count], count))
-
-
-def _period_of(states: Floats, rock: StroboscopicMap) -> int:
-    """Return after how many periods the last states come again; 0 where that is not seen."""
-    sides = rock.body.sides
-    alpha, p = min(side.alpha for side in sides), min(side.p for side in sides)  # type: ignore[attr-defined]
-    relative = states / [alpha, alpha * p]
-    for period in range(1, len(states) // 2 + 1):
-        if period <= LONGEST and np.abs(relative[-period:] - relative[-2 * period : -period]).max() <= _SAME:
-            return period
-    return 0
+    return Settled(states, period, rests, Fate(int(fate)), periods, (last[-drawn], drawn))
 
 
 def settled_case(case: Case, sine: Sine) -> tuple[Settled, StroboscopicMap]:
@@ -223,7 +214,7 @@ def _about(case: Case, sine: Sine, found: Settled, rock: StroboscopicMap) -> str
     if found.rests:
         return f"{words}. A rest forgets what was before it: both multipliers are zero."
     _, change = rock.derivative(found.states[-1], found.period)
-    first, second = sorted(np.linalg.eigvals(change), key=abs, reverse=True)
+    first, second = multipliers_of(change)
     pair = f"{first.real:.4g} ± {abs(first.imag):.4g}i" if first.imag else f"{first.real:.4g} and {second.real:.4g}"
     return f"{words}. The multipliers of a small departure in one repetition are {pair}."
 

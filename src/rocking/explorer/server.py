@@ -26,7 +26,7 @@ from starlette.routing import Route
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer import maps, periodic, sweeps
 from rocking.explorer.background import Compilation, low_priority
-from rocking.explorer.code import map_as_code, sweep_as_python
+from rocking.explorer.code import map_as_code, sweep_as_code
 from rocking.explorer.core import EXPORTS, Explorer
 from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.parameters import PARAMETERS, field_label, specification
@@ -258,7 +258,7 @@ class App:
 
         def begun(query: Query) -> _Stream:
             sweep = sweeps.sweep_of(self._case(query), query.others)
-            about = {**sweeps.described(sweep), "python": sweep_as_python(sweep), "command": None}
+            about = {**sweeps.described(sweep), **sweep_as_code(sweep)}
             return _Stream(about, sweeps.parts(sweep), lambda part: pack(sweeps.part_payload(sweep, part)))
 
         return await self._streamed(request, begun)

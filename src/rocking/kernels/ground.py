@@ -65,7 +65,7 @@ def ground_of(
     pieces = np.zeros((len(coefficients) + 1, _FIRST + columns * len(components)))
     stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), len(Window._fields)))
     ground = Ground(pieces, stretches, error * unit, columns, _FIRST)
-    work = len(coefficients) * len(components)
+    work = sum(component.size for component in components)
     write = _interpreted_fill if _interpreted_fill.work() > work else fill
     _interpreted_fill.spend(work)
     for k, component in enumerate(components):
@@ -105,9 +105,9 @@ def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground,
         set_stretch(ground, k // STRETCH, Window(low, high, max(before.slope, piece.slope), before.jumps + jumps))
 
 
-#: Pieces of motions in one process that Python writes: half a second's work, which is what compiling takes,
+#: Coefficients of motions in one process that Python writes: half a second's work, which is what compiling takes,
 #: and numba takes longer to import.
-_interpreted_fill: Final = Interpreted(fill, 100_000)
+_interpreted_fill: Final = Interpreted(fill, 200_000)
 
 
 @inlined

@@ -245,8 +245,9 @@ def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
 def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, states: Records, out: Floats) -> None:
     """Write the derivative of each state after one period by the state before it, in the frames of their sides.
 
-    It is exactly zero where the body has come to rest on the way. The rules of the trail have the march write its
-    table, whose rows are used again and again. The states are those after the period; ``ending`` is their `Fate`.
+    It is exactly zero where the body has come to rest on the way, for any time. The rules of the trail have the march
+    write its table, whose rows are used again and again. The states are those after the period; ``ending`` is their
+    `Fate`.
     """
     for k in range(states.shape[0]):
         differentiate_period(trail, scratch, work, table, states[k], out[k])
@@ -256,7 +257,8 @@ def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, s
 def differentiate_period(trail: Trail, scratch: Record, work: Record, table: Records, state: Record, M: Floats) -> int:
     """Take one state through a period and write its derivative, as `differentiate`; returns the number of impacts."""
     ground, block, rules, _ = trail
-    M[0, 0], M[0, 1], M[1, 0], M[1, 1] = 1.0, 0.0, 0.0, 1.0
+    one = 1.0 if state.side >= 0 else 0.0  # a body at rest has forgotten what was before
+    M[0, 0], M[0, 1], M[1, 0], M[1, 1] = one, 0.0, 0.0, one
     state.until = pieces_of(ground)
     state.budget = TURNS
     ending = Ending.FULL.value
@@ -311,10 +313,12 @@ def stretch(
 @shared
 def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, following: Record, M: Floats) -> None:
     """Multiply a derivative by that along the step from a node to what follows it, an impact at its end included."""
-    if node.side < 0 or following.side < 0:
-        M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
-        return
     ground, block, rules, _ = trail
+    if node.side < 0:  # what coming to rest has made of it
+        return
+    if following.side < 0:
+        come_to_rest(ground, block, node, following, M)
+        return
     h = following.offset - node.offset
     if following.piece > node.piece:
         h = length_of(ground, node.piece) - node.offset
@@ -330,9 +334,26 @@ def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, followin
         work.change[0], work.change[1] = M[0, column], M[1, column]
         variation_coefficients(work, block.damping[node.side], order)
         M[0, column], M[1, column], _ = evaluate(work.change, order, h)
-    if following.u == 0.0 and (following.side != node.side or following.v > 0.0):
+    if following.u == 0.0 and h > 0.0:
         _, v, _ = evaluate(scratch.rotation, order, h)
         apply_saltation(ground, block, node.side, following, v, M)
+
+
+@inlined
+def come_to_rest(ground: Ground, block: Record, node: Record, following: Record, M: Floats) -> None:
+    """Multiply a derivative by that from a node to a rest: zero, but where the ground ends the rest at once.
+
+    The impact has then left no speed, or what it left was taken away. When the body leaves depends on when it came.
+    """
+    side = node.side
+    after = restoring(ground, block, side, following.piece, following.offset)
+    if after >= 0.0 and not block.facing:
+        after = restoring(ground, block, block.entered[side], following.piece, following.offset)
+    if after >= 0.0 or node.u > 0.0:
+        M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
+    elif node.v > 0.0:
+        for column in range(2):
+            M[0, column], M[1, column] = 0.0, -after / node.v * M[0, column]
 
 
 @inlined

@@ -111,8 +111,17 @@ class Answers:
     def sensitivity(self) -> Sensitivity:
         """How the peak and the times of events and impacts change with the motion, the initial state and the block."""
         return sensitivity_along(
-            self._trail, self.peak_time, len(self.impacts), len(self.events), overturned=self.overturned
+            self._trail,
+            self.peak_time,
+            len(self.impacts),
+            len(self.events),
+            fixed=self.overturned or self._reaches_second_stop,
         )
+
+    @property
+    def _reaches_second_stop(self) -> bool:
+        """Whether the peak is where the second of two stops is."""
+        return bool(self._trail.block["facing"]) and self.peak_rotation == self.body.stops[1]
 
     @property
     def ambiguous(self) -> bool:
@@ -128,7 +137,7 @@ class Answers:
         An ambiguous response is one of those that are possible. Scale the motion, or the initial state, by 1 plus some
         millionths, simulate each, and take the spread of the results for the answer.
         """
-        return ambiguities(self.sensitivity, self.peak_rotation, self.near_ties)
+        return ambiguities(self.sensitivity, abs(self.peak_rotation - self.body.stops[0]), self.near_ties)
 
     @property
     def time_at_rest(self) -> float:

@@ -156,33 +156,38 @@ class Sensitivity:
         )
 
 
-def sensitivity_along(trail: Trail, peak_time: float, impacts: int, events: int, *, overturned: bool) -> Sensitivity:
-    """Sensitivity of a response with that many impacts and events: one pass along its steps for each quantity."""
+def sensitivity_along(trail: Trail, peak_time: float, impacts: int, events: int, *, fixed: bool) -> Sensitivity:
+    """Sensitivity of a response with that many impacts and events: one pass along its steps for each quantity.
+
+    A fixed peak is that of a body that has fallen, or has reached a stop.
+    """
     count = len(QUANTITIES)
     peak, impact_times, event_times = np.zeros(count), np.zeros((count, impacts)), np.zeros((count, events))
     scratch, work = state.new_scratch(), state.record(state.VARIATION)
     for k in range(count):
         peak[k] = vary(trail, scratch, work, k, peak_time, impact_times[k], event_times[k])
-    if overturned:
+    if fixed:
         peak[:] = 0.0
     return Sensitivity(*(_by_quantity(values) for values in (peak[:, None], impact_times, event_times)))
 
 
-def ambiguities(found: Sensitivity, peak_rotation: float, near_ties: int) -> tuple[str, ...]:
-    """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly."""
+def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str, ...]:
+    """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly.
+
+    ``height`` is that of the peak above the stop.
+    """
     peak, *times = (_ULP * _total(values, QUANTITIES) for values in (found.peak, found.events, found.impacts))
     known = {
-        # A body between two stops has no peak that could be unknown.
-        "peak": math.isnan(peak_rotation) or bool(np.all(peak <= AMBIGUITY * max(peak_rotation, 1e-300))),
+        "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
         "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
         "touch": near_ties == 0,
     }
     return tuple(name for name, is_known in known.items() if not is_known)
 
 
-def driving(found: Sensitivity) -> tuple[float, Floats]:
-    """Sizes of the changes of the peak and of the events with all that drives the block, per relative change."""
-    return float(_total(found.peak, DRIVING)[0]), _total(found.events, DRIVING)
+def driving(found: Sensitivity) -> tuple[float, Floats, Floats]:
+    """Sizes of the changes of peak, events and impacts with all that drives the block, per relative change."""
+    return float(_total(found.peak, DRIVING)[0]), _total(found.events, DRIVING), _total(found.impacts, DRIVING)
 
 
 def _total(values: NDArray[np.void], quantities: tuple[str, ...]) -> Floats:

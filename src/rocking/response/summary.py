@@ -200,8 +200,11 @@ def peak_time_text(response: Answers) -> str:
     """Time of the peak: that of a swing which is uncertain by a share of itself, by this share of its duration."""
     if response.overturned:
         return _short_text(response.peak_time, KNOWN * _change_of_fall(response))
+    if response._reaches_second_stop:
+        hit = response.impacts["time"] == response.peak_time
+        return _short_text(response.peak_time, KNOWN * float(np.sum(driving(response.sensitivity)[2][hit])))
     change = driving(response.sensitivity)[0]
-    bend = response.peak_rotation * abs(float(response.states(response.peak_time)[2]))
+    bend = abs(response.peak_rotation - response.body.stops[0]) * abs(float(response.states(response.peak_time)[2]))
     return _short_text(response.peak_time, KNOWN * change / math.sqrt(bend) if bend > 0.0 else 0.0)
 
 
@@ -209,9 +212,9 @@ def digits_of(value: float, change: float) -> int:
     """Digits that are known of a value, which changes so much per relative change of what drives the body."""
     if not math.isfinite(change):
         return 1
-    if not (change > 0.0 and value > 0.0):
+    if not (change > 0.0 and value != 0.0):
         return _MOST_DIGITS
-    return min(max(math.floor(-math.log10(KNOWN * change / value)), 1), _MOST_DIGITS)
+    return min(max(math.floor(-math.log10(KNOWN * change / abs(value))), 1), _MOST_DIGITS)
 
 
 def _motion_text(response: Answers) -> str:
@@ -271,13 +274,13 @@ def _rest_text(response: Answers, time: float, change: float, sequence: np.void)
 
 
 def _peak_rows(response: Answers) -> list[Row]:
-    """Peak and its time, each as far as it is known; a body between two stops has none."""
-    if math.isnan(response.peak_rotation):
-        return []
+    """Peak and its time, each as far as it is known."""
     name, _, _, unit, limit = response.body.coordinate
     note = f" at {peak_time_text(response)}"
     if response.overturned:
         note += ", where the block has fallen"
+    elif response._reaches_second_stop:
+        note += ", at the stop"
     elif limit:
         note += f", {ratio_text(response)} of the {limit}"
     return [Row(f"peak {name}", f"{response.peak_rotation:.{_peak_digits(response)}g}", unit, note)]
@@ -321,7 +324,7 @@ def _when_stopped(response: Answers) -> str:
 
 
 def _has_moved(response: Answers) -> bool:
-    return bool(len(response.events) or len(response.impacts) or response.peak_rotation > 0.0)
+    return bool(np.any(response._trail.nodes["side"] >= 0))
 
 
 def _change_of_fall(response: Answers) -> float:
