@@ -91,9 +91,9 @@ def set_start(
     sign = np.where(one_sided, 1.0, np.sign(np.where(from_plus == 0.0, speed, from_plus)))
     at_other = facing & (at == stops[:, 1])
     u, v = np.where(at_other, 0.0, sign * from_plus), np.where(at_other, -speed, sign * speed)
-    _refuse_behind(
-        bodies[0].coordinate, at, one_sided & ((u < 0.0) | (facing & (u > records["fallen"]))), stops, facing
-    )
+    behind = one_sided & ((u < 0.0) | (facing & (u > records["fallen"])))
+    if np.any(behind):
+        _refuse_behind(bodies[0].coordinate, at, behind, stops, facing)
     into = one_sided & (u == 0.0) & (v < 0.0)
     if np.any(into):
         worst = float(np.broadcast_to(speed, into.shape)[into][0])
@@ -111,8 +111,6 @@ def set_start(
 
 def _refuse_behind(coordinate: Coordinate, at: Floats, behind: Flags, stops: Floats, facing: Flags) -> None:
     """Refuse to start where a body cannot be."""
-    if not np.any(behind):
-        return
     k = int(np.argmax(behind))
     low, high = np.broadcast_to(stops, (len(behind), 2))[k]
     where = f"from {low:g} to {high:g}" if np.broadcast_to(facing, behind.shape)[k] else f"at least {low:g}"
