@@ -230,7 +230,9 @@ def shown_boxes(figure):
 
 
 @pytest.mark.parametrize("dpi", [100.0, *(pytest.param(dpi, marks=pytest.mark.thorough) for dpi in (200.0, 300.0))])
-@pytest.mark.parametrize("width", [COLUMN, PAGE], ids=["column", "page"])
+@pytest.mark.parametrize(
+    "width", [pytest.param(COLUMN, id="column"), pytest.param(PAGE, id="page", marks=pytest.mark.thorough)]
+)
 @pytest.mark.parametrize("kind", FIGURES)
 def test_no_text_leaves_the_figure(kind, width, dpi):
     draw, height = FIGURES[kind]

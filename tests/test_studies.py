@@ -105,7 +105,9 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
     assert (~found.done.values).sum() == study._store.grid.simulations(keys[3])
 
 
-@pytest.mark.parametrize(("blocks", "motions", "scales"), [(1, 200, 5), (700, 3, 20), (9_000, 2, 2)])
+@pytest.mark.parametrize(
+    ("blocks", "motions", "scales"), [(1, 200, 5), pytest.param(700, 3, 20, marks=pytest.mark.thorough), (9_000, 2, 2)]
+)
 def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_path, blocks, motions, scales):
     pulses = [rocking.pulses.one_sine(4.0, frequency) for frequency in np.linspace(0.5, 2.0, motions)]
     many = rocking.Blocks(p=np.linspace(1.0, 6.0, blocks), alpha=0.2, restitution=0.7)
