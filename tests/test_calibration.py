@@ -590,9 +590,8 @@ def test_a_release_test_gives_the_block_within_its_errors_in_the_linear_model_to
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
-def test_a_full_search_gives_the_block_within_its_errors_too(model):
-    is_within_its_errors(rocking.calibrate_history(TIMES, released(model), model=model), 4)
+def test_a_full_search_gives_the_block_within_its_errors_too():
+    is_within_its_errors(rocking.calibrate_history(TIMES, released()), 4)
 
 
 def is_within_its_errors(found: HistoryCalibration, count: int) -> None:

@@ -97,7 +97,11 @@ def test_under_slow_forcing_the_first_arc_decides(omega):
 
 CORNERS = [(omega, eta) for omega in (1e-6, 1e-3, 1.0, 1e6) for eta in (1e-300, 1e-100, 1e-8, 0.01, 0.9, 0.999)]
 #: Sequences of a hundred thousand impacts.
-LONG = [(1e-6, 0.99999), *(pytest.param(omega, 0.99999, marks=pytest.mark.thorough) for omega in (1e-3, 1.0, 1e6))]
+LONG = [
+    (1e-6, 0.99999),
+    pytest.param(1e-3, 0.99999, marks=pytest.mark.thorough),
+    *(pytest.param(omega, 0.99999, marks=pytest.mark.slow) for omega in (1.0, 1e6)),
+]
 
 
 @pytest.mark.parametrize(("omega", "eta"), [*CORNERS, *LONG])

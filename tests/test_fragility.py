@@ -107,7 +107,7 @@ def test_fishers_covariance_is_the_inverse_of_the_expected_curvature():
     ("band", "share", "repeats"),
     [
         ("likelihood", 0.89, 20),
-        pytest.param("likelihood", 0.89, 80, marks=pytest.mark.thorough),
+        pytest.param("likelihood", 0.89, 50, marks=pytest.mark.thorough),
         pytest.param("bootstrap", 0.87, 60, marks=pytest.mark.thorough),
     ],
 )
