@@ -6,6 +6,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -53,18 +54,31 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["MPLCONFIGDIR"] = str(config.cache.mkdir("matplotlib")) if cached else tempfile.mkdtemp()
 
 
-@pytest.fixture
-def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Calibrations that search less and draw less, for what does not hang on how well a block is known."""
+@pytest.fixture(scope="session")
+def coarsely() -> Callable[[], AbstractContextManager[None]]:
+    """Calibrations within it search less and draw less, for what does not hang on how well a block is known."""
     from rocking.analysis.calibration import history, search
 
-    monkeypatch.setattr(search, "_GUIDING", (64, 1))
-    monkeypatch.setattr(search, "_COMPARED", (64, 2))
-    monkeypatch.setattr(search, "_EXPONENTS", (0.1, 1.0))
-    monkeypatch.setattr(search, "_MORE", 0)
-    monkeypatch.setattr(history, "_CANDIDATES", 256)
-    monkeypatch.setattr(history, "_STAGES", ((0.15, 6), (0.3, 3), (1.0, 1)))
-    monkeypatch.setattr(history, "_AROUND", 16)
+    @contextmanager
+    def shortened() -> Iterator[None]:
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(search, "_GUIDING", (64, 1))
+            patched.setattr(search, "_COMPARED", (64, 2))
+            patched.setattr(search, "_EXPONENTS", (0.1, 1.0))
+            patched.setattr(search, "_MORE", 0)
+            patched.setattr(history, "_CANDIDATES", 256)
+            patched.setattr(history, "_STAGES", ((0.15, 6), (0.3, 3), (1.0, 1)))
+            patched.setattr(history, "_AROUND", 16)
+            yield
+
+    return shortened
+
+
+@pytest.fixture
+def coarse(coarsely: Callable[[], AbstractContextManager[None]]) -> Iterator[None]:
+    """Calibrations of one test that search less."""
+    with coarsely():
+        yield
 
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -79,7 +93,23 @@ def _no_waiting_for_disks() -> Iterator[None]:
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def unarranged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write figures as they are, without a layout, in a third of the time: `test_figures.py` looks at layouts."""
+    from matplotlib.figure import Figure
+
+    saved = Figure.savefig
+
+    def save(figure: Figure, *arguments: Any, **options: Any) -> None:
+        layout = figure.get_layout_engine()
+        figure.set_layout_engine("none")
+        saved(figure, *arguments, **options)
+        figure.set_layout_engine(layout)
+
+    monkeypatch.setattr(Figure, "savefig", save)
+
+
+@pytest.fixture
+def run(unarranged: None, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
     """Run the command line: exit code, output, and errors but for the word that kernels are being compiled."""
     from rocking.cli import main
 

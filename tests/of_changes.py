@@ -36,8 +36,8 @@ def words(name: str) -> set[str]:
 
 def names_used(tree: ast.AST, package: str) -> Iterator[str]:
     """Dotted names that a module imports, reads from what it imports, or writes in a string."""
-    imported = {}
-    for node in ast.walk(tree):
+    imported, nodes = {}, [*ast.walk(tree)]
+    for node in nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 imported[alias.asname or alias.name] = alias.name
@@ -47,7 +47,7 @@ def names_used(tree: ast.AST, package: str) -> Iterator[str]:
             for alias in node.names:
                 imported[alias.asname or alias.name] = f"{source}.{alias.name}"
     yield from imported.values()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Attribute):
             first, _, others = ast.unparse(node).partition(".")
             if first in imported and re.fullmatch(r"[\w.]+", others):

@@ -8,6 +8,7 @@ lists the faults, one a line, and exits with 1 where there are some.
 from __future__ import annotations
 
 import ast
+import functools
 import importlib
 import inspect
 import re
@@ -51,6 +52,7 @@ def names_of(module: Any) -> list[str]:
     return sorted(listed or (name for name in own if not name.startswith("_")))
 
 
+@functools.cache
 def public_names() -> dict[str, Any]:
     """Functions and classes by the name under which a user finds them."""
     found: dict[str, Any] = {}
@@ -110,6 +112,7 @@ def unreachable() -> list[str]:
     return sorted(found)
 
 
+@functools.cache
 def imported(module: Any) -> dict[str, Any]:
     """Classes of the package by the names that a module gives them, also where it imports them for types alone."""
     found = {name: value for name, value in vars(module).items() if inspect.isclass(value)}

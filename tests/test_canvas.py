@@ -33,7 +33,7 @@ def printed(script: str, **environment: str) -> str:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
-@pytest.mark.parametrize("name", ["DISPLAY", "WAYLAND_DISPLAY"])
+@pytest.mark.parametrize("name", ["DISPLAY", pytest.param("WAYLAND_DISPLAY", marks=pytest.mark.thorough)])
 def test_pyplot_is_loaded_where_there_is_a_display_and_not_before(name):
     script = "draw(); print('matplotlib.pyplot' in sys.modules)"
     assert printed(f"{script}; import os; os.environ['{name}'] = ':987'; {script}") == "False\nTrue"

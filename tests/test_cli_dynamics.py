@@ -69,7 +69,11 @@ def test_bifurcation_writes_what_it_says(run, tmp_path):
     [
         (["--ball", "0.5"], dynamics.BouncingBall(0.5)),
         (["--oscillator", "frequency=1,restitution=0.8,stop=0.01"], dynamics.ImpactOscillator(1.0, 0.8, stop=0.01)),
-        (["--pendulum", "p=3,gap=0.1,restitution=0.6"], dynamics.InvertedPendulum(3.0, 0.1, 0.6)),
+        pytest.param(
+            ["--pendulum", "p=3,gap=0.1,restitution=0.6"],
+            dynamics.InvertedPendulum(3.0, 0.1, 0.6),
+            marks=pytest.mark.thorough,
+        ),
     ],
 )
 def test_every_body_has_a_basin_and_a_diagram(run, options, body):

@@ -158,11 +158,11 @@ def test_cells_drawn_at_random_go_where_an_integration_by_scipy_goes(count):
 
 
 def test_the_order_of_work_and_threads_do_not_count():
-    x, v = np.linspace(-0.2, 0.2, 70), np.linspace(-0.4, 0.4, 61)
+    x, v = np.linspace(-0.2, 0.2, 36), np.linspace(-0.4, 0.4, 31)
     one, two = (dynamics.basins(BLOCK, SHAKING, x, v, threads=count) for count in (1, 3))
     assert one.data.identical(two.data)
     assert one.share.values.sum() == pytest.approx(1.0)
-    assert one.standard_error.values == pytest.approx(np.sqrt(one.share * (1.0 - one.share) / (70 * 61)))
+    assert one.standard_error.values == pytest.approx(np.sqrt(one.share * (1.0 - one.share) / (36 * 31)))
     assert np.count_nonzero(one.outcome.values < 0) == 0
 
 

@@ -220,6 +220,7 @@ rocking.simulate_many(blocks, motion, levels=np.linspace(0.5, 3.0, 300), threads
 """
 
 
+@pytest.mark.thorough  # `test_ends.py` interrupts another one
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
 def test_an_interrupt_returns_at_once(records):
     simulate_many(

@@ -762,13 +762,13 @@ def _mapped(texts, axes):
 
 def test_a_map_of_overturning_is_a_command_and_a_script(run, tmp_path):
     texts = {**SINE, "motion": "ricker:amplitude=3,frequency=1,kind=antisymmetric", "model": "nonlinear"}
-    axes = {"x": "omega", "x_from": "2", "x_to": "5", "y": "a", "y_from": "0.7", "y_to": "9"}
+    axes = {"x": "omega", "x_from": "3", "x_to": "5", "y": "a", "y_from": "0.7", "y_to": "9"}
     grid, found = _mapped(texts, axes)
     modes = np.where(found["mode"] == maps.Mode.OVERTURNS_AFTER_REST, 0, found["mode"])
     code, out, _ = run(*shlex.split(map_as_command(grid))[1:], "--json", "--quiet")
     assert code == 0
     assert np.array_equal(np.array(json.loads(out)["mode"]), modes)
-    assert len(np.unique(modes)) > 3
+    assert len(np.unique(modes)) > 2
     script = tmp_path / "map.py"
     script.write_text(map_as_python(grid, "mode"), "utf-8")
     assert np.array_equal(runpy.run_path(str(script))["found"].data.mode.values, modes)
@@ -777,7 +777,7 @@ def test_a_map_of_overturning_is_a_command_and_a_script(run, tmp_path):
 @pytest.mark.parametrize(
     ("texts", "axes"),
     [
-        (SINE, {"x": "omega", "x_from": "1", "x_to": "4", "y": "a", "y_from": "1", "y_to": "1.1"}),
+        (SINE, {"x": "omega", "x_from": "2.5", "x_to": "4", "y": "a", "y_from": "1", "y_to": "1.12"}),
         (SINE, {"x": "restitution", "y": "omega"}),
         ({**SINE, "restitution": "0.9,0.92"}, {"x": "p", "y": "a", "y_from": "1.1", "y_to": "2"}),
         ({**STATUE, "motion": "el-centro-meloland-270"}, {"x": "alpha", "y": "pga"}),

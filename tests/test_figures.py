@@ -247,8 +247,15 @@ def shown_boxes(figure):
             yield "an axis", box
 
 
-@pytest.mark.parametrize("dpi", [100.0, *(pytest.param(dpi, marks=pytest.mark.thorough) for dpi in (200.0, 300.0))])
-@pytest.mark.parametrize("width", [COLUMN, PAGE], ids=["column", "page"])
+@pytest.mark.parametrize(
+    ("width", "dpi"),
+    [
+        pytest.param(COLUMN, 100.0, id="column"),
+        pytest.param(PAGE, 100.0, id="page", marks=pytest.mark.thorough),
+        pytest.param(COLUMN, 300.0, id="column, fine", marks=pytest.mark.thorough),
+        pytest.param(PAGE, 200.0, id="page, fine", marks=pytest.mark.thorough),
+    ],
+)
 @pytest.mark.parametrize("kind", FIGURES)
 def test_no_text_leaves_the_figure(kind, width, dpi):
     draw, height = FIGURES[kind]

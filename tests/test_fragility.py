@@ -105,7 +105,11 @@ def test_fishers_covariance_is_the_inverse_of_the_expected_curvature():
 # Shares of docs/_tables/fragility-coverage.txt, which scripts/fragility_coverage.py measures.
 @pytest.mark.parametrize(
     ("band", "share", "repeats"),
-    [("likelihood", 0.89, 40), pytest.param("bootstrap", 0.87, 60, marks=pytest.mark.thorough)],
+    [
+        ("likelihood", 0.89, 20),
+        pytest.param("likelihood", 0.89, 50, marks=pytest.mark.thorough),
+        pytest.param("bootstrap", 0.87, 60, marks=pytest.mark.thorough),
+    ],
 )
 def test_ninety_per_cent_intervals_hold_the_truth_nine_times_in_ten(band, share, repeats):
     held = np.zeros(2)
@@ -126,13 +130,13 @@ def striped(seed, count):
 
 def test_intervals_from_stripes_know_that_the_outcomes_of_a_motion_belong_together():
     held = np.zeros(2)
-    for seed in range(50):
+    for seed in range(30):
         intensity, exceeded, motion = striped(seed, 20)
         for k, clusters in enumerate((motion, None)):
             low, high = fit_fragility(intensity, exceeded, clusters=clusters).curves[0].median_interval
             held[k] += low <= 3.0 <= high
-    assert held[0] >= 41
-    assert held[1] < 38
+    assert held[0] >= 25
+    assert held[1] < 22
 
 
 def test_the_interval_of_the_likelihood_is_where_it_has_fallen_by_half_a_quantile():
@@ -269,8 +273,8 @@ def test_the_test_of_fit_is_pearsons_over_stripes():
 
 
 def test_the_test_of_fit_accepts_lognormals_and_rejects_what_is_none():
-    accepted = [fit_fragility(*outcomes(seed, 200)).curves[0].goodness.p_value > 0.05 for seed in range(20)]
-    assert sum(accepted) >= 17
+    accepted = [fit_fragility(*outcomes(seed, 100)).curves[0].goodness.p_value > 0.05 for seed in range(12)]
+    assert sum(accepted) >= 10
     rng = np.random.default_rng(0)
     intensity = rng.uniform(1.0, 10.0, 400)
     # Safe again between 4 and 7, as a rocking block may be.

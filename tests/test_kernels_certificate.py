@@ -104,7 +104,7 @@ def test_bounds_on_an_arc_hold_its_duration_and_its_impact(problem: Problem, sid
 
 
 @long_uncompiled
-@settings(few, max_examples=24)
+@few
 @given(problems(pieces=4, jumps=True), st.integers(0, 1), between(1e-5, 0.2), between(0.0, 0.3), tolerances)
 def test_the_bracket_holds_the_time_to_rest_whatever_jumps_lie_in_the_window(
     problem: Problem, side: int, share: float, start: float, tolerance: float

@@ -29,7 +29,7 @@ from rocking.kernels.state import new_scratch
 #: Limits that no motion passes.
 ANYTHING = (-math.inf, math.inf)
 
-quick = settings(deadline=None, max_examples=100)
+quick = settings(deadline=None, max_examples=50)
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:

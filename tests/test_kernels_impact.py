@@ -15,7 +15,7 @@ from rocking.kernels.state import Outcome, new_scratch
 
 QUARTER_TURN = 0.5 * math.pi
 
-quick = settings(deadline=None, max_examples=100)
+quick = settings(deadline=None, max_examples=50)
 
 
 def between(low: float, high: float) -> st.SearchStrategy[float]:

@@ -58,7 +58,7 @@ def choose(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("count", [60, pytest.param(4000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [30, pytest.param(4000, marks=pytest.mark.slow)])
 def test_python_gives_the_same_bits(count: int, choose: Callable[[bool], None]) -> None:
     random = np.random.default_rng(count)
     impacts = 0

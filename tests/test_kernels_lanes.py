@@ -140,7 +140,7 @@ def rounds_of(few: int, many: int) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("rounds", [few, pytest.param(many, marks=pytest.mark.thorough)])
 
 
-@rounds_of(6, 20)
+@rounds_of(3, 20)
 @pytest.mark.parametrize("late", [0.0, 1e-9, -1e-9])
 @pytest.mark.parametrize("stiffness", [1.0, 0.0, -1.0], ids=["block", "ball", "oscillator"])
 def test_a_quiet_linear_step_is_exact(stiffness: float, late: float, rounds: int) -> None:

@@ -421,7 +421,7 @@ def extremes(draw: st.DrawFn) -> dict[str, object]:
 
 
 @long_uncompiled
-@settings(quick, max_examples=150)
+@settings(quick, max_examples=75)
 @given(extremes())
 def test_every_march_ends_and_stays_sound(case: dict[str, object]) -> None:
     assert_sound(run(**case))  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from rocking.kernels.rest import LARGEST_BETA, LARGEST_GAMMA, proven_arc
 GRAVITY = 9.80665
 FOREVER = 1e9
 
-many = settings(deadline=None, max_examples=40)
+many = settings(deadline=None, max_examples=25)
 quick = settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.filter_too_much])
 few = settings(deadline=None, max_examples=12)
 

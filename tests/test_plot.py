@@ -184,7 +184,9 @@ def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
     assert zoom.lines[0].get_xdata().size < 60
 
 
-@pytest.mark.parametrize("extension", ["png", "pdf", "svg"])
+@pytest.mark.parametrize(
+    "extension", ["png", *(pytest.param(vector, marks=pytest.mark.thorough) for vector in ("pdf", "svg"))]
+)
 @pytest.mark.parametrize(
     "changes",
     [
@@ -199,6 +201,14 @@ def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
 def test_every_response_is_drawn_to_every_format_without_a_warning(changes, extension):
     buffer = io.BytesIO()
     figure_of(**changes).savefig(buffer, format=extension)
+    assert buffer.tell() > 5000
+
+
+@pytest.mark.parametrize("extension", ["pdf", "svg"])
+def test_the_fullest_response_is_drawn_in_vectors_without_a_warning(unarranged, extension):
+    sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
+    buffer = io.BytesIO()
+    figure_of(chattering=sequence).savefig(buffer, format=extension)
     assert buffer.tell() > 5000
 
 

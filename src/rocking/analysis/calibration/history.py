@@ -303,8 +303,7 @@ class _Problem:
     def block(self, logs: Floats) -> Block:
         values = self.values(logs)
         p, alpha, restitution = (
-            [values[name + side if name + side in values else name] for side in ("_plus", "_minus")]
-            for name in PARAMETERS
+            values[name] if name in values else [values[f"{name}_plus"], values[f"{name}_minus"]] for name in PARAMETERS
         )
         return Block.from_parameters(p, alpha, restitution)
 
