@@ -48,6 +48,6 @@ def test_the_shift_of_the_rest_is_its_derivative_by_what_is_changed(model: str, 
     )
     # What happens to the speed at the impact itself is in dv.
     node, later = node_of(side, 0.0, v, start), node_of(state.AT_REST, 0.0, 0.0, start + 1e-4)
-    found = rest_shift(trail, node, what, dv, shift, later)
+    found = rest_shift(trail, node, what, (dv, shift, 0.0), later)
     slope = float((rest(step) - rest(-step)) / (2.0 * step))
     assert found - shift == pytest.approx(slope - shift, rel=1e-3)
