@@ -23,6 +23,9 @@ from rocking import (
     impact_restitution,
 )
 from rocking.block import RestrainedBlocks, housner_restitution
+from rocking.kernels import compiled
+from rocking.kernels import march as march_module
+from rocking.kernels.interpreted import Interpreted
 from rocking.kernels.restitution import factor, uniform
 
 COLUMN = Block(width=0.4, height=2.0, mass=2000.0)
@@ -245,6 +248,22 @@ def test_many_are_those_one_by_one_in_any_order():
     again = RestrainedBlocks(**{name: values for name, (values, _) in many.parameters().items()}, gravity=9.81)
     records = [each.kernel_records("linear", np.zeros((16, 2))) for each in (again, many)]
     assert np.array_equal(*records)
+
+
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+def test_python_reads_the_same_bits(monkeypatch):
+    judged = 0
+    for seed in (13, 14, 17, 28):
+        ours, _, motion, start = drawn(seed)
+        found = []
+        for interpreted in (False, True):
+            monkeypatch.setattr(compiled.Kernel, "is_at_hand", not interpreted)
+            monkeypatch.setattr(march_module, "_interpreted", Interpreted(march_module.march, 10**9))
+            response = rocking.simulate(ours, motion, initial_rotation=start, duration=1.0)
+            found.append(response.impacts.tobytes() + response.chattering.tobytes())
+            judged += len(response.impacts)
+        assert found[0] == found[1], seed
+    assert judged >= 10
 
 
 def test_seeds_make_bodies_that_differ_and_one_seed_the_same():
