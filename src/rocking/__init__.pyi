@@ -10,6 +10,7 @@ from .analysis.fragility.result import Fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
+from .analysis.restitution import compare_restitution
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
 from .block import (
@@ -121,6 +122,7 @@ __all__ = [
     "calibrate_history",
     "chattering",
     "compare_measures",
+    "compare_restitution",
     "dynamics",
     "explore",
     "fit_fragility",
