@@ -188,15 +188,15 @@ def test_wider_bounds_never_give_a_narrower_bracket(
     bracket: tuple[float, list[list[float]], tuple[float, float]], side: int, which: int, more: float
 ) -> None:
     v, sides, e = bracket
-    lower, upper = geometric_bracket(v, Bounds(*sides[0]), Bounds(*sides[1]), *e)
+    lower, upper = geometric_bracket(v, Bounds(*sides[0]), Bounds(*sides[1]), e, e)
     sides[side][which] *= 1.0 - 0.5 * more if which == 1 else 1.0 + more
-    wider_lower, wider_upper = geometric_bracket(v, Bounds(*sides[0]), Bounds(*sides[1]), *e)
+    wider_lower, wider_upper = geometric_bracket(v, Bounds(*sides[0]), Bounds(*sides[1]), e, e)
     assert math.isnan(wider_upper) or wider_lower <= lower * (1.0 + 1e-14) <= upper <= wider_upper * (1.0 + 1e-14)
 
 
 def test_a_constant_motion_of_little_stiffness_leaves_only_rounding_between_the_bounds() -> None:
     bounds = Bounds(1e-20, 3.0, 3.0, 0.0, 0.0, 0.0)
-    lower, upper = geometric_bracket(0.6, bounds, bounds, 0.5, 0.8)
+    lower, upper = geometric_bracket(0.6, bounds, bounds, (0.5, 0.8), (0.5, 0.8))
     assert lower == pytest.approx(0.4 * 1.5 / 0.6, rel=1e-13)
     assert lower < 0.4 * 1.5 / 0.6 < upper < lower * (1.0 + 1e-13)
 
@@ -220,8 +220,8 @@ STEADY = Bounds(1.0, 2.0, 2.0, 0.0, 0.0, 0.0)
 def test_where_a_condition_fails_nothing_is_proven(
     v: float, first: tuple[float, ...], second: tuple[float, ...], e: float
 ) -> None:
-    assert np.all(np.isnan(geometric_bracket(v, Bounds(*first), Bounds(*second), e, e)))
-    assert np.all(np.isfinite(geometric_bracket(0.1, STEADY, STEADY, 0.5, 0.5)))
+    assert np.all(np.isnan(geometric_bracket(v, Bounds(*first), Bounds(*second), (e, e), (e, e))))
+    assert np.all(np.isfinite(geometric_bracket(0.1, STEADY, STEADY, (0.5, 0.5), (0.5, 0.5))))
 
 
 def test_a_window_over_too_many_pieces_proves_nothing_until_the_block_is_slower() -> None:

@@ -10,13 +10,17 @@ from .analysis.fragility.result import Fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
+from .analysis.restitution import compare_restitution
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
 from .block import (
     Block,
     Blocks,
     Damper,
+    FallingRestitution,
     Load,
+    RandomRestitution,
+    Restitution,
     RestrainedBlock,
     RestrainedBlocks,
     Restraint,
@@ -24,6 +28,7 @@ from .block import (
     Spring,
     Tendon,
     Thrust,
+    impact_restitution,
     one_sided_restitution,
 )
 from .body import Bodies, Body, Coordinate
@@ -70,6 +75,7 @@ __all__ = [
     "DatasetResult",
     "Description",
     "DrawnResult",
+    "FallingRestitution",
     "Fragility",
     "Frame",
     "GeometricBypass",
@@ -86,7 +92,9 @@ __all__ = [
     "OutputError",
     "OutsideFit",
     "Product",
+    "RandomRestitution",
     "Response",
+    "Restitution",
     "RestrainedBlock",
     "RestrainedBlocks",
     "Restraint",
@@ -114,10 +122,12 @@ __all__ = [
     "calibrate_history",
     "chattering",
     "compare_measures",
+    "compare_restitution",
     "dynamics",
     "explore",
     "fit_fragility",
     "fragility",
+    "impact_restitution",
     "incremental_dynamic_analysis",
     "one_sided_restitution",
     "overturning_map",

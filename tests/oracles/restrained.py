@@ -4,6 +4,7 @@ Nothing here knows the equations of the package: the moment about a pivot is the
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -33,6 +34,10 @@ class Held:
     damper: float = 0.0
     plastic: float = 0.0
     flows: bool = False
+    law: Callable[[int, float, int], float] | None = None  # of side, speed and impacts before
+
+    def factor(self, j, speed, number):
+        return self.restitution[j] if self.law is None else self.law(j, speed, number)
 
     def inertia(self, j):
         return self.mass * (self.gyration**2 + self.height**2 + self.distances[j] ** 2)
@@ -146,7 +151,7 @@ def integrated(body, motion, end, u, v, j):  # noqa: C901
             if len(found.t_events[0]):
                 times.append(t)
                 speeds.append(-v)
-                u, v = 0.0, -body.restitution[j] * v
+                u, v = 0.0, -body.factor(j, -v, len(times) - 1) * v
                 j = j if body.one_sided else 1 - j
                 if v < SLOWEST:
                     return times[:-1], speeds[:-1], peak, "chatters"

@@ -8,6 +8,7 @@ from .fragility.curve import Band, FragilityCurve
 from .fragility.lognormal import Goodness, Likelihood, Probit
 from .incremental import IncrementalDynamicAnalysis
 from .overturning import Mode, OverturningMap, mode_name
+from .restitution import LawFit, RestitutionComparison
 from .risk import Rate, Risk
 from .spectrum import RockingSpectrum
 from .survey import Survey
@@ -21,6 +22,7 @@ __all__ = [
     "FragilityCurve",
     "Goodness",
     "IncrementalDynamicAnalysis",
+    "LawFit",
     "Likelihood",
     "MeasureComparison",
     "Measured",
@@ -29,6 +31,7 @@ __all__ = [
     "Probit",
     "Rate",
     "ResponseRose",
+    "RestitutionComparison",
     "Risk",
     "RockingSpectrum",
     "Scores",

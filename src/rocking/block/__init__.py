@@ -1,15 +1,26 @@
 """What rocks: one block, or many as a struct of arrays; free, or held back."""
 
 from rocking.block.many import Blocks
-from rocking.block.restrained import RestrainedBlock, RestrainedBlocks, one_sided_restitution
+from rocking.block.restitution import (
+    FallingRestitution,
+    RandomRestitution,
+    Restitution,
+    housner_restitution,
+    impact_restitution,
+    one_sided_restitution,
+)
+from rocking.block.restrained import RestrainedBlock, RestrainedBlocks
 from rocking.block.restraints import Damper, Load, Restraint, Spring, Tendon, Thrust
-from rocking.block.single import Block, Side, housner_restitution, one_block
+from rocking.block.single import Block, Side, one_block
 
 __all__ = [
     "Block",
     "Blocks",
     "Damper",
+    "FallingRestitution",
     "Load",
+    "RandomRestitution",
+    "Restitution",
     "RestrainedBlock",
     "RestrainedBlocks",
     "Restraint",
@@ -18,6 +29,7 @@ __all__ = [
     "Tendon",
     "Thrust",
     "housner_restitution",
+    "impact_restitution",
     "one_block",
     "one_sided_restitution",
 ]

@@ -13,6 +13,7 @@ from rocking import checks
 from rocking.arrays import Floats, Integers
 from rocking.bisection import bisected
 from rocking.block.limits import checked_parameter
+from rocking.block.restitution import Restitution, Varying, one_sided_restitution
 from rocking.block.restraints import Held, Load, Pivot, Restraint, Yielding
 from rocking.block.single import Block, Side, block_of_sides, one_block
 from rocking.body import KINDS, Coordinate
@@ -40,9 +41,10 @@ class RestrainedBlock:
         Whether it rocks to side + only, and bounces back from what stands behind it with `restitution` times its speed.
     lean : float
         Angle by which it stands out of plumb to side +, rad.
-    restitution : float or pair, optional
-        Factor on the angular speed at an impact. By default that of the block; with a load that follows, the one that
-        conserves angular momentum; of a one-sided block `one_sided_restitution`.
+    restitution : float, pair or Restitution, optional
+        Factor on the angular speed at an impact, or the law by which it varies: `FallingRestitution`,
+        `RandomRestitution`; that of the `sides` is then the largest. By default that of the block; with a load that
+        follows, the one that conserves angular momentum; of a one-sided block `one_sided_restitution`.
 
     Raises
     ------
@@ -75,6 +77,7 @@ class RestrainedBlock:
     block: Block
     held: tuple[Held, Held]
     tendon: tuple[Yielding, Yielding]
+    _varying: tuple[Varying, Varying]
     is_one_sided: bool
     description: str
 
@@ -84,7 +87,7 @@ class RestrainedBlock:
         *restraints: Restraint,
         one_sided: bool = False,
         lean: float = 0.0,
-        restitution: float | Sequence[float] | None = None,
+        restitution: float | Sequence[float] | Restitution | None = None,
     ) -> None:
         own = one_block(block)
         for each in restraints:
@@ -99,6 +102,9 @@ class RestrainedBlock:
         standing = _leaning(_carrying(own, loads), tilt)
         if one_sided and restitution is None:
             restitution = one_sided_restitution(own.sides[0].alpha)
+        varying = Varying(), Varying()
+        if isinstance(restitution, Restitution):
+            varying = restitution._varying()
         if restitution is not None:
             standing = _with_restitution(standing, restitution)
         pivots = _pivots(standing, tilt)
@@ -111,7 +117,8 @@ class RestrainedBlock:
         tendon = (yielding[0], yielding[1]) if yielding else (Yielding(), Yielding())
         texts = [own.description, *map(str, restraints)]
         texts += [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_sided
-        _fill(self, standing, (held[0], held[1]), tendon, one_sided, ", ".join(texts))
+        texts += [str(restitution)] * isinstance(restitution, Restitution)
+        _fill(self, standing, (held[0], held[1]), tendon, varying, one_sided, ", ".join(texts))
         if (least := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
                 f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
@@ -150,35 +157,6 @@ class RestrainedBlock:
         return RestrainedBlocks.of([self])
 
 
-def one_sided_restitution(alpha: float) -> float:
-    """Restitution of a wall that rocks against transverse walls, by angular momentum at three impacts.
-
-    The wall meets the ground with its inner edge, then the transverse walls with its top, then the ground again.
-
-    Parameters
-    ----------
-    alpha : float
-        Slenderness, rad.
-
-    Returns
-    -------
-    float
-        The size of (1 - 1.5 sin(alpha)^2)^2 (1 - 1.5 cos(alpha)^2): 0.47 for a slenderness of 0.1.
-
-    Notes
-    -----
-    After Sorrentino, AlShawa and Decanini (2011), who measured about as much and less; give a measured value where
-    there is one.
-
-    Examples
-    --------
-    >>> round(one_sided_restitution(0.1), 4)
-    0.4707
-    """
-    sine, cosine = math.sin(alpha), math.cos(alpha)
-    return abs((1.0 - 1.5 * sine * sine) ** 2 * (1.0 - 1.5 * cosine * cosine))
-
-
 @dataclass(frozen=True, eq=False)
 class RestrainedBlocks:
     """Any number n of such blocks under one gravity, each array of shape (n, 2): side +, side -.
@@ -191,6 +169,9 @@ class RestrainedBlocks:
         What the restraints do: the coefficients s, c, h, k and d of `RestrainedBlock`; damping in 1/s.
     opening, stiffness, yields, slack : ndarray
         Of a tendon that yields what `rocking.block.restraints.Yielding` says, in m and 1/m; of none 0, 0, inf and 0.
+    restitution_least, restitution_slope, restitution_seed : ndarray
+        Of a restitution that varies what `rocking.block.restitution.Varying` says, the largest being `restitution`: 1,
+        s/rad and 1; of a constant one 0, 0 and -1.
     one_sided : ndarray
         1 where a block rocks to side + only, else 0, twice the same.
     gravity : float
@@ -217,6 +198,9 @@ class RestrainedBlocks:
     stiffness: Floats
     yields: Floats
     slack: Floats
+    restitution_least: Floats
+    restitution_slope: Floats
+    restitution_seed: Floats
     one_sided: Floats
     gravity: float = STANDARD_GRAVITY
 
@@ -250,16 +234,20 @@ class RestrainedBlocks:
         if len({each.gravity for each in given}) > 1:
             raise InvalidBlock("all blocks must be under one {}", "gravity")
         rows = [
-            [(*(side.p, side.alpha, side.restitution), *held, *tendon, float(each.is_one_sided)) for side, held, tendon
-             in zip(each.block.sides, each.held, each.tendon, strict=True)]
+            [
+                (*(side.p, side.alpha, side.restitution), *held, *tendon, *varying, float(each.is_one_sided))
+                for side, held, tendon, varying in zip(
+                    each.block.sides, each.held, each.tendon, each._varying, strict=True
+                )
+            ]
             for each in given
-        ]  # fmt: skip
+        ]
         return cls(**dict(zip(_PARAMETERS, np.moveaxis(np.array(rows), 2, 0), strict=True)), gravity=given[0].gravity)
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         """Return what they are made from, with units, by name."""
         units = {"p": "rad/s", "alpha": "rad", "damping": "1/s", "opening": "m", "stiffness": "1/m"}
-        units |= {"yields": "m", "slack": "m"}
+        units |= {"yields": "m", "slack": "m", "restitution_slope": "s/rad"}
         return {name: (getattr(self, name), units.get(name, "1")) for name in _PARAMETERS}
 
     @property
@@ -283,9 +271,10 @@ class RestrainedBlocks:
         p, alpha, e, *others, one_sided = (getattr(self, name)[index].tolist() for name in _PARAMETERS)
         block = Block.from_parameters(p, alpha, e, gravity=self.gravity)
         plus, minus = ([values[j] for values in others] for j in range(2))
-        held, tendon = (Held(*plus[:5]), Held(*minus[:5])), (Yielding(*plus[5:]), Yielding(*minus[5:]))
+        held, tendon = (Held(*plus[:5]), Held(*minus[:5])), (Yielding(*plus[5:9]), Yielding(*minus[5:9]))
+        varying = Varying(*plus[9:]), Varying(*minus[9:])
         text = "block with restraints" + ", rocking one way" * bool(one_sided[0])
-        return _fill(RestrainedBlock.__new__(RestrainedBlock), block, held, tendon, bool(one_sided[0]), text)
+        return _fill(RestrainedBlock.__new__(RestrainedBlock), block, held, tendon, varying, bool(one_sided[0]), text)
 
     def select(self, index: slice | Integers) -> RestrainedBlocks:
         """Return some of them: a slice, indices, or a mask."""
@@ -308,6 +297,9 @@ class RestrainedBlocks:
         made["fallen"] = 0.5 * math.pi
         made["prestress"], made["spring"] = p * p * self.prestress, p * p * self.spring
         made["damping"] = self.damping
+        made["least"], made["slope"] = self.restitution_least, self.restitution_slope
+        made["seed"] = self.restitution_seed[:, 0]
+        made["varying"] = (made["seed"] >= 0) | np.any(self.restitution_slope > 0.0, axis=1)
         at_zero = self.sine * sine + self.cosine * cosine  # of the moment, and its slope by -u
         slope = self.sine * cosine - self.cosine * sine
         # A moment that only a tendon without prestress makes is zero there, whatever rounding says.
@@ -346,7 +338,7 @@ class RestrainedBlocks:
 
 _PARAMETERS: Final = (
     "p", "alpha", "restitution", "sine", "cosine", "prestress", "spring", "damping", "opening", "stiffness", "yields",
-    "slack", "one_sided",
+    "slack", "restitution_least", "restitution_slope", "restitution_seed", "one_sided",
 )  # fmt: skip
 
 
@@ -355,13 +347,13 @@ def _fill(
     block: Block,
     held: tuple[Held, Held],
     tendon: tuple[Yielding, Yielding],
+    varying: tuple[Varying, Varying],
     one_sided: bool,
     description: str,
 ) -> RestrainedBlock:
     """Fill in what a restrained block is, and return it."""
-    for name, value in {
-        "block": block, "held": held, "tendon": tendon, "is_one_sided": bool(one_sided), "description": description,
-    }.items():  # fmt: skip
+    names = ("block", "held", "tendon", "_varying", "is_one_sided", "description")
+    for name, value in zip(names, (block, held, tendon, varying, bool(one_sided), description), strict=True):
         object.__setattr__(made, name, value)
     return made
 
@@ -400,9 +392,10 @@ def _leaning(block: Block, lean: float) -> Block:
     return block_of_sides(Block.__new__(Block), sides, block.gravity, block.description, block.mass)
 
 
-def _with_restitution(block: Block, restitution: float | Sequence[float]) -> Block:
+def _with_restitution(block: Block, restitution: float | Sequence[float] | Restitution) -> Block:
     """Return a block with another restitution."""
-    factors = np.broadcast_to(checks.numbers(restitution, "restitution", InvalidBlock), 2).tolist()
+    given = restitution._factors() if isinstance(restitution, Restitution) else restitution
+    factors = np.broadcast_to(checks.numbers(given, "restitution", InvalidBlock), 2).tolist()
     plus, minus = (
         replace(side, restitution=checked_parameter(factor, "restitution"))
         for side, factor in zip(block.sides, factors, strict=True)

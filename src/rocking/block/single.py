@@ -12,6 +12,7 @@ import numpy as np
 from rocking import checks, svg
 from rocking.arrays import Floats, Integers
 from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
+from rocking.block.restitution import Restitution, housner_restitution
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
 from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.constants import MODELS, STANDARD_GRAVITY, Model
@@ -506,11 +507,6 @@ class Block:
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
-def housner_restitution(alpha: float) -> float:
-    """Restitution of a rectangular block that conserves angular momentum: 1 - 1.5 sin(alpha)^2 (Housner 1963)."""
-    return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", InvalidBlock)) ** 2
-
-
 def one_block(block: Block) -> Block:
     """Return the block, or say that it is none."""
     if not isinstance(block, Block):
@@ -604,5 +600,9 @@ def _restitutions(given: object, conserved: Sequence[float], advice: str = "") -
                 "restitution",
             )
         return conserved[0], conserved[1]
+    if isinstance(given, Restitution):
+        raise InvalidBlock(
+            "{} of a block is a number or a pair; a law goes to RestrainedBlock(block, restitution=...)", "restitution"
+        )
     plus, minus = (checked_parameter(value, "restitution") for value in checked_pair(given, "restitution"))
     return plus, minus

@@ -51,6 +51,11 @@ class Repeated:
         self._records = self.bodies.kernel_records(self.model, limits)
         if np.any(self._records["yielding"]):
             raise InvalidBlock("a tendon that yields remembers; maps know what position and velocity tell")
+        if np.any(self._records["varying"] & (self._records["seed"] >= 0)):
+            raise InvalidOption(
+                "a map takes a state to the same one each time, but this body draws its restitution at each impact: "
+                "give it a number, or one that falls with the speed"
+            )
         self._ground = repeated(self.motion, self.body.gravity)
         rows = step_rows(self._ground, self._records[0])
         self._steps = rows if self.model == "linear" else rows[:, :0]

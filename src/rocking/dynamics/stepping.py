@@ -14,7 +14,7 @@ from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.simulation import model_of, position_at_start
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state, stepping
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
@@ -262,6 +262,8 @@ def integrate(
     rules = rules_of(alone, equation, how, stop, record=True)
     records = alone.kernel_records(equation, how.limits(alone, motion, equation))
     record = records[0]
+    if record["varying"]:
+        raise InvalidBlock("time stepping knows no {} that varies from impact to impact: give a number", "restitution")
     longest = _LONGEST_STEP / math.sqrt(float(np.max(np.abs(record["stiffness"]))) or math.inf)
     if not isinstance(scheme, TimeStepping):
         raise InvalidOption(f"{{}} must be one of time stepping, as MoreauJean(1e-3), not {scheme!r}", "scheme")

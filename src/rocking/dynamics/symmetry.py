@@ -39,7 +39,8 @@ def is_mirrored(strobe: StroboscopicMap) -> bool:
     if not strobe._is_two_sided or low != -high:
         return False
     same = all(
-        record[name][0] == record[name][1] for name in ("stiffness", "gain", "threshold", "restitution", "slenderness")
+        record[name][0] == record[name][1]
+        for name in ("stiffness", "gain", "threshold", "restitution", "least", "slope", "slenderness")
     )
     return same and _is_antisymmetric(strobe.motion)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rocking.analysis.overturning import Mode, modes_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Blocks
-from rocking.block.single import housner_restitution
+from rocking.block.restitution import housner_restitution
 from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
 from rocking.constants import STANDARD_GRAVITY

@@ -28,7 +28,8 @@ from rocking.kernels.ground import (
     start_of,
     vertical_of,
 )
-from rocking.kernels.remaining import Restoring, deviation, refined_bracket, remaining_time
+from rocking.kernels.remaining import Pair, Restoring, deviation, refined_bracket, remaining_time
+from rocking.kernels.restitution import least_factor, middle_factor
 from rocking.kernels.state import Record
 from rocking.kernels.tendon import may_change_below
 
@@ -58,23 +59,38 @@ class Bounds(NamedTuple):
 
 
 @inlined
-def geometric_bracket(v: float, first: Bounds, second: Bounds, e_i: float, e_j: float) -> tuple[float, float]:
+def geometric_bracket(v: float, first: Bounds, second: Bounds, e: Pair, least_e: Pair) -> tuple[float, float]:
     """Lower and upper bound on the time to rest, for bounds that hold as long as needed; NaN, NaN: no proof.
 
-    ``first`` bounds the side that the block enters, ``second`` the other one.
+    ``first`` bounds the side that the block enters, ``second`` the other one; ``e`` and ``least_e`` are the largest and
+    the least restitution on leaving them.
     """
     change_i, shortest_i, longest_i = arc_bounds(v, first)
-    fastest = e_i * math.sqrt(1.0 + change_i) * v
-    slowest = e_i * math.sqrt(max(0.0, 1.0 - change_i)) * v
+    fastest = e[0] * math.sqrt(1.0 + change_i) * v
+    slowest = least_e[0] * math.sqrt(max(0.0, 1.0 - change_i)) * v
     change_j, _, longest_j = arc_bounds(fastest, second)
     _, shortest_j, _ = arc_bounds(slowest, second)
-    most = fastest / v * e_j * math.sqrt(1.0 + change_j) * (1.0 + ROUNDING)
-    least = slowest / v * e_j * math.sqrt(max(0.0, 1.0 - change_j)) * (1.0 - ROUNDING)
+    most = fastest / v * e[1] * math.sqrt(1.0 + change_j) * (1.0 + ROUNDING)
+    least = slowest / v * least_e[1] * math.sqrt(max(0.0, 1.0 - change_j)) * (1.0 - ROUNDING)
     if not most < 1.0:
         return np.nan, np.nan
     lower = (shortest_i + shortest_j) / (1.0 - least)
     upper = (longest_i + longest_j) / (1.0 - most)
     return lower * (1.0 - ROUNDING), upper * (1.0 + ROUNDING)
+
+
+@inlined
+def fastest_impact(v: float, first: Bounds, second: Bounds, e_i: float) -> float:
+    """Bound on the speeds of all impacts until rest, for a body that a `geometric_bracket` brings to rest."""
+    fastest = math.sqrt(1.0 + arc_bounds(v, first)[0]) * v
+    following = e_i * fastest * math.sqrt(1.0 + arc_bounds(e_i * fastest, second)[0])
+    return max(fastest, following) * (1.0 + ROUNDING)
+
+
+@inlined
+def with_restitution(side: Restoring, e: float) -> Restoring:
+    """One side with another restitution."""
+    return Restoring(side.g, side.rate, side.curvature, side.stiffness, e, side.error)
 
 
 @inlined
@@ -135,7 +151,9 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
         fastest = e_i * math.sqrt(gained) * v
         if not (gained <= _GAINED and e_i * e_i * gained * (1.0 + arc_bounds(fastest, second)[0]) <= _GAINED):
             return unproven()
-    lower, upper = geometric_bracket(v, first, second, e_i, e_j)
+    fastest = fastest_impact(v, first, second, e_i) if block.varying else v
+    least_e = least_factor(block, i, fastest), least_factor(block, j, fastest)
+    lower, upper = geometric_bracket(v, first, second, (e_i, e_j), least_e)
     if not upper <= window:
         return unproven()
     least, change = min(first.least, second.least), max(first.change, second.change)
@@ -149,7 +167,10 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     horizon = Horizon(motion, ground.error, ground.columns, upper, height, drag)
     side_i = restoring_parabola(block, rules, i, scratch, horizon)
     side_j = restoring_parabola(block, rules, j, scratch, horizon)
-    if upper - lower > rules.tolerance and upper + rounding <= length_of(ground, state.piece) - state.offset:
+    if block.varying:
+        side_i = with_restitution(side_i, middle_factor(block, i, fastest))
+        side_j = with_restitution(side_j, middle_factor(block, j, fastest))
+    elif upper - lower > rules.tolerance and upper + rounding <= length_of(ground, state.piece) - state.offset:
         refined = refined_bracket(v, side_i, side_j, upper)
         if refined[1] >= refined[0]:
             lower, upper = max(lower, refined[0]), min(upper, refined[1])

@@ -12,6 +12,7 @@ from rocking.arrays import Floats
 from rocking.kernels.arc import evaluate
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import move
+from rocking.kernels.restitution import factor
 from rocking.kernels.state import Outcome, Record
 
 _EPSILON = 2.0**-53
@@ -197,6 +198,6 @@ def apply_impact(block: Record, state: Record) -> float:
         speed = max(0.0, state.v)
         state.proof_speed = np.inf
     state.u = 0.0
-    state.v = block.restitution[left] * speed
+    state.v = factor(block, left, speed, state.impacts) * speed
     state.impacts += 1
     return speed

@@ -124,7 +124,8 @@ def march_step(ground: Ground, block: Record, rules: Record, table: Records, scr
 @inlined
 def may_pass(ground: Ground, block: Record, rules: Record) -> bool:
     """Whether `pass_proven_impacts` applies: linear, unrestrained, a constant weight, a motion linear in time."""
-    return not rules.nonlinear and is_straight(ground) and not has_vertical(ground) and not block.restrained
+    plain = not (block.restrained or block.varying)
+    return not rules.nonlinear and is_straight(ground) and not has_vertical(ground) and plain
 
 
 @inlined
@@ -236,7 +237,7 @@ def pass_impact(ground: Ground, block: Record, rules: Record, table: Records, sc
     proof = unproven()
     if rules.treatment == RestRule.CERTIFIED and state.v <= state.proof_speed:
         proof = proven_bounds(ground, block, rules, scratch, state)
-        record_proof(ground, rules, state, proof)
+        record_proof(ground, block, rules, state, proof)
     rest = rest_after_impact(ground, block, rules, state, proof)
     state.last_impact_time = time
     if math.isnan(rest.time):

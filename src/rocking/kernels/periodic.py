@@ -17,6 +17,7 @@ from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import ROUNDING, Ground, length_of, start_of
 from rocking.kernels.march import march
 from rocking.kernels.recurrences import variation_coefficients
+from rocking.kernels.restitution import factor, relative_slope
 from rocking.kernels.state import AT_REST, Ending, Record, Records
 from rocking.kernels.trace import Trail, add_restraints, expand_coefficients
 
@@ -361,15 +362,17 @@ def apply_saltation(ground: Ground, block: Record, left: int, following: Record,
     """Multiply a derivative by that through an impact, before which the velocity was v."""
     across = block.facing and following.side != left  # at the other stop: seen from there, all signs change
     hit, sign = (following.side, -1.0) if across else (left, 1.0)
-    speed, e = -sign * v, block.restitution[hit]
+    speed = -sign * v
+    e = factor(block, hit, speed, 0)  # which is not drawn
+    rate = e * relative_slope(block, hit, speed, e)
     before = restoring(ground, block, hit, following.piece, following.offset) - block.damping[hit] * speed
     after = restoring(ground, block, following.side, following.piece, following.offset) + block.damping[
         following.side
     ] * (e * speed)
-    coupling = (e * before + after) / speed
+    coupling = (rate * before + after) / speed
     for column in range(2):
         du, dv = sign * M[0, column], sign * M[1, column]
-        M[0, column], M[1, column] = -e * du, coupling * du - e * dv
+        M[0, column], M[1, column] = -e * du, coupling * du - rate * dv
 
 
 # ---- From one impact to the next ----

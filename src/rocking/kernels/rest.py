@@ -10,6 +10,7 @@ from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import Ground, coefficient, length_of, start_of
 from rocking.kernels.remaining import THIRD, Pair
+from rocking.kernels.restitution import is_drawn, middle_factor
 from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRule, write_impact, write_node
 
 ULP = 2.0**-52
@@ -51,7 +52,7 @@ def count_impact(state: Record) -> None:
 
 
 @inlined
-def record_proof(ground: Ground, rules: Record, state: Record, proof: Proof) -> None:
+def record_proof(ground: Ground, block: Record, rules: Record, state: Record, proof: Proof) -> None:
     """Store since when chattering is proven, and at which speed the next proof is tried."""
     if not proof.upper >= 0.0:
         state.proof_speed = _SLOWER * state.v
@@ -60,6 +61,10 @@ def record_proof(ground: Ground, rules: Record, state: Record, proof: Proof) -> 
         state.run = 1
         state.run_start = time_of(ground, state)
     excess = (proof.upper - proof.lower) / rules.tolerance
+    if block.varying:
+        # The width is proportional to the square of the speed, or to the speed where the factor is drawn.
+        state.proof_speed = state.v * min(_SLOWEST, 1.0 / excess if is_drawn(block) else math.sqrt(1.0 / excess))
+        return
     wait = time_to_piece(ground, state, proof.time)
     # The width of a bracket of fourth order is proportional to the fifth power of the speed, that of the geometric one
     # to its square. The former needs a rest within the present piece.
@@ -133,7 +138,7 @@ def geometric_time(ground: Ground, block: Record, state: Record) -> float:
     i, j = state.side, block.entered[state.side]
     g_i = restoring(ground, block, i, state.piece, state.offset)
     g_j = restoring(ground, block, j, state.piece, state.offset)
-    e_i, e_j = block.restitution[i], block.restitution[j]
+    e_i, e_j = middle_factor(block, i, state.v), middle_factor(block, j, state.v)
     if not (g_i > 0.0 and g_j > 0.0 and e_i * e_j < 1.0):
         return np.nan
     return 2.0 * state.v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)

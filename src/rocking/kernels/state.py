@@ -103,7 +103,8 @@ _SERIES = ("f8", (ORDER + 2,))
 #: other: each side is then entered from itself, and at ``fallen``, their distance, the body hits the other stop.
 #: From ``yielding`` on: whether there is a tendon that yields; of it stiffness times lever arm over inertia, lever arm,
 #: what it adds to weight and push where it is elastic, elongations at which it yields and hangs slack; and the values
-#: of four fields without it.
+#: of four fields without it. From ``varying`` on: whether the restitution varies, up to that above; the seed by which
+#: it is drawn at each impact, or -1 where it falls with the speed; its least value, and how much it falls per speed.
 #: The fields that most iterations of a march read come first, here and below: fewer cache lines are read.
 BLOCK = _record(
     stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, hold=_SIDES, restitution=_SIDES, entered=("i8", (2,)),
@@ -111,6 +112,7 @@ BLOCK = _record(
     added_weight=_SIDES, added_push=_SIDES, prestress=_SIDES, spring=_SIDES, damping=_SIDES,
     yielding="?", tendon=_SIDES, opening=_SIDES, tendon_weight=_SIDES, tendon_push=_SIDES, yields="f8", slack="f8",
     base_weight=_SIDES, base_push=_SIDES, base_prestress=_SIDES, base_hold=_SIDES,
+    varying="?", seed="i8", least=_SIDES, slope=_SIDES,
 )  # fmt: skip
 
 #: How to compute: model, end of chattering (`RestRule`), width of a good bracket (s), when to stop (s), whether that

@@ -16,6 +16,7 @@ from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import first_root
 from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, start_of, vertical_of
 from rocking.kernels.recurrences import INTEGRATED_TWICE, variation_coefficients
+from rocking.kernels.restitution import factor, middle_factor, relative_slope
 from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, records
 from rocking.kernels.tendon import adopt, law_of_standing, plastic_after
 
@@ -150,7 +151,8 @@ def vary(
                 _, speed, _ = evaluate(scratch.rotation, order, t)
                 shift = du / -speed
                 away = -1.0 if trail.block.facing and following.side != node.side else 1.0  # the other stop
-                du, dv = saltation(trail, node, following, quantity, shift, (away * dv, -away * speed))
+                rates = away * dv, -away * speed
+                du, dv = saltation(trail, node, following, quantity, shift, rates, impact_count)
                 impacts[impact_count] = shift
                 impact_count += 1
     return at_peak
@@ -250,17 +252,21 @@ def added_weight(W: Floats, k: int, changes: int) -> float:
 
 @inlined
 def saltation(
-    trail: Trail, node: Record, following: Record, quantity: int, shift: float, rates: tuple[float, float]
+    trail: Trail, node: Record, following: Record, quantity: int, shift: float, rates: tuple[float, float], number: int
 ) -> tuple[float, float]:
-    """Variation after an impact that shifts; ``rates``: variation of the velocity before it, and speed of impact."""
+    """Variation after an impact that shifts; ``rates``: variation of the velocity before it, and speed of impact.
+
+    ``number`` of impacts came before. Where the restitution varies, its law is changed as a whole.
+    """
     block = trail.block
     dv, speed = rates
     hit = following.side if block.facing else node.side
     left = restoring(trail.ground, block, hit, following.piece, following.offset) - block.damping[hit] * speed
-    e = block.restitution[hit]
+    e = factor(block, hit, speed, number)
     entered = restoring(trail.ground, block, following.side, following.piece, following.offset)
     entered += block.damping[following.side] * (e * speed)
-    faster = -(dv - left * shift) + (speed if quantity == Quantity.RESTITUTION else 0.0)
+    faster = -(dv - left * shift) * relative_slope(block, hit, speed, e)
+    faster += speed if quantity == Quantity.RESTITUTION else 0.0
     return -e * speed * shift, e * faster + entered * shift
 
 
@@ -326,7 +332,7 @@ def rest_shift(
     g_j = restoring(trail.ground, block, j, node.piece, node.offset)
     dg_i = restoring_shift(trail, node, i, quantity, shift) + restoring_by_tendon(block, i, plastic, dp)
     dg_j = restoring_shift(trail, node, j, quantity, shift) + restoring_by_tendon(block, j, plastic, dp)
-    e_i, e_j = block.restitution[i], block.restitution[j]
+    e_i, e_j = middle_factor(block, i, node.v), middle_factor(block, j, node.v)
     de = 1.0 if quantity == Quantity.RESTITUTION else 0.0
     per_speed = 2.0 * (1.0 / g_i + e_i / g_j)
     change = -2.0 * (dg_i / (g_i * g_i) + e_i * dg_j / (g_j * g_j) - de * e_i / g_j)

@@ -95,7 +95,7 @@ def bracket(entered: State, window: float, delta: float, eta: float) -> tuple[fl
     high = (P + window * rate) * (1.0 + _ROUNDING)
     second = Bounds(delta, 2.0 - high, 2.0 - low, high - low, rate, 0.0)
     first = Bounds(delta, low, high, high - low, rate, 0.0)
-    return geometric_bracket(V, second, first, eta, eta)
+    return geometric_bracket(V, second, first, (eta, eta), (eta, eta))
 
 
 @inlined
