@@ -190,7 +190,7 @@ def test_the_variation_along_an_arc_is_the_derivative_by_what_is_changed(
         trail = Trail(ground, block, rules_for(nonlinear=nonlinear), state.records(0, state.NODE_ROW))
         node = state.record(state.NODE_ROW, time=0.0, piece=0, offset=0.0, side=side, u=u, v=v)
         work = state.record(state.VARIATION)
-        order = expand_variation(trail, new_scratch(), work, node, quantity, (du, dv), h)
+        order = expand_variation(trail, new_scratch(), work, node, quantity, (du, dv, 0.0), h)
         system = System(float(block["stiffness"][0]), alpha, nonlinear)
         expected = derivative(quantity, system, (u, v, du, dv), (1 - 2 * side) * push, lift)
         terms = [x * mp.mpf(h) ** k for k, x in enumerate(expected)]
