@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
@@ -192,7 +192,7 @@ class RestrainedBlocks:
     opening, stiffness, yields, slack : ndarray
         Of a tendon that yields what `rocking.block.restraints.Yielding` says, in m and 1/m; of none 0, 0, inf and 0.
     one_sided : ndarray
-        1 where a block rocks to side + only, else 0, twice the same.
+        1 where a block rocks to side + only, else 0, twice the same; all else of such a block is that of side +, twice.
     gravity : float
         m/s^2.
 
@@ -251,8 +251,9 @@ class RestrainedBlocks:
             raise InvalidBlock("all blocks must be under one {}", "gravity")
         rows = [
             [(*(side.p, side.alpha, side.restitution), *held, *tendon, float(each.is_one_sided)) for side, held, tendon
-             in zip(each.block.sides, each.held, each.tendon, strict=True)]
+             in (sides[0 if each.is_one_sided else k] for k in range(2))]
             for each in given
+            for sides in [[*zip(each.block.sides, each.held, each.tendon, strict=True)]]
         ]  # fmt: skip
         return cls(**dict(zip(_PARAMETERS, np.moveaxis(np.array(rows), 2, 0), strict=True)), gravity=given[0].gravity)
 
@@ -286,6 +287,36 @@ class RestrainedBlocks:
         held, tendon = (Held(*plus[:5]), Held(*minus[:5])), (Yielding(*plus[5:]), Yielding(*minus[5:]))
         text = "block with restraints" + ", rocking one way" * bool(one_sided[0])
         return _fill(RestrainedBlock.__new__(RestrainedBlock), block, held, tendon, bool(one_sided[0]), text)
+
+    def __iter__(self) -> Iterator[RestrainedBlock]:
+        return (self[index] for index in range(len(self)))
+
+    def resized(self, factors: Floats) -> RestrainedBlocks:
+        """Return blocks of the same shapes whose p is so many times theirs.
+
+        Lengths are over the square of the factor then, and forces keep their ratio to the weight: of a tendon
+        prestress, strength and stiffness times length, so that its strain at yield is the same, too.
+
+        Parameters
+        ----------
+        factors : ndarray, shape (n,)
+            Factors on p.
+
+        Returns
+        -------
+        RestrainedBlocks
+            In the same order.
+
+        Examples
+        --------
+        >>> tied = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0), Tendon(2e5)).alone()
+        >>> larger = tied.resized(np.array([0.5]))
+        >>> bool(np.all(larger.p == 0.5 * tied.p) and np.all(larger.sine == tied.sine))
+        True
+        """
+        powers = {"p": 1, "damping": 1, "stiffness": 2, "opening": -2, "yields": -2, "slack": -2}
+        scaled = {name: getattr(self, name) * factors[:, None] ** power for name, power in powers.items()}
+        return replace(self, **scaled)
 
     def select(self, index: slice | Integers) -> RestrainedBlocks:
         """Return some of them: a slice, indices, or a mask."""
