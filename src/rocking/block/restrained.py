@@ -13,9 +13,9 @@ from rocking import checks
 from rocking.arrays import Floats, Integers
 from rocking.bisection import bisected
 from rocking.block.limits import checked_parameter
-from rocking.block.restraints import Held, Load, Pivot, Restraint, Yielding
+from rocking.block.restraints import Held, Load, Pivot, Restraint, Tendon, Yielding
 from rocking.block.single import Block, Side, block_of_sides, one_block
-from rocking.body import KINDS, Coordinate
+from rocking.body import KINDS, ContactLaw, Coordinate
 from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
@@ -70,13 +70,14 @@ class RestrainedBlock:
     """
 
     coordinate: ClassVar[Coordinate] = _ROTATION
-    contact: ClassVar[None] = None
 
     block: Block
     held: tuple[Held, Held]
     tendon: tuple[Yielding, Yielding]
     is_one_sided: bool
     description: str
+    restraints: tuple[Restraint, ...] | None
+    lean: float
 
     def __init__(
         self,
@@ -111,7 +112,7 @@ class RestrainedBlock:
         tendon = (yielding[0], yielding[1]) if yielding else (Yielding(), Yielding())
         texts = [own.description, *map(str, restraints)]
         texts += [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_sided
-        _fill(self, standing, (held[0], held[1]), tendon, one_sided, ", ".join(texts))
+        _fill(self, standing, (held[0], held[1]), tendon, one_sided, ", ".join(texts), restraints, tilt)
         if (least := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
                 f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
@@ -144,6 +145,53 @@ class RestrainedBlock:
         made = self.alone().kernel_records(model, np.zeros((1, 2)))
         plus, minus = (self.gravity * (made["threshold"] + made["hold"])[0]).tolist()
         return plus, minus
+
+    @property
+    def contact(self) -> ContactLaw | None:
+        """Forces of the ground over the weight of the block with the loads that follow it (see `rocking.body`).
+
+        None where they are not known: of a block of one side, which at rest the wall behind it holds as well; with a
+        tendon that yields; and of one that was made of the arrays of `RestrainedBlocks`.
+        """
+        yields = any(tendon.stiffness > 0.0 for tendon in self.tendon)
+        return None if self.is_one_sided or yields or self.restraints is None else self._contact_forces
+
+    def _contact_forces(
+        self, motion: tuple[Floats, Floats, Floats], ground_over_g: tuple[Floats, Floats], side: Integers
+    ) -> tuple[Floats, Floats]:
+        horizontal, vertical = self.block.contact(motion, ground_over_g, side)
+        if not self.restraints or self.block.mass is None:
+            return horizontal, vertical
+        pivots, weight = _pivots(self.block, self.lean), self.block.mass * self.gravity
+        for each in self.restraints:
+            across, up = each.acting(pivots, motion[0], side)
+            horizontal, vertical = horizontal - across / weight, vertical - up / weight
+        return horizontal, vertical
+
+    def tendons_at(self, largest: tuple[float, float]) -> list[tuple[float, float, float]]:
+        """Return how far each tendon was stretched by rotations, in the order of the restraints.
+
+        Parameters
+        ----------
+        largest : (float, float)
+            Largest rotation on each side, rad.
+
+        Returns
+        -------
+        list of (float, float, float)
+            Largest elongation, m, and force, N, and plastic elongation, m, of each; none where restraints are not known
+            one by one.
+
+        Examples
+        --------
+        >>> from rocking import Tendon
+        >>> column = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0), Tendon(2e5, prestress=2e3))
+        >>> [[round(value, 6) for value in each] for each in column.tendons_at((0.02, 0.01))]
+        [[0.004, 2799.986667, 0.0]]
+        """
+        pivots = _pivots(self.block, self.lean)
+        tendons = [each for each in self.restraints or () if isinstance(each, Tendon)]
+        return [each.stretched(pivots, largest) for each in tendons]
 
     def alone(self) -> RestrainedBlocks:
         """Return `RestrainedBlocks` of which it is the only one."""
@@ -286,7 +334,7 @@ class RestrainedBlocks:
         plus, minus = ([values[j] for values in others] for j in range(2))
         held, tendon = (Held(*plus[:5]), Held(*minus[:5])), (Yielding(*plus[5:]), Yielding(*minus[5:]))
         text = "block with restraints" + ", rocking one way" * bool(one_sided[0])
-        return _fill(RestrainedBlock.__new__(RestrainedBlock), block, held, tendon, bool(one_sided[0]), text)
+        return _fill(RestrainedBlock.__new__(RestrainedBlock), block, held, tendon, bool(one_sided[0]), text, None, 0.0)
 
     def __iter__(self) -> Iterator[RestrainedBlock]:
         return (self[index] for index in range(len(self)))
@@ -388,10 +436,13 @@ def _fill(
     tendon: tuple[Yielding, Yielding],
     one_sided: bool,
     description: str,
+    restraints: tuple[Restraint, ...] | None,
+    lean: float,
 ) -> RestrainedBlock:
     """Fill in what a restrained block is, and return it."""
     for name, value in {
         "block": block, "held": held, "tendon": tendon, "is_one_sided": bool(one_sided), "description": description,
+        "restraints": restraints, "lean": lean,
     }.items():  # fmt: skip
         object.__setattr__(made, name, value)
     return made

@@ -7,7 +7,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from rocking import checks
+from rocking.arrays import Floats, Integers
 from rocking.errors import InvalidBlock
 
 
@@ -114,6 +117,32 @@ class Restraint(ABC):
         True
         """
         return None
+
+    def acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+        """Return the force on the block; a spring and a damper have none, since they turn it alone.
+
+        Parameters
+        ----------
+        pivots : (Pivot, Pivot)
+            Both sides.
+        rotation : ndarray
+            Rotations to side +, rad.
+        side : ndarray of int
+            0 on side +, 1 on side -, -1 at rest.
+
+        Returns
+        -------
+        (ndarray, ndarray)
+            To side + and up, N.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> pivot = Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)
+        >>> Thrust(1.5e3, height=4.0).acting((pivot, pivot), np.zeros(1), np.zeros(1, int))
+        (array([1500.]), array([0.]))
+        """
+        return np.zeros_like(rotation), np.zeros_like(rotation)
 
     def _finite(self, name: str) -> float:
         """Check a number and keep it as a float."""
@@ -233,6 +262,46 @@ class Tendon(Restraint):
             -self.prestress / self.stiffness,
         )
 
+    def acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+        """Return its pull along the chord from its end in the block to that in the ground, while it is elastic."""
+        x = np.where(side == 1, self._opening(pivots[1]), self._opening(pivots[0]))
+        pull = self.prestress + self.stiffness * 2.0 * x * np.sin(0.5 * np.abs(rotation))
+        along = 0.5 * rotation + pivots[0].lean
+        return -pull * np.sin(along), -pull * np.cos(along)
+
+    def stretched(self, pivots: tuple[Pivot, Pivot], largest: tuple[float, float]) -> tuple[float, float, float]:
+        """Return the largest elongation, m, the largest force, N, and the plastic elongation, m.
+
+        Parameters
+        ----------
+        pivots : (Pivot, Pivot)
+            Both sides.
+        largest : (float, float)
+            Largest rotation on each, rad.
+
+        Returns
+        -------
+        (float, float, float)
+            After these rotations; without a plastic elongation before.
+
+        Examples
+        --------
+        >>> pivot = Pivot(1.0, 0.2, 0.0, 0.5, 2.7, 1e4, 9.81)
+        >>> [round(value, 6) for value in Tendon(1e6, strength=1e3).stretched((pivot, pivot), (0.01, 0.0))]
+        [0.005, 1000.0, 0.004]
+        """
+        elongation = max(
+            2.0 * self._opening(pivot) * math.sin(0.5 * u) for pivot, u in zip(pivots, largest, strict=True)
+        )
+        elastic = self.prestress + self.stiffness * elongation
+        if elastic <= self.strength:
+            return elongation, elastic, 0.0
+        return elongation, self.strength, (elastic - self.strength) / self.stiffness
+
+    def __str__(self) -> str:
+        yields = "" if self.strength == math.inf else f", yielding at {self.strength:g} N"
+        return f"tendon of {self.stiffness:g} N/m, prestress {self.prestress:g} N{_at(self.offset)}{yields}"
+
     def _opening(self, pivot: Pivot) -> float:
         """Distance of the duct from the pivot, m."""
         x = pivot.distance - pivot.sign * self.offset
@@ -275,6 +344,9 @@ class Spring(Restraint):
         """Its moment."""
         return Held(spring=self.stiffness / pivot.moment)
 
+    def __str__(self) -> str:
+        return f"spring of {self.stiffness:g} N m/rad"
+
 
 @dataclass(frozen=True)
 class Damper(Restraint):
@@ -304,6 +376,9 @@ class Damper(Restraint):
     def held(self, pivot: Pivot) -> Held:
         """Its moment."""
         return Held(damping=self.coefficient * pivot.p**2 / pivot.moment)
+
+    def __str__(self) -> str:
+        return f"damper of {self.coefficient:g} N m s/rad"
 
 
 @dataclass(frozen=True)
@@ -350,6 +425,13 @@ class Thrust(Restraint):
         force = pivot.sign * self.force / pivot.moment
         return Held(force * across, -force * along)
 
+    def acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+        """Return the thrust."""
+        return np.full_like(rotation, self.force), np.zeros_like(rotation)
+
+    def __str__(self) -> str:
+        return f"thrust of {self.force:g} N at a height of {self.height:g} m{_at(self.offset)}"
+
 
 @dataclass(frozen=True)
 class Load(Restraint):
@@ -395,3 +477,17 @@ class Load(Restraint):
         across, along = pivot.turned(*pivot.arms(self.height, self.offset))
         weight = self.mass * pivot.gravity / pivot.moment
         return Held(weight * along, weight * across)
+
+    def acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+        """Return the weight of one that does not follow; that of one that follows is part of the block's."""
+        weight = 0.0 if self.follows else self.mass * pivots[0].gravity
+        return np.zeros_like(rotation), np.full_like(rotation, -weight)
+
+    def __str__(self) -> str:
+        follows = "that follows" if self.follows else "that only presses"
+        return f"load of {self.mass:g} kg {follows} at a height of {self.height:g} m{_at(self.offset)}"
+
+
+def _at(offset: float) -> str:
+    """Say where it is, if not at the centre of mass."""
+    return f", {abs(offset):g} m to side {'+' if offset > 0.0 else '-'}" if offset else ""
