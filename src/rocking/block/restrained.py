@@ -94,7 +94,7 @@ class RestrainedBlock:
                     f"{checks.shown(each)} is no restraint: Tendon, Spring, Damper, Thrust and Load are some"
                 )
         if restraints and own.mass is None:
-            raise InvalidBlock("a block with restraints needs its {}, kg: Block(width=, height=, mass=)", "mass")
+            raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
         tilt = checks.finite(lean, "lean", InvalidBlock)
         loads = [each for each in restraints if isinstance(each, Load) and each.follows]
         standing = _leaning(_carrying(own, loads), tilt)
