@@ -144,7 +144,7 @@ def test_the_response_of_a_ball_is_told_in_its_own_words():
     figure = found.plot(title="thrown")
     assert [axes.get_ylabel() for axes in figure.axes] == ["height (m)", "ground\nacceleration (g)"]
     assert figure.get_suptitle() == "thrown"
-    with pytest.raises(InvalidOption, match="forces of the ground on a Ball are not known"):
+    with pytest.raises(InvalidOption, match="forces of the ground are not known of this body: ball on a table"):
         found.normal_force(0.1)
     with pytest.raises(InvalidOption, match="known of blocks alone"):
         _ = found.block

@@ -135,7 +135,7 @@ class Bodies(Protocol):
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether both sides of every body are equal, or there is only one."""
+        """Whether a motion and its mirror image move every body to mirror images; never one of a single side."""
 
     def __len__(self) -> int:
         """Return their number."""

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block import Block, Blocks
+from rocking.block import Blocks
 from rocking.body import Bodies, Body
 from rocking.constants import VERSION, Model
 from rocking.engine import OUTCOME, Setup, Task, cores, parts_of, simulate_tasks
@@ -194,7 +194,7 @@ class Product:
 
 
 def product_of(
-    blocks: Bodies | Body | Sequence[Block],
+    blocks: Bodies | Body | Sequence[Body],
     motions: Motions,
     levels: ArrayLike | None,
     measure: MeasureName | Measure,
@@ -263,9 +263,9 @@ def verticals_of(motions: Sequence[Motion]) -> dict[str, Any]:
 
 
 def body_coordinates(bodies: Bodies) -> dict[str, Any]:
-    """Parameters of bodies as coordinates of the dimension ``block``, with units; of unequal sides one for each."""
+    """Parameters of bodies as coordinates of the dimension ``block``, with units; where sides differ one for each."""
     columns = bodies.parameters()
-    if bodies.is_symmetric:
+    if all(np.array_equal(values[:, 0], values[:, 1], equal_nan=True) for values, _ in columns.values()):
         return {name: ("block", values[:, 0], {"units": units}) for name, (values, units) in columns.items()}
     return {
         f"{name}_{side}": ("block", values[:, k], {"units": units})
@@ -275,7 +275,7 @@ def body_coordinates(bodies: Bodies) -> dict[str, Any]:
 
 
 def simulate_many(
-    blocks: Bodies | Body | Sequence[Block],
+    blocks: Bodies | Body | Sequence[Body],
     motions: Motions,
     *,
     model: Model = "nonlinear",
@@ -291,7 +291,7 @@ def simulate_many(
 
     Parameters
     ----------
-    blocks : Blocks, Block or sequence of Block
+    blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         n blocks, or bodies of another kind (`rocking.body.Bodies`).
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.

@@ -65,6 +65,30 @@ def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
     return Blocks.of(cast("Iterable[Block]", several))
 
 
+def slenderness_of(bodies: Bodies) -> Floats:
+    """Slenderness of each body as it stands, rad, the smaller one of two sides: in these, rotations are counted.
+
+    Raises
+    ------
+    InvalidOption
+        If bodies of this kind have none.
+    """
+    found = bodies.parameters().get("alpha")
+    if found is None:
+        raise InvalidOption(f"this is known of blocks alone, which have a slenderness, not of {bodies.kind}")
+    return np.asarray(found[0].min(axis=1))
+
+
+def thresholds_of(bodies: Bodies, model: Model) -> tuple[Floats, Floats]:
+    """Ground accelerations that lift each body to each side, and what its own weight makes of them, m/s^2, (n, 2).
+
+    Restraints make the rest, which a vertical motion does not change.
+    """
+    made = bodies.kernel_records(model, np.zeros((len(bodies), 2)))
+    own = bodies.gravity * made["threshold"]
+    return own + bodies.gravity * made["hold"], own
+
+
 def one_body(body: Body) -> Body:
     """Return the body, or say that it is none."""
     if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # a protocol is slow to ask

@@ -14,11 +14,12 @@ from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled, units_of, values_of
 from rocking.arrays import Floats, Integers
-from rocking.block import Block, Blocks
+from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import Measure
+from rocking.problem import bodies_of, slenderness_of
 from rocking.result import DatasetResult, variable
 from rocking.tables import counted, text_table
 
@@ -32,7 +33,7 @@ _CONFIDENCE: Final = 0.9
 
 
 def compare_measures(
-    blocks: Blocks | Block | Sequence[Block],
+    blocks: Bodies | Body | Sequence[Body],
     motions: Motions,
     *,
     periods: ArrayLike = (0.5, 1.0, 2.0),
@@ -47,7 +48,7 @@ def compare_measures(
 
     Parameters
     ----------
-    blocks : Blocks, Block or sequence of Block
+    blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         n blocks.
     motions : sequence of Motion
         m motions, two at least.
@@ -103,7 +104,8 @@ def compare_measures(
     >>> [f"{name} {beta:.2f}" for name, beta in zip(found.measure.values, found.dispersion.values)]
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / (g tan α) 0.67', 'p PGV / (g tan α) 0.02']
     """
-    many, shaken = Blocks.of(blocks), several_motions(motions)
+    many, shaken = bodies_of(blocks), several_motions(motions)
+    slenderness_of(many)  # refused before the work
     shares = mean_one(weights, len(many))
     if len(shaken) < 2:
         raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")

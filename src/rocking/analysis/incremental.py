@@ -23,7 +23,7 @@ from rocking.analysis.levels import (
     values_of,
 )
 from rocking.arrays import Floats, Integers
-from rocking.block import Block, Blocks
+from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.engine import Setup, simulate_each
 from rocking.errors import InvalidOption
@@ -31,6 +31,7 @@ from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
+from rocking.problem import bodies_of, slenderness_of, thresholds_of
 from rocking.result import DatasetResult
 from rocking.tables import counted, named, text_table
 from rocking.treatment import Certified
@@ -52,7 +53,7 @@ _VERDICT: Final = Certified(tolerance=1.0)
 
 
 def incremental_dynamic_analysis(
-    blocks: Blocks | Block | Sequence[Block],
+    blocks: Bodies | Body | Sequence[Body],
     motions: Motions,
     *,
     measure: IntensityName | Measure = "pga",
@@ -69,7 +70,7 @@ def incremental_dynamic_analysis(
 
     Parameters
     ----------
-    blocks : Blocks, Block or sequence of Block
+    blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         n blocks.
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
@@ -126,7 +127,8 @@ def incremental_dynamic_analysis(
     overturns from 2.9855 to 6.5019
     overturns from 7.2759 to nan
     """
-    many, how, shaken = Blocks.of(blocks), Measure.of(measure), several_motions(motions)
+    many, how, shaken = bodies_of(blocks), Measure.of(measure), several_motions(motions)
+    slenderness = slenderness_of(many)
     values = values_of(shaken, how)
     if np.any(np.prod(many.restitution, axis=1) == 1.0):
         raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
@@ -156,7 +158,7 @@ def incremental_dynamic_analysis(
     grid = table.overturned.transpose("level", "motion", "block").values
     flat = grid.reshape(len(grid), -1).astype(np.int64)
     edges = boundaries(table.level.values, flat, overturned, tolerance=width, progress=progress)
-    found = _dataset(table, _Bands.of(flat, edges), many, how)
+    found = _dataset(table, _Bands.of(flat, edges), slenderness, how)
     about = {"blocks": described(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
     return IncrementalDynamicAnalysis(found.assign_attrs(about))
 
@@ -318,10 +320,10 @@ class IncrementalDynamicAnalysis(DatasetResult):
         )
 
 
-def _lowest_uplift(blocks: Blocks, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
+def _lowest_uplift(blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
     """Lowest level of the measure from which on a motion lifts a block; its vertical component is scaled with it."""
-    thresholds = np.array([block.uplift_thresholds(model) for block in blocks])
-    factors = np.array([lifting_factors(motion, thresholds, blocks.gravity) for motion in motions])
+    thresholds, own = thresholds_of(blocks, model)
+    factors = np.array([lifting_factors(motion, thresholds, blocks.gravity, own) for motion in motions])
     lowest = float(np.min(factors * values[:, None] / units_of(blocks, measure, model)))
     if math.isinf(lowest):
         raise InvalidOption("no motion lifts a block at any level: none pushes towards a side as its weight allows")
@@ -329,7 +331,7 @@ def _lowest_uplift(blocks: Blocks, motions: Sequence[Motion], values: Floats, me
 
 
 def _until_overturned(
-    blocks: Blocks, motions: Sequence[Motion], measure: Measure, first: float, options: dict[str, Any]
+    blocks: Bodies, motions: Sequence[Motion], measure: Measure, first: float, options: dict[str, Any]
 ) -> xr.Dataset:
     """Levels in chunks, until each block has overturned under each motion, and on to three times that level."""
     import xarray as xr
@@ -369,16 +371,16 @@ class _Bands(NamedTuple):
         return cls(np.array(columns, dtype=np.int64), np.array(starts, dtype=float), np.array(ends, dtype=float))
 
 
-def _dataset(table: xr.Dataset, bands: _Bands, blocks: Blocks, measure: Measure) -> xr.Dataset:
+def _dataset(table: xr.Dataset, bands: _Bands, alpha: Floats, measure: Measure) -> xr.Dataset:
     import xarray as xr
 
-    motion, block = np.divmod(bands.column, len(blocks))
-    lowest = np.full((table.sizes["motion"], len(blocks)), np.inf)
+    motion, block = np.divmod(bands.column, len(alpha))
+    lowest = np.full((table.sizes["motion"], len(alpha)), np.inf)
     np.minimum.at(lowest, (motion, block), bands.start)
     lowest[np.isinf(lowest)] = np.nan
     level = {"units": measure.units, "long_name": measure.quantity, "label": measure.label, "scale": measure.scale}
     table = table.assign_coords(level=("level", table.level.values, level))
-    slenderness = xr.DataArray(blocks.alpha.min(axis=1), dims="block")
+    slenderness = xr.DataArray(alpha, dims="block")
     over_alpha = (table.peak_rotation / slenderness).where(~table.overturned, np.inf)
     return table[["peak_rotation", "overturned"]].assign(
         peak_over_alpha=over_alpha.assign_attrs(units="1", long_name="peak rotation over slenderness"),

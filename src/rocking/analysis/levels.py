@@ -11,13 +11,15 @@ from numpy.typing import ArrayLike
 
 from rocking import bisection, checks
 from rocking.arrays import Flags, Floats, Integers
-from rocking.block import Block, Blocks
+from rocking.block import Blocks
+from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
+from rocking.problem import bodies_of
 from rocking.progress import Progress
 from rocking.tables import counted
 
@@ -32,17 +34,17 @@ REVERSED_TOO: Final = "the sides differ, so motions that are reversed (scaled by
 _MOST: Final = 64
 
 
-def described(blocks: Blocks | Block | Sequence[Block]) -> str:
+def described(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Name blocks in a few words: one by its sizes or parameters, several by their number."""
     only = only_block(blocks)
     if only is None:
-        return counted(len(Blocks.of(blocks)), "block")
+        return counted(len(bodies_of(blocks)), "block")
     if not isinstance(blocks, Blocks):
         return only.description
     return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
 
 
-def pooled(blocks: Blocks | Block | Sequence[Block], weights: ArrayLike | None) -> str:
+def pooled(blocks: Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:
     """Name blocks whose outcomes are pooled, and say whether one counts more than another."""
     if only_block(blocks) is not None:
         return described(blocks)
@@ -61,10 +63,11 @@ def mean_one(weights: ArrayLike | None, count: int) -> Floats:
     return np.asarray(given * (count / given.sum()))
 
 
-def only_block(blocks: Blocks | Block | Sequence[Block]) -> Block | None:
+def only_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
     """Return the block, as it was described, where there is one only."""
-    several: Sequence[Block] | Blocks = [blocks] if isinstance(blocks, Block) else blocks
-    return several[0] if len(several) == 1 else None
+    if not isinstance(blocks, Sequence | Bodies):
+        return blocks
+    return blocks[0] if len(blocks) == 1 else None
 
 
 def _pair(sides: Floats) -> str:
@@ -76,15 +79,16 @@ def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
     return np.array([measure.positive(motion, motion.name) for motion in motions])
 
 
-def units_of(blocks: Blocks, measure: Measure, model: Model) -> Floats:
+def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:
     """Return what counts as 1 for each block, in SI units: the block's own unit, or 1."""
     if not measure.in_block_units:
         return np.ones(len(blocks))
-    return measure.unit(np.array([min(block.uplift_thresholds(model)) for block in blocks]), blocks.p.min(axis=1))
+    lifting = [min(blocks[k].uplift_thresholds(model)) for k in range(len(blocks))]
+    return measure.unit(np.array(lifting), blocks.parameters()["p"][0].min(axis=1))
 
 
 def simulate_levels(
-    blocks: Blocks, motions: Sequence[Motion], measure: Measure, levels: Floats, *, model: Model, **options: Any
+    blocks: Bodies, motions: Sequence[Motion], measure: Measure, levels: Floats, *, model: Model, **options: Any
 ) -> xr.Dataset:
     """Simulate every block under every motion at every level; as `simulate_many`, with the dimension ``level``.
 

@@ -14,14 +14,16 @@ from rocking import checks
 from rocking.analysis.labels import curves_of, labels_of, motions_in_words
 from rocking.analysis.levels import mean_one, pooled
 from rocking.arrays import Floats
-from rocking.block import Block, Blocks
+from rocking.block import Blocks, RestrainedBlocks
 from rocking.block.many import rates_of
+from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, several_motions
+from rocking.problem import bodies_of
 from rocking.result import DatasetResult, table_of_some, variable
 from rocking.treatment import Treatment
 
@@ -41,7 +43,7 @@ _UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "fractile": "
 
 
 def rocking_spectrum(
-    blocks: Blocks | Block | Sequence[Block],
+    blocks: Bodies | Body | Sequence[Body],
     motions: Motions,
     *,
     p: ArrayLike | None = None,
@@ -57,11 +59,11 @@ def rocking_spectrum(
 
     Parameters
     ----------
-    blocks : Blocks, Block or sequence of Block
+    blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         A grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), which are the dimensions of the
         spectrum. Or any blocks as an ensemble, such as that of a calibration: all are made larger or smaller together,
         so that their median p is each of `p`, and keep their shapes. A grid with `p`, `size` or `weights` is an
-        ensemble, too.
+        ensemble, too. Restraints grow with the blocks, as `RestrainedBlocks.resized` says.
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
     p : array_like, optional
@@ -100,7 +102,7 @@ def rocking_spectrum(
     ensemble are the lowest peaks that the share of the weight does not pass.
 
     Blocks of a grid are symmetric, so a motion and its mirror image give the same peaks. Those of an ensemble may not
-    be, and their peaks are over the smaller slenderness.
+    be, and their peaks are over the smaller slenderness, of the blocks as they stand.
 
     References
     ----------
@@ -120,8 +122,10 @@ def rocking_spectrum(
     """
     shares = _shares(fractiles)
     options: dict[str, Any] = {"model": model, "chattering": chattering, "threads": threads, "progress": progress}
-    gathered, shaken = Blocks.of(blocks), several_motions(motions)
-    if gathered.axes is not None and p is None and size is None and weights is None:
+    gathered, shaken = bodies_of(blocks), several_motions(motions)
+    if not isinstance(gathered, Blocks | RestrainedBlocks):
+        raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {gathered.kind}")
+    if isinstance(gathered, Blocks) and gathered.axes is not None and p is None and size is None and weights is None:
         checks.grid_size({"motions": len(shaken), "blocks": len(gathered)}, InvalidOption)
         table = simulate_many(gathered, shaken, **options)
         require_finished(table.unfinished.values)
@@ -302,7 +306,7 @@ class RockingSpectrum(DatasetResult):
 
 
 def _ensemble_spectrum(
-    blocks: Blocks,
+    blocks: Blocks | RestrainedBlocks,
     weight: Floats,
     motions: Sequence[Motion],
     factors: Floats,
@@ -315,8 +319,7 @@ def _ensemble_spectrum(
 
     count, n = len(rates), len(blocks)
     checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, InvalidOption)
-    same = blocks.select(np.repeat(np.arange(n), count))
-    resized = Blocks(same.p * np.tile(factors, n)[:, None], same.alpha, same.restitution, gravity=blocks.gravity)
+    resized = blocks.select(np.repeat(np.arange(n), count)).resized(np.tile(factors, n))
     table = simulate_many(resized, motions, **options)
     require_finished(table.unfinished.values)
     peak, overturned = (

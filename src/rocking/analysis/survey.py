@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import io
+import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from rocking.block import Block, Blocks
+from rocking.body import Body
 from rocking.constants import STANDARD_GRAVITY
 from rocking.ensemble import body_coordinates, verticals_of
+from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, motions_by_name, names_of
+from rocking.problem import one_body
 from rocking.progress import Progress, note
 from rocking.response import Response, in_brief, ratio_text
 from rocking.response.history import friction_coefficient
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 _SHOWN: Final = {
     "record": "record",
     named("pga", "g"): "PGA, g",
-    "peak_over_slenderness": "peak/slenderness",
+    "peak_over_{}": "peak/{}",
     "impacts_resolved": "resolved impacts",
     "rests": "rests",
     "verdict": "verdict",
@@ -46,7 +49,7 @@ class BlockUnderRecords(TableResult):
 
     TABLES = ("records",)
 
-    block: Block
+    block: Body
     records: tuple[str, ...]
     responses: tuple[Response, ...]
     skipped: Mapping[str, str] = field(default_factory=dict, kw_only=True)
@@ -76,7 +79,7 @@ class BlockUnderRecords(TableResult):
 
     def _labels(self) -> list[dict[str, Any]]:
         """First columns of each row: the record, its motion, the block."""
-        columns = body_coordinates(Blocks.of(self.block))
+        columns = body_coordinates(self.block.alone())
         numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
         labels = record_columns(self.records, [motion_of(response) for response in self.responses])
         return [{**label, "block": self.block.description, **numbers} for label in labels]
@@ -106,11 +109,12 @@ class Survey(BlockUnderRecords):
         return [label | _row(response) | self._sliding(response) for label, response in each]
 
     def summary(self) -> str:
-        known = [{"peak_over_slenderness": float(ratio_text(response))} for response in self.responses]
+        limit = self.block.coordinate.limit
+        known = [{f"peak_over_{limit}": float(ratio_text(response))} for response in self.responses]
         rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
-        shown = (
-            _SHOWN if self.friction is None else _SHOWN | {_SLIDING: f"with friction {self.friction:g} slides at, s"}
-        )
+        shown = {name.format(limit): title.format(limit) for name, title in _SHOWN.items()}
+        if self.friction is not None:
+            shown |= {_SLIDING: f"with friction {self.friction:g} slides at, s"}
         if any(row["processing"] for row in rows):
             shown = shown | {"processing": "done to the record"}
         table = text_table(list(shown.values()), [[row[name] for name in shown] for row in rows])
@@ -123,12 +127,10 @@ class Survey(BlockUnderRecords):
         return super()._headline() + known + unread
 
     def to_dict(self) -> dict[str, Any]:
-        sides = self.block.sides
+        numbers = self.block.alone().parameters().items()
         block = {
             "description": self.block.description,
-            named("p", "rad/s"): [side.p for side in sides],
-            named("alpha", "rad"): [side.alpha for side in sides],
-            "restitution": [side.restitution for side in sides],
+            **{named(name, unit): values[0].tolist() for name, (values, unit) in numbers},
         }
         friction = {} if self.friction is None else {"friction": self.friction}
         return {"block": block, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
@@ -171,13 +173,13 @@ class Survey(BlockUnderRecords):
 
 
 def survey(
-    block: Block, motions: Motions, *, friction: float | None = None, progress: bool | None = None, **options: Any
+    block: Body, motions: Motions, *, friction: float | None = None, progress: bool | None = None, **options: Any
 ) -> Survey:
     """Simulate a block under many motions.
 
     Parameters
     ----------
-    block : Block
+    block : Block or RestrainedBlock
         What rocks.
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; the table shows the names of a mapping, or else the motions' own.
@@ -210,6 +212,8 @@ def survey(
     rectangular block, 0.24 m x 1.1 m: 2 records, overturned by 1
     """
     named_motions = motions_by_name(motions)
+    if not one_body(block).coordinate.limit:
+        raise InvalidOption(f"a survey is of a block, which has a balance, not of a {type(block).__name__}")
     if friction is not None:
         friction_coefficient(friction)
     responses = []
@@ -260,11 +264,11 @@ def _row(response: Response) -> dict[str, Any]:
         "stopped": response.stopped,
         "ambiguous": response.ambiguous,
         named("overturn_time", "s"): response.overturn_time,
-        "peak_over_slenderness": response.peak_over_slenderness,
+        f"peak_over_{response.body.coordinate.limit}": response.peak_over_slenderness,
         named("peak_rotation", "rad"): response.peak_rotation,
         named("peak_time", "s"): response.peak_time,
         "impacts_resolved": len(response.impacts),
         "rests": int((response.events["kind"] == "rest").sum()),
         named("time_at_rest", "s"): response.time_at_rest,
-        "required_friction": response.required_friction,
+        "required_friction": math.nan if response.body.contact is None else response.required_friction,
     }

@@ -239,6 +239,26 @@ class Blocks:
         chosen = {name: values[index] for name, (values, _) in self.parameters().items()}
         return _filled(Blocks.__new__(Blocks), self.gravity, **chosen)
 
+    def resized(self, factors: Floats) -> Blocks:
+        """Return blocks of the same shapes whose p is so many times theirs.
+
+        Parameters
+        ----------
+        factors : ndarray, shape (n,)
+            Factors on p.
+
+        Returns
+        -------
+        Blocks
+            In the same order.
+
+        Examples
+        --------
+        >>> Blocks(p=[1.0, 2.0], alpha=0.2).resized(np.array([2.0, 0.5])).p[:, 0].tolist()
+        [2.0, 1.0]
+        """
+        return Blocks(self.p * factors[:, None], self.alpha, self.restitution, gravity=self.gravity)
+
     def _indices(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.int64]:
         """Positions of the blocks of a flat array of indices, or of a mask."""
         given = np.asarray(index)

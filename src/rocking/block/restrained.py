@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
@@ -14,9 +14,9 @@ from rocking.arrays import Floats, Integers
 from rocking.bisection import bisected
 from rocking.block.limits import checked_parameter
 from rocking.block.restitution import Restitution, Varying, one_sided_restitution
-from rocking.block.restraints import Held, Load, Pivot, Restraint, Yielding
+from rocking.block.restraints import Held, Load, Pivot, Restraint, Tendon, Yielding
 from rocking.block.single import Block, Side, block_of_sides, one_block
-from rocking.body import KINDS, Coordinate
+from rocking.body import KINDS, ContactLaw, Coordinate
 from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
@@ -72,14 +72,15 @@ class RestrainedBlock:
     """
 
     coordinate: ClassVar[Coordinate] = _ROTATION
-    contact: ClassVar[None] = None
 
     block: Block
-    held: tuple[Held, Held]
-    tendon: tuple[Yielding, Yielding]
+    _held: tuple[Held, Held]
+    _tendon: tuple[Yielding, Yielding]
     _varying: tuple[Varying, Varying]
     is_one_sided: bool
     description: str
+    restraints: tuple[Restraint, ...] | None
+    lean: float
 
     def __init__(
         self,
@@ -96,7 +97,7 @@ class RestrainedBlock:
                     f"{checks.shown(each)} is no restraint: Tendon, Spring, Damper, Thrust and Load are some"
                 )
         if restraints and own.mass is None:
-            raise InvalidBlock("a block with restraints needs its {}, kg: Block(width=, height=, mass=)", "mass")
+            raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
         tilt = checks.finite(lean, "lean", InvalidBlock)
         loads = [each for each in restraints if isinstance(each, Load) and each.follows]
         standing = _leaning(_carrying(own, loads), tilt)
@@ -110,15 +111,16 @@ class RestrainedBlock:
         pivots = _pivots(standing, tilt)
         held = [Held(), Held()]
         for each in restraints:
-            held = [of_side.plus(each.held(pivot)) for of_side, pivot in zip(held, pivots, strict=True)]
-        yielding = [found for each in restraints for pivot in pivots if (found := each.yielding(pivot))]
+            held = [of_side.plus(each._held(pivot)) for of_side, pivot in zip(held, pivots, strict=True)]
+        yielding = [found for each in restraints for pivot in pivots if (found := each._yielding(pivot))]
         if len(yielding) > len(pivots):
             raise InvalidBlock("one tendon of a block may yield; let the others have no {}", "strength")
         tendon = (yielding[0], yielding[1]) if yielding else (Yielding(), Yielding())
         texts = [own.description, *map(str, restraints)]
         texts += [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_sided
         texts += [str(restitution)] * isinstance(restitution, Restitution)
-        _fill(self, standing, (held[0], held[1]), tendon, varying, one_sided, ", ".join(texts))
+        text = ", ".join(texts)
+        _fill(self, standing, (held[0], held[1]), tendon, varying, one_sided, text, restraints, tilt)
         if (least := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
                 f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
@@ -143,7 +145,7 @@ class RestrainedBlock:
     @property
     def balance(self) -> tuple[float, float]:
         """Rotation of the unstable balance on each side, rad; infinite where the restraints hold it at any rotation."""
-        plus, minus = map(_balance, self.block.sides, self.held, self.tendon)
+        plus, minus = map(_balance, self.block.sides, self._held, self._tendon)
         return plus, math.inf if self.is_one_sided else minus
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
@@ -151,6 +153,53 @@ class RestrainedBlock:
         made = self.alone().kernel_records(model, np.zeros((1, 2)))
         plus, minus = (self.gravity * (made["threshold"] + made["hold"])[0]).tolist()
         return plus, minus
+
+    @property
+    def contact(self) -> ContactLaw | None:
+        """Forces of the ground over the weight of the block with the loads that follow it (see `rocking.body`).
+
+        None where they are not known: of a block of one side, which at rest the wall behind it holds as well; with a
+        tendon that yields; and of one that was made of the arrays of `RestrainedBlocks`.
+        """
+        yields = any(tendon.stiffness > 0.0 for tendon in self._tendon)
+        return None if self.is_one_sided or yields or self.restraints is None else self._contact_forces
+
+    def _contact_forces(
+        self, motion: tuple[Floats, Floats, Floats], ground_over_g: tuple[Floats, Floats], side: Integers
+    ) -> tuple[Floats, Floats]:
+        horizontal, vertical = self.block.contact(motion, ground_over_g, side)
+        if not self.restraints or self.block.mass is None:
+            return horizontal, vertical
+        pivots, weight = _pivots(self.block, self.lean), self.block.mass * self.gravity
+        for each in self.restraints:
+            across, up = each._acting(pivots, motion[0], side)
+            horizontal, vertical = horizontal - across / weight, vertical - up / weight
+        return horizontal, vertical
+
+    def tendons_at(self, largest: tuple[float, float]) -> list[tuple[float, float, float]]:
+        """Return how far each tendon was stretched by rotations, in the order of the restraints.
+
+        Parameters
+        ----------
+        largest : (float, float)
+            Largest rotation on each side, rad.
+
+        Returns
+        -------
+        list of (float, float, float)
+            Largest elongation, m, and force, N, and plastic elongation, m, of each; none where restraints are not known
+            one by one.
+
+        Examples
+        --------
+        >>> from rocking import Tendon
+        >>> column = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0), Tendon(2e5, prestress=2e3))
+        >>> [[round(value, 6) for value in each] for each in column.tendons_at((0.02, 0.01))]
+        [[0.004, 2799.986667, 0.0]]
+        """
+        pivots = _pivots(self.block, self.lean)
+        tendons = [each for each in self.restraints or () if isinstance(each, Tendon)]
+        return [each._stretched(pivots, largest) for each in tendons]
 
     def alone(self) -> RestrainedBlocks:
         """Return `RestrainedBlocks` of which it is the only one."""
@@ -173,7 +222,7 @@ class RestrainedBlocks:
         Of a restitution that varies what `rocking.block.restitution.Varying` says, the largest being `restitution`: 1,
         s/rad and 1; of a constant one 0, 0 and -1.
     one_sided : ndarray
-        1 where a block rocks to side + only, else 0, twice the same.
+        1 where a block rocks to side + only, else 0, twice the same; all else of such a block is that of side +, twice.
     gravity : float
         m/s^2.
 
@@ -236,11 +285,10 @@ class RestrainedBlocks:
         rows = [
             [
                 (*(side.p, side.alpha, side.restitution), *held, *tendon, *varying, float(each.is_one_sided))
-                for side, held, tendon, varying in zip(
-                    each.block.sides, each.held, each.tendon, each._varying, strict=True
-                )
+                for side, held, tendon, varying in (sides[0 if each.is_one_sided else k] for k in range(2))
             ]
             for each in given
+            for sides in [[*zip(each.block.sides, each._held, each._tendon, each._varying, strict=True)]]
         ]
         return cls(**dict(zip(_PARAMETERS, np.moveaxis(np.array(rows), 2, 0), strict=True)), gravity=given[0].gravity)
 
@@ -274,7 +322,46 @@ class RestrainedBlocks:
         held, tendon = (Held(*plus[:5]), Held(*minus[:5])), (Yielding(*plus[5:9]), Yielding(*minus[5:9]))
         varying = Varying(*plus[9:]), Varying(*minus[9:])
         text = "block with restraints" + ", rocking one way" * bool(one_sided[0])
-        return _fill(RestrainedBlock.__new__(RestrainedBlock), block, held, tendon, varying, bool(one_sided[0]), text)
+        made, one_way = RestrainedBlock.__new__(RestrainedBlock), bool(one_sided[0])
+        return _fill(made, block, held, tendon, varying, one_way, text, None, 0.0)
+
+    def __iter__(self) -> Iterator[RestrainedBlock]:
+        return (self[index] for index in range(len(self)))
+
+    def resized(self, factors: Floats) -> RestrainedBlocks:
+        """Return blocks of the same shapes whose p is so many times theirs.
+
+        Lengths are over the square of the factor then, and forces keep their ratio to the weight: of a tendon
+        prestress, strength and stiffness times length, so that its strain at yield is the same, too.
+
+        Parameters
+        ----------
+        factors : ndarray, shape (n,)
+            Factors on p.
+
+        Returns
+        -------
+        RestrainedBlocks
+            In the same order.
+
+        Examples
+        --------
+        >>> tied = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0), Tendon(2e5)).alone()
+        >>> larger = tied.resized(np.array([0.5]))
+        >>> bool(np.all(larger.p == 0.5 * tied.p) and np.all(larger.sine == tied.sine))
+        True
+        """
+        powers = {
+            "p": 1,
+            "damping": 1,
+            "stiffness": 2,
+            "opening": -2,
+            "yields": -2,
+            "slack": -2,
+            "restitution_slope": -1,
+        }
+        scaled = {name: getattr(self, name) * factors[:, None] ** power for name, power in powers.items()}
+        return replace(self, **scaled)
 
     def select(self, index: slice | Integers) -> RestrainedBlocks:
         """Return some of them: a slice, indices, or a mask."""
@@ -350,10 +437,13 @@ def _fill(
     varying: tuple[Varying, Varying],
     one_sided: bool,
     description: str,
+    restraints: tuple[Restraint, ...] | None,
+    lean: float,
 ) -> RestrainedBlock:
     """Fill in what a restrained block is, and return it."""
-    names = ("block", "held", "tendon", "_varying", "is_one_sided", "description")
-    for name, value in zip(names, (block, held, tendon, varying, bool(one_sided), description), strict=True):
+    names = ("block", "_held", "_tendon", "_varying", "is_one_sided", "description", "restraints", "lean")
+    values = (block, held, tendon, varying, bool(one_sided), description, restraints, lean)
+    for name, value in zip(names, values, strict=True):
         object.__setattr__(made, name, value)
     return made
 

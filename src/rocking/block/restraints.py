@@ -7,7 +7,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from rocking import checks
+from rocking.arrays import Floats, Integers
 from rocking.errors import InvalidBlock
 
 
@@ -95,7 +98,7 @@ class Pivot(NamedTuple):
 class Restraint(ABC):
     """What holds a block back, or pushes it."""
 
-    def yielding(self, pivot: Pivot) -> Yielding | None:
+    def _yielding(self, pivot: Pivot) -> Yielding | None:
         """Return what it is as a tendon that yields, on a side; None where it is none.
 
         Parameters
@@ -106,14 +109,40 @@ class Restraint(ABC):
         Returns
         -------
         Yielding or None
-            Without what `held` returns.
+            Without what `_held` returns.
 
         Examples
         --------
-        >>> Spring(2e3).yielding(Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)) is None
+        >>> Spring(2e3)._yielding(Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)) is None
         True
         """
         return None
+
+    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+        """Return the force on the block; a spring and a damper have none, since they turn it alone.
+
+        Parameters
+        ----------
+        pivots : (Pivot, Pivot)
+            Both sides.
+        rotation : ndarray
+            Rotations to side +, rad.
+        side : ndarray of int
+            0 on side +, 1 on side -, -1 at rest.
+
+        Returns
+        -------
+        (ndarray, ndarray)
+            To side + and up, N.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> pivot = Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)
+        >>> Thrust(1.5e3, height=4.0)._acting((pivot, pivot), np.zeros(1), np.zeros(1, int))
+        (array([1500.]), array([0.]))
+        """
+        return np.zeros_like(rotation), np.zeros_like(rotation)
 
     def _finite(self, name: str) -> float:
         """Check a number and keep it as a float."""
@@ -126,7 +155,7 @@ class Restraint(ABC):
         object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, unit))
 
     @abstractmethod
-    def held(self, pivot: Pivot) -> Held:
+    def _held(self, pivot: Pivot) -> Held:
         """Say what it does while the block leans to a side.
 
         Parameters
@@ -141,7 +170,7 @@ class Restraint(ABC):
 
         Examples
         --------
-        >>> Spring(2e3).held(Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)).spring
+        >>> Spring(2e3)._held(Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)).spring
         0.2
         """
 
@@ -213,7 +242,7 @@ class Tendon(Restraint):
         if stiffness == 0.0 and self.strength < math.inf:
             raise InvalidBlock("a tendon that yields needs a {}, N/m", "stiffness")
 
-    def held(self, pivot: Pivot) -> Held:
+    def _held(self, pivot: Pivot) -> Held:
         """Its moment; without one where the duct is at the pivot, or where it yields."""
         x = self._opening(pivot)
         if self.strength < math.inf:
@@ -221,7 +250,7 @@ class Tendon(Restraint):
         stiff = self.stiffness * x * x / pivot.moment
         return Held(-stiff * math.cos(pivot.alpha), stiff * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
-    def yielding(self, pivot: Pivot) -> Yielding | None:
+    def _yielding(self, pivot: Pivot) -> Yielding | None:
         """Return what it is where it yields."""
         if self.strength == math.inf:
             return None
@@ -232,6 +261,46 @@ class Tendon(Restraint):
             (self.strength - self.prestress) / self.stiffness,
             -self.prestress / self.stiffness,
         )
+
+    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+        """Return its pull along the chord from its end in the block to that in the ground, while it is elastic."""
+        x = np.where(side == 1, self._opening(pivots[1]), self._opening(pivots[0]))
+        pull = self.prestress + self.stiffness * 2.0 * x * np.sin(0.5 * np.abs(rotation))
+        along = 0.5 * rotation + pivots[0].lean
+        return -pull * np.sin(along), -pull * np.cos(along)
+
+    def _stretched(self, pivots: tuple[Pivot, Pivot], largest: tuple[float, float]) -> tuple[float, float, float]:
+        """Return the largest elongation, m, the largest force, N, and the plastic elongation, m.
+
+        Parameters
+        ----------
+        pivots : (Pivot, Pivot)
+            Both sides.
+        largest : (float, float)
+            Largest rotation on each, rad.
+
+        Returns
+        -------
+        (float, float, float)
+            After these rotations; without a plastic elongation before.
+
+        Examples
+        --------
+        >>> pivot = Pivot(1.0, 0.2, 0.0, 0.5, 2.7, 1e4, 9.81)
+        >>> [round(value, 6) for value in Tendon(1e6, strength=1e3)._stretched((pivot, pivot), (0.01, 0.0))]
+        [0.005, 1000.0, 0.004]
+        """
+        elongation = max(
+            2.0 * self._opening(pivot) * math.sin(0.5 * u) for pivot, u in zip(pivots, largest, strict=True)
+        )
+        elastic = self.prestress + self.stiffness * elongation
+        if elastic <= self.strength:
+            return elongation, elastic, 0.0
+        return elongation, self.strength, (elastic - self.strength) / self.stiffness
+
+    def __str__(self) -> str:
+        yields = "" if self.strength == math.inf else f", yielding at {self.strength:g} N"
+        return f"tendon of {self.stiffness:g} N/m, prestress {self.prestress:g} N{_at(self.offset)}{yields}"
 
     def _opening(self, pivot: Pivot) -> float:
         """Distance of the duct from the pivot, m."""
@@ -271,9 +340,12 @@ class Spring(Restraint):
     def __post_init__(self) -> None:
         self._positive("stiffness", "N m/rad")
 
-    def held(self, pivot: Pivot) -> Held:
+    def _held(self, pivot: Pivot) -> Held:
         """Its moment."""
         return Held(spring=self.stiffness / pivot.moment)
+
+    def __str__(self) -> str:
+        return f"spring of {self.stiffness:g} N m/rad"
 
 
 @dataclass(frozen=True)
@@ -301,9 +373,12 @@ class Damper(Restraint):
     def __post_init__(self) -> None:
         self._positive("coefficient", "N m s/rad")
 
-    def held(self, pivot: Pivot) -> Held:
+    def _held(self, pivot: Pivot) -> Held:
         """Its moment."""
         return Held(damping=self.coefficient * pivot.p**2 / pivot.moment)
+
+    def __str__(self) -> str:
+        return f"damper of {self.coefficient:g} N m s/rad"
 
 
 @dataclass(frozen=True)
@@ -344,11 +419,18 @@ class Thrust(Restraint):
         self._positive("height", "m")
         self._finite("offset")
 
-    def held(self, pivot: Pivot) -> Held:
+    def _held(self, pivot: Pivot) -> Held:
         """Its moment, which pushes the block over on the side it points to."""
         across, along = pivot.turned(*pivot.arms(self.height, self.offset))
         force = pivot.sign * self.force / pivot.moment
         return Held(force * across, -force * along)
+
+    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+        """Return the thrust."""
+        return np.full_like(rotation, self.force), np.zeros_like(rotation)
+
+    def __str__(self) -> str:
+        return f"thrust of {self.force:g} N at a height of {self.height:g} m{_at(self.offset)}"
 
 
 @dataclass(frozen=True)
@@ -388,10 +470,24 @@ class Load(Restraint):
         self._positive("height", "m")
         self._finite("offset")
 
-    def held(self, pivot: Pivot) -> Held:
+    def _held(self, pivot: Pivot) -> Held:
         """Return the moment of one that does not follow; of one that follows none, which is part of the block."""
         if self.follows:
             return Held()
         across, along = pivot.turned(*pivot.arms(self.height, self.offset))
         weight = self.mass * pivot.gravity / pivot.moment
         return Held(weight * along, weight * across)
+
+    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+        """Return the weight of one that does not follow; that of one that follows is part of the block's."""
+        weight = 0.0 if self.follows else self.mass * pivots[0].gravity
+        return np.zeros_like(rotation), np.full_like(rotation, -weight)
+
+    def __str__(self) -> str:
+        follows = "that follows" if self.follows else "that only presses"
+        return f"load of {self.mass:g} kg {follows} at a height of {self.height:g} m{_at(self.offset)}"
+
+
+def _at(offset: float) -> str:
+    """Say where it is, if not at the centre of mass."""
+    return f", {abs(offset):g} m to side {'+' if offset > 0.0 else '-'}" if offset else ""

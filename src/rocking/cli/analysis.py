@@ -15,8 +15,8 @@ from rocking.cli.options import (
     BLOCK,
     MEASURE,
     MODEL,
-    BlockOptions,
     EnsembleOptions,
+    HeldOptions,
     MeasureOptions,
     ModelOptions,
     SlendernessOptions,
@@ -158,7 +158,7 @@ def ida(
     *names: Names,
     tolerance: float = 1e-6,
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
+    block: Annotated[HeldOptions, BLOCK] = HeldOptions(),
     motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -175,7 +175,7 @@ def ida(
     tolerance
         Width, relative to the level, that the ends of bands are refined to.
     """
-    body = block.block()
+    body = block.body()
     with output.folder() as folder:
         read = motion.read_all(names)
         motions = [*read.motions.values()]

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 #: What describes a block, together, and what may go with it.
 _Descriptions = Mapping[tuple[str, ...], tuple[str, ...]]
 _DESCRIPTIONS: Final[_Descriptions] = {
-    ("width", "height"): ("offset",),
-    ("half_width", "half_height"): ("offset",),
+    ("width", "height"): ("offset", "mass"),
+    ("half_width", "half_height"): ("offset", "mass"),
     ("p", "alpha"): (),
-    ("pivots", "height_of_mass", "gyration"): (),
+    ("pivots", "height_of_mass", "gyration"): ("mass",),
 }
 
 #: What goes with a slenderness that is all that is known of a block.
@@ -102,7 +102,7 @@ class BlockOptions:
             distances = sides(given["pivots"], "pivots", length)
             height, gyration = (length(given[name], name) for name in ("height_of_mass", "gyration"))
             pair = [distances] * 2 if isinstance(distances, float) else distances
-            block = Block.from_pivots(pair, height, gyration, restitution=e)
+            block = Block.from_pivots(pair, height, gyration, restitution=e, mass=given.get("mass"))
         elif self.alpha is not None:
             alpha = sides(self.alpha, "alpha", tilt)
             if self.p is None and e is None and isinstance(alpha, list):
@@ -120,7 +120,73 @@ class BlockOptions:
     def given(self) -> dict[str, Any]:
         """Return what is given of the block, in the order of the descriptions."""
         names = dict.fromkeys(name for each in _DESCRIPTIONS.items() for names in each for name in names)
-        return {name: value for name in names if (value := getattr(self, name)) is not None}
+        return {name: value for name in names if (value := getattr(self, name, None)) is not None}
+
+
+@dataclass(frozen=True)
+class HeldOptions(BlockOptions):
+    """A block, and what holds it back or pushes it."""
+
+    mass: Annotated[float | None, hint("Mass of the block, kg, which restraints need; with its sizes or pivots.")] = (
+        None
+    )
+    one_sided: Annotated[
+        bool,
+        Parameter(
+            help="It rocks to side + only, as a wall against transverse walls; --restitution is then the speed back "
+            "over that before.",
+            negative="",
+        ),
+    ] = False
+    lean: Annotated[str | None, written("Angle by which it stands out of plumb to side +, 1deg or 0.02 (rad).")] = None
+    tendon: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="Elastic tendon, as stiffness=2e6,prestress=5e3 (N/m, N), with offset (m, to side +) and strength "
+            "(N), at which it yields; several times for several.",
+            negative="",
+        ),
+    ] = ()
+    spring: Annotated[float | None, hint("Rotational spring, N m/rad.")] = None
+    damper: Annotated[float | None, hint("Rotational viscous damper, N m s/rad.")] = None
+    thrust: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="Horizontal force to side +, as force=1500,height=4 (N, m), with offset (m); several times for "
+            "several.",
+            negative="",
+        ),
+    ] = ()
+    load: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="Weight on it, as mass=250,height=3 (kg, m), with offset (m), and follows=no for one that presses and "
+            "does not move with it; several times for several.",
+            negative="",
+        ),
+    ] = ()
+
+    def held(self) -> dict[str, Any]:
+        """Return what is given of restraints, by the name of its option."""
+        names = ("one_sided", "lean", "tendon", "spring", "damper", "thrust", "load")
+        return {name: value for name in names if (value := getattr(self, name)) not in (None, False, ())}
+
+    def body(self) -> Body:
+        """Return the block, with its restraints where there are some."""
+        from rocking.block import Damper, Load, RestrainedBlock, Spring, Tendon, Thrust
+
+        block, held = self.block(), self.held()
+        if not held:
+            return block
+        e = None if self.restitution is None else sides(self.restitution, "restitution")
+        kinds = {"tendon": Tendon, "thrust": Thrust, "load": Load}
+        restraints = [
+            kind(**_parameters(text, name, kind)) for name, kind in kinds.items() for text in getattr(self, name)
+        ]
+        couples = {"spring": Spring, "damper": Damper}
+        restraints += [kind(held[name]) for name, kind in couples.items() if name in held]
+        lean = 0.0 if self.lean is None else tilt(self.lean, "lean")
+        return RestrainedBlock(block, *restraints, one_sided=self.one_sided, lean=lean, restitution=e)
 
 
 @dataclass(frozen=True)
@@ -193,7 +259,7 @@ class BodyOptions(BlockOptions):
         return InvertedPendulum(**_parameters(self.pendulum or "", "pendulum", InvertedPendulum))
 
 
-def _parameters(text: str, option: str, made: type) -> dict[str, float]:
+def _parameters(text: str, option: str, made: type) -> dict[str, Any]:
     """Return the parameters of a body that a text gives, by name."""
     known = inspect.signature(made).parameters
     given = {}
@@ -202,15 +268,22 @@ def _parameters(text: str, option: str, made: type) -> dict[str, float]:
         name = name.replace("-", "_")
         if not equals or name not in known:
             raise InvalidOption(f"{{}} takes NAME=VALUE with {', '.join(known)}, not {part.strip()!r}", option)
-        given[name] = number(value, option)
+        is_truth = isinstance(known[name].default, bool)
+        given[name] = _truth(value, name, option) if is_truth else number(value, option)
     missing = [name for name, each in known.items() if each.default is each.empty and name not in given]
     if missing:
         raise InvalidOption(f"{{}} needs {' and '.join(missing)} as well", option)
     return given
 
 
+def _truth(text: str, name: str, option: str) -> bool:
+    if text not in ("yes", "no"):
+        raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {text!r}", option)
+    return text == "yes"
+
+
 @dataclass(frozen=True)
-class EnsembleOptions(BlockOptions):
+class EnsembleOptions(HeldOptions):
     """A block by its sizes or by its parameters, or the ensemble of a calibration."""
 
     ensemble: Annotated[
@@ -221,8 +294,8 @@ class EnsembleOptions(BlockOptions):
     def blocks(self, model: ModelOptions) -> dict[str, Any]:
         """Return blocks, weights and equation of motion as arguments."""
         if self.ensemble is None:
-            return {"blocks": self.block(), "model": model.model}
-        given = self.given()
+            return {"blocks": self.body(), "model": model.model}
+        given = self.given() | self.held()
         if given:
             raise InvalidBlock(f"{{}} has blocks of its own: leave {_all_of([*given])} out", "ensemble", *given)
         return ensemble_of(self.ensemble, model)

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from rocking.analysis.rules.check import check as apply_rules
 from rocking.analysis.survey import folder_names, survey
-from rocking.cli.options import BLOCK, MODEL, BlockOptions, ModelOptions, TreatmentOptions
+from rocking.cli.options import BLOCK, MODEL, BlockOptions, HeldOptions, ModelOptions, TreatmentOptions
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.errors import InvalidOption
@@ -41,7 +41,7 @@ def simulate(
     *names: Names,
     each: Annotated[bool, Parameter(negative="")] = False,
     start: Annotated[_Start, MODEL] = _Start(),
-    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
+    block: Annotated[HeldOptions, BLOCK] = HeldOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
     model: Annotated[TreatmentOptions, MODEL] = TreatmentOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -49,7 +49,8 @@ def simulate(
     """Simulate one block under a record and say what happens to it; under several, with one line for each.
 
     The block is a rectangle (--width, --height, or half of each; --offset where its centre of mass is off the middle),
-    or given by its parameters (--p, --alpha) or by its pivots (--pivots, --height-of-mass, --gyration). Of one record
+    or given by its parameters (--p, --alpha) or by its pivots (--pivots, --height-of-mass, --gyration). It may be held
+    back or pushed (--tendon, --spring, --damper, --thrust, --load), lean, or rock one way (--one-sided). Of one record
     --out holds response.png, .pdf, .csv, .nc, events.csv, impacts.csv and result.json; of several, summary.csv,
     summary.json and (if openpyxl is installed) summary.xlsx.
 
@@ -60,7 +61,7 @@ def simulate(
     """
     if start.friction is not None:
         friction_coefficient(start.friction)  # before the work
-    body = block.block()
+    body = block.body()
     options: dict[str, Any] = {
         **model.chosen(),
         "duration": start.duration,

@@ -150,7 +150,6 @@ class LinearBodies:
     """
 
     members: tuple[LinearBody, ...]
-    is_symmetric: ClassVar[bool] = True
 
     def __init__(self, members: Sequence[LinearBody]) -> None:
         given = tuple(members)
@@ -201,6 +200,11 @@ class LinearBodies:
     def stops(self) -> Floats:
         """Positions of the stops, m, shape (n, 2)."""
         return np.array([each.stops for each in self.members])
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether all hang or stand between two stops that are equally far away, without a pull."""
+        return all(law.pull == 0.0 and law.low == -law.high for law in (each.law for each in self.members))
 
     def __len__(self) -> int:
         return len(self.members)

@@ -35,10 +35,13 @@ def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float 
     return cuts[np.flatnonzero(np.diff(beyond, prepend=False, append=False))].reshape(-1, 2)
 
 
-def lifting_factors(motion: Motion, thresholds: ArrayLike, gravity: float = STANDARD_GRAVITY) -> Floats:
+def lifting_factors(
+    motion: Motion, thresholds: ArrayLike, gravity: float = STANDARD_GRAVITY, own: ArrayLike | None = None
+) -> Floats:
     """Lowest factors on both components of a motion from which on it lifts blocks from rest, shape (n,); or infinity.
 
-    The thresholds, pairs as `exceedances` takes one, have shape (n, 2).
+    The thresholds, pairs as `exceedances` takes one, have shape (n, 2), and so has what the weight makes of them, by
+    default all: a vertical motion changes that alone. They are infinite where a block rocks to one side.
 
     Examples
     --------
@@ -51,6 +54,7 @@ def lifting_factors(motion: Motion, thresholds: ArrayLike, gravity: float = STAN
     (array([2.]), array([1.]))
     """
     pairs = np.asarray(thresholds, dtype=np.float64)
+    weighing = pairs if own is None else np.asarray(own, dtype=np.float64)
     if motion.vertical is None:
         widths = np.diff(motion.breakpoints)
         reached = np.array([[piecewise.highest(widths, sign * motion.coefficients) for sign in (-1.0, 1.0)]])
@@ -59,9 +63,11 @@ def lifting_factors(motion: Motion, thresholds: ArrayLike, gravity: float = STAN
         widths = np.diff(breakpoints)
 
         def highest(sign: float, threshold: float) -> float:
+            if np.isinf(threshold):
+                return 0.0
             return piecewise.highest(widths, sign * push - threshold / gravity * lift)
 
-        reached = np.array([[highest(-1.0, plus), highest(1.0, minus)] for plus, minus in pairs])
+        reached = np.array([[highest(-1.0, plus), highest(1.0, minus)] for plus, minus in weighing])
     with np.errstate(divide="ignore"):
         factors = np.where(reached > 0.0, pairs / np.maximum(reached, 0.0), np.inf)
     lowest: Floats = factors.min(axis=1)

@@ -16,6 +16,8 @@ from rocking.errors import InvalidMotion
 from rocking.motion import measures, piecewise, processing
 from rocking.motion.description import Description, Origin, check_description, checked_history, labelled
 from rocking.motion.directions import recorded_azimuths, shares
+from rocking.motion.floors import floor_pieces
+from rocking.motion.measures import DAMPING
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 
 if TYPE_CHECKING:
@@ -620,6 +622,55 @@ class Motion:
             vertical=None if self.vertical is None else self.vertical.delayed(wait),
             description=self.description.changed("delayed"),
             history=(*self.history, f"delayed by {wait:.6g} s"),
+        )
+
+    def floor(self, period: float, damping: float = DAMPING, *, ringing: float | None = None) -> Motion:
+        """Return the motion of a floor: the absolute acceleration of a linear oscillator that the motion shakes.
+
+        Parameters
+        ----------
+        period : float
+            Natural period of the building, s.
+        damping : float
+            Its fraction of critical damping.
+        ringing : float, optional
+            For how long after the motion the floor is followed, s; by default until a free oscillation has faded to a
+            thousandth.
+
+        Returns
+        -------
+        Motion
+            Polynomials of degree 9 on pieces of a quarter radian at most; the vertical component as it is.
+
+        Raises
+        ------
+        InvalidMotion
+            If the period or the damping is out of its range, or there is no damping and no `ringing`.
+
+        Notes
+        -----
+        Of a building that moves in one mode this is the motion of its roof where the mode's shape times its
+        participation factor is 1; of a floor below multiply the part beyond the ground's own accordingly, as
+        ``ground + (floor + -ground) * 0.6``. What stands on the floor does not act back on it.
+
+        Examples
+        --------
+        A floor whose period is that of the shaking moves more than the ground, and goes on after it:
+
+        >>> import rocking
+        >>> ground = rocking.pulses.sine(1.0, 2.0, cycles=10)
+        >>> floor = ground.floor(0.5)
+        >>> round(floor.pga, 2), round(floor.duration, 1)
+        (9.6, 16.0)
+        """
+        pieces, error = floor_pieces(self, period, damping, ringing, self.error)
+        return replace(
+            self,
+            breakpoints=pieces.breakpoints,
+            coefficients=pieces.coefficients,
+            description=self.description.changed("floor"),
+            history=(*self.history, f"on a floor of period {period:.6g} s, damping {damping:.6g}"),
+            error=error,
         )
 
     def processed(

@@ -34,7 +34,7 @@ LARGEST_RATIO_SHOWN: Final = 2.0
 #: A figure at least so wide (inches) has room for the chattering sequence beside the histories.
 _WIDE: Final = 5.5
 
-_Y_LABELS: Final = {"slenderness": "rotation / slenderness", "rad": "rotation (rad)", "deg": "rotation (°)"}
+_Y_LABELS: Final = {"slenderness": "rotation / {}", "rad": "rotation (rad)", "deg": "rotation (°)"}
 
 
 class DrawnSequence(NamedTuple):
@@ -74,6 +74,7 @@ def response_figure(
     duration: float | None = None,
     chattering: DrawnSequence | None = None,
     units: RotationUnits = "slenderness",
+    limit: str = "slenderness",
     label: str = "",
     title: str = "",
     ax: Axes | None = None,
@@ -89,8 +90,8 @@ def response_figure(
 
     A sequence `chattering` has a panel of its own, the interval to the next impact against the time to rest, both
     logarithmic, unless the time of rest is not bracketed (NaN) or there is a single impact. Rotations are drawn in
-    `units`; a coordinate that is no rotation as it is, under its `label`. In `ax`, the rotation is drawn without the
-    other panels.
+    `units`, over what `limit` names; a coordinate that is no rotation as it is, under its `label`. In `ax`, the
+    rotation is drawn without the other panels.
     """
     shown = float(time[0]), float(time[-1])
     scale = _scale("rad" if label else units, slenderness)
@@ -100,7 +101,7 @@ def response_figure(
     with figure_for(ax, (7.0, 4.4 if histories < 3 else 5.4), figsize, title) as figure:
         (main, *grounds), sequence = _panels(figure, ax, histories, zoomed=zoom is not None)
         _shade_rest(main, np.clip(rest_intervals, *shown))
-        _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])))
+        _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])), limit)
         if units != "deg" and not label:
             to_degrees = (lambda y: np.degrees(scale.back(y)), lambda y: scale.of(np.radians(y)))
             main.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
@@ -115,7 +116,7 @@ def response_figure(
         if vertical_acceleration_g is not None and len(grounds) > 1:
             _draw_ground(grounds[1], motion_time, vertical_acceleration_g, 0.6)
         histories_shown = main, *grounds
-        labels = label or _Y_LABELS[units], "ground acceleration (g)", "vertical (g)"
+        labels = label or _Y_LABELS[units].format(limit), "ground acceleration (g)", "vertical (g)"
         for axes, name in zip(histories_shown, labels, strict=False):
             is_last = axes is histories_shown[-1]
             axes.tick_params(labelbottom=is_last)
@@ -164,7 +165,7 @@ def _scale(units: RotationUnits, slenderness: tuple[float, float]) -> _Scale:
     return _Scale(factor, factor)
 
 
-def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats) -> None:
+def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats, limit: str) -> None:
     """Draw the rotation, in its units, and the angles, to side - and to side +, at which the block tips over."""
     axes.axhline(0.0, color=INK, linewidth=0.4)
     axes.plot(time, drawn, color=INK, linewidth=0.9, label="_rotation")
@@ -173,7 +174,7 @@ def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats) -> 
     span = (highest - lowest) or 1.0
     # Room below for the marks of the impacts and uplifts.
     low, high = axes.set_ylim(lowest - 0.28 * span, highest + 0.1 * span)
-    label = "tipping, θ = ±α"
+    label = "tipping, θ = ±α" if limit == "slenderness" else "unstable balance without ground motion"
     for level in tipping[(tipping > low) & (tipping < high)]:
         axes.axhline(level, color=ABOVE, linewidth=0.8, linestyle=(0, (6, 2, 1, 2)), label=label)
         label = ""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.arrays import Floats, as_asked
-from rocking.block import Block
+from rocking.block import Block, RestrainedBlock
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.errors import InvalidOption
@@ -83,6 +83,18 @@ class Answers:
             return 0.0
         leaning = float(self.rotation(self.peak_time))
         return self.peak_rotation / self.body.balance[0 if leaning > 0.0 else 1]
+
+    @cached_property
+    def tendons(self) -> NDArray[np.void]:
+        """Largest elongation (m) and force (N), and plastic elongation (m) at the end, of each tendon of the body."""
+        rows = []
+        if isinstance(self.body, RestrainedBlock):
+            plus, minus = self._history.largest()
+            if self.overturned:  # the last step ends there
+                side = int(self._trail.nodes["side"][-1])
+                plus, minus = (self.peak_rotation, minus) if side == 0 else (plus, self.peak_rotation)
+            rows = self.body.tendons_at((plus, minus))
+        return np.array(rows, dtype=[("elongation", "f8"), ("force", "f8"), ("plastic_elongation", "f8")])
 
     @property
     def moves_at_end(self) -> bool:
@@ -252,7 +264,7 @@ class Answers:
     def _contact(self) -> Contact:
         law = self.body.contact
         if law is None:
-            raise InvalidOption(f"the forces of the ground on a {type(self.body).__name__} are not known")
+            raise InvalidOption(f"the forces of the ground are not known of this body: {self.body.description}")
         until = self.duration if math.isnan(self.tipping_time) else self.tipping_time
         return Contact(self._history, law, until)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -11,6 +12,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.plot.response import RotationUnits
+from rocking.problem import thresholds_of
 from rocking.response.answers import Answers, history_of
 from rocking.response.history import even_times
 from rocking.tables import named, rows_of
@@ -73,6 +75,7 @@ def _columns(response: Answers, table: str) -> dict[str, tuple[np.ndarray[Any, A
     """Fields of one of the response's own tables, with their units."""
     rows, speed = getattr(response, table), f"{response.body.coordinate.unit}/s"
     units = {"kind": "1", "side": "1", "impacts": "1", "speed_before": speed, "speed_after": speed}
+    units |= {"elongation": "m", "force": "N", "plastic_elongation": "m"}
     return {name: (rows[name], units.get(name, "s")) for name in rows.dtype.names}
 
 
@@ -146,12 +149,18 @@ def figure(
     corners = np.empty(0) if motion is None else motion.drawing_times(start, end)
     lift = None if motion is None or motion.vertical is None else motion.vertical.acceleration(corners) / gravity
     weight = 1.0 if lift is None else 1.0 + lift
-    plus, minus = (weight * threshold / gravity for threshold in body.uplift_thresholds(response.model))
+    (pair,), (own,) = thresholds_of(body.alone(), response.model)
+    with np.errstate(invalid="ignore"):  # of a body of one side, which nothing lifts to the other
+        plus, minus = ((pair[k] + (weight - 1.0) * own[k]) / gravity for k in range(2))
+    balance = (body.balance[0], body.balance[0 if math.isinf(pair[1]) else 1])
+    if units == "slenderness" and any(map(math.isinf, balance)):
+        units = "rad"
     sequence = _longest_sequence(response, start, end) if longest_sequence else None
     return response_figure(
         time=times,
         rotation=response.states(times)[:, 0],
-        slenderness=body.balance,
+        slenderness=balance,
+        limit=coordinate.limit,
         impact_times=response.impacts["time"],
         rest_intervals=response.rest_intervals,
         uplift_times=response.events["time"][response.events["kind"] == "uplift"],

@@ -25,6 +25,9 @@ from rocking.tables import counted
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
 _LOOKS: Final = 33
 
+#: Halvings of the time at which a body turns: the coordinate is stationary there.
+_TURNINGS: Final = 30
+
 #: A response is ambiguous when changes of the motion, the initial state and the block by one unit in the last place
 #: move its peak by more than this fraction, or one of its events or impacts by more than this many seconds.
 AMBIGUITY: Final = 1e-6
@@ -121,6 +124,24 @@ class History:
         if not len(within):
             return float(ends[0])  # beyond it from the start
         return bisected(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)[1]
+
+    def largest(self) -> tuple[float, float]:
+        """Largest rotation of a block on each side, rad: at nodes, and where it turns within a step."""
+        nodes = self.trail.nodes
+        moving = np.flatnonzero(nodes["side"] >= 0)
+        side, found = nodes["side"][moving], nodes["u"][moving].copy()
+        sign = 1.0 - 2.0 * side
+        low = nodes["time"][moving].copy()
+        high = np.append(nodes["time"][1:], self.end)[moving]
+        rising = (nodes["v"][moving] > 0.0) & (sign * self.states_in(high, moving)[:, 1] <= 0.0)
+        at = np.flatnonzero(rising)
+        for _ in range(_TURNINGS if len(at) else 0):
+            middle = 0.5 * (low[at] + high[at])
+            out = sign[at] * self.states_in(middle, moving[at])[:, 1] > 0.0
+            low[at], high[at] = np.where(out, middle, low[at]), np.where(out, high[at], middle)
+        found[at] = np.abs(self.states_in(low[at], moving[at])[:, 0])
+        plus, minus = (float(np.max(found[side == k], initial=0.0)) for k in range(2))
+        return plus, minus
 
 
 def even_times(end: float, dt: float) -> Floats:

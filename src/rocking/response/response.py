@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,6 +57,9 @@ class Response(Answers, DrawnResult):
         One row for each sequence of impacts that ended at rest: start (time of the impact from which it was proven to
         be complete), end (time of rest), lower and upper bound on the end (NaN if not proven), number of impacts
         resolved since the start.
+    tendons : structured array
+        One row for each tendon of a restrained block: largest elongation (m) and force (N), and the plastic_elongation
+        (m) that a tendon which yields has at the end.
     stalled : int
         Sequences that ended because time no longer advanced between impacts, without proof.
     near_ties : int
@@ -70,7 +74,7 @@ class Response(Answers, DrawnResult):
         times = export.drawing_times(self, start, end)
         coordinate, balance = self.body.coordinate, min(self.body.balance)
         drawn, label = self.states(times)[:, 0], f"{coordinate.name} ({coordinate.unit})"
-        if coordinate.limit:
+        if coordinate.limit and math.isfinite(balance):
             drawn = np.clip(drawn / balance, -_HIGHEST_PICTURED, _HIGHEST_PICTURED)
             label = f"{coordinate.name} / {coordinate.limit}"
         return svg.captioned(f"Response: {self._headline()}", svg.history(times, drawn, label))
@@ -307,7 +311,8 @@ class Response(Answers, DrawnResult):
         ax : matplotlib.axes.Axes, optional
             Draw the rotation here, without the other panels.
         units : {"slenderness", "rad", "deg"}
-            What rotations are drawn in: over the slenderness of their side, or as they are.
+            What rotations are drawn in: over the slenderness of their side (of a restrained block over its balance, if
+            it has one), or as they are.
         window : (start, end), optional
             Stretch of time to draw, s; by default from a little before the first event to a little after the last.
         longest_sequence : bool

@@ -7,7 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from rocking.block import Block
+from rocking.block import Block, RestrainedBlock
+from rocking.body import Body
+from rocking.problem import thresholds_of
 from rocking.response.answers import Answers
 from rocking.response.export import records
 from rocking.response.history import driving
@@ -48,12 +50,16 @@ def summary_rows(response: Answers, friction: float | None) -> list[Row]:
     rows = [
         Row("block" if isinstance(body, Block) else "body", body.description),
         Row("parameters", "; ".join(map(str, sides))),
+        *_balance_rows(body),
         Row("motion", _motion_text(response)),
         Row("uplift above", _thresholds_text(response)),
         *_event_rows(response),
         Row("impacts resolved", f"{len(response.impacts)}"),
         *_peak_rows(response),
+        *_tendon_rows(response),
     ]
+    if isinstance(body, RestrainedBlock) and body.contact is None:
+        rows.append(Row("friction, lift-off", "not judged: the forces of the ground are not known"))
     if body.contact is not None:
         tips = "" if math.isnan(response.tipping_time) else f", until it tips at {tipping_text(response)}"
         rows += [
@@ -71,7 +77,7 @@ def line(response: Answers) -> str:
     """Return what happened, in one line."""
     motion, limit = response.motion, response.body.coordinate.limit
     peak = ""
-    if limit and not response.overturned:
+    if limit and not response.overturned and math.isfinite(_balance_of(response)):
         peak = f", peak {response.peak_over_slenderness:.4g} of the {limit}"
     return (
         f"{response.body.description} under {'no motion' if motion is None else motion.label}: "
@@ -110,6 +116,8 @@ def facts(response: Answers, friction: float | None) -> list[Row]:
     ]
     if limit:
         rows.append(Row(f"peak_over_{limit}", response.peak_over_slenderness))
+    if isinstance(body, RestrainedBlock):
+        rows += [Row("balance", list(body.balance), unit), Row("tendons", records(response, "tendons"))]
     rows.append(Row("peak_time", response.peak_time, "s"))
     if body.contact is not None:
         rows += [
@@ -230,13 +238,17 @@ def _motion_text(response: Answers) -> str:
 def _thresholds_text(response: Answers) -> str:
     """Return what lifts the body; under a vertical motion it changes with the weight."""
     gravity, motion = response.body.gravity, response.motion
-    plus, minus = (threshold / gravity for threshold in response.body.uplift_thresholds(response.model))
+    (pair,), (own,) = thresholds_of(response.body.alone(), response.model)
+    plus, minus = (pair / gravity).tolist()
     one = plus == minus or math.isinf(minus)
     text = f"{plus:.4f} g" if one else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"
     if motion is None or motion.vertical is None:
         return text
     low, high = (1.0 + lift / gravity for lift in motion.vertical.extremes)
-    return f"{text}, times the weight over that at rest, {low:.4f} to {high:.4f}"
+    if np.array_equal(pair, own):
+        return f"{text}, times the weight over that at rest, {low:.4f} to {high:.4f}"
+    least, most = ((pair[0] + (factor - 1.0) * own[0]) / gravity for factor in (low, high))
+    return f"{text}; from {least:.4f} to {most:.4f} g with the weight{'' if one else ', to side +'}"
 
 
 def _event_rows(response: Answers) -> list[Row]:
@@ -281,9 +293,34 @@ def _peak_rows(response: Answers) -> list[Row]:
         note += ", where the block has fallen"
     elif response._reaches_second_stop:
         note += ", at the stop"
-    elif limit:
+    elif limit and math.isfinite(_balance_of(response)):
         note += f", {ratio_text(response)} of the {limit}"
     return [Row(f"peak {name}", f"{response.peak_rotation:.{_peak_digits(response)}g}", unit, note)]
+
+
+def _balance_rows(body: Body) -> list[Row]:
+    """Unstable balance of a block that is not free, which its slenderness does not tell."""
+    if not isinstance(body, RestrainedBlock):
+        return []
+    plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in body.balance)
+    text = plus if plus == minus or body.is_one_sided else f"{plus} (side +), {minus} (side -)"
+    return [Row("balance", text, note=": restraints hold it at any rotation" if text == "none" else "")]
+
+
+def _tendon_rows(response: Answers) -> list[Row]:
+    """Largest elongation and force of each tendon, and what stays of the elongation."""
+    rows = []
+    for row in response.tendons:
+        stays = f", {1e3 * row['plastic_elongation']:.4g} mm of it for good" if row["plastic_elongation"] else ""
+        text = f"longer by {1e3 * row['elongation']:.4g} mm at most{stays}"
+        rows.append(Row("tendon", text, note=f", force {1e-3 * row['force']:.4g} kN at most"))
+    return rows
+
+
+def _balance_of(response: Answers) -> float:
+    """Unstable balance on the side of the peak, rad."""
+    leaning = float(response.rotation(response.peak_time))
+    return response.body.balance[0 if leaning > 0.0 else 1] if response.peak_rotation > 0.0 else 1.0
 
 
 def _contact_rows(response: Answers, friction: float | None, sliding: float) -> list[Row]:

@@ -51,8 +51,8 @@ def pooled_fragility(
     """Fit one curve to the outcomes of all blocks, each of which may have a weight."""
     require_limits(store.grid.outcomes, limits)
     product = store.product
-    units, which = np.unique(units_of(product.blocks, measure, product.model), return_inverse=True)
-    shares, band = mean_one(weights, len(product.blocks)), Band(confidence=confidence)
+    units, which = np.unique(units_of(product.bodies, measure, product.model), return_inverse=True)
+    shares, band = mean_one(weights, len(product.bodies)), Band(confidence=confidence)
     motions, scales, _, _ = product.shape
     counts = {name: np.zeros((motions, scales, len(units))) for name in limits}
     trials = np.zeros((motions, scales, len(units)))
@@ -75,15 +75,15 @@ def pooled_fragility(
         )
         for name, count in counts.items()
     ]
-    text = f"{pooled(product.blocks, weights)}, {counted(motions, 'motion')}, {counted(scales, 'scale')}"
+    text = f"{pooled(product.bodies, weights)}, {counted(motions, 'motion')}, {counted(scales, 'scale')}"
     return Fragility(
         curves=tuple(curves),
         measure=measure,
         description=f"{text}, {product.model} model",
-        block=only_block(product.blocks),
+        block=only_block(product.bodies),
         model=product.model,
         outcomes=None,
-        one_way=product.polarity != "both" and not product.blocks.is_symmetric,
+        one_way=product.polarity != "both" and not product.bodies.is_symmetric,
     )
 
 
@@ -101,7 +101,7 @@ def block_fragilities(
     kept = {name: np.full(shape, np.nan) for name in _KEPT}
     faults = np.full(shape, "", dtype=object)
     intensities = _intensities(store.product, measure).ravel()
-    units = units_of(store.product.blocks, measure, store.product.model)
+    units = units_of(store.product.bodies, measure, store.product.model)
     options: dict[str, Any] = {
         "clusters": np.repeat(np.arange(motions), scales),
         "measure": measure,
@@ -131,7 +131,7 @@ def block_fragilities(
                 for name, values in kept.items()
             }
             | {"fault": variable(dims, faults.astype(str), "why there is no curve")},
-            {"limit_state": list(limits), **body_coordinates(store.product.blocks)},
+            {"limit_state": list(limits), **body_coordinates(store.product.bodies)},
             {
                 "outcomes": motions * scales * polarities,
                 "confidence": confidence,

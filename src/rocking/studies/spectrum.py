@@ -18,6 +18,7 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import require_finished
 from rocking.ensemble import body_coordinates
 from rocking.errors import InvalidOption, StudyError
+from rocking.problem import slenderness_of
 from rocking.progress import Progress
 from rocking.result import DatasetResult, table_of_some
 from rocking.studies.inputs import require
@@ -74,7 +75,7 @@ def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     """
     store.require_complete()
     motions, scales, polarities, _ = store.grid.shape
-    shape = motions, scales, 1 if store.product.blocks.is_symmetric else polarities
+    shape = motions, scales, 1 if store.product.bodies.is_symmetric else polarities
     width = max(1, _HELD // math.prod(shape))
     for unit in range(store.grid.cells[-1]):
         *_, whole = store.grid.ranges((0, 0, 0, unit))
@@ -84,7 +85,7 @@ def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
 
 
 def _read(store: Store, shape: tuple[int, int, int], unit: int, blocks: slice) -> Floats:
-    alpha = store.product.blocks.select(blocks).alpha.min(axis=1)
+    alpha = slenderness_of(store.product.bodies.select(blocks))
     ratios = np.empty((*shape, len(alpha)))
     for cell in np.ndindex(store.grid.cells[:3]):
         key = *cell, unit
@@ -130,7 +131,7 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
 
     require_ratios(store.grid.outcomes, "a spectrum")
     shares = checked_fractiles(fractiles)
-    product, count = store.product, len(store.product.blocks)
+    product, count = store.product, len(store.product.bodies)
     values = np.empty((len(shares), product.scales.count, count))
     overturned = np.empty((product.scales.count, count))
     with Progress("reading", count, show=progress) as bar:

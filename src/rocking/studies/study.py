@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.fragility.result import Fragility
-from rocking.block import Block, Blocks
+from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.ensemble import Polarity, Product, dataset_of, product_of
 from rocking.errors import InvalidOption
@@ -444,7 +444,7 @@ class Study(WrittenToFiles):
 
 def study(
     folder: str | Path,
-    blocks: Blocks | Block | Sequence[Block] | None = None,
+    blocks: Bodies | Body | Sequence[Body] | None = None,
     motions: Motions | None = None,
     *,
     model: Model = "nonlinear",
@@ -464,7 +464,7 @@ def study(
     folder : path
         Where the study is kept: a folder, or the URL of an object store as ``"s3://bucket/prefix"``, which
         needs obstore.
-    blocks : Blocks, Block or sequence of Block, optional
+    blocks : Blocks, Block, RestrainedBlock or sequence of one kind, optional
         As for `simulate_many`; without blocks and motions, the study must be there, and needs no script nor any other
         argument (but `refine`).
     motions : Motion, sequence of Motion, or mapping of str to Motion, optional

@@ -14,13 +14,14 @@ from rocking.analysis.fragility.curve import Band, fitted_curve, passed
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.levels import mean_one, only_block, pooled, simulate_levels, units_of, values_of
 from rocking.arrays import Floats, Integers
-from rocking.block import Block, Blocks
+from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import Polarity, simulate_many
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
+from rocking.problem import bodies_of, slenderness_of
 from rocking.tables import counted
 from rocking.treatment import Treatment
 
@@ -40,7 +41,7 @@ OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
 
 
 def fragility(
-    blocks: Blocks | Block | Sequence[Block],
+    blocks: Bodies | Body | Sequence[Body],
     motions: Motions,
     *,
     measure: IntensityName | Measure = "pga",
@@ -58,7 +59,7 @@ def fragility(
 
     Parameters
     ----------
-    blocks : Blocks, Block or sequence of Block
+    blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         One block; or several whose outcomes are pooled: against a measure in their own units, or of an ensemble that
         stands for one block that is not quite known, with `weights` (`Calibration.fragility` does so).
     motions : Motion, sequence of Motion, or mapping of str to Motion
@@ -69,7 +70,8 @@ def fragility(
     levels : array_like, optional
         Stripes: every motion scaled to each of these levels. Without them a cloud: every motion as it is.
     limits : mapping of str to float
-        Limit states: peak rotation over slenderness (the smaller one of two sides) that is exceeded; ``math.inf``
+        Limit states: peak rotation over slenderness (of the block as it stands, the smaller one of two sides) that is
+        exceeded; ``math.inf``
         stands for overturning, the default.
     model : {"nonlinear", "linear"}
         Equation of motion.
@@ -110,7 +112,8 @@ def fragility(
     >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
     median 1.443, dispersion 0.524
     """
-    many, how = Blocks.of(blocks), Measure.of(measure)
+    many, how = bodies_of(blocks), Measure.of(measure)
+    slenderness = slenderness_of(many)
     shares = mean_one(weights, len(many))
     mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
     _check_band(band)
@@ -136,7 +139,7 @@ def fragility(
     if "polarity" not in table.dims:
         table = table.expand_dims("polarity")
     table = table.transpose("level", "motion", "block", "polarity")
-    ratio = table.peak_rotation.values / many.alpha.min(axis=1)[:, None]
+    ratio = table.peak_rotation.values / slenderness[:, None]
     ratio[table.overturned.values] = np.inf
     clusters = np.broadcast_to(np.arange(len(shaken))[None, :, None, None], ratio.shape)
     x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
@@ -196,7 +199,7 @@ def fit_fragility(
     clusters: ArrayLike | None = None,
     measure: IntensityName | Measure = "pga",
     band: Band = _LIKELIHOOD,
-    block: Block | None = None,
+    block: Body | None = None,
     description: str = "observed outcomes",
 ) -> Fragility:
     """Fit a lognormal fragility to outcomes by maximum likelihood: a cloud (one outcome each) or stripes (counts).

@@ -20,7 +20,7 @@ from rocking import checks
 from rocking.analysis.fragility.curve import FragilityCurve
 from rocking.analysis.levels import units_of
 from rocking.arrays import Floats
-from rocking.block import Block, Blocks
+from rocking.body import Body
 from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
@@ -96,10 +96,10 @@ def fragility_function(
     return function
 
 
-def scale_of(measure: Measure, block: Block | None, model: Model) -> Scale:
+def scale_of(measure: Measure, block: Body | None, model: Model) -> Scale:
     """OpenQuake's type for a measure, and the factor from SI units or the block's own: PGA and SA in g, PGV in cm/s."""
     if block is not None:
-        own = float(units_of(Blocks.of([block]), measure, model)[0])
+        own = float(units_of(block.alone(), measure, model)[0])
     elif not measure.in_block_units:
         own = 1.0
     else:

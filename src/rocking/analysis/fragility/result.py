@@ -18,7 +18,7 @@ from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.risk import Risk, risk_of
 from rocking.analysis.survival import Survival
 from rocking.arrays import Floats
-from rocking.block import Block
+from rocking.body import Body
 from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption, Message
 from rocking.motion.scaling import Measure
@@ -71,7 +71,7 @@ class Fragility(DrawnResult, TableResult):
     curves: tuple[FragilityCurve, ...]
     measure: Measure
     description: str
-    block: Block | None
+    block: Body | None
     model: Model
     outcomes: pd.DataFrame | None
     one_way: bool = False
@@ -287,7 +287,7 @@ class Fragility(DrawnResult, TableResult):
         *,
         taxonomy: str = "rocking-block",
         format: nrml.Format = "continuous",
-        block: Block | None = None,
+        block: Body | None = None,
         model_id: str = "rocking",
         loss_category: nrml.LossCategory = "contents",
         asset_category: str = "contents",

@@ -1,0 +1,83 @@
+"""Walls and restraints by options: the public functions' numbers, one line for every mistake."""
+
+import json
+import math
+
+import pytest
+
+import rocking
+from rocking import Block, Damper, Load, RestrainedBlock, Spring, Tendon, Thrust
+
+PULSE = ["--pulse", "one-sine:amplitude=2,frequency=1Hz"]
+SIZES = ["--width", "0.5", "--height", "4", "--mass", "5000"]
+BLOCK = Block(width=0.5, height=4.0, mass=5e3)
+FACADE = ["--one-sided", "--thrust", "force=500,height=3"]
+
+
+@pytest.mark.parametrize(
+    ("options", "body"),
+    [
+        (FACADE, RestrainedBlock(BLOCK, Thrust(5e2, 3.0), one_sided=True)),
+        (["--one-sided", "--restitution", "0.4"], RestrainedBlock(BLOCK, one_sided=True, restitution=0.4)),
+        (
+            ["--tendon", "stiffness=2e5,prestress=1e3", "--tendon", "stiffness=1e5,strength=2e3,offset=-0.1"],
+            RestrainedBlock(BLOCK, Tendon(2e5, 1e3), Tendon(1e5, strength=2e3, offset=-0.1)),
+        ),
+        (
+            ["--spring", "1e3", "--damper", "50", "--lean", "-1deg"],
+            RestrainedBlock(BLOCK, Spring(1e3), Damper(50.0), lean=-math.radians(1.0)),
+        ),
+        (
+            ["--load", "mass=250,height=3,follows=no,offset=0.05", "--load", "mass=100,height=4"],
+            RestrainedBlock(BLOCK, Load(250.0, 3.0, 0.05, follows=False), Load(100.0, 4.0)),
+        ),
+    ],
+    ids=["facade", "wall", "tendons", "couples", "loads"],
+)
+def test_simulate_takes_restraints(run, options, body):
+    code, out, err = run("simulate", *PULSE, *SIZES, *options, "--json")
+    assert (code, err) == (0, "")
+    found, response = json.loads(out), rocking.simulate(body, rocking.pulses.one_sine(2.0, 1.0))
+    assert found["block"]["description"] == body.description
+    assert found["overturned"] == response.overturned
+    assert found["peak_rotation_rad"] == response.peak_rotation > 0.0
+
+
+def test_ida_and_fragility_take_restraints(run):
+    body = RestrainedBlock(BLOCK, Thrust(5e2, 3.0), one_sided=True)
+    pulse, given = rocking.pulses.one_sine(1.0, 0.8), ["--pulse", "one-sine:amplitude=1,frequency=0.8Hz"]
+    code, out, _ = run("ida", *given, *SIZES, *FACADE, "--levels", "1:4:7", "--json")
+    assert code == 0
+    levels = [1.0 + 0.5 * k for k in range(7)]
+    truth = rocking.incremental_dynamic_analysis(body, pulse, levels=levels)
+    assert json.loads(out)["motions"][0]["peak_over_alpha"][0] == truth.peak_over_alpha.values.ravel()[0]
+    code, out, _ = run("fragility", *given, *SIZES, *FACADE, "--levels", "1:4:7", "--polarity", "both", "--json")
+    truth = rocking.fragility(body, pulse, levels=levels, polarity="both")
+    assert json.loads(out)["curves"][0]["median"] == pytest.approx(truth.curves[0].median)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--tendon", "stiffnes=1"], "--tendon takes NAME=VALUE with stiffness, prestress, offset, strength"),
+        (["--tendon", "prestress=1"], "--tendon needs stiffness"),
+        (["--load", "mass=1,height=2,follows=maybe"], "--load takes follows=yes or follows=no, not 'maybe'"),
+        (["--lean", "40deg"], "whose --lean is 0.698132 rad falls"),
+        (["--thrust", "force=9e4,height=4"], "does not stand"),
+        (["--p", "2"], "belong to different descriptions"),
+    ],
+)
+def test_a_mistake_in_restraints_is_told_in_one_line(run, options, says):
+    code, _, err = run("simulate", *PULSE, *SIZES, *options)
+    assert code != 0
+    assert says in err
+    assert err.count("\n") == 1
+
+
+def test_restraints_need_a_mass_and_an_ensemble_has_blocks_of_its_own(run, tmp_path):
+    code, _, err = run("simulate", *PULSE, "--p", "2", "--alpha", "0.2", "--spring", "5")
+    assert code != 0
+    assert "needs its --mass, kg, beside its sizes or its pivots" in err
+    code, _, err = run("fragility", *PULSE, "--ensemble", tmp_path / "none.csv", *FACADE)
+    assert code != 0
+    assert "--ensemble has blocks of its own: leave --one-sided and --thrust out" in err

@@ -1,0 +1,152 @@
+"""What responses of walls and of blocks with restraints tell: tendons, forces of the ground, summary, figure."""
+
+import math
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking import Block, Damper, InvalidOption, Load, RestrainedBlock, Spring, Tendon, Thrust
+
+MASS, G = 4e3, 9.80665
+COLUMN = Block.from_pivots((0.25, 0.3), 1.5, 0.9, mass=MASS, restitution=0.85)
+PUSH = rocking.pulses.sine(3.0, 1.1, cycles=2).with_vertical(rocking.pulses.sine(2.0, 3.0, cycles=3))
+
+
+def body_of(which, lean=0.0):
+    restraints = {
+        "tendon": [Tendon(2e5, prestress=4e3, offset=0.05)],
+        "thrust": [Thrust(3e2, height=2.0, offset=0.1)],
+        "load": [Load(3e2, height=3.0, offset=-0.05, follows=False)],
+        "couples": [Spring(1e3), Damper(4e2)],
+    }
+    chosen = [each for name, some in restraints.items() for each in some if which in (name, "all")]
+    return RestrainedBlock(COLUMN, *chosen, lean=lean)
+
+
+def moment_of(force, arm):
+    """Clockwise moment of a force."""
+    return arm[1] * force[0] - arm[0] * force[1]
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.02])
+@pytest.mark.parametrize("which", ["tendon", "thrust", "load", "couples", "all"])
+def test_forces_of_the_ground_and_of_restraints_turn_the_block_about_its_centre_of_mass(which, lean):
+    """Forces come from how the centre of mass moves; here is what they do to the rotation, which they do not know."""
+    body = body_of(which, lean)
+    response = rocking.simulate(body, PUSH)
+    times = np.linspace(0.0, min(response.duration, 3.0), 500)
+    theta, rate, acceleration = response.states(times).T
+    vertical = response.normal_force(times)
+    horizontal = body.contact((theta, rate, acceleration), (PUSH.acceleration(times) / G,
+        PUSH.vertical.acceleration(times) / G), np.where(theta > 0, 0, np.where(theta < 0, 1, -1)))[0]  # fmt: skip
+    judged = 0
+    for k in np.flatnonzero(theta != 0.0):
+        turned = theta[k] + lean
+        c, s = math.cos(turned), math.sin(turned)
+        turn = np.array([[c, s], [-s, c]])  # clockwise: to side +
+        pivot = np.array([0.25 if theta[k] > 0.0 else -0.3, 0.0])
+        centre = turn @ (np.array([0.0, 1.5]) - pivot)
+        total = moment_of(MASS * G * np.array([horizontal[k], vertical[k]]), -centre)
+        if which in ("thrust", "all"):
+            total += moment_of(np.array([3e2, 0.0]), turn @ (np.array([0.1, 2.0]) - pivot) - centre)
+        if which in ("load", "all"):
+            total += moment_of(np.array([0.0, -3e2 * G]), turn @ (np.array([-0.05, 3.0]) - pivot) - centre)
+        if which in ("tendon", "all"):
+            here = turn @ (np.array([0.05, 0.0]) - pivot)
+            standing = np.array([[math.cos(lean), math.sin(lean)], [-math.sin(lean), math.cos(lean)]])
+            there = standing @ (np.array([0.05, 0.0]) - pivot)
+            length = math.hypot(*(there - here))
+            total += moment_of((4e3 + 2e5 * length) * (there - here) / length, here - centre)
+        if which in ("couples", "all"):
+            total -= 1e3 * theta[k] + 4e2 * rate[k]
+        assert total == pytest.approx(MASS * 0.9**2 * acceleration[k], abs=1e-7 * MASS * G)
+        judged += 1
+    assert judged >= 60
+    assert 0.0 < response.minimum_normal_force < 2.0
+    assert response.required_friction > 0.1
+
+
+def test_a_block_that_restraints_hold_at_rest_presses_on_the_ground_with_all_their_forces():
+    body = RestrainedBlock(COLUMN, Tendon(2e5, prestress=4e3), Thrust(3e2, height=1.0), Load(3e2, 2.0, follows=False))
+    response = rocking.simulate(body, rocking.pulses.one_sine(0.1, 1.0))
+    assert len(response.events) == 0
+    assert response.normal_force(0.0) == pytest.approx(1.0 + (4e3 + 3e2 * G) / (MASS * G))
+    assert response.friction_demand(0.0) == pytest.approx(3e2 / (MASS * G + 4e3 + 3e2 * G))
+
+
+@pytest.mark.parametrize("strength", [math.inf, 5e3])
+def test_tendons_are_stretched_as_the_rotations_of_both_sides_stretch_them(strength):
+    tendons = Tendon(3e5, prestress=4e3, offset=0.15, strength=strength), Tendon(1e5, offset=-0.2)
+    body = RestrainedBlock(COLUMN, *tendons)
+    response = rocking.simulate(body, rocking.pulses.sine(3.4, 1.1, cycles=2))
+    assert not response.overturned
+    theta = response.rotation(np.linspace(0.0, response.duration, 20001))
+    found = response.tendons
+    for tendon, row in zip(tendons, found, strict=True):
+        distances = np.where(theta > 0.0, 0.25 - tendon.offset, 0.3 + tendon.offset)
+        elongation = np.max(2.0 * distances * np.sin(0.5 * np.abs(theta)))
+        assert row["elongation"] == pytest.approx(elongation, rel=1e-5)
+        force = tendon.prestress + tendon.stiffness * row["elongation"]
+        assert row["force"] == pytest.approx(min(force, tendon.strength))
+        assert row["plastic_elongation"] == pytest.approx(max(0.0, force - tendon.strength) / tendon.stiffness)
+    assert (found["plastic_elongation"][0] > 1e-3) == (strength < math.inf)
+    # On the other side of its toe the second one is stretched less by the larger rotation.
+    assert response.to_dict()["tendons"][1]["force_N"] == found["force"][1]
+
+
+def test_a_summary_names_restraints_balance_and_the_forces_of_tendons():
+    response = rocking.simulate(body_of("all"), PUSH)
+    text = response.summary()
+    for words in (
+        "tendon of 200000 N/m, prestress 4000 N, 0.05 m to side +",
+        "thrust of 300 N at a height of 2 m, 0.1 m to side +",
+        "load of 300 kg that only presses at a height of 3 m, 0.05 m to side -",
+        "spring of 1000 N m/rad",
+        "damper of 400 N m s/rad",
+        "balance  ",
+        "of the balance",
+        "kN at most",
+        "friction needed",
+        "g with the weight, to side +",
+    ):
+        assert words in text, words
+    assert response.to_dict()["balance_rad"] == list(response.body.balance)
+
+
+def test_what_is_not_known_of_a_wall_is_said():
+    wall = RestrainedBlock(Block(width=0.5, height=5.0, mass=6e3), Thrust(8e2, height=4.0), one_sided=True)
+    response = rocking.simulate(wall, rocking.pulses.one_sine(1.5, 0.8))
+    assert "not judged: the forces of the ground are not known" in response.summary()
+    assert "required_friction" not in response.to_dict()
+    with pytest.raises(
+        InvalidOption, match=r"not known of this body: rectangular block, 0\.5 m x 5 m, thrust of 800 N"
+    ):
+        _ = response.required_friction
+    yielding = RestrainedBlock(COLUMN, Tendon(3e5, strength=9e3))
+    assert yielding.contact is None
+    assert yielding.alone()[0].contact is None
+
+
+def test_a_block_that_is_held_at_any_rotation_has_no_balance_to_count_by():
+    held = RestrainedBlock(COLUMN, Spring(2e5))
+    assert held.balance == (math.inf, math.inf)
+    response = rocking.simulate(held, PUSH)
+    assert "none: restraints hold it at any rotation" in response.summary()
+    assert "of the balance" not in response.summary()
+    assert "of the balance" not in repr(response)
+    figure = response.plot()
+    assert figure.axes[0].get_ylabel() == "rotation (rad)"
+    assert "rotation (rad)" in response._repr_html_()
+
+
+@pytest.mark.parametrize("vertical", [False, True])
+def test_a_figure_of_a_wall_counts_by_its_balance(vertical):
+    wall = RestrainedBlock(Block(width=0.5, height=5.0, mass=6e3), Thrust(8e2, height=4.0), one_sided=True)
+    response = rocking.simulate(
+        wall, rocking.pulses.one_sine(1.2, 0.8).with_vertical(PUSH.vertical if vertical else None)
+    )
+    figure = response.plot()
+    assert figure.axes[0].get_ylabel() == "rotation / balance"
+    drawn = figure.axes[0].lines[1].get_ydata()
+    assert np.max(drawn) == pytest.approx(response.peak_over_slenderness, rel=1e-3)
