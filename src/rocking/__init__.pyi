@@ -3,6 +3,7 @@ from .analysis import rules
 from .analysis.calibration.history import HistoryCalibration, calibrate_history
 from .analysis.calibration.outcomes import calibrate
 from .analysis.calibration.result import Calibration
+from .analysis.critical import CriticalScale, critical_scale
 from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
 from .analysis.fragility.fit import fit_fragility, fragility
@@ -52,7 +53,7 @@ from .motion import Motion, pulses, records
 from .motion.description import Description, Origin
 from .motion.formats import read
 from .motion.scaling import Measure
-from .response import Response, Sensitivity
+from .response import Gradient, Response, Sensitivity, gradient
 from .result import DatasetResult, DrawnResult, Result, Row, TableResult
 from .simulation import simulate
 from .solid.solid import Solid
@@ -70,6 +71,7 @@ __all__ = [
     "Calibration",
     "Certified",
     "Coordinate",
+    "CriticalScale",
     "DamagedStudy",
     "Damper",
     "DatasetResult",
@@ -79,6 +81,7 @@ __all__ = [
     "Fragility",
     "Frame",
     "GeometricBypass",
+    "Gradient",
     "HazardCurve",
     "HistoryCalibration",
     "IntervalThreshold",
@@ -123,10 +126,12 @@ __all__ = [
     "chattering",
     "compare_measures",
     "compare_restitution",
+    "critical_scale",
     "dynamics",
     "explore",
     "fit_fragility",
     "fragility",
+    "gradient",
     "impact_restitution",
     "incremental_dynamic_analysis",
     "one_sided_restitution",

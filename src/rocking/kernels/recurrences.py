@@ -112,7 +112,7 @@ def variation_coefficients(work: Record, damping: float, order: int) -> None:
         value = forcing[k]
         for j in range(k + 1):
             value += stiffness[j] * x[k - j]
-        if damping > 0.0:
+        if damping != 0.0:
             value -= damping * ((k + 1) * x[k + 1])
         x[k + 2] = value * INTEGRATED_TWICE[k]
 

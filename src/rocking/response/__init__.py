@@ -1,6 +1,7 @@
 """What one simulation found, and what a practitioner asks of it."""
 
 from rocking.response.answers import trail_of
+from rocking.response.derivatives import Gradient, gradient
 from rocking.response.export import active_span, drawing_times
 from rocking.response.history import AMBIGUITY, QUANTITIES, Sensitivity
 from rocking.response.response import Response
@@ -9,10 +10,12 @@ from rocking.response.summary import in_brief, in_words, ratio_text
 __all__ = [
     "AMBIGUITY",
     "QUANTITIES",
+    "Gradient",
     "Response",
     "Sensitivity",
     "active_span",
     "drawing_times",
+    "gradient",
     "in_brief",
     "in_words",
     "ratio_text",
