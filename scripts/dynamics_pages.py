@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -189,10 +190,13 @@ def compared(slenderness, contact):
     transient = math.ceil(-20.0 / math.log(restitution))
     diagram = dynamics.bifurcation_diagram(family, LEVELS, [0.0, 0.0], direction="afresh", transient=transient).data
     period, theta = diagram.period.values[0, :, 0], np.linspace(-block.alpha, block.alpha, 61)
-    found = dynamics.basins(*family(LEVEL), theta, P * theta, progress=False)
+    body, sine = family(LEVEL)
+    found = dynamics.basins(body, sine, theta, P * theta, progress=False)
     shares = zip(found.attractor.values, found.share.values, strict=True)
-    exponents = [dynamics.lyapunov_exponents(*family(level), [0.0, 0.0], 2000, transient=transient).largest
-                 for level in LEVELS[period != -1][::8]]  # fmt: skip
+    exponents = []
+    for level in LEVELS[period != -1][::8]:
+        body, sine = family(level)
+        exponents.append(dynamics.lyapunov_exponents(body, sine, [0.0, 0.0], 2000, transient=transient).largest)
     return {
         "restitution": restitution,
         "lost": lost,
@@ -224,7 +228,10 @@ def restitution_figure(rows):
     """Amplitudes, and shares of states that stay, against the slenderness."""
     with figure_for(None, (7.4, 3.2)) as drawn:
         left, right = drawn.subplots(1, 2)
-        looks = {1.0: {"linestyle": "-"}, 0.7: {"linestyle": (0, (4, 2)), "markerfacecolor": "white"}}
+        looks: dict[float, dict[str, Any]] = {
+            1.0: {"linestyle": "-"},
+            0.7: {"linestyle": (0, (4, 2)), "markerfacecolor": "white"},
+        }
         marks = {"fold": ("orbits begin", "o", INK), "overturns": ("overturns from rest", "s", ABOVE)}
         for contact, look in looks.items():
             of = [rows[slenderness, contact] for slenderness in SLENDERNESSES]

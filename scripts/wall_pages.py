@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ WALL = {"width": 0.6, "height": 7.0, "mass": 7500.0}
 THRUSTS = (0.0, 500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0)
 
 COLUMN = Block(width=0.8, height=5.0, mass=9000.0)
-BODIES = {
+BODIES: dict[str, Any] = {
     "free": COLUMN,
     "tendon, 0.2 MN/m": RestrainedBlock(COLUMN, Tendon(2e5)),
     "tendon, 1 MN/m": RestrainedBlock(COLUMN, Tendon(1e6)),
@@ -96,7 +97,7 @@ def tendon_figure():
 def yielding_figure():
     """Draw the rotation of the column, free, with an elastic tendon and with one that yields, and forces of both."""
     pulse = rocking.pulses.one_sine(2.5, 0.8)
-    bodies = {
+    bodies: dict[str, Any] = {
         "without a tendon: falls": COLUMN,
         "elastic tendon": RestrainedBlock(COLUMN, Tendon(1e6, prestress=5e3)),
         "tendon that yields at 40 kN": RestrainedBlock(COLUMN, Tendon(1e6, prestress=5e3, strength=4e4)),
@@ -108,7 +109,7 @@ def yielding_figure():
             response = rocking.simulate(body, pulse, duration=10.0)
             rotation = response.rotation(times)
             histories.plot(times, np.degrees(rotation), **look, label=name)
-            if isinstance(body, RestrainedBlock):
+            if isinstance(body, RestrainedBlock) and body.restraints:
                 forces.plot(times, 1e-3 * tension(body.restraints[0], rotation), **look)
         histories.set_ylim(-10.0, 16.0)
         add_labels(histories, "", "rotation (°)")

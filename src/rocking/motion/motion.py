@@ -661,7 +661,7 @@ class Motion:
         >>> ground = rocking.pulses.sine(1.0, 2.0, cycles=10)
         >>> floor = ground.floor(0.5)
         >>> round(floor.pga, 2), round(floor.duration, 1)
-        (9.6, 16.0)
+        (9.62, 16.0)
         """
         pieces, error = floor_pieces(self, period, damping, ringing, self.error)
         return replace(
