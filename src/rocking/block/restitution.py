@@ -39,7 +39,7 @@ def one_sided_restitution(alpha: float) -> float:
     Returns
     -------
     float
-        |(1 - 1.5 sin(alpha)^2)^2 (1 - 1.5 cos(alpha)^2)|: 0.47 for a slenderness of 0.1.
+        The size of (1 - 1.5 sin(alpha)^2)^2 (1 - 1.5 cos(alpha)^2): 0.47 for a slenderness of 0.1.
 
     Notes
     -----
