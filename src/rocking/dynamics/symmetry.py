@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from rocking.arrays import Floats
@@ -33,15 +35,19 @@ class HalfMap(StroboscopicMap):
         return at, total
 
 
+#: Fields of a body's record that are a side's own.
+_OF_SIDES: Final = (
+    "stiffness", "gain", "threshold", "slenderness", "restitution", "least", "slope", "hold", "added_weight",
+    "added_push", "prestress", "spring", "damping",
+)  # fmt: skip
+
+
 def is_mirrored(strobe: StroboscopicMap) -> bool:
     """Whether the mirror image of every course of a body is one half a period later."""
     record, (low, high) = strobe._records[0], strobe.body.stops
     if not strobe._is_two_sided or low != -high:
         return False
-    same = all(
-        record[name][0] == record[name][1]
-        for name in ("stiffness", "gain", "threshold", "restitution", "least", "slope", "slenderness")
-    )
+    same = all(record[name][0] == record[name][1] for name in _OF_SIDES)
     return same and _is_antisymmetric(strobe.motion)
 
 
