@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 
 import rocking
 from rocking import Block, InvalidBlock, InvalidOption, Solid
-from rocking.solid.mending import agreeing, closed, is_closed, joined
 from rocking.solid.moments import moments
 from rocking.solid.reading import upright
+from rocking.solid.repair import agreeing, closed, is_closed, joined
 
 SCRIPT = runpy.run_path(str(Path(__file__).resolve().parents[1] / "scripts" / "ship_statue.py"))
 SIZES = (0.6, 0.4, 1.8)
@@ -61,7 +61,7 @@ def test_a_box_is_the_rectangular_block_across_its_sides():
                 assert getattr(side, name) == pytest.approx(getattr(exact, name), rel=1e-12), name
         assert solid.inertia_over_mass[2, 2] == pytest.approx((width**2 + deep**2) / 12.0, rel=1e-12)
     assert solid.weakest_azimuth in (pytest.approx(0.0), pytest.approx(180.0))
-    assert solid.mends == () == solid.notes
+    assert solid.repairs == () == solid.notes
 
 
 def polygon_shares(count=36):
@@ -210,28 +210,28 @@ def test_parts_of_a_scene_stand_where_their_nodes_put_them(tmp_path):
     solid = Solid.from_mesh(made, density={"low": 1.0, "high": 2.0, "mirrored": 3.0})
     assert solid.mass == pytest.approx(6.0)
     assert solid.centre[2] == pytest.approx((0.5 + 2 * 1.5 + 3 * 2.5) / 6.0)
-    assert solid.mends == ()
+    assert solid.repairs == ()
 
 
-# What is mended
+# What is repaired
 
 
-def mends_of(mesh):
-    return Solid.from_mesh(mesh).mends
+def repairs_of(mesh):
+    return Solid.from_mesh(mesh).repairs
 
 
 def test_normals_that_point_inwards_are_turned():
     inverted = box()
     inverted.invert()
     assert_same(Solid.from_mesh(inverted), Solid.from_mesh(box()))
-    assert mends_of(inverted) == ("normals pointed inwards: the surface was turned inside out",)
+    assert repairs_of(inverted) == ("normals pointed inwards: the surface was turned inside out",)
 
 
 def test_faces_against_their_neighbours_are_turned():
     mixed = box()
     mixed.faces[[1, 4, 7]] = mixed.faces[[1, 4, 7], ::-1]
     assert_same(Solid.from_mesh(mixed), Solid.from_mesh(box()))
-    assert mends_of(mixed) == ("3 faces turned to agree with the neighbours",)
+    assert repairs_of(mixed) == ("3 faces turned to agree with the neighbours",)
 
 
 def test_flat_holes_are_filled_exactly_and_said_to_be():
@@ -242,7 +242,7 @@ def test_flat_holes_are_filled_exactly_and_said_to_be():
         opened = mesh_of(mesh.vertices, mesh.faces[~left_out])
         solid = Solid.from_mesh(opened)
         assert_same(solid, plain, 1e-11)
-        (said,) = solid.mends
+        (said,) = solid.repairs
         assert said.startswith(f"{count} filled, ")
         assert said.endswith("their edges are flat to 0 m") or "e-1" in said
         area = polygon_shares()[0] * 0.3**2 * int(count[0])
@@ -253,7 +253,7 @@ def test_a_hole_round_an_edge_is_filled_with_what_is_missing_known():
     opened = box((1.0, 1.0, 1.0))
     corner = np.flatnonzero(np.all(opened.vertices == [0.5, 0.5, 1.0], axis=1))
     opened.update_faces(~np.any(np.isin(opened.faces, corner), axis=1))
-    (said,) = mends_of(opened)
+    (said,) = repairs_of(opened)
     assert "1 hole filled" in said and "flat to 0 m" not in said
     assert 0.5 < Solid.from_mesh(opened).volume < 1.0
 
@@ -266,18 +266,18 @@ def test_cavities_are_hollow_and_pieces_are_not():
     both = trimesh.util.concatenate([outer, hollow])
     solid = Solid.from_mesh(both)
     assert solid.volume == pytest.approx(1.0 - 0.008)
-    assert solid.mends == ("1 cavity of 0.008 m^3 taken as hollow",)
+    assert solid.repairs == ("1 cavity of 0.008 m^3 taken as hollow",)
     inverted = both.copy()
     inverted.invert()
     assert Solid.from_mesh(inverted).volume == pytest.approx(1.0 - 0.008)
     core = Solid.from_mesh(trimesh.util.concatenate([outer, inner]))
     assert core.volume == pytest.approx(1.008)
-    assert "turn them if they are cavities" in core.mends[0]
+    assert "turn them if they are cavities" in core.repairs[0]
     apart = box((0.2, 0.2, 0.2), at=(0.0, 2.0))
     apart.invert()
     pieces = Solid.from_mesh(trimesh.util.concatenate([outer, apart]))
     assert pieces.volume == pytest.approx(1.008)
-    assert pieces.mends == ("1 separate surface turned inside out",)
+    assert pieces.repairs == ("1 separate surface turned inside out",)
 
 
 def test_faces_that_are_none_or_come_twice_are_left_out():
@@ -285,7 +285,7 @@ def test_faces_that_are_none_or_come_twice_are_left_out():
     faces = np.vstack([mesh.faces, [0, 0, 1], [2, 2, 2], mesh.faces[3], np.roll(mesh.faces[5], 1)])
     solid = Solid.from_mesh(mesh_of(mesh.vertices, faces))
     assert_same(solid, Solid.from_mesh(box()))
-    assert solid.mends == ("2 faces without area left out", "2 faces that came twice left out")
+    assert solid.repairs == ("2 faces without area left out", "2 faces that came twice left out")
 
 
 def test_a_surface_in_several_open_parts_of_one_density_is_joined():
@@ -296,7 +296,7 @@ def test_a_surface_in_several_open_parts_of_one_density_is_joined():
     )
     solid = Solid.from_mesh(halves, density=2000.0)
     assert_same(solid, Solid.from_mesh(box()))
-    assert solid.mends == ()
+    assert solid.repairs == ()
     assert [each.name for each in solid.regions] == ["left + right"]
     assert solid.mass == pytest.approx(2000.0 * math.prod(SIZES))
 
@@ -417,7 +417,7 @@ def test_the_statue_is_what_quadrature_over_its_cross_sections_says():
     assert solid.mass == pytest.approx(masses.sum(), rel=1e-8)
     np.testing.assert_allclose(solid.centre, centre, rtol=1e-8)
     np.testing.assert_allclose(solid.inertia_over_mass, inertia, rtol=1e-8, atol=1e-9)
-    assert solid.mends == ()
+    assert solid.repairs == ()
 
 
 # What is refused

@@ -11,20 +11,16 @@ import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
-from rocking.bisection import bisected
-from rocking.block.limits import checked_parameter
 from rocking.block.restitution import Restitution, Varying, one_sided_restitution
-from rocking.block.restraints import Held, Load, Pivot, Restraint, Tendon, Yielding
-from rocking.block.single import Block, Side, block_of_sides, one_block
+from rocking.block.restraints import Held, Load, Restraint, Tendon, Yielding
+from rocking.block.single import Block, Side, one_block
+from rocking.block.standing import balance_of, carrying, leaning, pivots_of, with_restitution
 from rocking.body import KINDS, ContactLaw, Coordinate
 from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 
 _ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
-
-#: Rotations at which the balance is looked for, on each side.
-_LOOKS: Final = 512
 
 
 @dataclass(frozen=True)
@@ -100,15 +96,15 @@ class RestrainedBlock:
             raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
         tilt = checks.finite(lean, "lean", InvalidBlock)
         loads = [each for each in restraints if isinstance(each, Load) and each.follows]
-        standing = _leaning(_carrying(own, loads), tilt)
+        standing = leaning(carrying(own, loads), tilt)
         if one_sided and restitution is None:
             restitution = one_sided_restitution(own.sides[0].alpha)
         varying = Varying(), Varying()
         if isinstance(restitution, Restitution):
             varying = restitution._varying()
         if restitution is not None:
-            standing = _with_restitution(standing, restitution)
-        pivots = _pivots(standing, tilt)
+            standing = with_restitution(standing, restitution)
+        pivots = pivots_of(standing, tilt)
         held = [Held(), Held()]
         for each in restraints:
             held = [of_side.plus(each._held(pivot)) for of_side, pivot in zip(held, pivots, strict=True)]
@@ -145,7 +141,7 @@ class RestrainedBlock:
     @property
     def balance(self) -> tuple[float, float]:
         """Rotation of the unstable balance on each side, rad; infinite where the restraints hold it at any rotation."""
-        plus, minus = map(_balance, self.block.sides, self._held, self._tendon)
+        plus, minus = map(balance_of, self.block.sides, self._held, self._tendon)
         return plus, math.inf if self.is_one_sided else minus
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
@@ -170,7 +166,7 @@ class RestrainedBlock:
         horizontal, vertical = self.block.contact(motion, ground_over_g, side)
         if not self.restraints or self.block.mass is None:
             return horizontal, vertical
-        pivots, weight = _pivots(self.block, self.lean), self.block.mass * self.gravity
+        pivots, weight = pivots_of(self.block, self.lean), self.block.mass * self.gravity
         for each in self.restraints:
             across, up = each._acting(pivots, motion[0], side)
             horizontal, vertical = horizontal - across / weight, vertical - up / weight
@@ -197,7 +193,7 @@ class RestrainedBlock:
         >>> [[round(value, 6) for value in each] for each in column.tendons_at((0.02, 0.01))]
         [[0.004, 2799.986667, 0.0]]
         """
-        pivots = _pivots(self.block, self.lean)
+        pivots = pivots_of(self.block, self.lean)
         tendons = [each for each in self.restraints or () if isinstance(each, Tendon)]
         return [each._stretched(pivots, largest) for each in tendons]
 
@@ -446,90 +442,6 @@ def _fill(
     for name, value in zip(names, values, strict=True):
         object.__setattr__(made, name, value)
     return made
-
-
-def _carrying(block: Block, loads: Sequence[Load]) -> Block:
-    """Return the rigid body of a block and the loads that follow it."""
-    if not loads:
-        return block
-    assert block.mass is not None
-    plus = block.sides[0]
-    height, (right, left) = plus.radius * math.cos(plus.alpha), _distances(block)
-    masses = np.array([block.mass, *(load.mass for load in loads)])
-    across = np.array([0.0, *(load.offset for load in loads)])
-    up = np.array([height, *(load.height for load in loads)])
-    share = masses / masses.sum()
-    x, z = float(share @ across), float(share @ up)
-    own = block.gravity * plus.radius / plus.p**2 - plus.radius**2
-    gyration = float(share[0] * own + share @ ((across - x) ** 2 + (up - z) ** 2))
-    return Block.from_pivots(
-        (right - x, left + x), z, math.sqrt(gyration), mass=float(masses.sum()), gravity=block.gravity
-    )
-
-
-def _leaning(block: Block, lean: float) -> Block:
-    """Return a block that leans to side + by an angle."""
-    if lean == 0.0:
-        return block
-    plus, minus = block.sides
-    if not -minus.alpha < lean < plus.alpha:
-        raise InvalidBlock(
-            f"a block whose {{}} is {lean:g} rad falls: from {-minus.alpha:.4g} to {plus.alpha:.4g} rad it stands",
-            "lean",
-            value=lean,
-        )
-    sides = replace(plus, alpha=plus.alpha - lean), replace(minus, alpha=minus.alpha + lean)
-    return block_of_sides(Block.__new__(Block), sides, block.gravity, block.description, block.mass)
-
-
-def _with_restitution(block: Block, restitution: float | Sequence[float] | Restitution) -> Block:
-    """Return a block with another restitution."""
-    given = restitution._factors() if isinstance(restitution, Restitution) else restitution
-    factors = np.broadcast_to(checks.numbers(given, "restitution", InvalidBlock), 2).tolist()
-    plus, minus = (
-        replace(side, restitution=checked_parameter(factor, "restitution"))
-        for side, factor in zip(block.sides, factors, strict=True)
-    )
-    return block_of_sides(Block.__new__(Block), (plus, minus), block.gravity, block.description, block.mass)
-
-
-def _distances(block: Block) -> tuple[float, float]:
-    """Distances of the pivots from the centre of mass along the base, m."""
-    plus, minus = block.sides
-    return plus.radius * math.sin(plus.alpha), minus.radius * math.sin(minus.alpha)
-
-
-def _pivots(block: Block, lean: float) -> tuple[Pivot, Pivot]:
-    """Both sides of a block that leans, as restraints see them."""
-    weight = math.nan if block.mass is None else block.mass * block.gravity
-    plus, minus = (
-        Pivot(
-            sign, side.alpha, sign * lean, side.radius * math.sin(side.alpha + sign * lean), side.p,
-            weight * side.radius, block.gravity,
-        )
-        for sign, side in zip((1.0, -1.0), block.sides, strict=True)
-    )  # fmt: skip
-    return plus, minus
-
-
-def _balance(side: Side, held: Held, tendon: Yielding) -> float:
-    """First rotation at which what brings a block back has become nothing, without ground motion, rad.
-
-    A tendon that yields does so for the first time.
-    """
-
-    def moment(u: float) -> float:
-        own = (1.0 + held.sine) * math.sin(side.alpha - u) + held.cosine * math.cos(side.alpha - u)
-        stretch = min(2.0 * tendon.opening * math.sin(0.5 * u), tendon.yields) - tendon.slack
-        return own + (held.prestress + tendon.stiffness * stretch) * math.cos(0.5 * u) + held.spring * u
-
-    looks = np.linspace(0.0, 0.5 * math.pi, _LOOKS)
-    values = np.array([moment(u) for u in looks.tolist()])
-    negative = np.flatnonzero(values[1:] <= 0.0)
-    if not len(negative):
-        return math.inf
-    k = int(negative[0])
-    return bisected(float(looks[k]), float(looks[k + 1]), lambda u: moment(u) <= 0.0)[1]
 
 
 KINDS[RestrainedBlocks.kind] = RestrainedBlocks

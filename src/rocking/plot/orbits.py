@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _STABLE: Final[dict[str, Any]] = {"color": INK, "linewidth": 1.4, "linestyle": "-"}
 _UNSTABLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
-#: Room above a branch for the words at its marks, over its height.
+#: Space above a branch for the words at its marks, over its height.
 _ROOM: Final = 0.12
 
 

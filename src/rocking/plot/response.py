@@ -31,7 +31,7 @@ RotationUnits = Literal["slenderness", "rad", "deg"]
 #: Rotations beyond this multiple of the slenderness leave the frame: past it a block only falls.
 LARGEST_RATIO_SHOWN: Final = 2.0
 
-#: A figure at least so wide (inches) has room for the chattering sequence beside the histories.
+#: A figure at least so wide (inches) has space for the chattering sequence beside the histories.
 _WIDE: Final = 5.5
 
 _Y_LABELS: Final = {"slenderness": "rotation / {}", "rad": "rotation (rad)", "deg": "rotation (°)"}
@@ -172,7 +172,7 @@ def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats, lim
     lowest = max(float(np.min(drawn, initial=0.0)), LARGEST_RATIO_SHOWN * float(tipping[0]))
     highest = min(float(np.max(drawn, initial=0.0)), LARGEST_RATIO_SHOWN * float(tipping[1]))
     span = (highest - lowest) or 1.0
-    # Room below for the marks of the impacts and uplifts.
+    # Space below for the marks of the impacts and uplifts.
     low, high = axes.set_ylim(lowest - 0.28 * span, highest + 0.1 * span)
     label = "tipping, θ = ±α" if limit == "slenderness" else "unstable balance without ground motion"
     for level in tipping[(tipping > low) & (tipping < high)]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: Up to so many motions are named; of so few there is nothing to take fractiles of, either.
 _FEW: Final = 2
 
-#: So many curves leave room for all of their fractiles, and so many for every motion.
+#: So many curves leave space for all of their fractiles, and so many for every motion.
 _WITH_ALL_FRACTILES: Final = 2
 _WITH_ALL_MOTIONS: Final = 4
 

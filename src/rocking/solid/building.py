@@ -14,9 +14,9 @@ from rocking.errors import InvalidBlock
 from rocking.motion.directions import sine_cosine
 from rocking.plausibility import height_notes
 from rocking.solid import support as polygons
-from rocking.solid.mending import Surface, agreeing, closed, is_closed, joined
 from rocking.solid.moments import moments, together
 from rocking.solid.reading import length_of, parts_of, upright
+from rocking.solid.repair import Surface, agreeing, closed, is_closed, joined
 
 if TYPE_CHECKING:
     from rocking.solid.reading import Mesh, Part
@@ -76,7 +76,7 @@ def properties(
         "description": found.name,
         "height": height,
         "regions": [Region(*each) for each in zip(names, (each.amount for each in inside), used, strict=True)],
-        "mends": _all_mends(names, surfaces),
+        "repairs": _all_repairs(names, surfaces),
         "notes": (*notes, *height_notes(height)),
     }
 
@@ -121,13 +121,13 @@ def _surfaces(parts: Sequence[Part], uniform: bool) -> tuple[list[str], list[Sur
     return names, [closed(surface) for surface in found]
 
 
-def _all_mends(names: Sequence[str], surfaces: Sequence[Surface]) -> tuple[str, ...]:
-    """All that was mended, each with the part if there are several."""
+def _all_repairs(names: Sequence[str], surfaces: Sequence[Surface]) -> tuple[str, ...]:
+    """All that was repaired, each with the part if there are several."""
     several = len(names) > 1
     return tuple(
         f"{name}: {sentence}" if several else sentence
         for name, surface in zip(names, surfaces, strict=True)
-        for sentence in surface.mends
+        for sentence in surface.repairs
     )
 
 

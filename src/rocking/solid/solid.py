@@ -54,7 +54,7 @@ class Solid(Result):
         Its height, m.
     regions : sequence of Region
         Its parts, each with its name, volume (m^3) and density (kg/m^3).
-    mends : sequence of str
+    repairs : sequence of str
         What was done to the mesh to close its surface.
     notes : sequence of str
         What looks like a mistake.
@@ -89,7 +89,7 @@ class Solid(Result):
     description: str = "rigid body"
     height: float | None = None
     regions: tuple[Region, ...] = ()
-    mends: tuple[str, ...] = ()
+    repairs: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -105,7 +105,7 @@ class Solid(Result):
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
             object.__setattr__(self, name, value)
-        for name in ("regions", "mends", "notes"):
+        for name in ("regions", "repairs", "notes"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         checks.positive(self.centre[2], "height of the centre of mass", InvalidBlock, "m")
         facing, distances = polygons.edges(self._about_centre)
@@ -160,7 +160,7 @@ class Solid(Result):
         Returns
         -------
         Solid
-            With what was mended: triangles that are turned otherwise than their neighbours, holes, and normals that
+            With what was repaired: triangles that are turned otherwise than their neighbours, holes, and normals that
             point inwards.
 
         Raises
@@ -295,7 +295,7 @@ class Solid(Result):
                 f"alpha {one['alpha']:.4g} rad, p {one['p']:.4g} rad/s"),
             Row("left out there", f"products of inertia, {one['coupling']:.2g} of the moment; pivot {one['aside']:.2g} "
                 f"m to the side of the centre of mass, {one['gap']:.2g} m from facing the other one"),
-            *(Row("mended", sentence) for sentence in self.mends),
+            *(Row("repaired", sentence) for sentence in self.repairs),
             *(Row("note", sentence) for sentence in self.notes),
         ]  # fmt: skip
         return f"{self._headline()}\n\n{text_of(rows, _NAMES)}"
@@ -324,7 +324,7 @@ class Solid(Result):
                 )
                 for each in self.regions
             ],
-            "mends": [*self.mends],
+            "repairs": [*self.repairs],
             "notes": [*self.notes],
         }
 

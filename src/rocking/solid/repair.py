@@ -22,11 +22,11 @@ _SAME: Final = 1e-8
 
 
 class Surface(NamedTuple):
-    """Corners, m, shape (n, 3), triangles, shape (m, 3), and what was mended."""
+    """Corners, m, shape (n, 3), triangles, shape (m, 3), and what was repaired."""
 
     vertices: Floats
     faces: Integers
-    mends: tuple[str, ...] = ()
+    repairs: tuple[str, ...] = ()
 
 
 def is_closed(faces: Integers) -> bool:
@@ -48,29 +48,29 @@ def joined(vertices: Floats, faces: Integers) -> Surface:
     # Each begins with its least corner, so that those of one orientation are equal.
     turned = np.take_along_axis(kept, (np.argmin(kept, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     unique = np.sort(np.unique(turned, axis=0, return_index=True)[1])
-    mends = []
+    repairs = []
     if not whole.all():
-        mends.append(f"{counted(int(np.sum(~whole)), 'face')} without area left out")
+        repairs.append(f"{counted(int(np.sum(~whole)), 'face')} without area left out")
     if len(unique) < len(kept):
-        mends.append(f"{counted(len(kept) - len(unique), 'face')} that came twice left out")
-    return Surface(vertices[first], kept[unique], tuple(mends))
+        repairs.append(f"{counted(len(kept) - len(unique), 'face')} that came twice left out")
+    return Surface(vertices[first], kept[unique], tuple(repairs))
 
 
 def agreeing(surface: Surface) -> Surface:
     """Turn triangles to agree with their neighbours."""
-    vertices, faces, mends = surface
+    vertices, faces, repairs = surface
     turned = _against_neighbours(faces)
     if not turned.any():
         return surface
     said = f"{counted(int(turned.sum()), 'face')} turned to agree with the neighbours"
-    return Surface(vertices, np.where(turned[:, None], faces[:, ::-1], faces), (*mends, said))
+    return Surface(vertices, np.where(turned[:, None], faces[:, ::-1], faces), (*repairs, said))
 
 
 def closed(surface: Surface) -> Surface:
     """Fill the holes of a surface whose triangles agree, and turn its normals outwards."""
     vertices, faces, filled = _filled(surface.vertices, surface.faces)
     faces, outward = _outward(vertices, faces)
-    return Surface(vertices, faces, (*surface.mends, *filled, *outward))
+    return Surface(vertices, faces, (*surface.repairs, *filled, *outward))
 
 
 def _edges(faces: Integers) -> Integers:
@@ -162,10 +162,10 @@ def _outward(vertices: Floats, faces: Integers) -> tuple[Integers, tuple[str, ..
     label = label.reshape(-1)
     volume = np.bincount(label, weights=signed_volumes(vertices, faces))
     largest = int(np.argmax(np.abs(volume)))
-    mends: list[str] = []
+    repairs: list[str] = []
     sign = np.ones(len(shells))
     if volume[largest] < 0.0:
-        mends.append("normals pointed inwards: the surface was turned inside out")
+        repairs.append("normals pointed inwards: the surface was turned inside out")
         sign[:] = -1.0
     cavities, apart, inner = [], 0, 0
     for k in range(len(shells)):
@@ -183,15 +183,15 @@ def _outward(vertices: Floats, faces: Integers) -> tuple[Integers, tuple[str, ..
             inner += 1
     if cavities:
         said = "1 cavity" if len(cavities) == 1 else f"{len(cavities)} cavities"
-        mends.append(f"{said} of {sum(cavities):.3g} m^3 taken as hollow")
+        repairs.append(f"{said} of {sum(cavities):.3g} m^3 taken as hollow")
     if apart:
-        mends.append(f"{counted(apart, 'separate surface')} turned inside out")
+        repairs.append(f"{counted(apart, 'separate surface')} turned inside out")
     if inner:
-        mends.append(
+        repairs.append(
             f"{counted(inner, 'closed surface')} inside another with normals outwards counted as more of the material; "
             "turn them if they are cavities"
         )
-    return np.where(sign[label][:, None] < 0.0, faces[:, ::-1], faces), tuple(mends)
+    return np.where(sign[label][:, None] < 0.0, faces[:, ::-1], faces), tuple(repairs)
 
 
 def _winding(vertices: Floats, faces: Integers, place: Floats) -> float:

@@ -1,0 +1,105 @@
+"""A block as it stands: with the loads that follow it, leaning, its pivots as restraints see them, and its balance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from rocking import checks
+from rocking.bisection import bisected
+from rocking.block.limits import checked_parameter
+from rocking.block.restitution import Restitution
+from rocking.block.restraints import Held, Load, Pivot, Yielding
+from rocking.block.single import Block, Side, block_of_sides
+from rocking.errors import InvalidBlock
+
+#: Rotations at which the balance is looked for, on each side.
+_LOOKS: Final = 512
+
+
+def carrying(block: Block, loads: Sequence[Load]) -> Block:
+    """Return the rigid body of a block and the loads that follow it."""
+    if not loads:
+        return block
+    assert block.mass is not None
+    plus = block.sides[0]
+    height, (right, left) = plus.radius * math.cos(plus.alpha), distances_of(block)
+    masses = np.array([block.mass, *(load.mass for load in loads)])
+    across = np.array([0.0, *(load.offset for load in loads)])
+    up = np.array([height, *(load.height for load in loads)])
+    share = masses / masses.sum()
+    x, z = float(share @ across), float(share @ up)
+    own = block.gravity * plus.radius / plus.p**2 - plus.radius**2
+    gyration = float(share[0] * own + share @ ((across - x) ** 2 + (up - z) ** 2))
+    return Block.from_pivots(
+        (right - x, left + x), z, math.sqrt(gyration), mass=float(masses.sum()), gravity=block.gravity
+    )
+
+
+def leaning(block: Block, lean: float) -> Block:
+    """Return a block that leans to side + by an angle."""
+    if lean == 0.0:
+        return block
+    plus, minus = block.sides
+    if not -minus.alpha < lean < plus.alpha:
+        raise InvalidBlock(
+            f"a block whose {{}} is {lean:g} rad falls: from {-minus.alpha:.4g} to {plus.alpha:.4g} rad it stands",
+            "lean",
+            value=lean,
+        )
+    sides = replace(plus, alpha=plus.alpha - lean), replace(minus, alpha=minus.alpha + lean)
+    return block_of_sides(Block.__new__(Block), sides, block.gravity, block.description, block.mass)
+
+
+def with_restitution(block: Block, restitution: float | Sequence[float] | Restitution) -> Block:
+    """Return a block with another restitution."""
+    given = restitution._factors() if isinstance(restitution, Restitution) else restitution
+    factors = np.broadcast_to(checks.numbers(given, "restitution", InvalidBlock), 2).tolist()
+    plus, minus = (
+        replace(side, restitution=checked_parameter(factor, "restitution"))
+        for side, factor in zip(block.sides, factors, strict=True)
+    )
+    return block_of_sides(Block.__new__(Block), (plus, minus), block.gravity, block.description, block.mass)
+
+
+def distances_of(block: Block) -> tuple[float, float]:
+    """Distances of the pivots from the centre of mass along the base, m."""
+    plus, minus = block.sides
+    return plus.radius * math.sin(plus.alpha), minus.radius * math.sin(minus.alpha)
+
+
+def pivots_of(block: Block, lean: float) -> tuple[Pivot, Pivot]:
+    """Both sides of a block that leans, as restraints see them."""
+    weight = math.nan if block.mass is None else block.mass * block.gravity
+    plus, minus = (
+        Pivot(
+            sign, side.alpha, sign * lean, side.radius * math.sin(side.alpha + sign * lean), side.p,
+            weight * side.radius, block.gravity,
+        )
+        for sign, side in zip((1.0, -1.0), block.sides, strict=True)
+    )  # fmt: skip
+    return plus, minus
+
+
+def balance_of(side: Side, held: Held, tendon: Yielding) -> float:
+    """First rotation at which what brings a block back has become nothing, without ground motion, rad.
+
+    A tendon that yields does so for the first time.
+    """
+
+    def moment(u: float) -> float:
+        own = (1.0 + held.sine) * math.sin(side.alpha - u) + held.cosine * math.cos(side.alpha - u)
+        stretch = min(2.0 * tendon.opening * math.sin(0.5 * u), tendon.yields) - tendon.slack
+        return own + (held.prestress + tendon.stiffness * stretch) * math.cos(0.5 * u) + held.spring * u
+
+    looks = np.linspace(0.0, 0.5 * math.pi, _LOOKS)
+    values = np.array([moment(u) for u in looks.tolist()])
+    negative = np.flatnonzero(values[1:] <= 0.0)
+    if not len(negative):
+        return math.inf
+    k = int(negative[0])
+    return bisected(float(looks[k]), float(looks[k + 1]), lambda u: moment(u) <= 0.0)[1]
