@@ -43,19 +43,29 @@ browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chrom
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
 	$(PYTEST) -m slow
 
-lowest: ## install the oldest versions that pyproject.toml allows, and run a test of every part with them
-	$(PYTHON) scripts/lowest_versions.py > .lowest.txt
-	@ROCKING_SHIPPED=0 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest PACKAGE=. CONSTRAINTS="-c .lowest.txt"
+lowest: .venv-lowest/.installed ## run a test of every part with the oldest versions that pyproject.toml allows
+	@ROCKING_SHIPPED=0 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest PACKAGE=.
 
-latest: wheel ## the same with the versions of the day, and with the compiled kernels of the wheel
+latest: wheel .venv-latest/.installed ## the same with the versions of the day, and with the compiled kernels of the wheel
 	@ROCKING_LIBRARY_REQUIRED=1 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-latest \
-	    PACKAGE="$$(ls $(CURDIR)/dist/rocking-*.whl)" CONSTRAINTS=
+	    PACKAGE="$$(ls $(CURDIR)/dist/rocking-*.whl)"
 
 .bounds:
-	@test -x $(ENVIRONMENT)/bin/python || $(PYTHON) -m venv $(ENVIRONMENT)
-	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq --no-compile $(CONSTRAINTS) "$(PACKAGE)[test,explorer]"
 	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq --no-deps --force-reinstall "$(PACKAGE)"
 	$(PYTEST:$(BIN)/%=$(ENVIRONMENT)/bin/%) -m $(FAST) $(EVERY_PART)
+
+.lowest.txt: pyproject.toml scripts/lowest_versions.py
+	$(PYTHON) scripts/lowest_versions.py > $@
+
+# What the versions of the day are is asked each time.
+.PHONY: .venv-latest/.installed
+.venv-latest/.installed: CONSTRAINTS :=
+.venv-lowest/.installed: CONSTRAINTS := -c .lowest.txt
+.venv-lowest/.installed: .lowest.txt
+.venv-lowest/.installed .venv-latest/.installed: .venv-%/.installed:
+	@test -x .venv-$*/bin/python || $(PYTHON) -m venv .venv-$*
+	.venv-$*/bin/python -m pip install --disable-pip-version-check -qq --no-compile $(CONSTRAINTS) ".[test,explorer]"
+	@touch $@
 
 doctest: .venv/.all ## run the examples in the docstrings
 	$(BIN)/python -m pytest --doctest-modules src/rocking

@@ -2,8 +2,9 @@
 
 python scripts/ship_kernels.py            # build/shipped: a library for each level of the processor, and a manifest
 
-numba compiles each kernel for the types that `rocking.kernels.signatures` lists. Of what it makes, the kernel's own
-function is kept; a function around it unpacks arguments from the eight bytes each that `rocking.kernels.library` packs.
+numba brings each kernel into LLVM's language for the types that `rocking.kernels.signatures` lists, once; all of them
+are then optimised together for each level, so that what several kernels call is in a library once. A function around
+each kernel unpacks arguments from the eight bytes each that `rocking.kernels.library` packs.
 """
 
 from __future__ import annotations
@@ -160,37 +161,66 @@ class Unpacking:
         return "\n".join([*lines, f"  %result = load {result}, ptr %own", f"  ret {result} %result", "}"])
 
 
-def compiled(level: str, folder: Path, names: Collection[str]) -> dict[str, list[dict[str, Any]]]:
-    """Compile kernels, all by default, for a level, in a process whose numba was told so; objects go to a folder."""
+def lower(names: Collection[str], folder: Path) -> None:
+    """Write kernels in LLVM's language, with all that they call and not optimised yet; in a process for this alone.
+
+    To the folder go their code, that of the functions around them, and the manifest's part about them.
+    """
     import llvmlite.binding as llvm
     import numba
 
+    from rocking.kernels import compiler
     from rocking.kernels.signatures import named, signatures
 
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    llvm.initialize_native_asmparser()
-    target = llvm.Target.from_triple(llvm.get_process_triple())
-    machine = target.create_target_machine(cpu=level, features="", opt=3, reloc="pic", codemodel="default")
+    module, linked, around = llvm.parse_assembly(""), set(), []
     manifest: dict[str, list[dict[str, Any]]] = {}
     every = signatures()
-    for name, several in every.items() if not names else ((name, every[name]) for name in names):
-        kernel = named(name)
-        for number, arguments in enumerate(several):
+    # A part is kept as it is before it is optimised; a kernel may call another one.
+    parts = {name: compiler.part_of(named(name).py_func, None, inline=False) for name in every}
+    for name, part in parts.items():
+        if not isinstance(part, compiler.Part):
+            raise RuntimeError(f"numba {numba.__version__} lacks members of its libraries that this script needs")
+        vars(named(name))["compiled"] = part
+    for name in names or every:
+        part = parts[name]
+        for number, arguments in enumerate(every[name]):
             kinds = tuple(numba.typeof(argument) for argument in arguments)
-            kernel.prepare(*arguments)
-            made = kernel.compiled.overloads[kinds]
+            part.dispatcher.compile(kinds)
+            made = part.dispatcher.overloads[kinds]
+            # What nothing refers to so far is dropped by linking: a kernel comes before its parts.
+            module.link_in(llvm.parse_assembly(made.library.get_llvm_str()))
+            for needed in made.library.with_needed()[1:]:
+                if needed not in linked:
+                    module.link_in(needed._get_module_for_linking(), preserve=True)
+                    linked.add(needed)
             symbol = f"rocking_{name.replace('.', '_')}_{number}"
             unpacking = Unpacking()
             for kind in kinds:
                 unpacking.take(kind)
             returns = numbers_of(made.signature.return_type)
-            around = unpacking.text(symbol, f'"{made.fndesc.llvm_func_name}"', returns)
-            path = folder / f"{symbol}.o"
-            path.write_bytes(object_of(made.library.get_llvm_str() + "\n" + around, symbol, machine))
+            around.append(unpacking.text(symbol, f'"{made.fndesc.llvm_func_name}"', returns))
             what = {"symbol": symbol, "arguments": [described(kind) for kind in kinds], "returns": returns}
             manifest.setdefault(f"rocking.kernels.{name}", []).append(what)
-    return manifest
+    (folder / "kernels.ll").write_text(str(module), "utf-8")
+    (folder / "around.ll").write_text("\n".join(around), "utf-8")
+    (folder / "kernels.json").write_text(json.dumps(manifest), "utf-8")
+
+
+def optimise(level: str, folder: Path) -> None:
+    """Write machine code of what `lower` has written, optimised for a level as numba does it there."""
+    import llvmlite.binding as llvm
+    from numba.core.codegen import AOTCPUCodegen
+    from numba.core.compiler_lock import global_compiler_lock
+
+    llvm.initialize_native_asmparser()
+    made = AOTCPUCodegen("rocking", level).create_library("kernels")
+    with global_compiler_lock:
+        made.add_llvm_module(llvm.parse_assembly((folder / "kernels.ll").read_text("utf-8")))
+        made.finalize()
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    machine = target.create_target_machine(cpu=level, features="", opt=3, reloc="pic", codemodel="default")
+    around = (folder / "around.ll").read_text("utf-8")
+    (folder / f"{level}.o").write_bytes(object_of(f"{made.get_llvm_str()}\n{around}", machine))
 
 
 def numbers_of(returned: Any) -> list[str]:
@@ -202,13 +232,13 @@ def numbers_of(returned: Any) -> list[str]:
     return [described(member) for member in (returned.types if isinstance(returned, types.BaseTuple) else [returned])]
 
 
-def object_of(text: str, symbol: str, machine: Any) -> bytes:
-    """Machine code of one function of a module, with what it calls and nothing else."""
+def object_of(text: str, machine: Any) -> bytes:
+    """Machine code of the functions of a module that are named as kernels are, with what they call and nothing else."""
     import llvmlite.binding as llvm
 
     module = llvm.parse_assembly(text)
     for each in [*module.functions, *module.global_variables]:
-        if not each.is_declaration and each.name != symbol and each.linkage != llvm.Linkage.private:
+        if not (each.is_declaration or each.name.startswith("rocking_") or each.linkage == llvm.Linkage.private):
             each.linkage = llvm.Linkage.internal
     builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
     passes = llvm.create_new_module_pass_manager()
@@ -219,8 +249,8 @@ def object_of(text: str, symbol: str, machine: Any) -> bytes:
     known = (re.fullmatch(r"llvm\.(\w+)\.f(32|64)", name) for name in declared)
     wanted = {name for name in declared if not name.startswith("llvm.")}
     wanted |= {each[1] + ("f" if each[2] == "32" else "") for each in known if each}
-    if unknown := {name for name in wanted if name.startswith(("numba", "NRT", "Py"))}:
-        raise RuntimeError(f"{symbol} needs {', '.join(sorted(unknown))}, which only numba and Python have")
+    if unknown := {name for name in wanted if name.startswith(("numba", "NRT", "Py", "_ZN"))}:
+        raise RuntimeError(f"kernels need {', '.join(sorted(unknown))}, which only numba and Python have")
     if platform.libc_ver()[0] == "glibc":
         first = FIRST_VERSION[platform.machine()]
         versions = "\n".join(f'module asm ".symver {name},{name}@{first}"' for name in sorted(wanted))
@@ -229,23 +259,16 @@ def object_of(text: str, symbol: str, machine: Any) -> bytes:
     return code
 
 
-def library(level: str, out: Path, names: Collection[str] = ()) -> dict[str, Any]:
-    """Compile and link the library of a level; return the manifest's part about kernels."""
-    with tempfile.TemporaryDirectory() as folder:
-        environment = os.environ | {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": folder}
-        command = [sys.executable, __file__, "--level", level, "--out", folder, *names]
-        subprocess.run(command, env=environment | {"ROCKING_SHIPPED": "0"}, check=True)
-        source = Path(folder) / "processor.c"
-        source.write_text(PROCESSOR[platform.machine().lower()], "utf-8")
-        objects = sorted(str(path) for path in Path(folder).glob("*.o"))
-        name = out / f"kernels-{level}{SUFFIX}"
-        strip = [] if sys.platform == "darwin" else ["-Wl,--strip-all", "-Wl,-z,noexecstack"]
-        subprocess.run(
-            ["cc", "-O2", "-fPIC", "-shared", *strip, "-o", str(name), str(source), *objects, "-lm"], check=True
-        )
-        kernels: dict[str, Any] = json.loads((Path(folder) / "kernels.json").read_text("utf-8"))
-    print(f"{name.name}: {name.stat().st_size / 1e6:.2f} MB, {len(objects)} functions")
-    return kernels
+def library(level: str, folder: Path, out: Path) -> None:
+    """Compile and link the library of a level of what `lower` has written to a folder."""
+    subprocess.run([sys.executable, __file__, "--level", level, "--folder", str(folder)], check=True)
+    source = folder / f"{level}.c"
+    source.write_text(PROCESSOR[platform.machine().lower()], "utf-8")
+    name = out / f"kernels-{level}{SUFFIX}"
+    strip = [] if sys.platform == "darwin" else ["-Wl,--strip-all", "-Wl,-z,noexecstack"]
+    made = [str(name), str(source), str(folder / f"{level}.o")]
+    subprocess.run(["cc", "-O2", "-fPIC", "-shared", *strip, "-o", *made, "-lm"], check=True)
+    print(f"{name.name}: {name.stat().st_size / 1e6:.2f} MB")
 
 
 def ship(out: Path, levels: list[str], names: Collection[str] = ()) -> None:
@@ -255,8 +278,14 @@ def ship(out: Path, levels: list[str], names: Collection[str] = ()) -> None:
     if is_made(out, made_from, files):
         print(f"{out}: made from these sources already")
         return
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        kernels, *_ = pool.map(library, levels, [out] * len(levels), [names] * len(levels))
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        # What numba compiles for itself beside the kernels runs on every processor, too.
+        least = {"NUMBA_CPU_NAME": levels[0], "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": name}
+        subprocess.run([sys.executable, __file__, "--folder", name, *names], env=os.environ | least, check=True)
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(library, levels, [folder] * len(levels), [out] * len(levels)))
+        kernels = json.loads((folder / "kernels.json").read_text("utf-8"))
     libraries = {path.name: digest(path) for path in files}
     manifest = {**made_from, "platform": tag(files), "libraries": libraries, "kernels": kernels}
     (out / "manifest.json").write_text(json.dumps(manifest), "utf-8")
@@ -306,15 +335,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", type=Path, default=OUT, help="folder for libraries and manifest")
     parser.add_argument("kernels", nargs="*", help="names of kernels; by default all")
-    parser.add_argument("--level", help="compile for this level alone (used by the script itself)")
+    parser.add_argument("--folder", type=Path, help="do one step with it (used by the script itself)")
+    parser.add_argument("--level", help="that for this level")
     options = parser.parse_args()
     if shutil.which("cc") is None:
         sys.exit("error: a C compiler (cc) links the libraries: install one, or make a wheel without them: pip wheel .")
-    options.out.mkdir(parents=True, exist_ok=True)
     if options.level:
-        kernels = compiled(options.level, options.out, options.kernels)
-        (options.out / "kernels.json").write_text(json.dumps(kernels), "utf-8")
+        optimise(options.level, options.folder)
         return
+    if options.folder:
+        lower(options.kernels, options.folder)
+        return
+    options.out.mkdir(parents=True, exist_ok=True)
     ship(options.out, LEVELS[platform.machine().lower()], options.kernels)
 
 

@@ -72,7 +72,7 @@ def test_bifurcation_writes_what_it_says(run, tmp_path):
         pytest.param(
             ["--pendulum", "p=3,gap=0.1,restitution=0.6"],
             dynamics.InvertedPendulum(3.0, 0.1, 0.6),
-            marks=pytest.mark.thorough,
+            marks=pytest.mark.slow,
         ),
     ],
 )

@@ -15,7 +15,7 @@ import pytest
 from oracles import referee
 from oracles.referee import Batch, Verdict
 
-QUICK, LONGER, LONG = 200, 2_000, 40_000
+QUICK, LONGER, LONG = 200, 1_000, 40_000
 LAW_BATCHES = 12
 
 vertical = pytest.mark.parametrize("vertical", [False, True], ids=["horizontal", "vertical"])

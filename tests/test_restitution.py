@@ -168,9 +168,11 @@ def test_impacts_are_those_of_an_integration():
     assert compared([13, 14, 17, 35]) >= 20
 
 
-@pytest.mark.thorough
-def test_impacts_are_those_of_an_integration_over_wide_ranges():
-    assert compared(range(90)) >= 150
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(range(40), marks=pytest.mark.thorough), pytest.param(range(40, 120), marks=pytest.mark.slow)]
+)
+def test_impacts_are_those_of_an_integration_over_wide_ranges(seeds):
+    assert compared(seeds) >= 1.5 * len(seeds)
 
 
 # ---- Proofs ----

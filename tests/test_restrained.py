@@ -96,12 +96,15 @@ def test_restrained_blocks_move_as_forces_on_their_points_make_them():
     assert (impacts, peaks, overturned) >= (20, 1, 5)
 
 
-@pytest.mark.thorough
-def test_restrained_blocks_move_so_over_wide_ranges():
-    impacts, peaks, overturned = compared(range(16, 120))
-    assert impacts > 150
-    assert peaks > 20
-    assert overturned > 40
+@pytest.mark.parametrize(
+    "seeds",
+    [pytest.param(range(16, 50), marks=pytest.mark.thorough), pytest.param(range(50, 120), marks=pytest.mark.slow)],
+)
+def test_restrained_blocks_move_so_over_wide_ranges(seeds):
+    impacts, peaks, overturned = compared(seeds)
+    assert impacts > 1.4 * len(seeds)
+    assert peaks > 0.15 * len(seeds)
+    assert overturned > 0.35 * len(seeds)
 
 
 def of_restraints(body, j, u):
