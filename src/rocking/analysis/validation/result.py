@@ -137,8 +137,8 @@ class Repeatability:
     @property
     def expectation(self) -> str:
         """What is expected, in words."""
-        own = f"expected {self.expected:.3g} ({self.lower:.3g} to {self.upper:.3g}) with a block of its own in each"
-        return own if math.isnan(self.same_block) else f"{own}, {self.same_block:.3g} with one block in all of a set"
+        own = f"expected {self.expected:.2g} ({self.lower:.2g} to {self.upper:.2g}) with a block of its own in each"
+        return own if math.isnan(self.same_block) else f"{own}, {self.same_block:.2g} with one block in all of a set"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -246,7 +246,8 @@ class ModelValidation(DrawnResult, TableResult):
             ("peaks have a standard deviation of", self.repeated_peaks, " rad"),
         ):
             if one is not None:
-                parts.append(f"repetitions, {one.sizes}: {what} {one.observed:.3g}{unit}; {one.expectation}")
+                parts.append(f"repetitions, {one.sizes}: {what} {one.observed:.3g}{unit}")
+                parts.append(f"  {one.expectation}")
         rows = [
             [test.name, test.specimen, "overturned" if test.overturned else "stood", test.probability, test.chance]
             for test in self.surprising[:_SURPRISING]
