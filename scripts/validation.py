@@ -59,13 +59,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Write the tables of docs/validation.md.")
     parser.add_argument("--shake-table", type=Path, metavar="FOLDER")
     parser.add_argument("--small-table", type=Path, metavar="FILE")
-    parser.add_argument("tables", nargs="*", help="quick, limits, random, opensees, shake-table, small-table")
+    parser.add_argument("tables", nargs="*", help="quick, limits, random, opensees, shake-table, small-table, judged")
     options = parser.parse_args()
     parts = {"quick": quick_tables, "limits": limits_tables, "random": random_tables}
     if importlib.util.find_spec("openseespy"):
         parts["opensees"] = opensees_tables
     if options.shake_table:
         parts["shake-table"] = lambda: shake_tables(options.shake_table)
+    if options.shake_table and options.small_table:
+        parts["judged"] = lambda: judged_tables(options.shake_table, options.small_table)
     if options.small_table:
         parts["small-table"] = lambda: small_tables(options.small_table)
     for name in options.tables or parts:
@@ -422,12 +424,8 @@ def shake_tables(folder):
 
 def small_tables(file):
     """Cross-validated scores on tests of a printed rock on a small table, and its p from three seeds."""
-    with file.open(newline="", encoding="utf-8") as opened:
-        # A command of nothing has no PGA to regress on.
-        tests = [test for test in csv.DictReader(opened) if float(test["pga_g"]) > 0.0]
     scores, found = [], []
-    for series in sorted({test["set"] for test in tests}):
-        chosen = [test for test in tests if test["set"] == series]
+    for series, chosen in small_series(file).items():
         motions = [commanded(test) for test in chosen]
         overturned = np.array([test["overturned"] == "1" for test in chosen])
         calibrated = [
@@ -443,6 +441,73 @@ def small_tables(file):
         "validation-small-table.txt": markdown(SCORE_HEADING, scores),
         "validation-small-table-seeds.txt": markdown(heading, found),
     }
+
+
+def judged_tables(folder, file):
+    """Predictions of both sets of tests judged: scores, whether they are reliable, and repetitions.
+
+    Of the granite tests all that have one source motion belong together, and none is said to be a repetition; on the
+    small table those with one command are repetitions, and those with one shape of the pulse belong together.
+    """
+    from shake_table import FOLDS, read
+
+    tests, motions = read(folder)
+    groups = [test["ground_motion"].strip().partition("_")[0] for test in tests]
+    scores, repeated = [], []
+    for specimen in ("1", "2"):
+        overturned = [test[f"overturned_specimen_{specimen}"] == "1" for test in tests]
+        calibration = rocking.calibrate(motions, overturned, alpha=(0.02, 0.5), **LINEAR)
+        judged = judged_of(motions, overturned, groups, calibration, FOLDS)
+        scores += [judged_row(f"granite {specimen}", name, one) for name, one in judged.items()]
+    for series, chosen in small_series(file).items():
+        motions, overturned = [commanded(test) for test in chosen], [test["overturned"] == "1" for test in chosen]
+        groups = [test["pgv_over_pga_s"] for test in chosen]
+        calibration = rocking.calibrate(motions, overturned, p=MESH_P, alpha=SMALL_ALPHA, **LINEAR)
+        judged = judged_of(motions, overturned, groups, calibration, min(FOLDS, len(set(groups))))
+        scores += [judged_row(series, name, one) for name, one in judged.items()]
+        repeated += [repeated_row(series, name, one) for name, one in judged.items()]
+    heading = ("tests", "predicted", "Brier", "skill", "log loss", "skill", "p of reliability")
+    of_repetitions = ("tests", "predicted", "repetitions", "differ", "expected", "90 %", "one block in a set")
+    return {
+        "validation-judged.txt": markdown(heading, scores),
+        "validation-repeated.txt": markdown(of_repetitions, repeated),
+    }
+
+
+def judged_of(motions, overturned, groups, calibration, folds):
+    """Judge a calibration on its own tests, and what it said of them while they were left out."""
+    tests = [
+        rocking.ShakeTest(motion, fell, group=group)
+        for motion, fell, group in zip(motions, overturned, groups, strict=True)
+    ]
+    left_out = calibration.cross_validate(groups=groups, folds=folds)
+    return {"fitted": rocking.validate(tests, calibration), "left out": rocking.validate(tests, left_out)}
+
+
+def judged_row(tests, predicted, found):
+    """Scores with their standard errors as text."""
+    cells = [
+        f"{value:.3f} +- {error:.3f}"
+        for score in (found.brier, found.log_loss)
+        for value, error in ((score.value, score.error), (score.skill, score.skill_error))
+    ]
+    return tests, predicted, *cells, f"{found.reliability_chance:.2g}"
+
+
+def repeated_row(tests, predicted, found):
+    """Repetitions as text."""
+    one = found.repeated_outcomes
+    alone = "-" if math.isnan(one.same_block) else f"{one.same_block:.2f}"
+    band = f"{one.lower:.2f} to {one.upper:.2f}"
+    return tests, predicted, one.sizes, f"{one.observed:.2f}", f"{one.expected:.2f}", band, alone
+
+
+def small_series(file):
+    """Return the tests of each series on the small table."""
+    with file.open(newline="", encoding="utf-8") as opened:
+        # A command of nothing has no PGA to regress on.
+        tests = [test for test in csv.DictReader(opened) if float(test["pga_g"]) > 0.0]
+    return {name: [test for test in tests if test["set"] == name] for name in sorted({test["set"] for test in tests})}
 
 
 def commanded(test):

@@ -20,6 +20,7 @@ from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
 from rocking.plot.rose import rose_figure, shares_figure
 from rocking.plot.schemes import SchemeCurve, schemes_figure
 from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
+from rocking.plot.validation import Bars, PeaksPlot, validation_figure
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
 LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"
@@ -136,6 +137,26 @@ def trials_of(sides=2, **options):
     )
 
 
+def validation_of(**options):
+    rng = np.random.default_rng(1)
+    ends, count = np.linspace(0.0, 1.0, 11), np.full(10, 8)
+    middle = 0.5 * (ends[1:] + ends[:-1])
+    seen = rng.binomial(8, middle) / 8.0
+    bars = Bars(ends[:-1], ends[1:], count, middle, seen, np.maximum(middle - 0.2, 0.0), np.minimum(middle + 0.2, 1.0))
+    probabilities = rng.uniform(size=80)
+    measured = rng.uniform(0.0, 0.1, 20)
+    middle_of_peaks = np.append(measured[1:], np.nan)
+    peaks = PeaksPlot(measured, 0.5 * middle_of_peaks, middle_of_peaks, 2.0 * middle_of_peaks)
+    return validation_figure(
+        reliability=bars,
+        probabilities=probabilities,
+        overturned=probabilities > rng.uniform(size=80),
+        ranks=bars._replace(observed=0.1 * seen, band_lower=np.zeros(10), band_upper=np.full(10, 0.2)),
+        peaks=peaks,
+        **options,
+    )
+
+
 def risk_of(**options):
     x = np.geomspace(0.05, 2.0, 80)
     lines = [RiskLine(f"{name}: once in 460 years (210 to 830)", x * np.exp(-x)) for name in ("half", "overturning")]
@@ -223,6 +244,7 @@ FIGURES = {
     "bifurcation": (bifurcation_of, 3.8),
     "intervals": (intervals_of, 4.2),
     "outcomes of tests": (trials_of, 4.8),
+    "validation": (validation_of, 5.2),
     "measured": (measured_of, 3.8),
     "factors": (factors_of, 3.8),
     "response": (response_of, 4.8),

@@ -10,10 +10,14 @@ from .analysis.fragility.fit import fit_fragility, fragility
 from .analysis.fragility.result import Fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
+from .analysis.input_tables import read_tests
 from .analysis.overturning import overturning_map
 from .analysis.restitution import compare_restitution
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
+from .analysis.validation.judging import validate
+from .analysis.validation.result import ModelValidation
+from .analysis.validation.tested import ShakeTest
 from .block import (
     Block,
     Blocks,
@@ -90,6 +94,7 @@ __all__ = [
     "InvalidOption",
     "Load",
     "Measure",
+    "ModelValidation",
     "Motion",
     "Origin",
     "OutputError",
@@ -106,6 +111,7 @@ __all__ = [
     "Row",
     "Scales",
     "Sensitivity",
+    "ShakeTest",
     "Side",
     "Solid",
     "Spring",
@@ -138,6 +144,7 @@ __all__ = [
     "overturning_map",
     "pulses",
     "read",
+    "read_tests",
     "records",
     "response_rose",
     "rocking_spectrum",
@@ -148,4 +155,5 @@ __all__ = [
     "studies",
     "study",
     "survey",
+    "validate",
 ]

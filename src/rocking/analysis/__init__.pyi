@@ -13,6 +13,8 @@ from .risk import Rate, Risk
 from .spectrum import RockingSpectrum
 from .survey import Survey
 from .survival import Survival
+from .validation.result import JudgedTest, Repeatability, ShareInBin
+from .validation.scores import Score
 
 __all__ = [
     "Band",
@@ -22,6 +24,7 @@ __all__ = [
     "FragilityCurve",
     "Goodness",
     "IncrementalDynamicAnalysis",
+    "JudgedTest",
     "LawFit",
     "Likelihood",
     "MeasureComparison",
@@ -30,11 +33,14 @@ __all__ = [
     "OverturningMap",
     "Probit",
     "Rate",
+    "Repeatability",
     "ResponseRose",
     "RestitutionComparison",
     "Risk",
     "RockingSpectrum",
+    "Score",
     "Scores",
+    "ShareInBin",
     "Survey",
     "Survival",
     "Validation",

@@ -1,27 +1,32 @@
-"""Tables that analyses read: outcomes that were observed, measured rotation histories, ensembles of blocks."""
+"""Tables that analyses read: tests and what was observed in them, rotation histories, ensembles of blocks."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, get_args
 
 import numpy as np
 
+from rocking import checks
 from rocking.analysis.hazard import HEADINGS, heading_of
+from rocking.analysis.validation.tested import ShakeTest
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.constants import Model
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
-from rocking.motion.named import named_motion
+from rocking.motion.named import named_motion, named_vertical
 from rocking.motion.scaling import Measure
+from rocking.named_pulses import FAMILIES, named_pulse
 from rocking.tables import counted, csv_rows, named
 
 _FOLDER: Final = re.compile(r"[\w-][\w. -]*(?<![. ])")
 
+_YES_OR_NO: Final = "0 or 1, no or yes, false or true"
 _ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
 
 
@@ -65,8 +70,8 @@ class _Table:
 
     def answers(self, column: str) -> tuple[bool, ...]:
         """Return the truth values of a column: 1 or 0, yes or no, true or false."""
-        what = "0 or 1, no or yes, false or true"
-        return tuple(self.convert(line, row[column].lower(), _ANSWERS.__getitem__, what) for line, row in self.rows)
+        read = _ANSWERS.__getitem__
+        return tuple(self.convert(line, row[column].lower(), read, _YES_OR_NO) for line, row in self.rows)
 
     def convert(self, line: int, text: str, how: Callable[[str], Any], what: str) -> Any:
         """Return a cell read in some way; an error says the line and what it should be."""
@@ -86,8 +91,8 @@ def read_calibration(
     """Read a table; its columns say what it is.
 
     Outcomes: `motion` (a record file, relative to the table's folder, or a shipped record) and `overturned` (1 or 0,
-    yes or no); also, if there are such columns, `scale`, `channel` and `group`. With a column `specimen`, outcomes of
-    several specimens by their names. A history: `time_s`, and `rotation_rad` or `rotation_deg`.
+    yes or no); also, if there are such columns, `group` and those of a motion as `read_tests` has them. With a column
+    `specimen`, outcomes of several specimens by their names. A history: `time_s`, and `rotation_rad` or `rotation_deg`.
     """
     table = read_table(path)
     if {"motion", "overturned"} <= set(table.columns):
@@ -164,23 +169,131 @@ def _folder_name(text: str) -> str:
 
 def outcomes_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
     """Return motions and outcomes of a table with these columns; an error says the line."""
-    motions, overturned = [], table.answers("overturned")
+    overturned = table.answers("overturned")
+    motions = _motions_of(table, channel=channel, dt=dt, units=units)
+    groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None
+    return Outcomes(motions, overturned, groups)
+
+
+def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Motion, ...]:
+    """Read the motion of each row, with its vertical component and times its scale where it has such cells.
+
+    A row's own channel, step (dt_s) and units are before those that are given for all.
+    """
     several = len({row["motion"] for _, row in table.rows}) > 1
+    read: dict[tuple[object, ...], Motion] = {}
+    motions = []
     for line, row in table.rows:
-        scale = table.convert(line, row.get("scale") or "1", float, "a number")
-        beside = table.path.parent / row["motion"]
-        name = str(beside) if beside.exists() else row["motion"]
-        own = row.get("channel")
-        about = {"channel": own or channel, "dt": dt, "units": units}
+        scale = table.convert(line, row.get("scale") or "1", _finite, "a number")
+        step = row.get("dt_s") or ""
+        own = row.get("channel"), table.convert(line, step, float, "a number") if step else None, row.get("units")
+        about = {"channel": own[0] or channel, "dt": own[1] or dt, "units": own[2] or units}
+        name, vertical = row["motion"], row.get("vertical") or ""
         try:
-            motions.append(named_motion(name, **about, scale=scale, several=several and not own))
+            if (key := (name, vertical, *own)) not in read:
+                read[key] = _motion_of(table.path, name, vertical, several=several and not any(own), **about)
+            motions.append(read[key] if scale == 1.0 else read[key].scaled(scale))
         except RockingError as error:
             where = str(error).removesuffix(str(error.message))  # the record's file, before the table's
             raise table.error(
                 where + error.message.template, *error.message.arguments, line=line, value=error.value
             ) from error
-    groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None
-    return Outcomes(tuple(motions), overturned, groups)
+    return tuple(motions)
+
+
+def _motion_of(table: Path, name: str, vertical: str, *, several: bool, **about: Any) -> Motion:
+    """Read a motion with its vertical component, where one is named; a pulse is written as commands take it."""
+    record = _beside(table, name)
+    if record == name and name.partition(":")[0] in FAMILIES:
+        motion = named_pulse(name)
+    else:
+        motion = named_motion(record, **about, several=several)
+    return motion.with_vertical(named_vertical(_beside(table, vertical), record, **about)) if vertical else motion
+
+
+def _beside(table: Path, name: str) -> str:
+    """Name a file relative to a table's folder, where there is one there."""
+    beside = table.parent / name
+    return str(beside) if beside.exists() else name
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+#: Columns of what `read_tests` reads; others are left aside.
+_LABELS: Final = ("name", "specimen", "nominal", "group")
+_PEAKS: Final[Mapping[str, float]] = {"peak_rotation_rad": 1.0, "peak_rotation_deg": np.pi / 180.0}
+
+
+def read_tests(
+    path: str | Path, *, channel: str | None = None, dt: float | None = None, units: str | None = None
+) -> list[ShakeTest]:
+    r"""Read tests of specimens from a CSV table, one in each row.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        Table with a header. Its column motion names a record file (relative to the table) or a shipped record, or is a
+        pulse, as "one-sine:amplitude=0.2g,frequency=2Hz"; scale multiplies it; vertical names its vertical component, a
+        file or a channel; channel, dt_s (step, s) and units are for files that do not say them. What was observed is in
+        overturned (1 or 0, yes or no, true or false) and in peak_rotation_rad or peak_rotation_deg (a size; inf where
+        it overturned, empty where it was not measured), one of them or both. The columns name, specimen, nominal and
+        group are those of `ShakeTest`. Columns of other names are left aside.
+    channel : str, optional
+        As for `rocking.read`, of rows that name none themselves.
+    dt : float, optional
+        Likewise the step, s.
+    units : str, optional
+        Likewise the units.
+
+    Returns
+    -------
+    list of ShakeTest
+        In the order of the rows.
+
+    Raises
+    ------
+    UnreadableRecord
+        If the table or a motion cannot be read, a column is missing, or a cell is wrong; the line is that of the table.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> rows = "motion,scale,overturned,peak_rotation_deg", "ridgecrest-clc-090,0.5,0,1.5", "ridgecrest-clc-090,3,1,"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     table = pathlib.Path(folder, "tests.csv")
+    ...     _ = table.write_text("\n".join(rows))
+    ...     read_tests(table)
+    [<ShakeTest: ridgecrest-clc-090, stood, peak 0.0261799 rad>, <ShakeTest: ridgecrest-clc-090, overturned>]
+    """
+    table = read_table(checks.path(path, "path of a table", UnreadableRecord))
+    doubled = [name for name in dict.fromkeys(table.columns) if table.columns.count(name) > 1]
+    peaks = [name for name in _PEAKS if name in table.columns]
+    if "motion" not in table.columns or not ({"overturned", *peaks} & {*table.columns}) or len(peaks) > 1 or doubled:
+        raise table.error(
+            "the columns must be motion and overturned, peak_rotation_rad or peak_rotation_deg, or the first with one "
+            f"of these two, each once, not {','.join(table.columns)}"
+        )
+    motions = _motions_of(table, channel=channel, dt=dt, units=units)
+    tests = []
+    for motion, (line, row) in zip(motions, table.rows, strict=True):
+        fell, peak = row.get("overturned"), next((row[name] for name in peaks), "")
+        answer = None
+        if fell:
+            answer = table.convert(line, fell.lower(), _ANSWERS.__getitem__, f"{_YES_OR_NO} in the column overturned")
+        rotation = None
+        if peak:
+            rotation = _PEAKS[peaks[0]] * table.convert(line, peak, float, f"a number in the column {peaks[0]}")
+        labels = {name: row.get(name) or "" for name in _LABELS}
+        try:
+            tests.append(ShakeTest(motion, answer, rotation, **labels))
+        except RockingError as error:
+            raise table.error(error.message.template, *error.message.arguments, line=line, value=error.value) from error
+    return tests
 
 
 def read_observed(

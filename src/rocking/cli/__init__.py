@@ -37,6 +37,7 @@ for _module, _commands in {
     "analysis": ("spectrum", "map", "ida", "measures"),
     "dynamics": ("orbits", "bifurcation", "basin"),
     "fits": ("fragility", "calibrate"),
+    "validation": ("validate",),
     "mesh": ("mesh",),
     "explore": ("explore",),
 }.items():

@@ -295,10 +295,14 @@ class EnsembleOptions(HeldOptions):
         """Return blocks, weights and equation of motion as arguments."""
         if self.ensemble is None:
             return {"blocks": self.body(), "model": model.model}
+        self.refuse_a_block()
+        return ensemble_of(self.ensemble, model)
+
+    def refuse_a_block(self) -> None:
+        """Refuse what is given of a block beside an ensemble."""
         given = self.given() | self.held()
         if given:
             raise InvalidBlock(f"{{}} has blocks of its own: leave {_all_of([*given])} out", "ensemble", *given)
-        return ensemble_of(self.ensemble, model)
 
 
 def ensemble_of(file: Path, model: ModelOptions) -> dict[str, Any]:

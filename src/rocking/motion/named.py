@@ -68,13 +68,35 @@ def motions_by_name(motions: Motions) -> dict[str, Motion]:
 
 def names_of(motions: Sequence[Motion]) -> list[str]:
     """Names of motions, numbered where several share one: a row of a table must say which it is."""
-    shared = {name for name, count in Counter(motion.name for motion in motions).items() if count > 1}
+    return numbered([motion.name for motion in motions])
+
+
+def numbered(given: Sequence[str]) -> list[str]:
+    """Names, numbered where several are the same.
+
+    Examples
+    --------
+    >>> numbered(["one", "two", "one"])
+    ['one #1', 'two', 'one #2']
+    """
+    shared = {name for name, count in Counter(given).items() if count > 1}
     seen: Counter[str] = Counter()
     names = []
-    for motion in motions:
-        seen[motion.name] += 1
-        names.append(f"{motion.name} #{seen[motion.name]}" if motion.name in shared else motion.name)
+    for name in given:
+        seen[name] += 1
+        names.append(f"{name} #{seen[name]}" if name in shared else name)
     return names
+
+
+def distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
+    """Motions that differ, and which of them each one is: the same command is often given several times."""
+    places: dict[tuple[bytes, ...], tuple[int, Motion]] = {}
+    which = []
+    for motion in motions:
+        parts = [part for part in (motion, motion.vertical) if part is not None]
+        key = tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients))
+        which.append(places.setdefault(key, (len(places), motion))[0])
+    return [motion for _, motion in places.values()], which
 
 
 def _refusal(given: Any) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rocking.analysis.calibration.evidence import unpacked
 from rocking.analysis.calibration.search import AGREEMENT, RUNS, Search
 from rocking.analysis.calibration.space import HIGHEST, Space, unit_of
-from rocking.arrays import Floats
+from rocking.arrays import Flags, Floats
 from rocking.errors import InvalidOption
 from rocking.tables import counted
 
@@ -84,13 +84,17 @@ class Scores:
             raise InvalidOption(f"there must be one probability for each outcome, not {given.shape} and {seen.shape}")
         if not np.all((given >= 0.0) & (given <= 1.0)):
             raise InvalidOption("{} must lie between 0 and 1", "probabilities")
-        with np.errstate(divide="ignore"):
-            losses = -np.log(np.where(seen, given, 1.0 - given))
         return cls(
             accuracy=float(np.mean((given > 0.5) == seen)),
-            log_loss=float(losses.mean()),
+            log_loss=float(log_losses(given, seen).mean()),
             brier=float(np.mean((given - seen) ** 2)),
         )
+
+
+def log_losses(probabilities: Floats, observed: Flags) -> Floats:
+    """-log of the probability that was given to each outcome; infinite after a certainty that failed."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(-np.log(np.where(observed, probabilities, 1.0 - probabilities)))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from rocking.arrays import Flags, Floats
 from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import several_motions
+from rocking.motion.named import distinct_motions, several_motions
 
 #: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
 _LAPSE: Final = 0.005
@@ -136,7 +136,7 @@ def calibrate(
     checks.whole(candidates, "candidates", InvalidOption, 128)
     checks.whole(ensemble, "ensemble", InvalidOption, 1)
     rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
-    distinct, which = _distinct(tested)
+    distinct, which = distinct_motions(tested)
 
     def tried(points: Floats) -> NDArray[np.float32]:
         return np.take(overturned_under(space.blocks(points), distinct, model, threads, progress), which, axis=1)
@@ -159,17 +159,6 @@ def calibrate(
         diagnostics=diagnosed(found, final),
         _evidence=evidence,
     )
-
-
-def _distinct(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
-    """Motions that differ, and which of them each one is: the same command is often given several times."""
-    places: dict[tuple[bytes, ...], tuple[int, Motion]] = {}
-    which = []
-    for motion in motions:
-        parts = [part for part in (motion, motion.vertical) if part is not None]
-        key = tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients))
-        which.append(places.setdefault(key, (len(places), motion))[0])
-    return [motion for _, motion in places.values()], which
 
 
 def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:

@@ -1,0 +1,1 @@
+"""Validation: what blocks predict of tests, judged against what was observed in them."""

@@ -1,0 +1,277 @@
+"""What blocks predict of tests: how probably each overturns the specimen, and how large the rotation is if not.
+
+The blocks stand for one specimen that is not quite known, or that is not quite the same from test to test: draws from a
+population, with weights. Each is simulated under every motion once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking.analysis.calibration.evidence import blurred, expected_share
+from rocking.analysis.calibration.result import Calibration, Validation
+from rocking.analysis.levels import mean_one, pooled
+from rocking.analysis.validation.scores import Ranks
+from rocking.analysis.validation.tested import Observed
+from rocking.arrays import Flags, Floats, Integers
+from rocking.body import Bodies, Body
+from rocking.constants import Model
+from rocking.engine import require_finished
+from rocking.ensemble import simulate_many
+from rocking.errors import InvalidOption
+from rocking.problem import bodies_of, slenderness_of
+from rocking.tables import counted
+
+#: What can predict tests of one specimen.
+Source = Calibration | Validation | Bodies | Body | Sequence[Body]
+
+#: Equally probable errors that stand for a normal one, for each block; of few blocks more, so many points in all.
+_ERRORS: Final = 16
+_POINTS: Final = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Outcomes of n blocks under m tests of one specimen, their weights, which sum to 1, and what they say of a test.
+
+    Attributes
+    ----------
+    probabilities : ndarray, shape (m,)
+        Probability that a test is noted as overturned.
+    tests : ndarray of int, shape (m,)
+        Positions of the tests.
+    weights : ndarray, shape (n,)
+        Weights of the blocks; n is 0 where probabilities are all that is known.
+    peaks : ndarray, shape (n, m)
+        Largest rotation, rad; infinite where the block overturns.
+    effective : float
+        Number of blocks that the shares come from, effectively; infinite of a block that is known.
+    lapse : float
+        Chance that an outcome is not that of a rocking block at all.
+    deviation : float
+        Standard deviation of a measured peak, rad.
+    """
+
+    probabilities: Floats
+    tests: Integers
+    weights: Floats
+    peaks: Floats
+    effective: float
+    lapse: float = 0.0
+    deviation: float = 0.0
+
+    @property
+    def has_blocks(self) -> bool:
+        """Whether more than probabilities is known."""
+        return len(self.weights) > 0
+
+    @property
+    def overturned(self) -> Flags:
+        """Whether each block overturns in each test, shape (n, m)."""
+        return np.isinf(self.peaks)
+
+    @cached_property
+    def errors(self) -> Floats:
+        """Equally probable errors of a measured peak, rad."""
+        if self.deviation == 0.0:
+            return np.zeros(1)
+        from scipy.special import ndtri
+
+        count = max(_ERRORS, _POINTS // max(len(self.weights), 1))
+        return np.asarray(self.deviation * ndtri((np.arange(count) + 0.5) / count))
+
+    def points(self, k: int) -> tuple[Floats, Floats, Integers]:
+        """Measured peaks that are possible in test k, in order, their weights, and block and error of each."""
+        values = self._measured(self.peaks[:, k, None], self.errors).ravel()
+        order = np.argsort(values, kind="stable")
+        weights = np.repeat(self.weights / len(self.errors), len(self.errors))
+        return values[order], weights[order], order
+
+    def standing(self, k: int) -> tuple[Ranks, Floats] | None:
+        """Ranks among the peaks of blocks that stand in test k, and the weights of these; None where none stands."""
+        values, weights, _ = self.points(k)
+        stand = np.isfinite(values) & (weights > 0.0)
+        share = float(weights[stand].sum())
+        if share == 0.0:
+            return None
+        within = weights[stand] / share
+        return Ranks.of(values[stand], within, self.effective * share), within
+
+    def drawn_outcomes(self, labels: Integers | None, count: int, rng: np.random.Generator) -> Flags:
+        """Draw outcomes of the tests so many times, shape (count, m), one block for each label; without, for each test.
+
+        The chances are the probabilities: some outcomes are those of no block, as likely one as the other, and some
+        lapse.
+        """
+        shape = count, len(self.probabilities)
+        if labels is None or not self.has_blocks:
+            return np.asarray(rng.random(shape) < self.probabilities)
+        found = np.take_along_axis(self.overturned, self._drawn_blocks(labels, count, rng), axis=0)
+        if math.isfinite(self.effective):
+            unknown = rng.random(shape) < 1.0 / (self.effective + 1.0)
+            found = np.where(unknown, rng.random(shape) < 0.5, found)
+        return np.asarray(found ^ (rng.random(shape) < self.lapse))
+
+    def drawn_peaks(
+        self, k: int, blocks: Integers | None, count: int, rng: np.random.Generator
+    ) -> tuple[Floats, Floats, Floats]:
+        """Draw peaks of a test k that stands, and the intervals of their ranks: each of shape (count,).
+
+        From these blocks, or from any that stands in it; NaN where the block overturns.
+        """
+        found = self.standing(k)
+        if found is None:
+            nothing = np.full(count, math.nan)
+            return nothing, nothing, nothing
+        ranks, within = found
+        uniform = rng.random(count)
+        if blocks is None:
+            held = np.cumsum(within)
+            places = np.minimum(np.searchsorted(held, uniform * held[-1], "right"), len(held) - 1)
+            values = ranks.points[places]
+        else:
+            values = self._measured(self.peaks[blocks, k], rng.choice(self.errors, count))
+            places = np.minimum(np.searchsorted(ranks.points, values), len(ranks.points) - 1)
+            uniform = ranks.uniform_at(places, uniform)
+        low, high = ranks.intervals(uniform)
+        fell = np.isinf(values)
+        return tuple(np.where(fell, math.nan, each) for each in (values, low, high))  # type: ignore[return-value]
+
+    def drawn_blocks(self, labels: Integers | None, count: int, rng: np.random.Generator) -> Integers | None:
+        """Draw a block for each label of the tests, shape (count, m); None without labels."""
+        return None if labels is None else self._drawn_blocks(labels, count, rng)
+
+    @staticmethod
+    def _measured(peaks: Floats, errors: Floats) -> Floats:
+        """Peaks as they are measured: a size is not below 0, whatever its error."""
+        return np.maximum(peaks + errors, 0.0)
+
+    def _drawn_blocks(self, labels: Integers, count: int, rng: np.random.Generator) -> Integers:
+        distinct, which = np.unique(labels, return_inverse=True)
+        drawn = rng.choice(len(self.weights), (count, len(distinct)), p=self.weights)
+        return np.asarray(drawn[:, which])
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predictions of all tests: of each specimen, and in words from what."""
+
+    of_specimens: tuple[Predicted, ...]
+    description: str
+    model: str
+
+    @property
+    def probabilities(self) -> Floats:
+        """Probability that each test overturns its specimen, in the order of the tests."""
+        found = np.empty(sum(len(one.tests) for one in self.of_specimens))
+        for one in self.of_specimens:
+            found[one.tests] = one.probabilities
+        return found
+
+
+def predicted(
+    tests: Observed,
+    sources: Source | Mapping[str, Source],
+    *,
+    weights: ArrayLike | Mapping[str, ArrayLike] | None,
+    model: Model | None,
+    lapse: float | None,
+    deviation: float,
+    threads: int | None,
+    progress: bool | None,
+) -> Prediction:
+    """Simulate the blocks of each specimen under its tests."""
+    if isinstance(sources, Mapping):
+        missing = [name for name in tests.names if name not in sources]
+        if missing:
+            raise InvalidOption(
+                f"{{}} have nothing for the specimen {missing[0]!r} of the tests; they have "
+                f"{', '.join(map(repr, sources)) or 'none'}",
+                "blocks",
+            )
+        if weights is not None and not isinstance(weights, Mapping):
+            raise InvalidOption("{} of several specimens must be a mapping like {}", "weights", "blocks")
+        chosen = {name: (sources[name], (weights or {}).get(name)) for name in tests.names}
+        where = {name: np.flatnonzero(tests.specimens == k) for k, name in enumerate(tests.names)}
+    else:
+        if isinstance(weights, Mapping):
+            raise InvalidOption(
+                "{} are a mapping, and {} are none: make both mappings by specimen", "weights", "blocks"
+            )
+        chosen, where = {"": (sources, weights)}, {"": np.arange(len(tests.overturned))}
+    found, words, models = [], {}, {}
+    for name, (source, own) in chosen.items():
+        if isinstance(source, Validation):
+            found.append(_left_out(source, own, tests, where[name]))
+            words[name], models[name] = "predictions of tests that were left out", ""
+            continue
+        how: Model = model or (source.model if isinstance(source, Calibration) else "nonlinear")
+        shared = {"lapse": lapse, "deviation": deviation, "threads": threads, "progress": progress}
+        found.append(_simulated(source, own, tests, where[name], how, **shared))  # type: ignore[arg-type]
+        words[name], models[name] = _described(source, own), how
+    several = [f"{name}: {text}" for name, text in words.items()] if len(words) > 1 else [*words.values()]
+    known = sorted({each for each in models.values() if each})
+    return Prediction(tuple(found), "; ".join(several), " and ".join(known))
+
+
+def _simulated(
+    source: Calibration | Bodies | Body | Sequence[Body],
+    weights: ArrayLike | None,
+    tests: Observed,
+    where: Integers,
+    model: Model,
+    *,
+    lapse: float | None,
+    deviation: float,
+    threads: int | None,
+    progress: bool | None,
+) -> Predicted:
+    if isinstance(source, Calibration):
+        if weights is not None:
+            raise InvalidOption("a calibration has {} of its own: leave them out", "weights")
+        bodies: Bodies = source.blocks
+        shares, effective = source.weights / source.weights.sum(), source.diagnostics.effective
+        lapse = source.lapse if lapse is None else lapse
+    else:
+        bodies = bodies_of(source)
+        slenderness_of(bodies)  # refused before the work
+        shares = mean_one(weights, len(bodies)) / len(bodies)
+        effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
+    needed, which = np.unique(tests.which[where], return_inverse=True)
+    motions = [tests.distinct[k] for k in needed]
+    simulated = simulate_many(bodies, motions, model=model, threads=threads, progress=progress)
+    require_finished(simulated.unfinished.values)
+    fell = simulated.overturned.transpose("block", "motion").values
+    peaks = np.where(fell, math.inf, simulated.peak_rotation.transpose("block", "motion").values)[:, which]
+    share = shares @ np.isinf(peaks).astype(np.float64)
+    expected = share if math.isinf(effective) else expected_share(share, effective)
+    lapse = 0.0 if lapse is None else lapse
+    # A sum of weights may be a rounding above 1.
+    probabilities = np.clip(blurred(expected, lapse), 0.0, 1.0)
+    return Predicted(probabilities, where, shares, peaks, effective, lapse, deviation)
+
+
+def _left_out(source: Validation, weights: object, tests: Observed, where: Integers) -> Predicted:
+    if weights is not None:
+        raise InvalidOption("predictions of tests that were left out have no blocks: leave {} out", "weights")
+    count = source.probabilities.shape[1]
+    if count != len(where):
+        raise InvalidOption(
+            f"the predictions are of {counted(count, 'test')}, and {counted(len(where), 'test')} are given: "
+            "{} must be those of the calibration, in their order",
+            "tests",
+        )
+    return Predicted(source.probabilities.mean(axis=0), where, np.empty(0), np.empty((0, count)), math.nan)
+
+
+def _described(source: Calibration | Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:
+    if isinstance(source, Calibration):
+        return f"calibration, {counted(len(source.blocks), 'block')}"
+    return pooled(source, weights)

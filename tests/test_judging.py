@@ -1,0 +1,474 @@
+"""Predictions judged against tests: scores by closed forms and quadrature, chances that are even, tables."""
+
+import itertools
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+from scipy.integrate import quad
+
+import rocking
+from rocking import Block, Blocks, InvalidMotion, InvalidOption, ShakeTest, UnreadableRecord, engine
+from rocking.analysis import Validation
+from rocking.analysis.validation import scores
+from rocking.analysis.validation.predicted import Predicted
+
+STRONG, WEAK = rocking.pulses.one_sine(6.0, 1.0), rocking.pulses.one_sine(1.0, 1.0)
+BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+
+
+def left_out(probabilities):
+    """Predictions by probability alone."""
+    return Validation(np.atleast_2d(np.asarray(probabilities, dtype=float)), ())
+
+
+def of_outcomes(outcomes, **labels):
+    """Tests under one motion each, with these outcomes."""
+    motions = [rocking.pulses.one_sine(1.0 + k, 1.0) for k in range(len(outcomes))]
+    return [ShakeTest(motion, bool(fell), **labels) for motion, fell in zip(motions, outcomes, strict=True)]
+
+
+# Scores
+
+
+def test_perfect_predictions_score_zero_and_have_skill_one():
+    outcomes = [1, 0, 1, 1, 0, 0]
+    found = rocking.validate(of_outcomes(outcomes), left_out(outcomes))
+    for score in (found.brier, found.log_loss):
+        assert (score.value, score.error, score.skill, score.skill_error) == (0.0, 0.0, 1.0, 0.0)
+    assert found.reliability_chance == 1.0 and found.crps is None and not found.ranks
+
+
+def test_the_base_rate_has_no_skill():
+    outcomes = [1, 0, 1, 1, 0, 0, 0, 0]
+    found = rocking.validate(of_outcomes(outcomes), left_out([3 / 8] * 8))
+    assert found.brier.value == pytest.approx(3 / 8 * 5 / 8, abs=1e-15)
+    assert found.log_loss.value == pytest.approx(-3 / 8 * math.log(3 / 8) - 5 / 8 * math.log(5 / 8), abs=1e-15)
+    assert abs(found.brier.skill) < 1e-14 and abs(found.log_loss.skill) < 1e-14
+
+
+def test_scores_of_three_tests_are_those_by_hand():
+    found = rocking.validate(of_outcomes([1, 0, 0]), left_out([0.9, 0.2, 0.6]))
+    assert found.brier.value == pytest.approx((0.01 + 0.04 + 0.36) / 3)
+    assert found.brier.error == pytest.approx(np.std([0.01, 0.04, 0.36], ddof=1) / math.sqrt(3))
+    assert found.log_loss.value == pytest.approx(-math.log(0.9 * 0.8 * 0.4) / 3)
+    assert found.brier.skill == pytest.approx(1.0 - found.brier.value / (2 / 9))
+    assert found.scores.accuracy == pytest.approx(2 / 3)
+    assert [test.chance for test in found.surprising] == pytest.approx([0.4, 0.8, 0.9])
+
+
+def test_standard_errors_allow_for_tests_that_belong_together():
+    outcomes, chances = [1, 0, 0, 1], [0.9, 0.2, 0.6, 0.7]
+    four = of_outcomes(outcomes)
+    twice = [ShakeTest(test.motion, test.overturned, group=str(k)) for k, test in enumerate(four) for _ in range(2)]
+    apart, together = (
+        rocking.validate(tests, left_out(given)) for tests, given in ((four, chances), (twice, np.repeat(chances, 2)))
+    )
+    for name in ("value", "error", "skill", "skill_error"):
+        assert getattr(together.brier, name) == pytest.approx(getattr(apart.brier, name))
+        assert getattr(together.log_loss, name) == pytest.approx(getattr(apart.log_loss, name))
+    assert (together.brier.tests, together.brier.clusters) == (8, 4)
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(0.05, 1.0)), min_size=1, max_size=6), st.floats(0.0, 2.0))
+def test_the_ranked_probability_score_is_its_integral(points, observed):
+    values, weights = np.array(sorted(points)).T
+    weights = weights / weights.sum()
+
+    def integrand(x):
+        return (float(weights[values <= x].sum()) - (x >= observed)) ** 2
+
+    ends = sorted({0.0, 2.0, observed, *values.tolist()})
+    integral = sum(quad(integrand, low, high)[0] for low, high in itertools.pairwise(ends))
+    assert scores.crps(values, weights, observed) == pytest.approx(integral, abs=1e-8)
+
+
+def test_the_score_of_a_known_block_with_a_measuring_error_is_that_of_a_normal_distribution():
+    one = Predicted(np.zeros(1), np.zeros(1, int), np.ones(1), np.full((1, 1), 0.1), math.inf, 0.0, 0.004)
+    ranks, within = one.standing(0)
+    for observed in (0.09, 0.1, 0.103):
+        z = (observed - 0.1) / 0.004
+        normal = 0.004 * (z * (2 * stats.norm.cdf(z) - 1) + 2 * stats.norm.pdf(z) - 1 / math.sqrt(math.pi))
+        assert scores.crps(ranks.points, within, observed) == pytest.approx(normal, rel=2e-3)
+        assert np.mean(ranks.interval(observed)) == pytest.approx(stats.norm.cdf(z), abs=1e-3)
+
+
+def test_a_peak_is_judged_among_the_blocks_that_stand_by_their_weights():
+    blocks = Blocks(2.0, [0.2, 0.22, 0.05], 0.9)
+    weights = np.array([3.0, 1.0, 4.0])
+    motion = STRONG.scaled(0.4)
+    simulated = rocking.simulate_many(blocks, motion)
+    assert simulated.overturned.values.ravel().tolist() == [False, False, True]
+    first, second = simulated.peak_rotation.values.ravel()[:2]
+    assert second < first
+    found = rocking.validate([ShakeTest(motion, peak_rotation=first)], blocks, weights=weights)
+    (test,) = found.tests
+    effective = 64.0 / 26.0
+    assert test.blocks == pytest.approx(effective)
+    assert test.probability == pytest.approx((effective * 0.5 + 0.5) / (effective + 1.0))
+    assert test.crps == pytest.approx(0.25 * 0.25 * (first - second))
+    n = 0.5 * effective
+    assert (test.pit_lower, test.pit_upper) == pytest.approx((n * 0.25 / (n + 1.0), 1.0))
+    assert (test.lower, test.median, test.upper) == (second, first, first)
+
+
+# Chances and bands
+
+
+def test_a_rank_is_in_one_interval_more_than_there_are_draws():
+    ranks = scores.Ranks.of(np.array([1.0, 2.0, 3.0]), np.full(3, 1 / 3), 3.0)
+    assert [ranks.interval(x) for x in (0.5, 1.5, 3.5)] == [
+        pytest.approx(pair) for pair in ((0.0, 0.25), (0.25, 0.5), (0.75, 1.0))
+    ]
+    assert ranks.edges == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
+    tied = scores.Ranks.of(np.array([0.0, 0.0, 3.0]), np.full(3, 1 / 3), 3.0)
+    assert tied.interval(0.0) == pytest.approx((0.0, 0.75)) and tied.edges == pytest.approx([0.0, 0.75, 1.0])
+    known = scores.Ranks.of(np.array([0.5]), np.ones(1), math.inf)
+    assert known.interval(0.5) == (0.0, 1.0) and known.interval(0.4) == (0.0, 0.0) and known.interval(0.6) == (1.0, 1.0)
+
+
+def test_an_interval_is_spread_evenly_over_bins():
+    spread = scores.spread_in_bins(np.array([0.0, 0.25, 0.3, 1.0]), np.array([1.0, 0.5, 0.3, 1.0]), 4)
+    assert spread.tolist() == [[0.25] * 4, [0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
+
+
+MOTIONS = [rocking.pulses.one_sine(1.0 + k, 1.0) for k in range(40)]
+STRENGTH = np.random.default_rng(1).uniform(0.2, 3.0, 40)
+
+
+def peaks_of(own):
+    """Peaks of blocks, shape (..., 40): where little drives them zero, and infinite where they overturn."""
+    drive = STRENGTH * own
+    return np.where(drive > 2.0, math.inf, np.where(drive < 0.4, 0.0, 0.05 * drive))
+
+
+def seen_by(own, rng, monkeypatch, **options):
+    """Validate tests with the peaks of blocks by 400 others of the population; what they do is not simulated here."""
+    observed, peaks = peaks_of(own), peaks_of(rng.lognormal(0.0, 0.4, (400, 1)))
+    tests = [ShakeTest(one, peak_rotation=peak) for one, peak in zip(MOTIONS, observed, strict=True)]
+
+    def simulated(blocks, given, **_):
+        import xarray as xr
+
+        assert len(given) == len(MOTIONS)
+        fell = np.isinf(peaks)
+        variables = {"overturned": fell, "unfinished": np.zeros_like(fell), "peak_rotation": np.where(fell, 1.6, peaks)}
+        return xr.Dataset({name: (("block", "motion"), values) for name, values in variables.items()})
+
+    monkeypatch.setattr("rocking.analysis.validation.predicted.simulate_many", simulated)
+    blocks = Blocks(np.full(len(peaks), 2.0), 0.2, 0.9)
+    return rocking.validate(tests, blocks, simulations=200, seed=int(rng.integers(1 << 30)), **options)
+
+
+def chances_are_even(chances):
+    """Whether chances are those of right predictions: below x no more often than x, and not much less often."""
+    assert len(chances) >= 12
+    return stats.kstest(chances, "uniform").pvalue > 0.01
+
+
+@pytest.mark.parametrize("scope", ["test", "specimen"])
+@pytest.mark.parametrize("sets", [12, pytest.param(200, marks=pytest.mark.thorough)])
+def test_of_right_predictions_chances_are_even_and_bands_hold(monkeypatch, scope, sets):
+    rng = np.random.default_rng(2)
+    found = [
+        seen_by(rng.lognormal(0.0, 0.4, 40 if scope == "test" else 1), rng, monkeypatch, one_block_in=scope)
+        for _ in range(sets)
+    ]
+    assert chances_are_even([one.reliability_chance for one in found])
+    assert chances_are_even([one.ranks_chance for one in found])
+    for name in ("reliability", "ranks"):
+        inside = [
+            each.band_lower - 1e-9 <= each.observed <= each.band_upper + 1e-9
+            for one in found
+            for each in getattr(one, name)
+        ]
+        assert len(inside) >= 8 * sets
+        assert np.mean(inside) > 0.85
+    if scope == "test":
+        for name in ("brier", "log_loss", "crps") if sets >= 200 else ():
+            each = [getattr(one, name) for one in found]
+            for value, error in (("value", "error"), ("skill", "skill_error")):
+                spread = np.std([getattr(score, value) for score in each])
+                # A jackknife errs to the safe side; most so for a quotient of means over some thirty peaks.
+                ratio = np.mean([getattr(score, error) for score in each]) / spread
+                assert 0.85 < ratio < (1.5 if (name, value) == ("crps", "skill") else 1.2), (name, value)
+        assert np.mean([one.coverage for one in found]) == pytest.approx(0.9, abs=0.05 if sets < 200 else 0.01)
+
+
+def test_one_specimen_in_all_tests_is_no_contradiction_but_the_same_population_in_each_is(monkeypatch):
+    rng = np.random.default_rng(3)
+    chances = {
+        scope: [
+            seen_by(np.exp(0.4 * sign), rng, monkeypatch, one_block_in=scope).ranks_chance
+            for sign in (-1.5, -1.0, 1.0, 1.5)
+        ]
+        for scope in ("test", "specimen")
+    }
+    assert max(chances["test"]) < 0.05 < min(chances["specimen"])
+
+
+@pytest.mark.parametrize("wrong", [0.6, 1.6])
+def test_predictions_that_are_wrong_are_found_out(monkeypatch, wrong):
+    rng = np.random.default_rng(4)
+    found = seen_by(wrong * rng.lognormal(0.0, 0.4, 40), rng, monkeypatch)
+    assert found.ranks_chance < 0.05 and "not as if the predictions were right" in found.summary()
+
+
+# Repetitions
+
+
+def test_repetitions_differ_as_counted_by_hand():
+    # Three of one motion, one of which stood; two of a nominal one that agree; one alone.
+    tests = [ShakeTest(STRONG, fell) for fell in (True, True, False)]
+    tests += [ShakeTest(WEAK.scaled(k), True, nominal="weak") for k in (1.0, 1.1)] + [ShakeTest(WEAK, False)]
+    found = rocking.validate(tests, left_out([0.5] * 6), simulations=4000)
+    seen = found.repeated_outcomes
+    assert (seen.sets, seen.tests) == (2, 5)
+    assert seen.observed == pytest.approx((2 * 2 * 1 / 3) / 3)
+    assert seen.expected == pytest.approx(0.5, abs=0.02)
+    assert math.isnan(seen.same_block) and found.repeated_peaks is None
+
+
+def test_one_block_repeats_itself_under_one_motion_and_a_population_does_not():
+    blocks = Blocks(2.0, [0.1, 0.8], 0.9)
+    tests = [ShakeTest(STRONG, True), ShakeTest(STRONG, False)]
+    seen = rocking.validate(tests, blocks).repeated_outcomes
+    assert (seen.observed, seen.same_block) == (1.0, 0.0) and seen.expected == pytest.approx(0.5, abs=0.03)
+    # A table that does not repeat its motion: both blocks overturn under one, and stand under the other.
+    other = [ShakeTest(STRONG, True, nominal="one"), ShakeTest(WEAK.scaled(0.1), False, nominal="one")]
+    assert rocking.validate(other, Blocks(2.0, [0.1, 0.1], 0.9)).repeated_outcomes.same_block == 1.0
+
+
+def test_peaks_of_repetitions_spread_as_by_hand():
+    blocks = Blocks([2.0, 2.2], [0.2, 0.22], 0.9)
+    motion = STRONG.scaled(0.4)
+    low, high = np.sort(rocking.simulate_many(blocks, motion).peak_rotation.values.ravel())
+    tests = [ShakeTest(motion, peak_rotation=peak) for peak in (0.05, 0.06, 0.07)]
+    seen = rocking.validate(tests, blocks, peak_error=0.001).repeated_peaks
+    assert seen.observed == pytest.approx(0.01)
+    assert seen.expected == pytest.approx(math.hypot(0.5 * (high - low), 0.001), rel=0.03)
+    assert seen.same_block == pytest.approx(0.001)
+
+
+def test_two_specimens_on_one_table_are_no_repetitions_but_belong_together():
+    tests = [ShakeTest(motion, k == 0, specimen=name) for k, motion in enumerate((STRONG, WEAK)) for name in "ab"]
+    found = rocking.validate(tests, {"a": BLOCK, "b": Blocks(2.0, [0.2, 0.1], 0.9)})
+    assert found.repeated_outcomes is None and found.brier.clusters == 2
+    assert [test.specimen for test in found.tests] == ["a", "b", "a", "b"]
+    assert [math.isinf(test.blocks) for test in found.tests] == [True, False, True, False]
+    assert "a: block from its parameters" in found.description
+
+
+# What predicts
+
+
+def test_a_calibration_says_of_tests_what_it_predicts(coarse):
+    pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+    fell = [False, False, True, True]
+    calibration = rocking.calibrate(
+        pulses, fell, p=2.0, restitution=0.9, two_sided=False, candidates=128, model="linear", progress=False
+    )
+    tests = [ShakeTest(*pair) for pair in zip(pulses, fell, strict=True)]
+    found = rocking.validate(tests, calibration)
+    np.testing.assert_allclose([t.probability for t in found.tests], calibration.predict(pulses), rtol=1e-12)
+    assert found.model == "linear" and found.scores.brier == pytest.approx(found.brier.value)
+    validation = calibration.cross_validate(folds=2, repeats=2)
+    assert [t.probability for t in rocking.validate(tests, validation).tests] == pytest.approx(
+        validation.probabilities.mean(axis=0).tolist()
+    )
+    with pytest.raises(InvalidOption, match="a calibration has weights of its own"):
+        rocking.validate(tests, calibration, weights=[1.0])
+    with pytest.raises(InvalidOption, match="of 4 tests, and 3 tests are given"):
+        rocking.validate(tests[:3], validation)
+    with pytest.raises(InvalidOption, match="no blocks: leave one_block_in out"):
+        rocking.validate(tests, validation, one_block_in="specimen")
+
+
+def test_a_known_block_is_certain_and_a_lapse_is_not():
+    tests = [ShakeTest(STRONG, False), ShakeTest(WEAK, False)]
+    found = rocking.validate(tests, BLOCK)
+    assert [test.probability for test in found.tests] == [1.0, 0.0] and math.isinf(found.log_loss.value)
+    assert any("a certainty failed" in note for note in found.notes)
+    assert any("no test overturned" in note for note in found.notes) and math.isnan(found.brier.skill)
+    blurred = rocking.validate(tests, BLOCK, lapse=0.01)
+    assert [test.probability for test in blurred.tests] == pytest.approx([0.99, 0.01])
+    assert "all tests overturned" in rocking.validate([ShakeTest(STRONG, True)], BLOCK).summary()
+
+
+def test_vertical_motion_and_weights_and_the_model_count():
+    blocks = Blocks(2.0, [0.1, 0.4], 0.9)
+    lifted = STRONG.with_vertical(rocking.pulses.one_sine(30.0, 1.0))
+    simulated = rocking.simulate_many(blocks, [lifted, STRONG], model="linear")
+    tests = [ShakeTest(one, True) for one in (lifted, STRONG)]
+    found = rocking.validate(tests, blocks, weights=[1.0, 3.0], model="linear")
+    shares = np.array([0.25, 0.75]) @ simulated.overturned.transpose("block", "motion").values
+    effective = 1.0 / (0.25**2 + 0.75**2)
+    assert [test.probability for test in found.tests] == pytest.approx((effective * shares + 0.5) / (effective + 1.0))
+    assert found.repeated_outcomes is None  # motions that differ in the vertical component alone are two
+
+
+def test_simulations_that_were_given_up_are_no_prediction(monkeypatch):
+    monkeypatch.setattr(engine, "BUDGET", 0)
+    restless = Block.from_parameters(p=2.0, alpha=0.2, restitution=1.0 - 1e-9)
+    with pytest.raises(rocking.Unfinished, match="were given up"):
+        rocking.validate([ShakeTest(STRONG.scaled(0.4), False)], restless)
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({}, "a test needs what was observed: overturned, peak_rotation, or both"),
+        ({"peak_rotation": math.nan}, "a test needs what was observed"),
+        ({"overturned": True, "peak_rotation": 0.1}, "it overturned, and has a largest rotation of 0.1 rad"),
+        ({"overturned": False, "peak_rotation": math.inf}, "it did not overturn: a specimen that overturns"),
+        ({"peak_rotation": -0.1}, "from 0 to pi/2 rad, a size without a sign"),
+        ({"peak_rotation": 5.0}, r"give math.radians\(5\)"),
+        ({"overturned": "yes"}, "overturned must be True or False, not 'yes'"),
+        ({"overturned": True, "group": 3}, "group must be text, not 3"),
+    ],
+)
+def test_what_contradicts_itself_is_no_test(given, sentence):
+    with pytest.raises(InvalidOption, match=sentence):
+        ShakeTest(STRONG, **given)
+
+
+def test_a_test_needs_a_motion():
+    for motion in (None, "RSN6.AT2", 3.0):
+        with pytest.raises(InvalidMotion):
+            ShakeTest(motion, True)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"tests": []}, "tests must hold at least one test"),
+        ({"tests": [STRONG]}, "tests must hold tests"),
+        ({"blocks": {"other": BLOCK}}, "nothing for the specimen '' of the tests; they have 'other'"),
+        ({"blocks": {"": BLOCK}, "weights": [1.0]}, "must be a mapping like blocks"),
+        ({"weights": {"": [1.0]}}, "make both mappings by specimen"),
+        ({"weights": [1.0, 2.0]}, "weights must hold one number for each of 1 block"),
+        ({"lapse": 0.7}, "lapse must be a number from 0 to 0.5"),
+        ({"peak_error": math.nan}, "peak_error must be a number from 0 to 1"),
+        ({"one_block_in": "all"}, "one_block_in must be one of test, group, specimen"),
+        ({"bins": 0}, "bins must be a whole number from 1"),
+        ({"simulations": 3}, "simulations must be a whole number of at least 100"),
+        ({"model": "rigid"}, "model must be one of nonlinear, linear"),
+        ({"blocks": rocking.dynamics.BouncingBall(0.9)}, "this is known of blocks alone"),
+    ],
+)
+def test_what_cannot_be_judged_is_refused_in_a_sentence(change, sentence):
+    given = {"tests": [ShakeTest(STRONG, True)], "blocks": BLOCK} | change
+    with pytest.raises(InvalidOption, match=sentence):
+        rocking.validate(given.pop("tests"), given.pop("blocks"), **given)
+
+
+# Tables
+
+
+def written(path, text):
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_a_table_of_tests_is_read_with_its_units_and_labels(tmp_path):
+    times = 0.01 * np.arange(50)
+    samples = np.sin(2.0 * np.pi * times)
+    (tmp_path / "one.txt").write_text("\n".join(f"{value:.6f}" for value in samples), "utf-8")
+    rows = [
+        "motion,scale,dt_s,units,vertical,name,specimen,nominal,group,overturned,peak_rotation_deg,remark",
+        "one.txt,2,0.01,g,,first,a,N1,G1,no,3,",
+        "one.txt,-1,0.02,m/s2,,,b,,,1,,fell late",
+        "el-centro-meloland-270,0.5,,,el-centro-meloland-up,,,,,,2.5,",
+        '"one-sine:amplitude=0.2g,frequency=2Hz",,,,,,,,,,inf,',
+    ]
+    first, second, third, fourth = rocking.read_tests(written(tmp_path / "tests.csv", "\n".join(rows)))
+    assert (first.name, first.specimen, first.nominal, first.group) == ("first", "a", "N1", "G1")
+    assert first.peak_rotation == pytest.approx(math.radians(3.0)) and first.overturned is False
+    peak = float(f"{samples.max():.6f}")
+    assert first.motion.pga == pytest.approx(2.0 * 9.80665 * peak) and first.motion.step == pytest.approx(0.01)
+    assert second.motion.pga == pytest.approx(peak) and second.motion.step == pytest.approx(0.02)
+    assert second.overturned is True and second.peak_rotation is None
+    up = rocking.records.load("el-centro-meloland-up")
+    assert third.motion.vertical.pga == pytest.approx(0.5 * up.pga) and third.overturned is False
+    assert fourth.overturned is True and fourth.motion.pga == pytest.approx(0.2 * 9.80665)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "sentence"),
+    [
+        ("motion,fell\nx,1", 1, "the columns must be motion and overturned"),
+        ("motion,peak_rotation_deg,peak_rotation_rad\nx,1,1", 1, "the columns must be"),
+        ("motion,overturned,overturned\nx,1,1", 1, "each once"),
+        ("motion,overturned\nno-such-file.txt,1", 2, "no-such-file.txt"),
+        ("motion,overturned\n,1", 2, "this is a folder; name one record file"),
+        ("motion,overturned\nridgecrest-clc-090,perhaps", 2, "'perhaps' is not 0 or 1, .*column overturned"),
+        ("motion,overturned\nridgecrest-clc-090,1\nridgecrest-clc-090,", 3, "a test needs what was observed"),
+        ("motion,peak_rotation_deg\nridgecrest-clc-090,1 deg", 2, "'1 deg' is not a number in the column peak_rot"),
+        ("motion,peak_rotation_rad\nridgecrest-clc-090,12", 2, "if it is in degrees"),
+        ("motion,overturned,scale\nridgecrest-clc-090,1,inf", 2, "'inf' is not a number"),
+        ("motion,overturned,dt_s\nridgecrest-clc-090,1,x", 2, "'x' is not a number"),
+        ("motion,overturned,vertical\nridgecrest-clc-090,1,nothing", 2, "nothing"),
+        ("motion,overturned", None, "no rows"),
+    ],
+)
+def test_a_wrong_row_is_named_by_its_line(tmp_path, text, line, sentence):
+    with pytest.raises(UnreadableRecord, match=sentence) as caught:
+        rocking.read_tests(written(tmp_path / "tests.csv", text))
+    assert caught.value.line == line and "\n" not in str(caught.value)
+
+
+def test_a_table_that_is_not_there_is_said_to_be_missing(tmp_path):
+    with pytest.raises(UnreadableRecord, match="cannot be read"):
+        rocking.read_tests(tmp_path / "none.csv")
+
+
+TABLE = """motion,scale,specimen,overturned,peak_rotation_deg
+ridgecrest-clc-090,0.5,a,0,0.1
+ridgecrest-clc-090,0.5,a,0,0.2
+ridgecrest-clc-090,2,b,1,
+"""
+
+
+def test_the_command_writes_figure_tables_and_numbers(run, tmp_path):
+    table = written(tmp_path / "tests.csv", TABLE)
+    how = ("--width", "0.24", "--height", "1.1", "--peak-error", "0.1deg", "--lapse", "0.01")
+    code, out, err = run("validate", table, *how, "--out", tmp_path / "out")
+    assert (code, err) == (0, "") and "3 tests, 1 overturned, 2 measured peaks" in out
+    files = {"result.json", "tests.csv", "reliability.csv", "ranks.csv", "validation.png", "validation.pdf"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == files
+    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    direct = rocking.validate(
+        rocking.read_tests(table), Block(width=0.24, height=1.1), peak_error=math.radians(0.1), lapse=0.01
+    )
+    assert result["brier"]["value"] == pytest.approx(direct.brier.value)
+    assert result["crps_rad"]["value"] == pytest.approx(direct.crps.value)
+    rows = (tmp_path / "out" / "tests.csv").read_text("utf-8").splitlines()
+    assert rows[0].startswith("name,specimen,motion,overturned,probability,blocks,peak_rotation_rad,lower_rad")
+    assert len(rows) == 4
+
+
+def test_the_command_takes_the_ensemble_of_each_specimen(run, tmp_path):
+    table = written(tmp_path / "tests.csv", TABLE)
+    header = (
+        "p_plus_rad_s,p_minus_rad_s,alpha_plus_rad,alpha_minus_rad,restitution_plus,restitution_minus,weight,model\n"
+    )
+    for name, alpha in (("a", 0.3), ("b", 0.1)):
+        (tmp_path / "fits" / name).mkdir(parents=True)
+        rows = "".join(f"2,2,{alpha + d},{alpha + d},0.9,0.9,{w},linear\n" for d, w in ((0.0, 0.25), (0.02, 0.75)))
+        written(tmp_path / "fits" / name / "ensemble.csv", header + rows)
+    code, out, err = run("validate", table, "--ensemble", tmp_path / "fits", "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert found["model"] == "linear" and "a: 2 blocks, weighted; b: 2 blocks, weighted" in found["description"]
+    assert [test["blocks"] for test in found["tests"]] == pytest.approx([1.6] * 3)
+    code, _, err = run("validate", table, "--ensemble", tmp_path / "fits", "--width", "1")
+    assert code == 2 and "leave --width out" in err
+    code, _, err = run("validate", tmp_path / "tests.csv")
+    assert code == 2 and "a block is needed" in err
