@@ -66,6 +66,7 @@ for model in ("linear", "nonlinear"):
         response = rocking.simulate(rocking.Block(half_width=0.12, half_height=0.55), each, model=model)
         response.summary()
         rocking.gradient(response)
+        rocking.gradient(response, "event", -1)
         rocking.simulate_many(blocks, each, model=model)
 # Times as pandas and xarray give them.
 times = np.linspace(0.0, 1.0, 5)

@@ -11,7 +11,7 @@ from oracles.problem import Problem
 from test_restrained import drawn as restrained
 
 import rocking
-from rocking import Block, Motion, RestrainedBlock, Tendon
+from rocking import Block, Motion
 from rocking.arrays import Floats
 
 P, ALPHA, RESTITUTION = (2.0, 2.6), (0.15, 0.12), (0.9, 0.7)
@@ -118,8 +118,6 @@ def judged_by_variation(seeds: range) -> int:
     judged = 0
     for seed in seeds:
         body, _, motion, start = restrained(seed)
-        if body._tendon[0].yields < np.inf:
-            continue
         motion = motion * (1.3 * min(body.uplift_thresholds()) / motion.pga)
         for model in ("linear", "nonlinear"):
             response = rocking.simulate(body, motion, model=model, initial_rotation=start, duration=motion.end)
@@ -138,12 +136,12 @@ def judged_by_variation(seeds: range) -> int:
 
 
 def test_restrained_bodies_answer_backwards_as_forwards() -> None:
-    assert judged_by_variation(range(16)) >= 8
+    assert judged_by_variation(range(16)) >= 14
 
 
 @pytest.mark.thorough
 def test_many_restrained_bodies_answer_backwards_as_forwards() -> None:
-    assert judged_by_variation(range(16, 216)) >= 90
+    assert judged_by_variation(range(16, 216)) >= 180
 
 
 def test_what_comes_before_a_proven_rest_changes_nothing() -> None:
@@ -204,10 +202,6 @@ def test_what_cannot_be_differentiated_is_refused_in_a_sentence() -> None:
         _ = rocking.gradient(pulse).vertical_samples
     with pytest.raises(rocking.InvalidOption, match="must be a response"):
         rocking.gradient(BLOCK)
-    column = Block(width=0.5, height=3.0, mass=4000.0)
-    tied = RestrainedBlock(column, Tendon(3e5, prestress=1e3, strength=2e3))
-    with pytest.raises(rocking.InvalidOption, match="a tendon that yields"):
-        rocking.gradient(rocking.simulate(tied, rocking.pulses.one_sine(4.0, 1.0)))
 
 
 @pytest.mark.parametrize("model", [pytest.param("linear", marks=pytest.mark.thorough), "nonlinear"])

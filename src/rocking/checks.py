@@ -78,6 +78,13 @@ def share(value: object, name: str, error: Error, below: float = 1.0) -> float:
     return result
 
 
+def flag(value: object, name: str, error: Error) -> bool:
+    """Return `value`, or raise `error` unless it is a truth value."""
+    if not isinstance(value, bool | np.bool_):
+        raise error(f"{{}} must be True or False, not {shown(value)}", name, value=value)
+    return bool(value)
+
+
 def whole(value: object, name: str, error: Error, least: int, most: int | None = None) -> int:
     """Return `value` as an int, or raise `error` unless it is a whole number of a whole type within its bounds."""
     single = _single(value)

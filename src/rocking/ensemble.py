@@ -21,6 +21,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, names_of, several_motions
 from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
+from rocking.peak_changes import BETWEEN_STOPS, OF_BLOCKS, By, peak_changes
 from rocking.problem import bodies_of, rules_of
 from rocking.progress import Progress
 from rocking.treatment import Treatment, treatment
@@ -235,6 +236,8 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     dimensions = ("motion", "scale", "polarity", "block")
     gone = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
     described = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in VARIABLES.items()}
+    for name, (_, what) in {**OF_BLOCKS, **BETWEEN_STOPS}.items():
+        described[name] = {"units": "rad", "long_name": f"change of the peak per relative change of {what}"}
     variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}
     coordinates = {
         "motion": ("motion", names_of(product.motions)),
@@ -284,6 +287,7 @@ def simulate_many(
     measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",
     duration: float | None = None,
+    derivatives: bool = False,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> xr.Dataset:
@@ -308,6 +312,9 @@ def simulate_many(
         Motions as they are, reversed, or both (adds the dimension ``polarity``).
     duration : float, optional
         As for `simulate`.
+    derivatives : bool
+        Whether to differentiate the peaks. Each body that rocks and stands is then followed
+        once more, alone, which takes some twenty times as long.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional
@@ -320,7 +327,10 @@ def simulate_many(
         peak_time (s), impacts (resolved ones: those of a sequence after its proof are not among them), uplifts, rests,
         time_at_rest (s), complete_chattering (whether the block came to rest after its first uplift before the motion
         passed a threshold again), stalled (rests that were not proven), unfinished, stopped (by `duration`, so that
-        overturned is open). Coordinates name the motions and hold the blocks' parameters.
+        overturned is open). With `derivatives` also peak_by_motion, peak_by_p, peak_by_alpha and peak_by_restitution:
+        the change of the peak (rad) per relative change of each of these, as `Response.sensitivity` has it; NaN where
+        there is none, since the block overturns, the simulation was not finished, or rounding decides whether a block
+        that nothing weighs down touches the ground. Coordinates name the motions and hold the blocks' parameters.
 
     Raises
     ------
@@ -345,18 +355,30 @@ def simulate_many(
     [[True, False, True, False]]
     """
     product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
-    return dataset_of(product, outcomes_of(product, setup_of(product), threads, progress))
+    by = OF_BLOCKS if checks.flag(derivatives, "derivatives", InvalidOption) else None
+    return dataset_of(product, outcomes_of(product, setup_of(product), threads, progress, by))
 
 
 def outcomes_of(
-    product: Product, setup: Setup, threads: int | None, progress: bool | None
+    product: Product,
+    setup: Setup,
+    threads: int | None,
+    progress: bool | None,
+    by: By | None = None,
 ) -> dict[str, NDArray[np.generic]]:
-    """Simulate a whole product, and return arrays of its shape by the names of `VARIABLES`."""
+    """Simulate a whole product, and return arrays of its shape by the names of `VARIABLES`, and of changes of peaks."""
     count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in VARIABLES}
+    done = []
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:
         for task, outcomes in simulate_tasks(setup, _tasks(product), threads=count):
             for name, values in results.items():
                 values[(*task.key, task.bodies)] = outcomes[name]
+            if by:
+                done.append((task, outcomes["overturned"]))
             bar.advance(len(outcomes))
-    return results
+    return (
+        results
+        if by is None
+        else results | peak_changes(setup, done, product.shape, by, threads=count, progress=progress)
+    )

@@ -112,7 +112,7 @@ def response_to(
     records = alone.kernel_records(model, how.limits(alone, motion, model))
     trail = Trail(ground_of(motion, block.gravity), records[0], rules, NO_NODES)
     start = started(alone, records, *initial, name)
-    ending, table = _marched(trail, start)
+    ending, table = marched(trail, start)
     if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
     events = table["event"][: start["events"]]
@@ -137,7 +137,7 @@ def response_to(
     )
 
 
-def _marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
+def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     """How a march ends, in slices so that an interrupt is seen; and its table, which grows as it is filled."""
     ground, block, rules, _ = trail
     table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))

@@ -46,6 +46,8 @@ class Course:
     events: list[tuple[Number, str, int]] = field(default_factory=list)
     impacts: list[tuple[Number, int, Number, Number]] = field(default_factory=list)
     peaks: list[Number] = field(default_factory=list)
+    state: tuple[Number, Number] | None = None
+    """Rotation and velocity at the time that was asked for, if the block then moved."""
 
     @property
     def peak(self) -> Number:
@@ -66,15 +68,16 @@ def follow(
     slack: float = 0.0,
     digits: int = DIGITS,
     reach: float = 0.125,
+    at: float = -inf,
 ) -> Course:
     """Whole response from time zero until the block rests for good or overturns.
 
     Impacts of a sequence are followed until less than `closest` seconds are left of it, and its limit is known. A
     threshold counts as passed once the motion is beyond it by `slack` of it; `reach` is the length of steps over the
-    radius of convergence.
+    radius of convergence; the state is noted at the time `at`.
     """
     with ctx.workdps(digits):
-        return _Follower(problem, most_impacts, closest, slack, reach).whole(rotation, velocity)
+        return _Follower(problem, most_impacts, closest, slack, reach, at).whole(rotation, velocity)
 
 
 def rest_time(
@@ -103,13 +106,20 @@ class _Follower:
     """One block under one motion."""
 
     def __init__(
-        self, problem: Problem, most_impacts: int, closest: float = inf, slack: float = 0.0, reach: float = 0.125
+        self,
+        problem: Problem,
+        most_impacts: int,
+        closest: float = inf,
+        slack: float = 0.0,
+        reach: float = 0.125,
+        at: float = -inf,
     ) -> None:
         self.problem = problem
         self.most_impacts = most_impacts
         self.closest = closest
         self.slack = slack
         self.reach = reach
+        self.at = at
         self.course = Course()
         self.peak = arb(0)
         self.linear = problem.model == "linear"
@@ -174,6 +184,9 @@ class _Follower:
                 overturn = _first_root([self.fallen - series[0], *(-c for c in series[1:])], span)
             if overturn is not None and (impact is None or overturn < impact):
                 return (time + overturn).mid(), _slope(series, overturn), True
+            since = arb(self.at) - time if self.at > -inf else arb(-1)
+            if 0 <= since <= (span if impact is None else impact):
+                self.course.state = _told(side * _value(series, since)), _told(side * _slope(series, since))
             if not most <= self.peak:
                 self.note_peak(series, span if impact is None else impact)
             if impact is not None:

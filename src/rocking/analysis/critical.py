@@ -11,8 +11,7 @@ from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
-from rocking.response import Gradient, Response
-from rocking.response.derivatives import rotation_gradient
+from rocking.response import Gradient, Response, gradient
 from rocking.simulation import simulate
 
 
@@ -107,17 +106,15 @@ def critical_scale(
     _, falls = bisected(least, most, lambda scale: response(scale).overturned)
     last = response(falls)
     by_scale = {name: float(last.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")}
-    turned = rotation_gradient(last, last.overturn_time, falls)
-    speed = -float(abs(last.angular_velocity(last.overturn_time)))
-    of_scale = by_scale["motion"] * speed  # of the height of the rotation, with the logarithm of the scale
-    share = -falls / of_scale
-    gradient = replace(
+    turned, share = gradient(last, "event", -1), -falls / by_scale["motion"]
+    by_motion = replace(
         turned,
+        value=falls,
         coefficients=falls * share * turned.coefficients,
         vertical=None if turned.vertical is None else falls * share * turned.vertical,
         initial_rotation=share * turned.initial_rotation,
         initial_velocity=share * turned.initial_velocity,
         _motion=motion,
     )
-    p, alpha, restitution = (-falls * by_scale[name] / by_scale["motion"] for name in ("p", "alpha", "restitution"))
-    return CriticalScale(falls, gradient, p, alpha, restitution)
+    p, alpha, restitution = (share * by_scale[name] for name in ("p", "alpha", "restitution"))
+    return CriticalScale(falls, by_motion, p, alpha, restitution)

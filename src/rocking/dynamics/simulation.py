@@ -19,6 +19,7 @@ from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, one_motion
+from rocking.peak_changes import BETWEEN_STOPS
 from rocking.simulation import response_to
 from rocking.treatment import Treatment
 
@@ -147,6 +148,7 @@ def simulate_many(
     duration: float | None = None,
     initial_position: float | None = None,
     initial_velocity: float = 0.0,
+    derivatives: bool = False,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> xr.Dataset:
@@ -164,6 +166,8 @@ def simulate_many(
         As for `simulate`; by default of bodies that need not come to rest the end of the longest motion.
     initial_position, initial_velocity : float
         As for `simulate`, for all bodies.
+    derivatives : bool
+        As for `rocking.simulate_many`.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional
@@ -172,7 +176,9 @@ def simulate_many(
     Returns
     -------
     xarray.Dataset
-        As `rocking.simulate_many`, with ``peak_position`` (m), the highest.
+        As `rocking.simulate_many`, with ``peak_position`` (m), the highest. Of derivatives there are peak_by_motion,
+        peak_by_restitution, peak_by_initial_position (per relative change of the distance from the stop) and
+        peak_by_initial_velocity (m); NaN also where the peak is the second stop.
 
     Raises
     ------
@@ -203,9 +209,12 @@ def simulate_many(
         )
         or None,
     )
-    results = outcomes_of(product, setup, threads, progress)
+    by = BETWEEN_STOPS if checks.flag(derivatives, "derivatives", InvalidOption) else None
+    results = outcomes_of(product, setup, threads, progress, by)
     found = dataset_of(product, results).drop_vars("overturned").rename(peak_rotation="peak_position", block="body")
     found["peak_position"].attrs.update(units="m", long_name="highest position")
+    for name in by or ():
+        found[name].attrs.update(units="m")
     return found
 
 

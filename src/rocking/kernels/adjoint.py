@@ -3,18 +3,35 @@
 `trace.vary` carries one change of the input forwards, to all numbers of a response; this carries the change of one
 number with the state, (l, m) with d number = l du + m dv, backwards to all inputs. Along an arc with
 du'' = k(t) du - c du' + f(t), m'' = k(t) m + c m' and l = c m - m', and a forcing f adds the integral of m f. Through
-an impact the transposed saltation takes it.
+an impact the transposed saltation takes it. A tendon that yields adds a third number to the state, its plastic
+elongation, which forces the arcs on which it is elastic and is written where it turns back.
 """
 
+import math
 from enum import IntEnum
 
 from rocking.arrays import Floats
-from rocking.kernels.arc import evaluate, expand, sign_of
+from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import has_vertical
 from rocking.kernels.recurrences import variation_coefficients
-from rocking.kernels.state import Record, Records
-from rocking.kernels.trace import Quantity, Trail, add_restraints, elapsed, expand_coefficients, saltation
+from rocking.kernels.restitution import middle_factor
+from rocking.kernels.state import Record, Records, TendonLaw
+from rocking.kernels.tendon import adopt, plastic_after
+from rocking.kernels.trace import (
+    Quantity,
+    Trail,
+    add_restraints,
+    elapsed,
+    elongation_rate,
+    expand_coefficients,
+    is_impact,
+    is_jump,
+    plastic_by_start,
+    push_rate,
+    restoring_by_tendon,
+    saltation,
+)
 
 
 class Ends(IntEnum):
@@ -26,48 +43,170 @@ class Ends(IntEnum):
     GRAZES = 2
     #: The body leaves the ground at the instant at which it comes to rest.
     LEAVES_AT_ONCE = 3
+    #: The motion touches the threshold of a side without a rate.
+    TOUCHES_THRESHOLD = 4
+    #: Nowhere yet.
+    GOES_ON = 5
 
 
 @kernel
 def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, change: Floats, out: Floats) -> int:
-    """Take ``change``, of a number with u and v, from ``time`` after the node of a row back; returns the `Ends`.
+    """Take ``change``, of a number with u, v and a plastic elongation, back to the start; returns the `Ends`.
 
-    In ``change`` stays that with u and v at the start of the response, 0 where the body has come to rest. To row k of
-    ``out`` is added the change with the coefficients of piece k, in units of g, horizontal ones first. ``work`` is
-    scratch space (`state.VARIATION`). Tendons that yield and stops that face each other are not known here.
+    It is that at ``time`` after the node of a row; infinite, at the end of its step, before an impact there. In
+    ``change`` stays that at the start of the response, 0 where the body has come to rest. To row k of ``out`` is added
+    the change with the coefficients of piece k, in units of g, horizontal ones first. ``work`` is scratch space
+    (`state.VARIATION`).
     """
-    nodes = trail.nodes
+    block, nodes = trail.block, trail.nodes
     number = impacts_up_to(nodes, row)
+    plastic = plastic_at(trail, row)
     for k in range(row, -1, -1):
         node = nodes[k]
-        if node.side < 0:
-            change[0] = change[1] = 0.0
-            if k == 0:
-                return Ends.START
-            # Where the ground ends the rest at once, the time of landing is that of leaving.
-            return Ends.LEAVES_AT_ONCE if nodes[k + 1].time == node.time else Ends.REST
-        t = time
-        if k < row:
-            following = nodes[k + 1]
-            t = elapsed(trail, node, following)
-            if following.u == 0.0 and following.side == node.side and following.v <= 0.0 and t > 0.0:
-                return Ends.GRAZES
-        order, _, degree = expand(trail.ground, trail.block, trail.rules, scratch, node, t)
-        if k < row and following.u == 0.0 and t > 0.0:
+        if node.side < 0 or (k < row and nodes[k + 1].side < 0):
+            ends = at_rest(nodes, k, change)
+            if ends != Ends.GOES_ON:
+                return ends
+            continue
+        t = elapsed(trail, node, nodes[k + 1]) if k < row or time == math.inf else time
+        if block.yielding:
+            if k < row and turns_back(nodes, k + 1):
+                change[0] += elongation_rate(trail, node.side, nodes[k + 1].u) * change[2]
+                change[2] = 0.0
+                plastic = plastic_at(trail, k)
+            adopt(block, node.law, plastic)
+        order, _, degree = expand(trail.ground, block, trail.rules, scratch, node, t)
+        if k < row and nodes[k + 1].u == 0.0 and t > 0.0:
+            number -= is_impact(nodes, k)
             _, v, _ = evaluate(scratch.rotation, order, t)
-            if not v < 0.0:
+            if not back_through_impact(trail, k, v, number, change):
                 return Ends.GRAZES
-            rate = 1.0 / v
-            number -= 1
-            by_u = saltation(trail, node, following, Quantity.ROTATION, -rate, (0.0, -v), number)
-            by_v = saltation(trail, node, following, Quantity.ROTATION, 0.0, (1.0, -v), number)
-            change[0], change[1] = (
-                change[0] * by_u[0] + change[1] * by_u[1],
-                change[0] * by_v[0] + change[1] * by_v[1],
-            )
         if t > 0.0:
             back_through(trail, scratch, work, node, (order, degree), t, change, out)
+    change[0] += plastic_by_start(trail) * change[2]
     return Ends.START
+
+
+@inlined
+def at_rest(nodes: Records, k: int, change: Floats) -> int:
+    """Take ``change`` back through a rest, of which a node, or the one before it, is; GOES_ON where anything is left.
+
+    The impacts between the last resolved one and the rest count for nothing.
+    """
+    if nodes[k].side >= 0:
+        return Ends.GOES_ON
+    moved = change[0] != 0.0 or change[1] != 0.0
+    change[0] = change[1] = 0.0
+    if k == 0:
+        return Ends.START
+    # Where the ground ends the rest at once, the time of landing is that of leaving.
+    if moved and nodes[k + 1].time == nodes[k].time:
+        return Ends.LEAVES_AT_ONCE
+    return Ends.REST if change[2] == 0.0 else Ends.GOES_ON
+
+
+@inlined
+def back_through_impact(trail: Trail, k: int, v: float, number: int, change: Floats) -> bool:
+    """Take ``change`` back through the impact after the k-th node, at the velocity v; False where it only touches.
+
+    ``number`` of impacts came before.
+    """
+    if change[0] == 0.0 and change[1] == 0.0:
+        return True
+    node, following = trail.nodes[k], trail.nodes[k + 1]
+    away = -1.0 if trail.block.facing and following.side != node.side else 1.0  # the other stop
+    if not (is_impact(trail.nodes, k) and away * v < 0.0):
+        return False
+    by_u = saltation(trail, node, following, Quantity.ROTATION, -1.0 / v, (0.0, -away * v), number)
+    by_v = saltation(trail, node, following, Quantity.ROTATION, 0.0, (away, -away * v), number)
+    change[0], change[1] = change[0] * by_u[0] + change[1] * by_u[1], change[0] * by_v[0] + change[1] * by_v[1]
+    return True
+
+
+@kernel
+def of_ending(trail: Trail, scratch: Record, row: int, change: Floats, out: Floats) -> int:
+    """Write how the time at which the step of a row ends changes with the state before it; returns the `Ends`.
+
+    That is at the end of the step, before an impact or an overturning, else at its node. What the time of an uplift or
+    a rest changes with the motion at that instant is added to ``out``, as in `adjoint`.
+    """
+    block, nodes = trail.block, trail.nodes
+    node, following = nodes[row], nodes[row + 1]
+    plastic = plastic_at(trail, row)
+    if block.yielding:
+        adopt(block, node.law, plastic)
+    if node.side < 0:
+        side, rate = following.side, -push_rate(trail.ground, block, following.side, following.piece, following.offset)
+        if row > 0 and following.time == node.time:
+            return Ends.LEAVES_AT_ONCE
+        if is_jump(trail, following):
+            return Ends.START
+        if not rate > 0.0:
+            return Ends.TOUCHES_THRESHOLD
+        change[2] = restoring_by_tendon(block, side, plastic, 1.0) / (block.gain[side] * rate)
+        add_instant(trail, following, (sign_of(side) / rate, block.threshold[side] / rate), out)
+    elif following.side < 0:
+        by_rest(trail, node, plastic, change, out)
+    else:
+        t = elapsed(trail, node, following)
+        order, _, _ = expand(trail.ground, block, trail.rules, scratch, node, t)
+        _, v, _ = evaluate(scratch.rotation, order, t)
+        if v == 0.0:
+            return Ends.GRAZES
+        change[0] = -1.0 / v
+    return Ends.START
+
+
+@inlined
+def by_rest(trail: Trail, node: Record, plastic: float, change: Floats, out: Floats) -> None:
+    """Write the change of the time of rest after the impact with which a node begins: `trace.rest_shift`, by parts."""
+    block, i = trail.block, node.side
+    j = block.entered[i]
+    g_i = restoring(trail.ground, block, i, node.piece, node.offset)
+    g_j = restoring(trail.ground, block, j, node.piece, node.offset)
+    e_i, e_j = middle_factor(block, i, node.v), middle_factor(block, j, node.v)
+    share = 2.0 / (1.0 - e_i * e_j)
+    by_speed = share * (1.0 / g_i + e_i / g_j)
+    by_g_i, by_g_j = -share * node.v / (g_i * g_i), -share * node.v * e_i / (g_j * g_j)
+    later = 1.0 - by_speed * g_i  # by the shift of the impact
+    later += by_g_i * block.gain[i] * push_rate(trail.ground, block, i, node.piece, node.offset)
+    later += by_g_j * block.gain[j] * push_rate(trail.ground, block, j, node.piece, node.offset)
+    change[0], change[1] = -later / node.v, by_speed
+    change[2] = by_g_i * restoring_by_tendon(block, i, plastic, 1.0) + by_g_j * restoring_by_tendon(
+        block, j, plastic, 1.0
+    )
+    by_i, by_j = by_g_i * block.gain[i], by_g_j * block.gain[j]
+    push = by_i * sign_of(i) + by_j * sign_of(j)
+    add_instant(trail, node, (push, by_i * block.threshold[i] + by_j * block.threshold[j]), out)
+
+
+@inlined
+def add_instant(trail: Trail, node: Record, by: tuple[float, float], out: Floats) -> None:
+    """Add the change with the coefficients of a node's piece, from that ``by`` push and weight at its instant."""
+    columns = trail.ground.columns
+    push, weight = by
+    for j in range(columns):
+        out[node.piece, j] += push
+        if has_vertical(trail.ground):
+            out[node.piece, columns + j] += weight
+        push *= node.offset
+        weight *= node.offset
+
+
+@inlined
+def turns_back(nodes: Records, row: int) -> bool:
+    """Whether a tendon that has yielded turns back at a node: there its plastic elongation is written."""
+    return bool(nodes[row - 1].law == TendonLaw.PLASTIC and nodes[row].law == TendonLaw.ELASTIC)
+
+
+@inlined
+def plastic_at(trail: Trail, row: int) -> float:
+    """Plastic elongation of a tendon at a node; 0 without one that yields."""
+    if not trail.block.yielding:
+        return 0.0
+    while row > 0 and not turns_back(trail.nodes, row):
+        row -= 1
+    return plastic_after(trail.block, trail.rules, trail.nodes, row, 0.0)
 
 
 @inlined
@@ -75,9 +214,7 @@ def impacts_up_to(nodes: Records, row: int) -> int:
     """Count the impacts up to the node of a row."""
     count = 0
     for k in range(row):
-        node, following = nodes[k], nodes[k + 1]
-        moves = node.side >= 0 and following.side >= 0 and following.u == 0.0
-        count += moves and (following.side != node.side or following.v > 0.0)
+        count += is_impact(nodes, k)
     return count
 
 
@@ -125,6 +262,19 @@ def back_through(
             for j in range(k + 1):
                 m[k] += lam * x[j] * (-scratch.sine[k - j] if trail.rules.nonlinear else scratch.rotation[k - j])
         add_moments(scratch.other, m, order, node.offset, t, 1.0, out[node.piece, ground.columns :])
+    if block.yielding and node.law == TendonLaw.ELASTIC:
+        plastic_series(trail, scratch, node.side, x, order, m)
+        add_moments(scratch.other, m, order, 0.0, t, 1.0, change[2:])
+
+
+@inlined
+def plastic_series(trail: Trail, scratch: Record, side: int, x: Floats, order: int, m: Floats) -> None:
+    """Write x times d u'' / d plastic into m."""
+    stiffness = trail.block.tendon[side]
+    for k in range(order - 1):
+        m[k] = 0.0 if trail.rules.nonlinear else stiffness * x[k]
+        for j in range(k + 1 if trail.rules.nonlinear else 0):
+            m[k] += stiffness * x[j] * scratch.half_cosine[k - j]
 
 
 @inlined

@@ -114,9 +114,9 @@ def vary(
     """
     nodes = trail.nodes
     impact_count = event_count = 0
-    plastic = dp = 0.0  # elongation of a tendon for good, and its variation
     du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
     dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
+    plastic, dp = 0.0, plastic_by_start(trail) * du  # elongation of a tendon for good, and its variation
     at_peak = du
     for k in range(nodes.shape[0]):
         node = nodes[k]
@@ -145,9 +145,8 @@ def vary(
             t = elapsed(trail, node, following)
             du, dv, _ = evaluate(work.change, order, t)
             if node.law == TendonLaw.PLASTIC and following.law != node.law:
-                half = math.cos(0.5 * following.u) if trail.rules.nonlinear else 1.0
-                dp = trail.block.opening[node.side] * half * du
-            if following.u == 0.0 and (following.side != node.side or following.v > 0.0):  # no touch
+                dp = elongation_rate(trail, node.side, following.u) * du
+            if is_impact(nodes, k):
                 _, speed, _ = evaluate(scratch.rotation, order, t)
                 shift = du / -speed
                 away = -1.0 if trail.block.facing and following.side != node.side else 1.0  # the other stop
@@ -156,6 +155,31 @@ def vary(
                 impacts[impact_count] = shift
                 impact_count += 1
     return at_peak
+
+
+@inlined
+def elongation_rate(trail: Trail, side: int, u: float) -> float:
+    """Elongation of a tendon per rotation, at a rotation."""
+    return trail.block.opening[side] * (math.cos(0.5 * u) if trail.rules.nonlinear else 1.0)
+
+
+@inlined
+def plastic_by_start(trail: Trail) -> float:
+    """Return the plastic elongation of a tendon per rotation at the start of a response: 0 unless it yields there."""
+    node = trail.nodes[0]
+    if not trail.block.yielding or plastic_after(trail.block, trail.rules, trail.nodes, 0, 0.0) <= 0.0:
+        return 0.0
+    return elongation_rate(trail, node.side, node.u)
+
+
+@inlined
+def is_impact(nodes: Records, k: int) -> bool:
+    """Whether the step from the k-th node to the next ends in an impact, and not in a touch without speed."""
+    node, following = nodes[k], nodes[k + 1]
+    if node.side < 0 or following.side < 0 or following.u != 0.0:
+        return False
+    rests = k + 2 < nodes.shape[0] and nodes[k + 2].side < 0  # at once, where nothing is left of the speed
+    return bool(following.side != node.side or following.v > 0.0 or rests)
 
 
 @inlined
@@ -277,7 +301,7 @@ def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) ->
     threshold = block.threshold[node.side]
     push = -push_at(ground, block, node.side, node.piece, node.offset)
     rate = -push_rate(ground, block, node.side, node.piece, node.offset)
-    if abs(push - threshold - block.hold[node.side]) > _JUMP * (abs(threshold) + abs(block.hold[node.side])):
+    if is_jump(trail, node):
         return 0.0
     slackening = by_tendon / (block.gain[node.side] * rate)
     if quantity == Quantity.MOTION:
@@ -289,6 +313,14 @@ def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) ->
             growth += block.prestress[node.side] * threshold / block.gain[node.side]
         return block.slenderness[node.side] * growth / rate + slackening
     return slackening
+
+
+@inlined
+def is_jump(trail: Trail, node: Record) -> bool:
+    """Whether the motion jumps past the threshold at the uplift with which a node begins."""
+    threshold, hold = trail.block.threshold[node.side], trail.block.hold[node.side]
+    push = -push_at(trail.ground, trail.block, node.side, node.piece, node.offset)
+    return bool(abs(push - threshold - hold) > _JUMP * (abs(threshold) + abs(hold)))
 
 
 @inlined

@@ -1,48 +1,62 @@
-"""How the peak of a response changes with every coefficient, and so with every sample, of its motion."""
+"""How what a response tells changes with every coefficient, and so with every sample, of its motion."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal, get_args
 
 import numpy as np
 
+from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.adjoint import Ends, adjoint
+from rocking.kernels.adjoint import Ends, adjoint, of_ending
+from rocking.kernels.march import follow
+from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
-from rocking.response.answers import trail_of
+from rocking.response.answers import history_of, trail_of
+from rocking.response.history import steps_to_events, steps_to_impacts
 from rocking.response.response import Response
+
+#: What a gradient is of.
+Told = Literal["peak", "rotation", "velocity", "event", "impact"]
+
+#: To so long before a rest, s, its impacts are followed: what is left is to first order, and rounding counts for less.
+_CLOSE: Final = 1e-5
 
 _NO_REASON: Final = ""
 _OVERTURNS: Final = "the block overturns: its peak is where it falls, whatever changes a little"
+_AT_STOP: Final = "the body reaches its second stop: its peak is there, whatever changes a little"
 _UNFINISHED: Final = "the simulation was not finished: its peak is not known"
 _FROM_REST: Final = "the response starts on the ground: a start to the other side changes it otherwise"
 _REASONS: Final = {
     Ends.GRAZES: "the block touches the ground without speed: with a little less motion it does not, or it hits it",
-    Ends.LEAVES_AT_ONCE: "the block leaves the ground at the instant at which it comes to rest, before its peak",
+    Ends.LEAVES_AT_ONCE: "the block leaves the ground at the instant at which it comes to rest",
+    Ends.TOUCHES_THRESHOLD: "the motion touches the threshold of uplift: with a little less of it there is no uplift",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """Derivatives of a number, as the peak of a response, by what it was computed from; made by `gradient`.
+    """Derivatives of a number that a response tells by what it was computed from; made by `gradient`.
 
     Attributes
     ----------
     value : float
-        The number itself: of a peak rad, of another body's in the unit of its coordinate.
+        The number itself: a rotation (rad), an angular velocity (rad/s) or a time (s); of another body in the units of
+        its coordinate.
     coefficients : ndarray, shape (n, degree + 1)
-        By the coefficients of the motion's n pieces: rad per m/s^2, per m/s^3, and so on. Exactly zero for all pieces
-        that end before the last uplift in front of the peak, or begin after it.
+        By the coefficients of the motion's n pieces: units of the value per m/s^2, per m/s^3, and so on; of a peak rad
+        per m/s^2, of a time s per m/s^2. Exactly zero for all pieces that end before the last uplift in front of what
+        is asked for, or begin after it.
     vertical : ndarray or None
         The same, of the vertical component.
     initial_rotation, initial_velocity : float
-        By the start: rad per rad, and rad per rad/s.
+        By the start: units of the value per rad, and per rad/s.
     reason : str
         Why numbers are NaN, one sentence; empty where none is.
     """
@@ -57,7 +71,7 @@ class Gradient:
 
     @property
     def samples(self) -> Floats:
-        """By the samples of a record, rad per m/s^2, shape (n + 1,): by the motion's accelerations at breakpoints.
+        """By the samples of a record, per m/s^2, shape (n + 1,): by the motion's accelerations at breakpoints.
 
         Raises
         ------
@@ -86,13 +100,19 @@ class Gradient:
         return f"<Gradient: {self.value:.6g} depends on {moved} of {len(self.coefficients)} pieces of the motion>"
 
 
-def gradient(response: Response) -> Gradient:
-    """Differentiate the peak of a response by its motion, sample by sample, and by the start.
+def gradient(response: Response, of: Told = "peak", at: float | None = None) -> Gradient:
+    """Differentiate what a response tells by its motion, sample by sample, and by the start.
 
     Parameters
     ----------
     response : Response
         What `simulate` found, for a block or another body.
+    of : {"peak", "rotation", "velocity", "event", "impact"}
+        What is differentiated: the peak rotation (rad); the rotation (rad) or the angular velocity (rad/s) at a time;
+        or the time (s) of an event, an uplift, a rest or an overturning, or of an impact.
+    at : float or int, optional
+        Of a rotation or a velocity the time, s, just after an impact if there is one; of an event or an impact its
+        position among the response's `events` or `impacts`, the last one's being -1. A peak needs none.
 
     Returns
     -------
@@ -102,81 +122,179 @@ def gradient(response: Response) -> Gradient:
     Raises
     ------
     InvalidOption
-        If the response is none, or that of a body with a tendon that yields or with two stops.
+        If the response is none, there is no such quantity, or `at` is missing, out of place or out of range.
 
     Notes
     -----
     One pass back along the steps of the response, whatever the number of samples: the adjoint of what
-    `Response.sensitivity` carries forwards (see "Impacts: restitution and sensitivity" in the documentation). Numbers
-    are NaN where there is no derivative, and `Gradient.reason` says why: where the block overturns, or touches the
-    ground without speed.
+    `Response.sensitivity` carries forwards (see "Impacts: restitution and sensitivity" in the documentation). At rest a
+    rotation does not change. The time of an uplift changes with the motion about it alone, and not at all where the
+    motion jumps past the threshold; that of a rest follows its impacts up to 0.01 ms before it, and is to first order
+    from there. Numbers are NaN where there is no derivative, and `Gradient.reason` says why: where a block overturns,
+    so that its peak is fixed, touches the ground without speed, or leaves it as it comes to rest.
 
     Examples
     --------
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
-    >>> found = rocking.gradient(rocking.simulate(block, record))
-    >>> [f"{each:.5f}" for each in found.samples]
+    >>> response = rocking.simulate(block, record)
+    >>> [f"{each:.5f}" for each in rocking.gradient(response).samples]
     ['-0.00175', '-0.01310', '0.01048', '0.04288', '0.03351']
+    >>> [f"{each:.5f}" for each in rocking.gradient(response, "impact", 0).samples]
+    ['0.02102', '0.16678', '0.02122', '0.00000', '0.00000']
     """
     if not isinstance(response, Response):
         raise InvalidOption("{} must be a response, as `rocking.simulate` returns it", "response", value=response)
-    reason = _NO_REASON
-    if response.overturned or response.unfinished:
-        reason = _OVERTURNS if response.overturned else _UNFINISHED
-    elif response.near_ties:
-        reason = _REASONS[Ends.GRAZES]
-    return rotation_gradient(response, response.peak_time, response.peak_rotation, reason)
-
-
-def rotation_gradient(response: Response, time: float, height: float, reason: str = _NO_REASON) -> Gradient:
-    """Differentiate the height of the rotation at a time, unless there is a reason not to; as `gradient`."""
-    trail, motion = trail_of(response), response.motion
-    if trail.block["yielding"] or trail.block["facing"]:
-        what = "a tendon that yields" if trail.block["yielding"] else "two stops"
-        raise InvalidOption(
-            f"no gradient is known of a body with {what}; `Response.sensitivity` tells how its peak changes with scales"
-        )
+    checks.one_of(of, "of", InvalidOption, get_args(Told))
+    if of == "peak":
+        asked = _peak(response, at)
+    elif of in ("rotation", "velocity"):
+        asked = _state(response, of, at)
+    else:
+        asked = _time(response, of, at)
+    trail = trail_of(response)
     out = np.zeros((len(trail.ground.pieces), trail.ground.columns * trail.ground.stretches.shape[1]))
-    by_start = np.zeros(2)
-    reason = reason or _taken_back(trail, time, by_start, out)
+    change = np.zeros(3)
+    reason = asked.reason
+    if response.near_ties and not reason and _ties_before(trail, asked.instant):
+        reason = _REASONS[Ends.GRAZES]
+    reason = reason or _taken_back(asked, change, out)
     if reason and reason != _FROM_REST:
-        by_start[:] = math.nan
+        change[:] = math.nan
         out[:] = math.nan
-    horizontal, vertical = _by_components(motion, trail, response.body.gravity, out)
-    sign = -1.0 if int(trail.nodes["side"][0]) == 1 else 1.0
+    horizontal, vertical = _by_components(response.motion, trail, response.body.gravity, out)
+    sign = _sign(int(trail.nodes["side"][0]))
     return Gradient(
-        value=height,
+        value=asked.value,
         coefficients=horizontal,
         vertical=vertical,
-        initial_rotation=float(sign * by_start[0]),
-        initial_velocity=float(sign * by_start[1]),
+        initial_rotation=float(sign * change[0]),
+        initial_velocity=float(sign * change[1]),
         reason=reason,
-        _motion=motion,
+        _motion=response.motion,
     )
 
 
-def _taken_back(trail: Trail, peak_time: float, by_start: Floats, out: Floats) -> str:
-    """Write derivatives by the state at the start and by pieces of the ground; returns why there are none."""
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """A number: where in the steps it is told, how it changes with the state there, and why perhaps it has no gradient.
+
+    ``since`` is the time after the node of ``row``. ``by_state`` is None of the time at which the step of that row
+    ends. A height is the size of a rotation.
+    """
+
+    value: float
+    instant: float
+    trail: Trail
+    row: int = 0
+    since: float = 0.0
+    by_state: tuple[float, float] | None = None
+    reason: str = _NO_REASON
+    is_height: bool = False
+
+
+def _peak(response: Response, at: float | None) -> _Asked:
+    if at is not None:
+        raise InvalidOption('{} is for other quantities: a "peak" is where it is', "at", value=at)
+    trail, value, instant = trail_of(response), response.peak_rotation, response.peak_time
+    reason = _NO_REASON
+    if response.overturned or response.unfinished:
+        reason = _OVERTURNS if response.overturned else _UNFINISHED
+    elif response._reaches_second_stop:
+        reason = _AT_STOP
+    row = max(0, int(np.searchsorted(trail.nodes["time"], instant)) - 1)
+    since = instant - float(trail.nodes["time"][row])
+    return _Asked(value, instant, trail, row, since, (1.0, 0.0), reason, is_height=True)
+
+
+def _state(response: Response, of: Told, at: float | None) -> _Asked:
+    """Rotation or velocity at a time."""
+    if at is None:
+        raise InvalidOption(f"a {of} needs the time, {{}}, at which it is asked for, s", "at")
+    time = checks.within(at, "at", InvalidOption, 0.0, response.duration, "s")
+    trail, history = trail_of(response), history_of(response)
+    found = history.states(time)
+    row = int(np.searchsorted(trail.nodes["time"], time, side="right")) - 1
+    nodes = state.attributed(np.concatenate([trail.nodes[: row + 1], _later(response, row, time)]))
+    row = len(nodes) - 1
+    sign = _sign(int(nodes["side"][row])) if np.any(found) or time == 0.0 else 0.0
+    by_state = (sign, 0.0) if of == "rotation" else (0.0, sign)
+    since = max(0.0, time - float(nodes["time"][row]))
+    value = float(found[0 if of == "rotation" else 1])
+    return _Asked(value, time, trail._replace(nodes=nodes), row, since, by_state)
+
+
+def _time(response: Response, of: Told, at: float | None) -> _Asked:
+    """Time of an event or of an impact."""
+    trail, rows = trail_of(response), response.events if of == "event" else response.impacts
+    if not len(rows):
+        raise InvalidOption(f"the response has no {of}; ask for another quantity, {{}}", "of", value=of)
+    k = checks.whole(at, "at", InvalidOption, -len(rows), len(rows) - 1)
     nodes = trail.nodes
+    row = int((steps_to_events(nodes, overturns=response.overturned) if of == "event" else steps_to_impacts(nodes))[k])
+    if row > 0 and nodes["side"][row + 1] < 0 and nodes["time"][row + 1] == nodes["time"][row]:
+        row -= 1  # a rest at the instant of the impact
+    instant = float(rows["time"][k])
+    since = math.inf if nodes["side"][row] >= 0 and nodes["side"][row + 1] >= 0 else 0.0
+    if nodes["side"][row] >= 0 and nodes["side"][row + 1] < 0:
+        later = _later(response, row, instant - _CLOSE)
+        later = later[: int(np.max(np.flatnonzero(later["u"] == 0.0), initial=-1)) + 1]
+        trail = trail._replace(nodes=state.attributed(np.concatenate([nodes[: row + 1], later, nodes[row + 1 :]])))
+        row += len(later)
+    return _Asked(instant, instant, trail, row, since)
+
+
+def _later(response: Response, row: int, until: float) -> Records:
+    """Nodes after that of a row up to a time, of impacts that follow where a sequence is closed."""
+    nodes: Records = history_of(response).trail.nodes
+    found: Records = nodes[(nodes["time"] > trail_of(response).nodes["time"][row]) & (nodes["time"] <= until)]
+    return found
+
+
+def _ties_before(trail: Trail, instant: float) -> bool:
+    """Whether the last digits decided on a touch up to an instant: the march is followed once more, as far as that."""
+    rules, start = trail.rules.copy(), state.new_states(1, np.iinfo(np.int64).max)[0]
+    first = trail.nodes[0]
+    for name in ("piece", "offset", "side", "u", "v"):
+        start[name] = first[name]
+    start["peak"] = first["u"]
+    rules["stop"], rules["endless"], rules["record"] = math.nextafter(instant, math.inf), False, False
+    follow(trail.ground, trail.block, rules, state.new_table(0), state.new_scratch(), start)
+    return bool(start["near_ties"] > 0)
+
+
+def _taken_back(asked: _Asked, change: Floats, out: Floats) -> str:
+    """Write derivatives by the state at the start and by pieces of the ground; returns why there are none."""
+    nodes, scratch = asked.trail.nodes, state.new_scratch()
     starts_at_rest, begin = int(nodes["side"][0]) < 0, float(nodes["time"][0])
-    moves = peak_time > begin  # else the start is the peak
-    if moves or not starts_at_rest:
-        by_start[0] = 1.0
-    if moves:
-        row = int(np.searchsorted(nodes["time"], peak_time)) - 1
-        scratch, work = state.new_scratch(), state.record(state.VARIATION)
-        ends = Ends(adjoint(trail, scratch, work, row, peak_time - float(nodes["time"][row]), by_start, out))
+    ends = Ends.START
+    if asked.by_state is None:
+        ends = Ends(of_ending(asked.trail, scratch, asked.row, change, out))
+    else:
+        change[:2] = asked.by_state
+        if not np.any(change) or (asked.instant == begin and not asked.is_height):
+            return _NO_REASON  # at rest, or the start itself
+    if ends in _REASONS:
+        return _REASONS[ends]
+    if asked.instant > begin:
+        work = state.record(state.VARIATION)
+        ends = Ends(adjoint(asked.trail, scratch, work, asked.row, asked.since, change, out))
         if ends in _REASONS:
             return _REASONS[ends]
-        if ends == Ends.REST or (starts_at_rest and nodes["time"][1] > begin):
+        waits = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > begin)
+        if ends == Ends.REST or waits:
             return _NO_REASON  # what comes to rest again before an uplift leaves nothing
+        if not starts_at_rest:
+            change[0] = math.nan if nodes["u"][0] == 0.0 else change[0]
     if starts_at_rest:
-        by_start[:] = math.nan
-    elif moves and nodes["u"][0] == 0.0:
-        by_start[0] = math.nan
-    return _FROM_REST if np.any(np.isnan(by_start)) else _NO_REASON
+        change[:2] = math.nan
+    return _FROM_REST if np.any(np.isnan(change)) else _NO_REASON
+
+
+def _sign(side: int) -> float:
+    """Sign of a coordinate in the frame of a side, or at rest."""
+    return -1.0 if side == 1 else 1.0
 
 
 def _by_components(motion: Motion | None, trail: Trail, gravity: float, out: Floats) -> tuple[Floats, Floats | None]:

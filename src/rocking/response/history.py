@@ -18,6 +18,7 @@ from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import components
 from rocking.kernels.march import follow
+from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, trace, vary
 from rocking.motion import piecewise
 from rocking.tables import counted
@@ -249,6 +250,21 @@ def friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
     return demand
 
 
+def steps_to_events(nodes: Records, *, overturns: bool) -> Integers:
+    """Rows of the nodes whose steps end in an uplift, a rest or, where the response so ends, an overturning."""
+    rests = nodes["side"] < 0
+    rows = np.flatnonzero(rests[:-1] | rests[1:])
+    return np.append(rows, len(nodes) - 2) if overturns else rows
+
+
+def steps_to_impacts(nodes: Records) -> Integers:
+    """Rows of the nodes whose steps end in an impact; as `trace.is_impact`."""
+    side, moves = nodes["side"], nodes["side"] >= 0
+    onto_ground = moves[:-1] & moves[1:] & (nodes["u"][1:] == 0.0)
+    rests = np.append(~moves, False)[2:]
+    return np.flatnonzero(onto_ground & ((side[1:] != side[:-1]) | (nodes["v"][1:] > 0.0) | rests))
+
+
 def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     """Return the trail with the impacts between the last resolved one of each chattering sequence and its rest.
 
@@ -269,8 +285,9 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     parts, done = [], 0
     for row in closing:
         start = state.new_states(1, _MOST_IMPACTS)[0]
-        for name in ("piece", "offset", "side", "u", "v"):
+        for name in ("piece", "offset", "side", "u", "v", "law"):
             start[name] = nodes[name][row]
+        start["plastic"] = _plastic_at(trail, row)
         body["limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
         start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
         rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
@@ -280,6 +297,18 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
         parts += [nodes[done : row + 1], found[(found["side"] >= 0) & (found["time"] < rules["stop"])]]
         done = row + 1
     return trail._replace(nodes=state.attributed(np.concatenate([*parts, nodes[done:]])))
+
+
+def _plastic_at(trail: Trail, row: int) -> float:
+    """Plastic elongation of a tendon at a node, from where it last turned back; as `tendon.plastic_after`."""
+    block, nodes = trail.block, trail.nodes[: row + 1]
+    law = nodes["law"]
+    turns = np.flatnonzero((law[:-1] == state.TendonLaw.PLASTIC) & (law[1:] == state.TendonLaw.ELASTIC)) + 1
+    at = nodes[turns[-1] if len(turns) else 0]
+    if not block["yielding"] or at["side"] < 0:
+        return 0.0
+    u = 2.0 * math.sin(0.5 * at["u"]) if trail.rules["nonlinear"] else at["u"]
+    return max(0.0, float(block["opening"][at["side"]] * u - block["yields"]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,97 @@
+"""How the peaks of many simulations change with the motion, the body and the start, each as `Response.sensitivity`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking.arrays import Flags, Floats, Integers
+from rocking.engine import Setup, Task, in_threads
+from rocking.kernels import state
+from rocking.kernels.trace import NO_NODES, Quantity, Trail, vary
+from rocking.problem import ground_of, highest, rules_of, set_start
+from rocking.progress import Progress
+from rocking.simulation import marched
+
+#: What peaks are differentiated by, and its name in words, by the name of the derivative in a dataset.
+By = Mapping[str, tuple[Quantity, str]]
+
+OF_BLOCKS: Final[By] = {
+    "peak_by_motion": (Quantity.MOTION, "the motion"),
+    "peak_by_p": (Quantity.FREQUENCY, "p of both sides"),
+    "peak_by_alpha": (Quantity.SLENDERNESS, "the slenderness of both sides"),
+    "peak_by_restitution": (Quantity.RESTITUTION, "the restitution of both sides"),
+}
+BETWEEN_STOPS: Final[By] = {
+    "peak_by_motion": (Quantity.MOTION, "the motion"),
+    "peak_by_restitution": (Quantity.RESTITUTION, "the restitution"),
+    "peak_by_initial_position": (Quantity.ROTATION, "the initial distance from the stop"),
+    "peak_by_initial_velocity": (Quantity.VELOCITY, "the initial velocity"),
+}
+
+#: Bodies whose changes are found together, in one thread.
+_TOGETHER: Final = 64
+
+
+def peak_changes(
+    setup: Setup,
+    done: Sequence[tuple[Task, Flags]],
+    shape: tuple[int, ...],
+    by: By,
+    *,
+    threads: int | None,
+    progress: bool | None,
+) -> dict[str, NDArray[np.generic]]:
+    """Find the changes of peaks per relative change of each quantity, for tasks and which bodies overturned in each.
+
+    They lie in arrays of a shape where the keys and the bodies of tasks say, and are NaN where a body has overturned or
+    reached its second stop, the simulation was not finished, or rounding decides whether it touches the ground.
+    """
+    portions = [
+        (task, slice(first, first + _TOGETHER), overturned[first : first + _TOGETHER])
+        for task, overturned in done
+        for first in range(0, len(overturned), _TOGETHER)
+    ]
+    quantities = [quantity for quantity, _ in by.values()]
+    changes: dict[str, NDArray[np.generic]] = {name: np.full(shape, math.nan) for name in by}
+
+    def found(portion: tuple[Task, slice, Flags]) -> tuple[tuple[int | Integers, ...], Floats]:
+        task, part, overturned = portion
+        bodies = np.arange(shape[-1])[task.bodies][part]
+        return (*task.key, bodies), _changes(setup, replace(task, bodies=bodies), overturned, quantities)
+
+    with Progress("differentiating", math.prod(shape), show=progress) as bar:
+        for place, values in in_threads(found, portions, threads=threads):
+            for name, column in zip(by, values.T, strict=True):
+                changes[name][place] = column
+            bar.advance(len(values))
+    return changes
+
+
+def _changes(setup: Setup, task: Task, overturned: Flags, quantities: Sequence[Quantity]) -> Floats:
+    """Find the changes of the peaks of a task's bodies by each quantity, shape (bodies, quantities)."""
+    bodies = setup.bodies.select(task.bodies)
+    limits = setup.treatment.limits(bodies, task.motion, setup.model, task.factor)
+    rules = rules_of(bodies, setup.model, setup.treatment, setup.duration, record=True)
+    ground = ground_of(task.motion, bodies.gravity, task.factor)
+    records = bodies.kernel_records(setup.model, limits)
+    states = state.new_states(len(bodies), 0)
+    set_start(states, records, bodies, *setup.start)
+    scratch, work = state.new_scratch(), state.record(state.VARIATION)
+    changes = np.full((len(bodies), len(quantities)), math.nan)
+    for k in np.flatnonzero(~overturned):
+        start, trail = states[k], Trail(ground, records[k], rules, NO_NODES)
+        ending, table = marched(trail, start)
+        known = ending == state.Ending.DONE and start["near_ties"] == 0
+        if not known or (records["facing"][k] and highest(start, records[k], bodies.stops[k]) == bodies.stops[k, 1]):
+            continue
+        trail = trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]])))
+        impacts, events = np.empty(start["impacts"]), np.empty(start["events"])
+        for j, quantity in enumerate(quantities):
+            changes[k, j] = vary(trail, scratch, work, quantity, start["peak_time"], impacts, events)
+    return changes
