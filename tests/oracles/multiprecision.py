@@ -41,11 +41,15 @@ Number = Any
 
 @dataclass
 class Course:
-    """What happened, in mpf: (time, kind, side), (time, side entered, speed before and after), peak up to each rest."""
+    """What happened, in mpf: (time, kind, side), (time, side entered, speed before and after), peak up to each rest.
+
+    And the rotation at the times that were asked for, but for those at rest.
+    """
 
     events: list[tuple[Number, str, int]] = field(default_factory=list)
     impacts: list[tuple[Number, int, Number, Number]] = field(default_factory=list)
     peaks: list[Number] = field(default_factory=list)
+    rotations: dict[float, Number] = field(default_factory=dict)
 
     @property
     def peak(self) -> Number:
@@ -66,15 +70,16 @@ def follow(
     slack: float = 0.0,
     digits: int = DIGITS,
     reach: float = 0.125,
+    at: Sequence[float] = (),
 ) -> Course:
     """Whole response from time zero until the block rests for good or overturns.
 
     Impacts of a sequence are followed until less than `closest` seconds are left of it, and its limit is known. A
     threshold counts as passed once the motion is beyond it by `slack` of it; `reach` is the length of steps over the
-    radius of convergence.
+    radius of convergence; `at` are times whose rotations are noted.
     """
     with ctx.workdps(digits):
-        return _Follower(problem, most_impacts, closest, slack, reach).whole(rotation, velocity)
+        return _Follower(problem, most_impacts, closest, slack, reach, at).whole(rotation, velocity)
 
 
 def rest_time(
@@ -103,13 +108,20 @@ class _Follower:
     """One block under one motion."""
 
     def __init__(
-        self, problem: Problem, most_impacts: int, closest: float = inf, slack: float = 0.0, reach: float = 0.125
+        self,
+        problem: Problem,
+        most_impacts: int,
+        closest: float = inf,
+        slack: float = 0.0,
+        reach: float = 0.125,
+        at: Sequence[float] = (),
     ) -> None:
         self.problem = problem
         self.most_impacts = most_impacts
         self.closest = closest
         self.slack = slack
         self.reach = reach
+        self.at = at
         self.course = Course()
         self.peak = arb(0)
         self.linear = problem.model == "linear"
@@ -172,6 +184,10 @@ class _Follower:
             overturn = None
             if most >= self.fallen:
                 overturn = _first_root([self.fallen - series[0], *(-c for c in series[1:])], span)
+            ends = min((root for root in (impact, overturn) if root is not None), default=span)
+            for each in self.at:
+                if time < each <= time + ends:
+                    self.course.rotations[each] = _told(side * _value(series, each - time))
             if overturn is not None and (impact is None or overturn < impact):
                 return (time + overturn).mid(), _slope(series, overturn), True
             if not most <= self.peak:
