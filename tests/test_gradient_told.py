@@ -32,7 +32,7 @@ def judged_by_digits(seed: int, model: str, pieces: list[int], most: int) -> dic
             changed = coefficients.copy()
             changed[piece, 0] += h
             problem = Problem(model, P, ALPHA, RESTITUTION, drawn.breakpoints, changed)
-            return follow(problem, closest=1e-2, digits=30, at=at)
+            return follow(problem, closest=1e-2, digits=30, at=(at,))
 
         higher, lower = course(h), course(-h)
 
@@ -42,10 +42,8 @@ def judged_by_digits(seed: int, model: str, pieces: list[int], most: int) -> dic
             assert abs(error) <= 1e-8 * max(1e-3, np.max(np.abs(found))), (seed, model, name, where, piece)
             judged[name] += 1
 
-        assert higher.state is not None
-        assert lower.state is not None
-        judge("rotation", "rotation", at, higher.state[0], lower.state[0])
-        judge("velocity", "velocity", at, higher.state[1], lower.state[1])
+        judge("rotation", "rotation", at, higher.states[at][0], lower.states[at][0])
+        judge("velocity", "velocity", at, higher.states[at][1], lower.states[at][1])
         for k in range(min(most, len(times))):
             judge("impact", "impact", k, higher.impacts[k][0], lower.impacts[k][0])
         for k, kind in enumerate(response.events["kind"][:most]):

@@ -91,7 +91,8 @@ def _changes(setup: Setup, task: Task, overturned: Flags, quantities: Sequence[Q
         if not known or (records["facing"][k] and highest(start, records[k], bodies.stops[k]) == bodies.stops[k, 1]):
             continue
         trail = trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]])))
-        impacts, events = np.empty(start["impacts"]), np.empty(start["events"])
+        at, impacts, events = np.array([start["peak_time"]]), np.empty(start["impacts"]), np.empty(start["events"])
+        at.flags.writeable = False
         for j, quantity in enumerate(quantities):
-            changes[k, j] = vary(trail, scratch, work, quantity, start["peak_time"], impacts, events)
+            vary(trail, scratch, work, quantity, at, changes[k, j : j + 1], impacts, events)
     return changes

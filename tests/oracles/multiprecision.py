@@ -41,13 +41,16 @@ Number = Any
 
 @dataclass
 class Course:
-    """What happened, in mpf: (time, kind, side), (time, side entered, speed before and after), peak up to each rest."""
+    """What happened, in mpf: (time, kind, side), (time, side entered, speed before and after), peak up to each rest.
+
+    And the rotation at the times that were asked for, but for those at rest.
+    """
 
     events: list[tuple[Number, str, int]] = field(default_factory=list)
     impacts: list[tuple[Number, int, Number, Number]] = field(default_factory=list)
     peaks: list[Number] = field(default_factory=list)
-    state: tuple[Number, Number] | None = None
-    """Rotation and velocity at the time that was asked for, if the block then moved."""
+    states: dict[float, tuple[Number, Number]] = field(default_factory=dict)
+    """Rotation and velocity at the times that were asked for, where the block then moved."""
 
     @property
     def peak(self) -> Number:
@@ -68,13 +71,13 @@ def follow(
     slack: float = 0.0,
     digits: int = DIGITS,
     reach: float = 0.125,
-    at: float = -inf,
+    at: Sequence[float] = (),
 ) -> Course:
     """Whole response from time zero until the block rests for good or overturns.
 
     Impacts of a sequence are followed until less than `closest` seconds are left of it, and its limit is known. A
     threshold counts as passed once the motion is beyond it by `slack` of it; `reach` is the length of steps over the
-    radius of convergence; the state is noted at the time `at`.
+    radius of convergence; `at` are times whose states are noted.
     """
     with ctx.workdps(digits):
         return _Follower(problem, most_impacts, closest, slack, reach, at).whole(rotation, velocity)
@@ -112,7 +115,7 @@ class _Follower:
         closest: float = inf,
         slack: float = 0.0,
         reach: float = 0.125,
-        at: float = -inf,
+        at: Sequence[float] = (),
     ) -> None:
         self.problem = problem
         self.most_impacts = most_impacts
@@ -182,11 +185,13 @@ class _Follower:
             overturn = None
             if most >= self.fallen:
                 overturn = _first_root([self.fallen - series[0], *(-c for c in series[1:])], span)
+            ends = min((root for root in (impact, overturn) if root is not None), default=span)
+            for each in self.at:
+                since = arb(each) - time
+                if 0 <= since <= ends:
+                    self.course.states[each] = _told(side * _value(series, since)), _told(side * _slope(series, since))
             if overturn is not None and (impact is None or overturn < impact):
                 return (time + overturn).mid(), _slope(series, overturn), True
-            since = arb(self.at) - time if self.at > -inf else arb(-1)
-            if 0 <= since <= (span if impact is None else impact):
-                self.course.state = _told(side * _value(series, since)), _told(side * _slope(series, since))
             if not most <= self.peak:
                 self.note_peak(series, span if impact is None else impact)
             if impact is not None:

@@ -55,7 +55,7 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
     return {
         "march.march": [(seen, block, rules, table, scratch, states[0])],
         "trace.trace": [(trail, scratch, given(), count, reals(1, 3))],
-        "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(), reals())],
+        "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, given(), reals(), reals(), reals())],
         "adjoint.adjoint": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(3), reals(2, 2))],
         "adjoint.of_ending": [(trail, scratch, 0, reals(3), reals(2, 2))],
         "periodic.iterate": [(setting, scratch, states, 1, reals(1, 1, 3), count)],

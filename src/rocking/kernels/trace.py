@@ -90,7 +90,10 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
 
 
 class Quantity(IntEnum):
-    """What is changed: the motion, the initial rotation or velocity, or p, slenderness or restitution of both sides."""
+    """What is changed: the motion, the initial rotation or velocity, or p, slenderness or restitution of both sides.
+
+    Then the same three of side + alone, and of side - alone; and nothing.
+    """
 
     MOTION = 0
     ROTATION = 1
@@ -98,6 +101,13 @@ class Quantity(IntEnum):
     FREQUENCY = 3
     SLENDERNESS = 4
     RESTITUTION = 5
+    FREQUENCY_PLUS = 6
+    SLENDERNESS_PLUS = 7
+    RESTITUTION_PLUS = 8
+    FREQUENCY_MINUS = 9
+    SLENDERNESS_MINUS = 10
+    RESTITUTION_MINUS = 11
+    NOTHING = 12
 
 
 #: An uplift is a jump where the motion is beyond the threshold by more than this fraction of it.
@@ -106,18 +116,27 @@ _JUMP = 1e-9
 
 @kernel
 def vary(
-    trail: Trail, scratch: Record, work: Record, quantity: int, peak_time: float, impacts: Floats, events: Floats
-) -> float:
-    """Change of the peak rotation per unit of epsilon; the shifts of all impacts and events are written into arrays.
+    trail: Trail,
+    scratch: Record,
+    work: Record,
+    quantity: int,
+    times: Floats,
+    changes: Floats,
+    impacts: Floats,
+    events: Floats,
+) -> None:
+    """Write changes of u at given times, and the shifts of all impacts and events, per unit of epsilon, into arrays.
 
-    The peak must not be an overturning. ``work`` is scratch space (`state.VARIATION`).
+    ``times`` ascend; at an impact the change is that before it. ``work`` is scratch space (`state.VARIATION`).
     """
     nodes = trail.nodes
     impact_count = event_count = 0
     du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
     dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
     plastic, dp = 0.0, plastic_by_start(trail) * du  # elongation of a tendon for good, and its variation
-    at_peak = du
+    done = count_until(times, 0, nodes[0].time)
+    changes[:done] = du
+    changes[done:] = 0.0
     for k in range(nodes.shape[0]):
         node = nodes[k]
         if trail.block.yielding:
@@ -128,6 +147,7 @@ def vary(
                 events[event_count] = -du / node.v
             break
         following = nodes[k + 1]
+        first, done = done, count_until(times, done, following.time)
         if node.side < 0:
             events[event_count] = uplift_shift(
                 trail, following, quantity, restoring_by_tendon(trail.block, following.side, plastic, dp)
@@ -138,10 +158,12 @@ def vary(
             shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
             events[event_count] = rest_shift(trail, node, quantity, (dv, shift, plastic, dp), following)
             event_count += 1
+            if done > first:
+                order = expand_variation(trail, scratch, work, node, quantity, (du, dv, dp), following.time - node.time)
+                note_changes(trail, scratch, work, node, order, times[first:done], changes[first:done], True)
         else:
             order = expand_variation(trail, scratch, work, node, quantity, (du, dv, dp), following.time - node.time)
-            if node.time < peak_time <= following.time:
-                at_peak, _, _ = evaluate(work.change, order, peak_time - node.time)
+            note_changes(trail, scratch, work, node, order, times[first:done], changes[first:done], False)
             t = elapsed(trail, node, following)
             du, dv, _ = evaluate(work.change, order, t)
             if node.law == TendonLaw.PLASTIC and following.law != node.law:
@@ -154,7 +176,35 @@ def vary(
                 du, dv = saltation(trail, node, following, quantity, shift, rates, impact_count)
                 impacts[impact_count] = shift
                 impact_count += 1
-    return at_peak
+
+
+@inlined
+def count_until(times: Floats, count: int, last: float) -> int:
+    """Count the times up to the last one, of which so many are known."""
+    while count < times.shape[0] and times[count] <= last:
+        count += 1
+    return count
+
+
+@shared
+def note_changes(
+    trail: Trail, scratch: Record, work: Record, node: Record, order: int, times: Floats, changes: Floats, lands: bool
+) -> None:
+    """Write changes of u along the arc from a node, as it and its variation are in scratch; from landing on none."""
+    for n in range(times.shape[0]):
+        t = times[n] - start_of(trail.ground, node.piece) - node.offset
+        u, _, _ = evaluate(scratch.rotation, order, t)
+        if u > 0.0 or not lands:
+            changes[n], _, _ = evaluate(work.change, order, t)
+
+
+@inlined
+def on_side(quantity: int, side: int) -> int:
+    """Tell what a quantity is on a side: itself, that of both sides where it is this side's own, or nothing."""
+    if quantity <= Quantity.RESTITUTION:
+        return quantity
+    own = quantity - Quantity.FREQUENCY_PLUS - 3 * side
+    return Quantity.FREQUENCY + own if 0 <= own < 3 else Quantity.NOTHING
 
 
 @inlined
@@ -202,13 +252,14 @@ def expand_variation(
     """
     order, _, degree = expand(trail.ground, trail.block, trail.rules, scratch, node, left)
     expand_coefficients(trail, scratch, work, node.side, degree, order)
-    if quantity == Quantity.FREQUENCY:
+    here = on_side(quantity, node.side)
+    if here == Quantity.FREQUENCY:
         for k in range(order - 1):
             work.forcing[k] = 2.0 * scratch.rotation[k + 2] / INTEGRATED_TWICE[k]
-    elif quantity == Quantity.SLENDERNESS:
+    elif here == Quantity.SLENDERNESS:
         for k in range(order - 1):
             work.forcing[k] = -trail.block.slenderness[node.side] * work.stiffness[k]
-    elif quantity != Quantity.MOTION:
+    elif here != Quantity.MOTION:
         for k in range(order - 1):
             work.forcing[k] = 0.0
     work.change[0], work.change[1], plastic = start
@@ -290,7 +341,7 @@ def saltation(
     entered = restoring(trail.ground, block, following.side, following.piece, following.offset)
     entered += block.damping[following.side] * (e * speed)
     faster = -(dv - left * shift) * relative_slope(block, hit, speed, e)
-    faster += speed if quantity == Quantity.RESTITUTION else 0.0
+    faster += speed if on_side(quantity, hit) == Quantity.RESTITUTION else 0.0
     return -e * speed * shift, e * faster + entered * shift
 
 
@@ -306,7 +357,7 @@ def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) ->
     slackening = by_tendon / (block.gain[node.side] * rate)
     if quantity == Quantity.MOTION:
         return -push / rate + slackening
-    if quantity == Quantity.SLENDERNESS:
+    if on_side(quantity, node.side) == Quantity.SLENDERNESS:
         growth = weight_at(ground, node.piece, node.offset) + block.added_weight[node.side]
         if rules.nonlinear:
             growth *= 1.0 + threshold * threshold
@@ -365,10 +416,11 @@ def rest_shift(
     dg_i = restoring_shift(trail, node, i, quantity, shift) + restoring_by_tendon(block, i, plastic, dp)
     dg_j = restoring_shift(trail, node, j, quantity, shift) + restoring_by_tendon(block, j, plastic, dp)
     e_i, e_j = middle_factor(block, i, node.v), middle_factor(block, j, node.v)
-    de = 1.0 if quantity == Quantity.RESTITUTION else 0.0
+    de_i = 1.0 if on_side(quantity, i) == Quantity.RESTITUTION else 0.0
+    de_j = 1.0 if on_side(quantity, j) == Quantity.RESTITUTION else 0.0
     per_speed = 2.0 * (1.0 / g_i + e_i / g_j)
-    change = -2.0 * (dg_i / (g_i * g_i) + e_i * dg_j / (g_j * g_j) - de * e_i / g_j)
-    change += per_speed * 2.0 * de * e_i * e_j / (1.0 - e_i * e_j)
+    change = -2.0 * (dg_i / (g_i * g_i) + e_i * dg_j / (g_j * g_j) - de_i * e_i / g_j)
+    change += per_speed * (de_i + de_j) * e_i * e_j / (1.0 - e_i * e_j)
     return shift + (per_speed * (dv - g_i * shift) + change * node.v) / (1.0 - e_i * e_j)
 
 
@@ -380,9 +432,9 @@ def restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: fl
     change = block.gain[j] * shift * push_rate(ground, block, j, node.piece, node.offset)
     if quantity == Quantity.MOTION:
         change += block.gain[j] * push_at(ground, block, j, node.piece, node.offset)
-    elif quantity == Quantity.FREQUENCY:
+    elif on_side(quantity, j) == Quantity.FREQUENCY:
         change += 2.0 * restoring(ground, block, j, node.piece, node.offset)
-    elif quantity == Quantity.SLENDERNESS:
+    elif on_side(quantity, j) == Quantity.SLENDERNESS:
         slope_of_angle = weight_at(ground, node.piece, node.offset) + block.added_weight[j]
         if rules.nonlinear:
             slope_of_angle = (

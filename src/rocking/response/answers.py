@@ -122,8 +122,11 @@ class Answers:
     @cached_property
     def sensitivity(self) -> Sensitivity:
         """How the peak and the times of events and impacts change with the motion, the initial state and the block."""
+        drawn = int(self._trail.block["seed"]) >= 0 and bool(self._trail.block["varying"])
         return sensitivity_along(
             self._trail,
+            # What is drawn goes by the number of the impact, which those beyond a proof do not count in.
+            History(self._trail, self.duration, self.body.stops) if drawn else self._history,
             self.peak_time,
             len(self.impacts),
             len(self.events),

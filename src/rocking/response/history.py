@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -38,6 +38,9 @@ QUANTITIES: Final = ("motion", "initial_rotation", "initial_velocity", "p", "alp
 
 #: What drives the block, as against what it is.
 DRIVING: Final = QUANTITIES[:3]
+
+#: What a rotation may be differentiated by, in the order of the kernels.
+_NAMES: Final = (*QUANTITIES, *(f"{name}_{side}" for side in ("plus", "minus") for name in QUANTITIES[3:]))
 
 _ULP: Final = 2.0**-52
 
@@ -168,6 +171,63 @@ class Sensitivity:
     peak: NDArray[np.void]
     impacts: NDArray[np.void]
     events: NDArray[np.void]
+    _history: History
+
+    def rotation(self, time: ArrayLike, of: Iterable[str] = QUANTITIES) -> dict[str, Floats]:
+        """Return the change of the rotation at given times with each quantity.
+
+        Parameters
+        ----------
+        time : array_like
+            Times, s, of any shape.
+        of : iterable of str
+            Quantities: "motion", "initial_rotation", "initial_velocity", "p", "alpha" or "restitution"; the last three
+            also with "_plus" or "_minus", of that side alone.
+
+        Returns
+        -------
+        dict of str to ndarray
+            By quantity, for each time: rad (of another body in the unit of its coordinate) per unit of relative change,
+            with the sign of the rotation. 0 at rest; just before an impact, at one; NaN outside the response.
+
+        Raises
+        ------
+        InvalidOption
+            If a time is not a number, or there is no such quantity.
+
+        Notes
+        -----
+        One pass along the response for each quantity, whatever the number of times. At a fixed time the rotation is
+        continuous, and its derivative jumps at each impact (see "Impacts: restitution and sensitivity" in the
+        documentation).
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+        >>> response = rocking.simulate(block, None, initial_rotation=0.1)
+        >>> changes = response.sensitivity.rotation([0.2, 1.0], of=["p", "restitution_plus"])
+        >>> {name: [f"{each:.5f}" for each in values] for name, values in changes.items()}
+        {'p': ['-0.01640', '-0.09310'], 'restitution_plus': ['0.00000', '-0.11430']}
+        """
+        trail = self._history.trail
+        flat = checks.numbers(time, "time", InvalidOption)
+        shape, flat = flat.shape, flat.ravel()
+        outside = self._history.outside(flat)
+        order = np.argsort(flat, kind="stable")
+        order = order[~outside[order]]
+        times = flat[order]
+        times.flags.writeable = False
+        rows = np.maximum(np.searchsorted(trail.nodes["time"], times) - 1, 0)
+        signs = np.where(trail.nodes["side"][rows] == 1, -1.0, 1.0)
+        found = {}
+        for name in of:
+            if name not in _NAMES:
+                raise InvalidOption(f"{{}} must be among {', '.join(_NAMES)}, not {name!r}", "of", value=name)
+            values = np.full(flat.shape, np.nan)
+            values[order] = signs * _varied(trail, _NAMES.index(name), times, len(trail.nodes), len(self.events))[0]
+            found[name] = values.reshape(shape)
+        return found
 
     def __repr__(self) -> str:
         event = np.max(np.abs(self.events["motion"]), initial=0.0)
@@ -178,19 +238,27 @@ class Sensitivity:
         )
 
 
-def sensitivity_along(trail: Trail, peak_time: float, impacts: int, events: int, *, fixed: bool) -> Sensitivity:
+def sensitivity_along(
+    trail: Trail, history: History, peak_time: float, impacts: int, events: int, *, fixed: bool
+) -> Sensitivity:
     """Sensitivity of a response with that many impacts and events: one pass along its steps for each quantity.
 
     A fixed peak is that of a body that has fallen, or has reached a stop.
     """
-    count = len(QUANTITIES)
-    peak, impact_times, event_times = np.zeros(count), np.zeros((count, impacts)), np.zeros((count, events))
-    scratch, work = state.new_scratch(), state.record(state.VARIATION)
-    for k in range(count):
-        peak[k] = vary(trail, scratch, work, k, peak_time, impact_times[k], event_times[k])
+    at = np.array([peak_time])
+    at.flags.writeable = False
+    found = [_varied(trail, k, at, impacts, events) for k in range(len(QUANTITIES))]
+    peak, impact_times, event_times = (np.array(values) for values in zip(*found, strict=True))
     if fixed:
         peak[:] = 0.0
-    return Sensitivity(*(_by_quantity(values) for values in (peak[:, None], impact_times, event_times)))
+    return Sensitivity(_by_quantity(peak), _by_quantity(impact_times), _by_quantity(event_times), history)
+
+
+def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: int) -> tuple[Floats, Floats, Floats]:
+    """Change heights at given times, so many impacts, and so many events with a quantity."""
+    heights, at_impacts, at_events = np.empty(len(times)), np.zeros(impacts), np.zeros(events)
+    vary(trail, state.new_scratch(), state.record(state.VARIATION), quantity, times, heights, at_impacts, at_events)
+    return heights, at_impacts, at_events
 
 
 def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str, ...]:
