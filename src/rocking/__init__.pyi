@@ -7,6 +7,7 @@ from .analysis.critical import CriticalScale, critical_scale
 from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
 from .analysis.fragility.fit import fit_fragility, fragility
+from .analysis.fragility.gradient import MedianGradient, median_gradient
 from .analysis.fragility.result import Fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
@@ -90,6 +91,7 @@ __all__ = [
     "InvalidOption",
     "Load",
     "Measure",
+    "MedianGradient",
     "Motion",
     "Origin",
     "OutputError",
@@ -134,6 +136,7 @@ __all__ = [
     "gradient",
     "impact_restitution",
     "incremental_dynamic_analysis",
+    "median_gradient",
     "one_sided_restitution",
     "overturning_map",
     "pulses",
