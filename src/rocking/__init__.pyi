@@ -7,6 +7,7 @@ from .analysis.critical import CriticalScale, critical_scale
 from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
 from .analysis.fragility.fit import fit_fragility, fragility
+from .analysis.fragility.gradient import MedianGradient, median_gradient
 from .analysis.fragility.result import Fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
@@ -94,6 +95,7 @@ __all__ = [
     "InvalidOption",
     "Load",
     "Measure",
+    "MedianGradient",
     "ModelValidation",
     "Motion",
     "Origin",
@@ -140,6 +142,7 @@ __all__ = [
     "gradient",
     "impact_restitution",
     "incremental_dynamic_analysis",
+    "median_gradient",
     "one_sided_restitution",
     "overturning_map",
     "pulses",

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Final
 
 from rocking import checks
 from rocking.bisection import bisected
@@ -13,6 +16,15 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
 from rocking.response import Gradient, Response, gradient
 from rocking.simulation import simulate
+
+#: A response that comes to the balance point overturns later by more than this, s, per relative change of the scale:
+#: next to a critical scale by the inverse of some units in the last place.
+_LINGERS: Final = 1e6
+
+_NO_BALANCE: Final = (
+    "the outcome changes without the block coming to the balance point: by a touch of the ground without speed, or at "
+    "a rest"
+)
 
 
 @dataclass(frozen=True)
@@ -25,7 +37,8 @@ class CriticalScale:
         The least scale, to the last digit, that overturns the block, next to one that does not.
     gradient : Gradient
         Its derivatives by the motion as it was given (unscaled) and by the start, per unit of each; `Gradient.value` is
-        the scale.
+        the scale. Where the outcome changes there without the block coming to the balance point, all derivatives are
+        NaN, and `Gradient.reason` says so.
     p, alpha, restitution : float
         Its change per relative change of these of both sides together: times 1e-3 it is that by 0.1 % more.
     """
@@ -103,18 +116,37 @@ def critical_scale(
         if response(value).overturned is not expected:
             does, wanted = ("does not overturn", "raise") if expected else ("overturns", "lower")
             raise InvalidOption(f"the block {does} at the scale {{}} = {value:g}: {wanted} it", name, value=value)
-    _, falls = bisected(least, most, lambda scale: response(scale).overturned)
-    last = response(falls)
+    return critical_between(response, motion, least, most)
+
+
+def critical_between(
+    response: Callable[[float], Response], motion: Motion, low: float, high: float, *, falls_above: bool = True
+) -> CriticalScale:
+    """Find the critical scale of a motion between two scales, at one of which a response overturns.
+
+    It is on the side of those that do, which may be the lower one.
+    """
+
+    def falls(scale: float) -> bool:
+        return response(scale).overturned
+
+    ends = bisected(low, high, falls if falls_above else lambda scale: not falls(scale))
+    scale = ends[1] if falls_above else ends[0]
+    last = response(scale)
     by_scale = {name: float(last.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")}
-    turned, share = gradient(last, "event", -1), -falls / by_scale["motion"]
+    turned, share = gradient(last, "event", -1), -scale / by_scale["motion"]
+    reason = turned.reason
+    if not abs(by_scale["motion"]) > _LINGERS:
+        reason, share = _NO_BALANCE, math.nan
     by_motion = replace(
         turned,
-        value=falls,
-        coefficients=falls * share * turned.coefficients,
-        vertical=None if turned.vertical is None else falls * share * turned.vertical,
+        value=scale,
+        coefficients=scale * share * turned.coefficients,
+        vertical=None if turned.vertical is None else scale * share * turned.vertical,
         initial_rotation=share * turned.initial_rotation,
         initial_velocity=share * turned.initial_velocity,
+        reason=reason,
         _motion=motion,
     )
     p, alpha, restitution = (share * by_scale[name] for name in ("p", "alpha", "restitution"))
-    return CriticalScale(falls, by_motion, p, alpha, restitution)
+    return CriticalScale(scale, by_motion, p, alpha, restitution)
