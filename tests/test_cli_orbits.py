@@ -25,6 +25,33 @@ def test_orbits_are_those_of_the_functions_and_one_is_followed(run, tmp_path):
     assert {f"orbit-{k}.pdf" for k in range(1, len(expected) + 1)} <= names
 
 
+AT_FLIPS = "orbits", "--ball", 0.5, "--pulse", "sine:amplitude=14.95,frequency=5Hz", "--along", "amplitude:14.9:16.5"
+
+
+def test_what_begins_at_a_flip_is_followed(run):
+    code, out, err = run(*AT_FLIPS, "--switch", "15", "--json")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    (switched,) = result["switched"]
+    (flip,) = result["branch"]["bifurcations"]
+    assert (result["branch"]["period"], switched["period"]) == (1, 2)
+    assert switched["bifurcations"][0]["value"] == pytest.approx(flip["value"], abs=1e-8)
+
+
+@pytest.mark.thorough
+def test_branches_that_begin_at_flips_are_followed_one_after_the_other_and_written(run, tmp_path):
+    code, out, _ = run(*AT_FLIPS, "--switch", "15,16.3", "--out", tmp_path)
+    assert code == 0
+    assert [f"orbits of {count}" in out for count in ("1 period", "2 periods", "4 periods")] == [True] * 3
+    result = json.loads((tmp_path / "result.json").read_text())
+    second, third = result["switched"]
+    assert third["bifurcations"][0]["value"] == pytest.approx(second["bifurcations"][1]["value"], abs=1e-8)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {f"switched-{k}-{table}.csv" for k in (1, 2) for table in ("points", "bifurcations")} <= names
+    rows = (tmp_path / "switched-2-points.csv").read_text().splitlines()
+    assert len(rows) == len(third["values"]) + 1
+
+
 @pytest.mark.parametrize(
     "body",
     [
@@ -54,6 +81,11 @@ def test_every_body_is_shown_in_a_table(run, body):
         (("--ball", 0.5, "--along", "amplitude:9:16", "--orbit", 9), "--orbit must be from 1 to 3"),
         (("--ball", 0.5, "--along", "amplitude:13:16"), "12"),
         (("--ball", 0.5, "--period", 0), "--period"),
+        (("--ball", 0.5, "--switch", 15.0), "--along"),
+        (("--ball", 0.5, "--orbit", 1), "--along"),
+        (("--ball", 0.5, "--along", "amplitude:16:9"), "a lower value to a higher one"),
+        (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", 12), "leave --switch"),
+        (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", "wide"), "--switch"),
         ((), "a block is needed"),
     ],
 )

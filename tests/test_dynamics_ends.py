@@ -42,6 +42,58 @@ def test_branches_that_cross_are_followed_through_and_the_crossing_is_said():
     assert judged >= 4
 
 
+def oscillator(stop):
+    return dynamics.ImpactOscillator(0.5 / math.pi, 0.8, stop=stop)
+
+
+@pytest.mark.parametrize("step", [0.3, pytest.param(0.05, marks=pytest.mark.thorough)])
+def test_an_orbit_that_comes_to_touch_its_stop_once_more_ends_at_grazing(step):
+    """Differences by the parameter that reach beyond the touch turned the tangent: it was taken for a branch point."""
+    motion = pulses.sine(1.0, 1.1 / math.pi, cycles=1, phase=0.5 * math.pi)
+    found = dynamics.periodic_orbits(oscillator(-0.4), motion, starts=64)
+    (orbit,) = (each for each in found if each.impacts == 1.0 and not each.is_stable)
+    branch = dynamics.continue_orbit(orbit, lambda stop: (oscillator(stop), motion), -0.4, (-0.5, 4.5), step=step)
+    assert branch.ends == ("limit of the parameter", "grazing")
+    (end,) = branch.bifurcations
+    response = end.orbit.response
+    (at,) = response.impacts["time"]
+    times = np.linspace(at + 0.05, response.duration + at - 0.05, 20_001) % response.duration
+    assert np.min(response.position(times) - end.orbit.body.stops[0]) == pytest.approx(0.0, abs=1e-6)
+    assert np.max(np.abs(end.orbit.multipliers)) > 2.0  # none is near 1
+
+
+@pytest.mark.thorough
+def test_a_mass_that_just_touches_its_stop_does_not_double_its_period_there():
+    """Without impacts its multipliers are exp(+-2 pi i/2.2) up to the touch; a trial point beyond it counted as one."""
+
+    def family(amplitude):
+        return oscillator(0.3), pulses.sine(amplitude, 1.1 / math.pi, cycles=1)
+
+    (orbit,) = (each for each in dynamics.periodic_orbits(*family(1.0), starts=16) if each.impacts == 0.0)
+    branch = dynamics.continue_orbit(orbit, family, 1.0, (-3.0, 5.0), step=0.2)
+    assert [each.kind for each in branch.bifurcations] == ["grazing", "grazing"]
+    assert [each.value for each in branch.bifurcations] == pytest.approx([-1.152, 1.152], abs=1e-9)
+
+
+@pytest.mark.thorough
+def test_long_steps_do_not_lead_from_one_branch_to_another():
+    """Over a wide range a step is as long as two orbits of this block are apart; it was said to cross a branch."""
+    block = Block.from_parameters(p=1.65, alpha=0.292, restitution=0.901)
+
+    def family(amplitude):
+        return block, pulses.sine(amplitude, 2.91, cycles=1)
+
+    found = dynamics.periodic_orbits(*family(2.02), starts=64)
+    stable = next(each for each in found if each.is_stable and each.impacts)
+    branch = dynamics.continue_orbit(stable, family, 2.02, (0.001, 30.0), step=0.1)
+    assert branch.ends == ("grazing", "limit of the parameter")
+    assert [each.kind for each in branch.bifurcations] == ["grazing", "fold"]
+    (fold,) = (each.value for each in branch.bifurcations if each.kind == "fold")
+    beyond = np.argmin(branch.values)  # on one side of the fold every orbit is stable, on the other none
+    assert not branch.is_stable[: beyond - 1].any() and branch.is_stable[beyond + 1 :].all()
+    assert branch.values.min() >= fold and len(branch) >= 20
+
+
 def test_a_flip_is_a_branch_point_where_the_motion_is_given_twice():
     """Orbits of twice the sine's period have that of the motion: they cross the branch that goes on."""
     branch = branch_of(lambda level: table(level, cycles=2), 1.5, (1.48, 1.58))

@@ -1,6 +1,7 @@
 """Maps from period to period and from impact to impact, against simulations, finite differences and closed forms."""
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -163,6 +164,24 @@ def test_a_ball_flies_for_one_period_in_closed_form():
     ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
     # Over a period the table adds nothing where it starts at its greatest acceleration: 1.0 t = 5 t^2 at t = 0.2.
     assert dynamics.impact_map(ball, table)([0.05, 1.0]) == pytest.approx([0.05, 0.5], abs=1e-14)
+
+
+@pytest.mark.parametrize("name", ["nonlinear block", "oscillator"])
+def test_what_no_body_follows_is_not_a_number_at_once(name):
+    """Such a state used to be marched for all the turns that a period may take: seconds, for each state."""
+    body, model, (amplitude, frequency) = CASES[name]
+    motion = pulses.sine(amplitude, frequency, cycles=1)
+    strobe = dynamics.stroboscopic_map(body, motion, model=model)
+    impacts = dynamics.impact_map(body, motion, model=model)
+    wrong = [[math.nan, 0.0], [0.0, math.nan], [0.0, math.inf], [0.05, 1e308]]
+    _ = strobe.followed([0.01, 0.1]), strobe.derivative([0.01, 0.1]), impacts([0.1, 1.0])  # compiled
+    before = time.process_time()
+    after, fates, _ = strobe.followed([*wrong, [0.01, 0.1]], 5)
+    assert np.isnan(after[:-1]).all() and np.isfinite(after[-1]).all()
+    assert fates.tolist() == [dynamics.Fate.UNFINISHED] * 4 + [dynamics.Fate.MOVES]
+    assert all(np.isnan(each).all() for each in strobe.derivative(wrong, 3))
+    assert np.isnan(impacts([[math.nan, 1.0], [0.1, math.inf]])).all()
+    assert time.process_time() - before < 2.0
 
 
 def test_one_state_does_not_depend_on_others_and_shapes_are_kept():

@@ -376,8 +376,9 @@ def test_results_are_written_and_drawn(branch, tmp_path):
         assert found.plot(figsize=(3.4, 2.7)).get_size_inches().tolist() == [3.4, 2.7]
         assert repr(found).startswith(f"<{type(found).__name__}: ")
         assert found.summary()
-    texts = [text.get_text() for text in branch.plot().axes[0].texts]
-    assert texts == ["fold", "flip"] or texts == ["flip", "fold"]
+    drawn = {line.get_label(): line for line in branch.plot().axes[0].lines}
+    assert drawn.keys() == {"stable", "unstable", "fold", "flip"}
+    assert len({drawn[kind].get_marker() for kind in ("fold", "flip")}) == 2
     header = branch.to_dataframe("points").columns.tolist()
     assert header[:4] == ["level", "position_m", "velocity_m_s", "peak_m"]
 

@@ -69,10 +69,10 @@ def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], 
     write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
 
 
-def write_tables(folder: Path, found: TableResult) -> None:
-    """Write every table of a result into a folder, each into a file of its name."""
+def write_tables(folder: Path, found: TableResult, before: str = "") -> None:
+    """Write every table of a result into a folder, each into a file of its name, with something before it."""
     for table in found.TABLES:
-        found.to_csv(folder / f"{table}.csv", table)
+        found.to_csv(folder / f"{before}{table}.csv", table)
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rocking.arrays import Flags, Floats
 from rocking.body import Body
 from rocking.constants import Model
+from rocking.dynamics.courses import course_of
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import NEUTRAL, PeriodicOrbit, orbit_at
 from rocking.errors import InvalidOption
@@ -217,30 +218,67 @@ class Branch(DrawnResult, TableResult):
         }
         return pd.DataFrame(columns)
 
-    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        title: str = "",
+        figsize: tuple[float, float] | None = None,
+        others: Sequence[Branch] = (),
+    ) -> Figure:
+        """Draw the greatest size of the coordinate against the parameter.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default in a new figure.
+        title : str
+            Title; by default one that says what is drawn.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+        others : sequence of Branch
+            Branches along the same parameter that are drawn with it, as those of `switch_branch`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Stable orbits as a full line, unstable ones dashed, and a mark at each bifurcation.
+
+        Examples
+        --------
+        >>> from rocking import dynamics, pulses
+        >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
+        >>> def family(amplitude):
+        ...     return ball, pulses.sine(amplitude, 5.0, cycles=1)
+        >>> stable = next(each for each in dynamics.periodic_orbits(*family(12.0)) if each.is_stable)
+        >>> branch = dynamics.continue_orbit(stable, family, 12.0, (11.0, 16.0), unit="m/s^2")
+        >>> figure = branch.plot(others=[dynamics.switch_branch(branch, 0)])
+        """
         from rocking.plot.orbits import branch_figure
 
         body, _ = self.family(float(self.values[0]))
-        coordinate = body.coordinate
-        unit = "" if self.unit == "1" else f" ({self.unit})"
+        coordinate, branches = body.coordinate, [self, *others]
+        unit = "" if self.unit == "1" else f" ({self.unit.replace('^2', '²')})"
+        periods = ", ".join(str(each) for each in sorted({each.period for each in branches}))
+        headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._headline()
         return branch_figure(
-            values=self.values,
-            peaks=self.peaks,
-            stable=self.is_stable,
-            marks=[(each.kind, each.value, _peak_at(self, each)) for each in self.bifurcations],
+            values=np.concatenate([np.append(each.values, np.nan) for each in branches])[:-1],
+            peaks=np.concatenate([np.append(each.peaks, np.nan) for each in branches])[:-1],
+            stable=np.concatenate([np.append(each.is_stable, False) for each in branches])[:-1],
+            marks=[(at.kind, at.value, _peak_at(at)) for each in branches for at in each.bifurcations],
             labels=(f"{self.name}{unit}", f"largest {coordinate.name} ({coordinate.unit})"),
-            title=title or f"{body.description}, {self._headline()}",
+            title=title or f"{body.description}, {headline.replace('^2', '²')}",
             ax=ax,
             figsize=figsize,
         )
 
 
-def _peak_at(branch: Branch, bifurcation: Bifurcation) -> float:
-    """Greatest coordinate of an orbit at a bifurcation: that of the nearest point."""
-    away = np.abs(branch.values - bifurcation.value) / max(np.ptp(branch.values), 1e-300)
-    size = np.max(np.abs(branch.states), axis=0)
-    away = away + np.max(np.abs(branch.states - bifurcation.orbit.state) / np.where(size > 0.0, size, 1.0), axis=1)
-    return float(branch.peaks[np.argmin(away)])
+def _peak_at(bifurcation: Bifurcation) -> float:
+    """Greatest size of the coordinate on the orbit at a bifurcation."""
+    orbit = bifurcation.orbit
+    return course_of(
+        StroboscopicMap(orbit.body, orbit.motion, orbit.model, orbit.treatment), orbit.state, orbit.period
+    ).peak
 
 
 def _written(multipliers: NDArray[np.complex128]) -> str:

@@ -34,10 +34,15 @@ _NEAR: Final = 1e-5
 #: Steps that are tried for each point.
 _TRIALS: Final = 4
 
-#: Least cosine between one tangent and the next, and the longest step in which less than that may mean that the branch
-#: ends; in a longer one it bends.
+#: Least cosine between one tangent and the next, how far a point may be from where the tangent leads, over the step (a
+#: bend of that cosine makes it half as much), and the longest step in which that may mean that the branch ends; in a
+#: longer one it bends, or the point is one of another branch.
 _COSINE: Final = 0.97
+_ASIDE: Final = 0.25
 _SHARP: Final = 1e-3
+
+#: Size of det(R - 1) on either side of a turn of the parameter: it is zero there.
+_TURNING: Final = 0.05
 
 #: Speed of the slowest impact, over the scale, from which grazing is extrapolated.
 _SLOW: Final = 2e-3
@@ -213,10 +218,7 @@ class _Walk(Location):
         solved, at_limit = found
         new, tangent = solved.z, solved.tangent(self.tangent)
         tests = solved.tests(tangent)
-        # The parameter turns, but no multiplier passes 1: this is where the branch bifurcates from orbits of half
-        # the period, or symmetric ones. Beyond it are the same orbits again, shifted or mirrored.
-        turns = self.tests.onwards * tests.onwards < 0.0 < self.tests.at_one * tests.at_one
-        if turns or equations.is_parent(new):
+        if self.turns(tests) or equations.is_parent(new):
             path.bifurcations.append(joined(self, new))
             return path.bifurcations[-1].kind
         path.bifurcations.extend(passed(self, new, tests))
@@ -272,7 +274,8 @@ class _Walk(Location):
     def next(self) -> tuple[Solved, bool] | None:
         """Return the next point where a step leads to one of the same kind, and whether at a limit."""
         equations, z, tangent, self.turned = self.equations, self.z, self.tangent, False
-        found = equations.solved(z + self.step * tangent, tangent)
+        guess = z + self.step * tangent
+        found = equations.solved(guess, tangent)
         if found is None:
             return None
         low, high = (each / equations.sizes[2] for each in self.limits)
@@ -286,13 +289,23 @@ class _Walk(Location):
                 return None
         onwards = found.tangent(tangent)
         # Far from the prediction it is another branch.
-        self.turned = bool(np.linalg.norm(found.z - z) > 2.0 * self.step or onwards @ tangent < _COSINE)
+        self.turned = bool(np.linalg.norm(found.z - guess) > _ASIDE * self.step or onwards @ tangent < _COSINE)
         if self.turned:
             return None
         before, after = self.tests, found.tests(onwards)
         if before.at_one * after.at_one < 0.0 and before.at_minus_one * after.at_minus_one < 0.0:
             return None  # A multiplier passes 1 and -1, or changes its sign through infinity, where an impact grazes.
+        if self.turns(after) and max(abs(before.at_one), abs(after.at_one)) > _TURNING:
+            return None  # Too far from the turn, or there is none: the difference by the parameter reaches past an end.
         return (found, at_limit) if equations.kind_at(found.z) == equations.kind else None
+
+    def turns(self, after: Tests) -> bool:
+        """Whether the parameter turns on the way to a point, but no multiplier passes 1.
+
+        There the branch bifurcates from orbits of half the period, or symmetric ones: beyond it are the same orbits
+        again, shifted or mirrored.
+        """
+        return self.tests.onwards * after.onwards < 0.0 < self.tests.at_one * after.at_one
 
     def move_start(self) -> None:
         """Move the start of the period where an impact is near it."""

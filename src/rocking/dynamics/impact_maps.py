@@ -108,7 +108,8 @@ class ImpactMap(Repeated):
             push = push * made["offset"] + column
         sign = np.where(side > 0, -1.0, 1.0)
         restoring = record["gain"][side] * (record["threshold"][side] + record["hold"][side] + sign * push)
-        return np.stack([made["v"], -restoring - record["damping"][side] * made["v"]], axis=-1)
+        with np.errstate(invalid="ignore"):  # a velocity may be infinite
+            return np.stack([made["v"], -restoring - record["damping"][side] * made["v"]], axis=-1)
 
 
 def impact_map(body: Body, motion: Motion, *, model: Model | None = None) -> ImpactMap:

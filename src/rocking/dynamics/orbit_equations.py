@@ -157,7 +157,7 @@ class OrbitEquations:
         """Return the point of the branch in the plane through a guess; None where Newton's method finds none."""
         z = guess.copy()
         for count in range(_CORRECTIONS):
-            residual, jacobian, change = self.at(z)
+            residual, jacobian, _ = self.at(z)
             if not np.all(np.isfinite(jacobian)):
                 return None
             sharp = np.max(np.abs(residual)) < _RESIDUAL * max(1.0, float(np.max(np.abs(jacobian[:, :2]))))
@@ -166,8 +166,8 @@ class OrbitEquations:
             except np.linalg.LinAlgError:
                 return None
             z = z + step
-            if sharp:
-                return Solved(z, jacobian, change, count)
+            if sharp:  # The derivative is that of the point itself: the one before may be beyond a grazing impact.
+                return Solved(z, jacobian, self.returned(*self.physical(z))[1], count)
         return None
 
     def tangent(self, z: Floats, like: Floats) -> Floats:

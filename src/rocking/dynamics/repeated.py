@@ -121,12 +121,12 @@ class Repeated:
 
     def _after_impacts(self, flat: Floats) -> state.Records:
         record, made = self._records[0], state.new_states(len(flat), 0)
-        phase = np.mod(flat[:, 0], self.period)
+        phase = np.mod(np.where(np.isfinite(flat[:, 0]), flat[:, 0], np.nan), self.period)
         starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
         made["piece"] = np.searchsorted(starts, phase, side="right") - 1
         made["offset"] = phase - starts[made["piece"]]
         made["side"] = np.where(self._directions(flat[:, 1]) < 0.0, 1, 0)
-        made["v"] = np.abs(flat[:, 1])
+        made["v"] = np.where(np.isnan(phase), np.nan, np.abs(flat[:, 1]))
         if np.any(flat[:, 1] == 0.0) or (not self._is_two_sided and np.any(flat[:, 1] < 0.0)):
             raise InvalidOption("every velocity in {} must lead away from the stop that was hit", "impacts")
         made["peak"] = record["fallen"] if np.isinf(record["fallen"]) else record["fallen"] * _ALMOST

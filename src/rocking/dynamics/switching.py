@@ -17,7 +17,7 @@ from rocking.errors import InvalidOption
 
 #: Multiplier of the orbit at a bifurcation, along whose eigenvector other orbits lie, and by what their period is
 #: longer.
-_LEAVING: Final = {FLIP: (-1.0, 2), SYMMETRY: (1.0, 1)}
+LEAVING: Final = {FLIP: (-1.0, 2), SYMMETRY: (1.0, 1)}
 
 #: Distances from a bifurcation, over the scale of states, at which an orbit of the other branch is looked for.
 _AWAY: Final = (1e-3, 1e-4, 1e-5)
@@ -85,7 +85,7 @@ def switch_branch(
     2 flip 15.268237 flip 16.671307
     """
     bifurcation = branch.bifurcations[_number_of(branch, number)]
-    if bifurcation.kind not in _LEAVING:
+    if bifurcation.kind not in LEAVING:
         raise InvalidOption(
             f"{{}} must be that of a flip or of a symmetry breaking; {number} is a {bifurcation.kind}, at which no "
             "other branch begins",
@@ -96,8 +96,8 @@ def switch_branch(
     found = _orbit_beside(branch, bifurcation, within)
     if found is None:
         raise InvalidOption(
-            f"no orbit of another branch was found near the {bifurcation.kind} at {bifurcation.value:g} within {{}}",
-            "limits",
+            f"no orbit of another branch was found near the {bifurcation.kind} at {bifurcation.value:g} in the range "
+            f"from {within[0]:g} to {within[1]:g}; take a range that it begins in"
         )
     orbit, value = found
     return continue_orbit(orbit, branch.family, value, within, name=branch.name, unit=branch.unit, step=step, most=most)
@@ -114,7 +114,7 @@ def _orbit_beside(
     branch: Branch, bifurcation: Bifurcation, limits: tuple[float, float]
 ) -> tuple[PeriodicOrbit, float] | None:
     """Orbit of the branch that begins at a bifurcation, and its parameter; None where there is none near it."""
-    multiplier, longer = _LEAVING[bifurcation.kind]
+    multiplier, longer = LEAVING[bifurcation.kind]
     orbit, value = bifurcation.orbit, bifurcation.value
     parent = OrbitEquations.of(orbit, branch.family, value, branch.limits)
     start = np.append(orbit.state, value) / parent.sizes

@@ -27,9 +27,11 @@ class HalfMap(StroboscopicMap):
         self._steps = self._steps[:, : len(first.coefficients)]
 
     def mirrored(self, state: Floats, halves: int) -> tuple[Floats, Floats]:
-        """Mirror image of a state after an odd number of half periods, and its derivative."""
+        """Mirror image of a state after an odd number of half periods, and its derivative; NaN where it overturns."""
         total, at = np.eye(2), state
         for _ in range(halves):
+            if not np.all(np.isfinite(at)):  # a march from there would take all its turns
+                break
             after, change = self.derivative(at)
             at, total = 0.0 - after, -change @ total
         return at, total

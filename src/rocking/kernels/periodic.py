@@ -21,8 +21,10 @@ from rocking.kernels.restitution import factor, relative_slope
 from rocking.kernels.state import AT_REST, Ending, Record, Records
 from rocking.kernels.trace import Trail, add_restraints, expand_coefficients
 
-#: Turns of a march that one period, or one impact, may take.
+#: Turns of a march that one period, or one impact, may take, and the coordinate and the speed from which on none is
+#: taken: a state beyond all sense, or that is no number, would take all of them.
 TURNS = 100_000
+BEYOND = 1e100
 
 
 class Fate(IntEnum):
@@ -124,7 +126,7 @@ def pass_period(setting: Setting, scratch: Record, state: Record) -> int:
     """Take a state through one period; returns its `Fate`."""
     ground, block, rules, table, steps = setting
     pieces = pieces_of(ground)
-    state.budget = TURNS
+    state.budget = turns_from(state)
     ending = Ending.RUNNING.value
     while ending == Ending.RUNNING and state.piece < pieces:
         state.until = pieces
@@ -134,6 +136,12 @@ def pass_period(setting: Setting, scratch: Record, state: Record) -> int:
             state.until = state.piece + 1
         ending = march(ground, block, rules, table, scratch, state)
     return put_back(ground, block, state, ending)
+
+
+@inlined
+def turns_from(state: Record) -> int:
+    """Return the number of turns that a march from a state may take."""
+    return TURNS if state.u < BEYOND and abs(state.v) < BEYOND else 0
 
 
 # ---- Pieces of a linear body's motion that hold no event, in closed form ----
@@ -261,7 +269,7 @@ def differentiate_period(trail: Trail, scratch: Record, work: Record, table: Rec
     one = 1.0 if state.side >= 0 else 0.0  # a body at rest has forgotten what was before
     M[0, 0], M[0, 1], M[1, 0], M[1, 1] = one, 0.0, 0.0, one
     state.until = pieces_of(ground)
-    state.budget = TURNS
+    state.budget = turns_from(state)
     ending = Ending.FULL.value
     impacts = 0
     while ending == Ending.FULL:
@@ -389,7 +397,7 @@ def to_next_impact(trail: Trail, scratch: Record, work: Record, table: Records, 
         state = states[k]
         out[k, 0, 0], out[k, 0, 1], out[k, 1, 0], out[k, 1, 1] = 1.0, 0.0, 0.0, 1.0
         fate = Fate.UNFINISHED.value
-        for _ in range(TURNS):
+        for _ in range(turns_from(state)):
             state.until = pieces_of(ground)
             state.budget = 1
             state.nodes = state.impacts = state.events = state.sequences = 0

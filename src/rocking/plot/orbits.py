@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking.arrays import Flags, Floats
-from rocking.plot.canvas import ABOVE, GROUND, INK, add_labels, add_legend, figure_for, handles_of, write
+from rocking.plot.canvas import ABOVE, GROUND, INK, add_labels, add_legend, figure_for, handles_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,8 +18,18 @@ if TYPE_CHECKING:
 _STABLE: Final[dict[str, Any]] = {"color": INK, "linewidth": 1.4, "linestyle": "-"}
 _UNSTABLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
-#: Space above a branch for the words at its marks, over its height.
-_ROOM: Final = 0.12
+#: Marks of bifurcations by their names, and what marks others.
+_MARKS: Final = {
+    "fold": "o",
+    "flip": "D",
+    "symmetry breaking": "s",
+    "branch point": "X",
+    "grazing": "v",
+    "loss of complete chattering": "^",
+    "start of rest": "<",
+    "uplift": ">",
+}
+_OTHER: Final = "P"
 
 
 def orbit_figure(
@@ -83,9 +93,10 @@ def branch_figure(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw a branch of periodic orbits: stable ones as full lines, unstable ones dashed, bifurcations with their names.
+    """Draw branches of periodic orbits: stable ones as full lines, unstable ones dashed, and bifurcations by marks.
 
-    `marks` are names of bifurcations, with the parameter and the peak there.
+    A value that is not a number parts a branch from the next. `marks` are names of bifurcations, with the parameter and
+    the peak there.
     """
     with figure_for(ax, (5.2, 3.6), figsize, title) as figure:
         axes = figure.add_subplot() if ax is None else ax
@@ -93,15 +104,19 @@ def branch_figure(
             # Dashes reach to the points where full lines begin.
             joined = chosen | np.append(chosen[1:], False) | np.insert(chosen[:-1], 0, False)
             shown = chosen if name == "stable" else joined
-            if np.any(chosen):
+            if np.any(chosen & ~np.isnan(values)):
                 axes.plot(np.where(shown, values, np.nan), np.where(shown, peaks, np.nan), label=name, **style)
-        low, high = float(values.min()), float(values.max())
-        for k, (name, value, peak) in enumerate(marks):
-            axes.plot([value], [peak], "o", color=INK, markersize=4.0, markerfacecolor=GROUND, zorder=4)
-            left = value > 0.5 * (low + high)
-            up = 4 if k % 2 == 0 else -10
-            write(axes, name, (value, peak), (-5 if left else 5, up), ha="right" if left else "left", fontsize=7.5)
-        axes.margins(x=0.04, y=_ROOM)
+        look: dict[str, Any] = {
+            "color": INK,
+            "markersize": 4.5,
+            "markerfacecolor": GROUND,
+            "linestyle": "",
+            "zorder": 4,
+        }
+        for kind in dict.fromkeys(name for name, _, _ in marks):
+            at = np.array([(value, peak) for name, value, peak in marks if name == kind])
+            axes.plot(at[:, 0], at[:, 1], marker=_MARKS.get(kind, _OTHER), label=kind, **look)
+        axes.margins(x=0.04, y=0.06)
         add_labels(axes, *labels)
         add_legend(figure, ax, handles_of(axes))
     return figure
