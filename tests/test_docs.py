@@ -24,7 +24,7 @@ EXAMPLE = re.compile(r"^```pycon\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PAGES_WITH_EXAMPLES = [page for page in PAGES if EXAMPLE.search(page.read_text("utf-8"))]
 # They take seconds; the other pages show that examples run.
 THOROUGH = {
-    "basins.md", "calibrate.md", "fragility.md", "from-a-mesh.md", "periodic-orbits.md", "study.md",
+    "basins.md", "calibrate.md", "fragility.md", "from-a-mesh.md", "gradients.md", "periodic-orbits.md", "study.md",
     "walls-and-tendons.md",
 }  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]

@@ -90,6 +90,27 @@ class History:
             found[:, 0] += np.array(self.stops)[np.where(side < 0, -1 - side, side)]
         return found
 
+    def changes(self, time: ArrayLike, of: Iterable[str]) -> dict[str, Floats]:
+        """Change the coordinate at times of any shape with each quantity, see `Sensitivity.rotation`."""
+        times, nodes = checks.numbers(time, "time", InvalidOption), self.trail.nodes
+        flat = times.ravel()
+        order = np.argsort(flat, kind="stable")
+        order = order[~self.outside(flat[order])]
+        ascending = flat[order]
+        ascending.flags.writeable = False
+        rows = np.maximum(np.searchsorted(nodes["time"], ascending) - 1, 0)
+        signs = np.where(nodes["side"][rows] == 1, -1.0, 1.0)
+        rests = nodes["side"] < 0
+        events = int(np.count_nonzero(rests[:-1] | rests[1:]))
+        found = {}
+        for name in of:
+            if name not in _NAMES:
+                raise InvalidOption(f"{{}} must be among {', '.join(_NAMES)}, not {name!r}", "of", value=name)
+            values = np.full(flat.shape, np.nan)
+            values[order] = signs * _varied(self.trail, _NAMES.index(name), ascending, len(nodes), events)[0]
+            found[name] = values.reshape(times.shape)
+        return found
+
     def rows(self, times: Floats) -> Integers:
         """Row of the node at which the step of each time starts."""
         rows = np.searchsorted(self.trail.nodes["time"], times, side="right") - 1
@@ -210,24 +231,7 @@ class Sensitivity:
         >>> {name: [f"{each:.5f}" for each in values] for name, values in changes.items()}
         {'p': ['-0.01640', '-0.09310'], 'restitution_plus': ['0.00000', '-0.11430']}
         """
-        trail = self._history.trail
-        flat = checks.numbers(time, "time", InvalidOption)
-        shape, flat = flat.shape, flat.ravel()
-        outside = self._history.outside(flat)
-        order = np.argsort(flat, kind="stable")
-        order = order[~outside[order]]
-        times = flat[order]
-        times.flags.writeable = False
-        rows = np.maximum(np.searchsorted(trail.nodes["time"], times) - 1, 0)
-        signs = np.where(trail.nodes["side"][rows] == 1, -1.0, 1.0)
-        found = {}
-        for name in of:
-            if name not in _NAMES:
-                raise InvalidOption(f"{{}} must be among {', '.join(_NAMES)}, not {name!r}", "of", value=name)
-            values = np.full(flat.shape, np.nan)
-            values[order] = signs * _varied(trail, _NAMES.index(name), times, len(trail.nodes), len(self.events))[0]
-            found[name] = values.reshape(shape)
-        return found
+        return self._history.changes(time, of)
 
     def __repr__(self) -> str:
         event = np.max(np.abs(self.events["motion"]), initial=0.0)

@@ -27,6 +27,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response, drawing_times
+from rocking.response.answers import history_of
 from rocking.result import DrawnResult
 from rocking.simulation import simulate
 from rocking.tables import counted, text_table
@@ -52,8 +53,8 @@ _RELEASED: Final = 0.05
 #: A sensitivity below this share of the largest counts as none.
 _INSENSITIVE: Final = 1e-7
 
-#: Steps of the numerical derivatives in the logarithms, simulations being good to about 1e-12: while fitting, and the
-#: largest for standard errors, whose step is refined this often.
+#: Steps in the logarithms of the differences that standard errors are from: the first and least, simulations being good
+#: to about 1e-12, and the largest; and how often a step is refined.
 _STEP: Final = 1e-5
 _LARGEST_STEP: Final = 0.05
 _REFINED: Final = 4
@@ -209,10 +210,10 @@ def calibrate_history(
 
     Notes
     -----
-    Least squares in the logarithms of the parameters. The search starts from 2048 blocks over the whole range; the best
-    go through fits to 15, 30, 60 and 100 % of the history. Standard errors are from the curvature at the optimum, and
-    allow for residuals that are correlated in time (their variance counts by its integrated autocorrelation), yet not
-    for a specimen that is no rigid plane block.
+    Least squares in the logarithms of the parameters, by the derivatives of `Sensitivity.rotation`. The search starts
+    from 2048 blocks over the whole range; the best go through fits to 15, 30, 60 and 100 % of the history. Standard
+    errors are from the curvature at the optimum, and allow for residuals that are correlated in time (their variance
+    counts by its integrated autocorrelation), yet not for a specimen that is no rigid plane block.
 
     Restitution is found in practice so (paper, section 2.3).
 
@@ -317,6 +318,16 @@ class _Problem:
         response = self.response(logs, float(times[-1]))
         return self.rotation[:count] - response.rotation(np.minimum(times, response.duration))
 
+    def derivatives(self, logs: Floats, count: int) -> Floats:
+        """Differentiate the residuals by the logarithms, shape (count, k)."""
+        times = self.times[:count]
+        response = self.response(logs, float(times[-1]))
+        fallen = times > response.duration
+        changes = history_of(response).changes(times[~fallen], [one.name for one in self.unknowns])
+        found = np.zeros((count, len(logs)))
+        found[~fallen] = -np.column_stack([changes[one.name] for one in self.unknowns])
+        return found
+
     def error(self, logs: Floats, count: int) -> float:
         """Sum of the squared residuals of the first samples."""
         return float((self.residuals(logs, count) ** 2).sum())
@@ -371,8 +382,7 @@ def _descended(problem: _Problem, start: Floats, count: int) -> Floats:
     from scipy.optimize import least_squares
 
     low, high = problem.bounds
-    steps = [_STEP] * len(low)
-    fit = least_squares(problem.residuals, start, "3-point", (low, high), args=(count,), diff_step=steps)
+    fit = least_squares(problem.residuals, start, problem.derivatives, (low, high), args=(count,))
     return np.asarray(fit.x, dtype=np.float64)
 
 
