@@ -124,6 +124,8 @@ def continue_orbit(
     fold 10.47197551
     flip 15.26823701
     """
+    if not isinstance(orbit, PeriodicOrbit):
+        raise InvalidOption("{} must be one of those that periodic_orbits returns", "orbit", value=orbit)
     low, high = range_of(limits)
     start = checks.within(value, "value", InvalidOption, low, high)
     longest = checks.positive(step, "step", InvalidOption)
@@ -333,6 +335,6 @@ def range_of(limits: Sequence[float]) -> tuple[float, float]:
     if len(values) != 2:
         raise InvalidOption("{} must be (lower, higher)", "limits")
     low, high = (checks.finite(each, "limits", InvalidOption) for each in values)
-    if not low < high:
+    if not (low < high and math.isfinite(high - low)):
         raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
     return low, high
