@@ -383,6 +383,15 @@ def test_results_are_written_and_drawn(branch, tmp_path):
     assert header[:4] == ["level", "position_m", "velocity_m_s", "peak_m"]
 
 
+def test_an_orbit_near_which_nothing_grows_or_shrinks_is_neutral():
+    """Without damping and impacts the multipliers of the forced motion are exp(+-2 pi i/1.3)."""
+    oscillator = dynamics.ImpactOscillator(1.0, 0.8, stop=1.0)
+    found = dynamics.periodic_orbits(oscillator, pulses.sine(1.0, 1.3, cycles=1), starts=64)
+    (orbit,) = (each for each in found if each.impacts == 0.0)
+    assert not orbit.is_stable and "neutral orbit of 1 period with 0 impacts" in orbit.summary()
+    assert orbit.multipliers[0] == pytest.approx(np.exp(2j * math.pi / 1.3).conjugate(), abs=1e-9)
+
+
 def test_the_peak_of_an_orbit_between_walls_is_where_they_are():
     def family(amplitude):
         return dynamics.InvertedPendulum(3.0, 0.1, 0.6), pulses.sine(amplitude, 1.3, cycles=1)

@@ -87,7 +87,7 @@ class Basins(DatasetResult):
             return "\n".join([*text, f"not reached before an interrupt: {missing} cells"])
         whole, boundary = self.entropy
         if np.isfinite(whole):
-            said = "above ln 2, so that it is fractal" if boundary > np.log(2.0) else "not above ln 2"
+            said = "above ln 2: fractal, if the grid is fine enough" if boundary > np.log(2.0) else "not above ln 2"
             text.append(f"basin entropy {whole:.4f}, of the boundary {boundary:.4f} ({said})")
         exponent, error = self.uncertainty
         if np.isfinite(exponent):
