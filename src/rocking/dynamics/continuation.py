@@ -104,6 +104,9 @@ def continue_orbit(
     image half a period later. Ends are located by halving the step. Of two multipliers whose product is less than one,
     none leaves the unit circle but through 1 or -1: there is no Neimark-Sacker bifurcation with restitution below 1.
 
+    The motion is to be given over its least period. Over two of them, orbits of twice the period and those from which
+    they bifurcate are of one kind, so that a long step may lead from the ones to the others without a word.
+
     References
     ----------
     H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems", in Applications of Bifurcation
