@@ -100,7 +100,7 @@ def test_every_body_has_a_basin_and_a_diagram(run, options, body):
         (["bifurcation", *SINE, "--along", "amplitude"], "--along takes a parameter of the pulse with its values"),
         (["bifurcation", *SINE, "--along", "amplitude:1:2"], "--along takes numbers, 1,2,5, or a range"),
         (["bifurcation", *SINE, "--along", "height:1:2:3"], "the pulse sine has no height"),
-        (["bifurcation", *SINE, "--along", "amplitude:3,2"], "--along must be increasing numbers"),
+        (["bifurcation", *SINE, "--along", "amplitude:3,2"], "--along must be increasing finite numbers"),
         (["bifurcation", "--pulse", "sine:frequency=1", "--along", "phase:0:1:3"], "the pulse sine needs amplitude"),
         (["bifurcation", *SINE, "--along", "phase:0:1:3", "--start", "0.1"], "--start takes a coordinate and a veloc"),
         (["basin", *SINE, "--positions", "0.1,0"], "--positions must be increasing"),

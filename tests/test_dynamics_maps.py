@@ -270,3 +270,52 @@ def test_steps_over_pieces_in_closed_form_are_what_the_march_finds(seed):
         judged += np.count_nonzero(fates == dynamics.Fate.MOVES)
         stepped += strobe._steps.shape[1] > 0
     assert judged > 1500 and stepped > 100
+
+
+TABLE = pulses.sine(12.0, 5.0, cycles=1)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda ball: dynamics.periodic_orbits(ball, TABLE, starts=[[math.nan, 0.0]]), "starts must be finite"),
+        (lambda ball: dynamics.periodic_orbits(ball, TABLE, starts=[]), "starts must hold pairs"),
+        (lambda ball: dynamics.periodic_orbits(ball, TABLE, starts=[[-1.0, 0.0]]), "starts must be at least 0 m"),
+        (lambda ball: dynamics.periodic_orbits(ball, pulses.sine(1e30, 5.0, cycles=1)), "beyond all sense"),
+        (lambda ball: dynamics.lyapunov_exponents(ball, TABLE, [0.0, math.inf]), "state must be finite"),
+        (lambda ball: dynamics.bifurcation_diagram(lambda v: (ball, TABLE), [1.0], [0.0, 1e308]), "starts must be fin"),
+        (lambda ball: dynamics.bifurcation_diagram(lambda v: (ball, TABLE), [1.0, math.nan], [0.0, 1.0]), "increasing"),
+        (lambda ball: dynamics.basins(ball, TABLE, [0.0, math.nan], [0.0, 1.0]), "positions must be increasing finite"),
+        (lambda ball: dynamics.basins(ball, TABLE, [0.0, 1.0], [0.0, 1e308]), "velocities must be finite"),
+        (lambda ball: dynamics.continue_orbit(None, lambda v: (ball, TABLE), 1.0, (0.0, 2.0)), "periodic_orbits"),
+        (lambda ball: dynamics.switch_branch(None, 0), "continue_orbit"),
+        (lambda ball: dynamics.compare_schemes(ball, TABLE, schemes=[]), "at least one scheme"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_in_one_sentence(make, words):
+    with pytest.raises(rocking.RockingError, match=words) as caught:
+        make(dynamics.BouncingBall(0.5))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_body_under_a_motion_without_acceleration_rests():
+    (orbit,) = dynamics.periodic_orbits(dynamics.BouncingBall(0.5), pulses.sine(0.0, 5.0, cycles=1), starts=64)
+    assert orbit.rests and orbit.impacts == 0.0
+
+
+@pytest.mark.parametrize(
+    ("content", "error", "words"),
+    [("file", rocking.OutputError, "cannot be made"), ("folder", InvalidOption, "bifurcation-diagram.npz that cannot")],
+)
+def test_a_folder_that_is_a_file_or_holds_another_is_refused_in_one_sentence(tmp_path, content, error, words):
+    place = tmp_path / "kept"
+    if content == "file":
+        place.write_text("mine")
+    else:
+        place.mkdir()
+        (place / "bifurcation-diagram.npz").write_bytes(b"mine")
+    with pytest.raises(error, match=words) as caught:
+        dynamics.bifurcation_diagram(
+            lambda value: (dynamics.BouncingBall(0.5), TABLE), [1.0], [0.0, 1.0], transient=1, kept=2, folder=place
+        )
+    assert "\n" not in str(caught.value)

@@ -357,7 +357,7 @@ def test_points_of_a_branch_are_orbits_and_stability_changes_at_its_bifurcations
     assert np.array_equal(stable, on_stable)
     steps = np.diff(branch.values)
     assert np.any(steps > 0.0) and np.any(steps < 0.0)  # it passes the fold
-    with pytest.raises(InvalidOption, match="one of"):
+    with pytest.raises(InvalidOption, match="index must be a whole number from"):
         branch.orbit(len(branch))
 
 
@@ -381,6 +381,28 @@ def test_results_are_written_and_drawn(branch, tmp_path):
     assert len({drawn[kind].get_marker() for kind in ("fold", "flip")}) == 2
     header = branch.to_dataframe("points").columns.tolist()
     assert header[:4] == ["level", "position_m", "velocity_m_s", "peak_m"]
+
+
+def test_an_orbit_near_which_nothing_grows_or_shrinks_is_neutral():
+    """Without damping and impacts the multipliers of the forced motion are exp(+-2 pi i/1.3)."""
+    oscillator = dynamics.ImpactOscillator(1.0, 0.8, stop=1.0)
+    found = dynamics.periodic_orbits(oscillator, pulses.sine(1.0, 1.3, cycles=1), starts=64)
+    (orbit,) = (each for each in found if each.impacts == 0.0)
+    assert not orbit.is_stable and "neutral orbit of 1 period with 0 impacts" in orbit.summary()
+    assert orbit.multipliers[0] == pytest.approx(np.exp(2j * math.pi / 1.3).conjugate(), abs=1e-9)
+
+
+def test_the_peak_of_an_orbit_between_walls_is_where_they_are():
+    def family(amplitude):
+        return dynamics.InvertedPendulum(3.0, 0.1, 0.6), pulses.sine(amplitude, 1.3, cycles=1)
+
+    found = dynamics.periodic_orbits(*family(3.0), starts=64)
+    start = next(each for each in found if each.is_stable and each.impacts == 2.0)
+    branch = dynamics.continue_orbit(start, family, 3.0, (2.8, 3.2))
+    assert len(branch) >= 5 and branch.peaks == pytest.approx(0.1, rel=1e-14)
+    axes = branch.plot().axes[0]  # which would be a flat line
+    assert axes.get_ylabel() == "position at the start of a period (m)"
+    assert np.nanmax(axes.lines[0].get_ydata()) == pytest.approx(branch.states[:, 0].max())
 
 
 @pytest.mark.parametrize(

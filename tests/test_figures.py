@@ -234,7 +234,7 @@ def branch_of(**options):
     s = np.linspace(-1.0, 1.0, 60)
     marks = [("fold", 3.0, 0.2), ("symmetry breaking", 3.6, 0.31), ("loss of complete chattering", 3.9, 0.02)]
     texts = {"marks": marks, "labels": ("peak ground acceleration (m/s²)", "largest rotation (rad)")}
-    return branch_figure(values=3.0 + s * s, peaks=0.2 + 0.18 * s, stable=s > 0.0, **(texts | options))
+    return branch_figure(values=3.0 + s * s, heights=0.2 + 0.18 * s, stable=s > 0.0, **(texts | options))
 
 
 FIGURES = {

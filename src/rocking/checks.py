@@ -174,8 +174,8 @@ def increasing_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
 def axis(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return finite numbers of an axis, of any sign, in increasing order, or raise `error`; one number is an axis."""
     found = np.atleast_1d(numbers(values, name, error))
-    if found.ndim != 1 or found.size == 0 or np.any(np.diff(found) <= 0.0):
-        raise error("{} must be increasing numbers", name, value=values)
+    if found.ndim != 1 or found.size == 0 or not np.all(np.isfinite(found)) or np.any(np.diff(found) <= 0.0):
+        raise error("{} must be increasing finite numbers", name, value=values)
     return found
 
 

@@ -22,7 +22,7 @@ from rocking.motion.motion import Motion
 from rocking.treatment import Treatment
 
 #: Fastest initial velocity, rad/s or m/s: beyond all sense, and squares and fourth powers of it are far from overflow.
-_FASTEST = 1e6
+FASTEST = 1e6
 
 
 @functools.lru_cache(maxsize=8)
@@ -153,7 +153,7 @@ def _check_start(
     coordinate: float | Floats, rate: float, records: state.Records, bodies: Bodies, name: str | None
 ) -> None:
     """Check the coordinate and the rate of one body, or of all; numbers of Python's own are the quickest to check."""
-    plain = type(coordinate) is float and type(rate) is float and math.isfinite(coordinate) and abs(rate) <= _FASTEST
+    plain = type(coordinate) is float and type(rate) is float and math.isfinite(coordinate) and abs(rate) <= FASTEST
     fallen = np.where(records["facing"], np.inf, records["fallen"]).min()
     if plain and abs(coordinate) < fallen:
         return
@@ -161,9 +161,9 @@ def _check_start(
     called = name or f"initial_{kind.name}"
     u = float(coordinate[0]) if isinstance(coordinate, np.ndarray) else checks.finite(coordinate, called, InvalidOption)
     v = checks.finite(rate, "initial_velocity", InvalidOption)
-    if abs(v) > _FASTEST:
+    if abs(v) > FASTEST:
         raise InvalidOption(
-            f"{{}} must be at most {_FASTEST:g} {kind.unit}/s in size, not {v:g}", "initial_velocity", value=v
+            f"{{}} must be at most {FASTEST:g} {kind.unit}/s in size, not {v:g}", "initial_velocity", value=v
         )
     if abs(u) >= fallen:
         limit = "pi/2" if fallen == 0.5 * math.pi else f"{fallen:g}"

@@ -16,6 +16,7 @@ from rocking.constants import Model
 from rocking.dynamics.basin_grid import NAMES, NOT_REACHED, Grid
 from rocking.dynamics.basin_measures import basin_entropy, uncertainty_exponent
 from rocking.dynamics.maps import StroboscopicMap
+from rocking.dynamics.repeated import sensible
 from rocking.engine import cores
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -86,7 +87,7 @@ class Basins(DatasetResult):
             return "\n".join([*text, f"not reached before an interrupt: {missing} cells"])
         whole, boundary = self.entropy
         if np.isfinite(whole):
-            said = "above ln 2, so that it is fractal" if boundary > np.log(2.0) else "not above ln 2"
+            said = "above ln 2: fractal, if the grid is fine enough" if boundary > np.log(2.0) else "not above ln 2"
             text.append(f"basin entropy {whole:.4f}, of the boundary {boundary:.4f} ({said})")
         exponent, error = self.uncertainty
         if np.isfinite(exponent):
@@ -246,6 +247,8 @@ def grid_of(
     """Grid of initial states that `basins` follows, checked, with what the folder holds of it."""
     strobe = StroboscopicMap(body, motion, model, chattering)
     x, v = checks.axis(positions, "positions", InvalidOption), checks.axis(velocities, "velocities", InvalidOption)
+    sensible(x, "positions")
+    sensible(v, "velocities")
     checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
     most = checks.whole(periods, "periods", InvalidOption, least=1)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)

@@ -270,7 +270,7 @@ class _Work:
         self.file: Kept | None = None
         self.ends = [self.mapped(0), self.mapped(levels.size - 1)]
         for strobe in self.ends:
-            strobe._states(first)  # a start behind a stop is refused
+            strobe.checked_starts(first, "starts")  # a start behind a stop is refused
 
     def keep_in(self, folder: str | Path) -> None:
         """Go on from what a folder holds, and keep what is computed there."""

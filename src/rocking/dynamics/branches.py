@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking import checks
 from rocking.arrays import Flags, Floats
 from rocking.body import Body
 from rocking.constants import Model
@@ -37,6 +38,9 @@ CHATTERING: Final = "loss of complete chattering"
 REST: Final = "start of rest"
 UPLIFT: Final = "uplift"
 OVERTURNING: Final = "overturning"
+
+#: Differences of peaks, over the greatest, that are only rounding.
+_FLAT: Final = 1e-9
 
 #: How a branch may end without one.
 LIMIT: Final = "limit of the parameter"
@@ -160,8 +164,7 @@ class Branch(DrawnResult, TableResult):
         >>> branch.orbit(0).impacts
         1.0
         """
-        if not -len(self) <= index < len(self):
-            raise InvalidOption(f"{{}} must be that of one of {len(self)} points, not {index}", "index", value=index)
+        index = checks.whole(index, "index", InvalidOption, least=-len(self), most=len(self) - 1)
         body, motion = self.family(float(self.values[index]))
         return orbit_at(StroboscopicMap(body, motion, self.model, self.treatment), self.states[index], self.period)
 
@@ -228,6 +231,8 @@ class Branch(DrawnResult, TableResult):
     ) -> Figure:
         """Draw the greatest size of the coordinate against the parameter.
 
+        Where that is the same all along, as between two stops, the coordinate at the start of a period is drawn.
+
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
@@ -259,14 +264,24 @@ class Branch(DrawnResult, TableResult):
         body, _ = self.family(float(self.values[0]))
         coordinate, branches = body.coordinate, [self, *others]
         unit = "" if self.unit == "1" else f" ({self.unit.replace('^2', '²')})"
+        # Between two stops that are both hit the greatest size is always that of a stop, and tells nothing.
+        peaks = np.concatenate([each.peaks for each in branches])
+        flat = float(np.ptp(peaks)) <= _FLAT * float(np.max(peaks))
+        what = f"{coordinate.name} at the start of a period" if flat else f"largest {coordinate.name}"
         periods = ", ".join(str(each) for each in sorted({each.period for each in branches}))
         headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._headline()
         return branch_figure(
             values=np.concatenate([np.append(each.values, np.nan) for each in branches])[:-1],
-            peaks=np.concatenate([np.append(each.peaks, np.nan) for each in branches])[:-1],
+            heights=np.concatenate([np.append(each.states[:, 0] if flat else each.peaks, np.nan) for each in branches])[
+                :-1
+            ],
             stable=np.concatenate([np.append(each.is_stable, False) for each in branches])[:-1],
-            marks=[(at.kind, at.value, _peak_at(at)) for each in branches for at in each.bifurcations],
-            labels=(f"{self.name}{unit}", f"largest {coordinate.name} ({coordinate.unit})"),
+            marks=[
+                (at.kind, at.value, float(at.orbit.state[0]) if flat else _peak_at(at))
+                for each in branches
+                for at in each.bifurcations
+            ],
+            labels=(f"{self.name}{unit}", f"{what} ({coordinate.unit})"),
             title=title or f"{body.description}, {headline.replace('^2', '²')}",
             ax=ax,
             figsize=figsize,

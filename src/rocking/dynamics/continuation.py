@@ -104,6 +104,9 @@ def continue_orbit(
     image half a period later. Ends are located by halving the step. Of two multipliers whose product is less than one,
     none leaves the unit circle but through 1 or -1: there is no Neimark-Sacker bifurcation with restitution below 1.
 
+    The motion is to be given over its least period. Over two of them, orbits of twice the period and those from which
+    they bifurcate are of one kind, so that a long step may lead from the ones to the others without a word.
+
     References
     ----------
     H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems", in Applications of Bifurcation
@@ -124,6 +127,8 @@ def continue_orbit(
     fold 10.47197551
     flip 15.26823701
     """
+    if not isinstance(orbit, PeriodicOrbit):
+        raise InvalidOption("{} must be one of those that periodic_orbits returns", "orbit", value=orbit)
     low, high = range_of(limits)
     start = checks.within(value, "value", InvalidOption, low, high)
     longest = checks.positive(step, "step", InvalidOption)
@@ -333,6 +338,6 @@ def range_of(limits: Sequence[float]) -> tuple[float, float]:
     if len(values) != 2:
         raise InvalidOption("{} must be (lower, higher)", "limits")
     low, high = (checks.finite(each, "limits", InvalidOption) for each in values)
-    if not low < high:
+    if not (low < high and math.isfinite(high - low)):
         raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
     return low, high

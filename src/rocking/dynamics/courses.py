@@ -62,7 +62,8 @@ def course_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Course:
     at = response.states(0.5 * (low + high))[:, 0]
     gaps = _gaps(strobe, at, rising)
     open_ = gaps[gaps > 0.0]
-    peak = float(np.max(np.abs(np.concatenate([states[:, 0], at]))))
+    hits = response.states(impacts["time"])[:, 0]  # at a second stop the coordinate may be greatest
+    peak = float(np.max(np.abs(np.concatenate([states[:, 0], at, hits]))))
     slowest = float(np.min(impacts["speed_before"])) if len(impacts) else math.inf
     return Course(
         peak, slowest, float(np.min(open_)) if len(open_) else math.inf, np.mod(impacts["time"], strobe.period)

@@ -162,6 +162,7 @@ def lyapunov_exponents(
     given = checks.numbers(state, "state", InvalidOption)
     if given.shape != (2,):
         raise InvalidOption(f"{{}} must be one pair (coordinate, velocity), not of shape {given.shape}", "state")
+    strobe.checked_starts(given, "state")
     count = checks.whole(periods, "periods", InvalidOption, least=_BATCHES)
     before = checks.whole(transient, "transient", InvalidOption, least=0)
     logs, impacts, fate = strobe._stretches(given, before, count)

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.constants import VERSION
 from rocking.dynamics.repeated import Repeated
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, OutputError
 from rocking.tables import write_bytes
 
 #: Seconds between two savings.
@@ -27,7 +28,10 @@ class Kept:
 
     def __init__(self, folder: str | Path, what: str, key: str) -> None:
         self._folder, self._what, self._key = checks.path(folder, "folder", InvalidOption), what, key
-        self._folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{{}} cannot be made: {error.strerror}", "folder", path=str(folder)) from error
         self._file = self._folder / f"{what.replace(' ', '-')}.npz"
         self._saved = time.monotonic()
 
@@ -37,15 +41,24 @@ class Kept:
         Raises
         ------
         InvalidOption
-            If they are of another problem.
+            If they are of another problem, or the file cannot be read.
         """
         if not self._file.exists():
             return {}
-        with np.load(self._file) as kept:
-            found = dict(kept)
-        if found.pop("key").item() != self._key:
+        try:
+            with np.load(self._file) as kept:
+                found = dict(kept)
+            key = found.pop("key").item()
+        except (OSError, EOFError, ValueError, KeyError, TypeError, BadZipFile) as error:
             raise InvalidOption(
-                f"{{}} holds {self._what} of something else; give another one", "folder", value=str(self._folder)
+                f"{{}} holds a file {self._file.name} that cannot be read; remove it, or give another folder",
+                "folder", value=str(self._folder),
+            ) from error  # fmt: skip
+        if key != self._key:
+            raise InvalidOption(
+                f"{{}} holds a result of something else in {self._file.name}; give another folder",
+                "folder",
+                value=str(self._folder),
             )
         return found
 

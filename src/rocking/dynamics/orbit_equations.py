@@ -106,7 +106,12 @@ class OrbitEquations:
     @classmethod
     def of(cls, orbit: PeriodicOrbit, family: Family, value: float, limits: tuple[float, float]) -> OrbitEquations:
         """Return the equations that an orbit solves at a value of the parameter."""
-        strobe = StroboscopicMap(*family(value), orbit.model, orbit.treatment)
+        pair = family(value) if callable(family) else None
+        if not isinstance(pair, tuple) or len(pair) != 2:
+            raise InvalidOption(
+                "{} must be a function of the parameter that returns a body and one period of a motion", "family"
+            )
+        strobe = StroboscopicMap(*pair, orbit.model, orbit.treatment)
         scale = scale_of(strobe)
         if not np.all(np.abs(strobe(orbit.state, orbit.period) - orbit.state) / scale < 1e-8):
             raise InvalidOption(

@@ -123,9 +123,7 @@ class _Search:
     def starts(self, given: ArrayLike | int | None) -> Floats:
         """States to start from: those given, or about as many as are wanted."""
         if given is not None and np.ndim(given) > 0:
-            states = checks.numbers(given, "starts", InvalidOption)
-            self.strobe._states(states)
-            return states.reshape(-1, 2)
+            return self.strobe.checked_starts(given, "starts")
         wanted = _STARTS if given is None else checks.whole(given, "starts", InvalidOption, least=1)
         strobe, (low, high) = self.strobe, self.strobe.body.stops
         both = strobe._is_two_sided
@@ -152,14 +150,14 @@ class _Search:
         restitution = float(np.max(strobe.bodies.restitution))
         gain = restitution / max(1.0 - restitution, 1e-300)
         push = self.count * strobe.period * mean_size(strobe.motion)
-        speed = min(max(gain, _LEAST_GAIN), _MOST_GAIN) * push
+        speed = min(max(gain, _LEAST_GAIN), _MOST_GAIN) * push or self.scale.velocity
         record = strobe._records[0]
         if not math.isinf(min(strobe.body.balance)):
             return min(speed, _BLOCK_SPEED * self.scale.velocity + push)
         if float(record["stiffness"][0]) == 0.0:  # A ball flies for as long as its speed lets it.
             pull = float(record["gain"][0] * record["threshold"][0])
             return min(speed, 0.5 * self.count * strobe.period * pull + push)
-        return speed or self.scale.velocity
+        return speed
 
     def _possible(self, states: Floats) -> Flags:
         """Which states a body may have."""

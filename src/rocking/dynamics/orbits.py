@@ -100,7 +100,11 @@ class PeriodicOrbit(DrawnResult, TableResult):
 
     @property
     def _kind(self) -> str:
-        words = ["stable" if self.is_stable else "unstable", *(["symmetric"] if self.symmetric else [])]
+        grows = float(np.max(np.abs(self.multipliers))) > 1.0 / NEUTRAL
+        words = [
+            "stable" if self.is_stable else "unstable" if grows else "neutral",
+            *(["symmetric"] if self.symmetric else []),
+        ]
         how = "with complete chattering" if math.isinf(self.impacts) else f"with {counted(int(self.impacts), 'impact')}"
         rests = ["with a rest"] if self.rests and self.impacts and not math.isinf(self.impacts) else []
         always = ["always at rest"] if self.rests and not self.impacts else []

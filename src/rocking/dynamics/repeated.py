@@ -22,7 +22,7 @@ from rocking.kernels.periodic import Fate, Setting, step_rows
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
-from rocking.problem import one_body, rules_of, set_start
+from rocking.problem import FASTEST, one_body, rules_of, set_start
 from rocking.treatment import Treatment, treatment
 
 #: Ground acceleration, g, that lifts any body: it stands behind the second period.
@@ -47,6 +47,8 @@ class Repeated:
         self.model: Model = model_of(self.body, model)
         self.treatment = treatment(chattering)
         self.period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
+        if not np.max(np.abs(self.motion.coefficients[:, 0])) < _BEYOND_ALL * self.body.gravity:
+            raise InvalidMotion(f"the motion is beyond all sense; maps take accelerations below {_BEYOND_ALL:g} g")
         limits = self.treatment.limits(self.bodies, self.motion, self.model)
         self._records = self.bodies.kernel_records(self.model, limits)
         if np.any(self._records["yielding"]):
@@ -73,18 +75,25 @@ class Repeated:
         trail = Trail(self._ground, self._records[0], self._rules(record=True), NO_NODES)
         return trail, state.new_scratch(), state.record(state.VARIATION), state.new_table(_ROWS)
 
-    def _states(self, states: ArrayLike) -> tuple[Floats, state.Records]:
-        """States as given, flat, and as records."""
-        given = checks.numbers(states, "states", InvalidOption)
+    def checked_starts(self, given: ArrayLike, name: str) -> Floats:
+        """Return states to start from, shape (n, 2): finite numbers, in front of the stops."""
+        states = checks.numbers(given, name, InvalidOption)
+        self._states(states, name)
+        sensible(states, name)
+        return states.reshape(-1, 2)
+
+    def _states(self, states: ArrayLike, name: str | None = None) -> tuple[Floats, state.Records]:
+        """States as given, flat, and as records; ``name`` is what a caller calls them, if it checks them."""
+        given = checks.numbers(states, name or "states", InvalidOption)
         if given.ndim == 0 or given.shape[-1] != 2:
             raise InvalidOption(
                 f"{{}} must hold pairs ({self.body.coordinate.name}, velocity) along the last axis, not have the shape "
                 f"{given.shape}",
-                "states",
+                name or "states",
             )
         flat = given.reshape(-1, 2)
         made = state.new_states(len(flat), 0)
-        set_start(made, self._records, self.bodies, flat[:, 0], flat[:, 1])
+        set_start(made, self._records, self.bodies, flat[:, 0], flat[:, 1], name)
         fallen = float(self._records["fallen"][0])
         made["peak"] = fallen if np.isinf(fallen) else fallen * _ALMOST
         return given, made
@@ -179,6 +188,12 @@ def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
 def parts_of(count: int) -> Sequence[slice]:
     """Ranges of states for one call of a kernel each."""
     return [slice(start, min(start + TOGETHER, count)) for start in range(0, count, TOGETHER)]
+
+
+def sensible(values: Floats, name: str) -> None:
+    """Refuse coordinates or velocities that are not finite, or beyond all sense."""
+    if not values.size or not np.all(np.abs(values) <= FASTEST):
+        raise InvalidOption(f"{{}} must be finite numbers of at most {FASTEST:g} in size", name)
 
 
 def described(what: Body | Motion) -> str:

@@ -143,6 +143,8 @@ def compare_schemes(
     again = checks.whole(repetitions, "repetitions", InvalidOption, least=0)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     chosen = [scheme_of(scheme) for scheme in checks.several(schemes, "schemes", InvalidOption)]
+    if not chosen:
+        raise InvalidOption("{} must hold at least one scheme", "schemes")
 
     equation, position = model_of(body, model), position_at_start(body, initial_position)
     shared: dict[str, Any] = {"initial_velocity": initial_velocity}

@@ -84,6 +84,8 @@ def switch_branch(
     >>> print(twice.period, *(f"{each.kind} {each.value:.6f}" for each in twice.bifurcations))
     2 flip 15.268237 flip 16.671307
     """
+    if not isinstance(branch, Branch):
+        raise InvalidOption("{} must be one that continue_orbit or switch_branch returns", "branch", value=branch)
     bifurcation = branch.bifurcations[_number_of(branch, number)]
     if bifurcation.kind not in LEAVING:
         raise InvalidOption(

@@ -85,7 +85,7 @@ def orbit_figure(
 def branch_figure(
     *,
     values: Floats,
-    peaks: Floats,
+    heights: Floats,
     stable: Flags,
     marks: Sequence[tuple[str, float, float]],
     labels: tuple[str, str],
@@ -96,7 +96,7 @@ def branch_figure(
     """Draw branches of periodic orbits: stable ones as full lines, unstable ones dashed, and bifurcations by marks.
 
     A value that is not a number parts a branch from the next. `marks` are names of bifurcations, with the parameter and
-    the peak there.
+    the height there.
     """
     with figure_for(ax, (5.2, 3.6), figsize, title) as figure:
         axes = figure.add_subplot() if ax is None else ax
@@ -105,7 +105,7 @@ def branch_figure(
             joined = chosen | np.append(chosen[1:], False) | np.insert(chosen[:-1], 0, False)
             shown = chosen if name == "stable" else joined
             if np.any(chosen & ~np.isnan(values)):
-                axes.plot(np.where(shown, values, np.nan), np.where(shown, peaks, np.nan), label=name, **style)
+                axes.plot(np.where(shown, values, np.nan), np.where(shown, heights, np.nan), label=name, **style)
         look: dict[str, Any] = {
             "color": INK,
             "markersize": 4.5,
@@ -114,7 +114,7 @@ def branch_figure(
             "zorder": 4,
         }
         for kind in dict.fromkeys(name for name, _, _ in marks):
-            at = np.array([(value, peak) for name, value, peak in marks if name == kind])
+            at = np.array([(value, height) for name, value, height in marks if name == kind])
             axes.plot(at[:, 0], at[:, 1], marker=_MARKS.get(kind, _OTHER), label=kind, **look)
         axes.margins(x=0.04, y=0.06)
         add_labels(axes, *labels)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from rocking.arrays import Flags, Floats
-from rocking.plot.canvas import GROUND, INK, add_labels, add_legend, figure_for, styles_of
+from rocking.plot.canvas import GROUND, INK, add_labels, add_legend, figure_for, scale_by_ratio, styles_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +27,9 @@ _BRACKET: Final = 1e-12
 #: Size (points) of the names of the curves, and their least distance over the height of the axes.
 _LETTERS: Final = 7.5
 _LINE: Final = 0.065
+
+#: Ratio of the greatest cost to the least up to which there is room for more numbers than powers of ten.
+_FEW: Final = 300.0
 
 
 class SchemeCurve(NamedTuple):
@@ -80,7 +83,12 @@ def schemes_figure(
 
 def _draw(axes: Axes, curves: Sequence[SchemeCurve], errors: Sequence[Floats]) -> None:
     """Draw one kind of error, and name each family to the right, at the height of its most exact member."""
-    axes.set_xscale("log")
+    costs = np.concatenate([each.cost for each in curves]) if curves else np.ones(1)
+    span = np.array([costs.min(), costs.max()])
+    if 0.0 < span[1] < _FEW * span[0]:  # of few decades, others than powers of ten are written, too
+        scale_by_ratio(axes, span)
+    else:
+        axes.set_xscale("log")
     axes.set_yscale("log")
     axes.grid()
     ends = []
