@@ -140,8 +140,8 @@ class Solid(Result):
         mesh : path, trimesh.Trimesh or trimesh.Scene
             Triangles; "statue" is a mesh that ships with the package.
         density : float or mapping of str to float, optional
-            Density, kg/m^3: of all, or of each part (object, group, node) by its name. Parts must not overlap. Without
-            it all is of one density, and the mass not known.
+            Density, kg/m^3: of all, or of each part (object, group, node) by its name. Without it all is of one
+            density, and the mass not known. What parts have in common counts twice, and is noted.
         support : array_like, shape (k, 2), optional
             Corners of the support, m, in the mesh's own horizontal coordinates after `up`, `unit` and `turn`. By
             default the convex polygon around all corners of the mesh within `tolerance` of the lowest one.
@@ -161,7 +161,7 @@ class Solid(Result):
         -------
         Solid
             With what was repaired: triangles that are turned otherwise than their neighbours, holes, and normals that
-            point inwards.
+            point inwards; and with notes, as on parts that overlap.
 
         Raises
         ------
@@ -174,7 +174,8 @@ class Solid(Result):
         -----
         Volume, centre and inertia are sums over tetrahedra between the triangles and one place, exact for the mesh. A
         hole is filled by triangles between its edge and the mean of its corners, which is exact where it is flat. Where
-        several parts are of one density and some are open, these are joined first.
+        several parts are of one density and some are open, these are joined first. A surface in another one, with its
+        normals inwards, is a cavity; so is such a part to which `density` gives none.
 
         Examples
         --------
