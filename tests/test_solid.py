@@ -291,13 +291,13 @@ def test_a_part_inside_another_that_is_turned_the_other_way_is_its_cavity():
     hollow.invert()
     parts = {"outer": box((1.0, 1.0, 1.0)), "hollow": hollow, "far": box((1.0, 1.0, 1.0), at=(3.0, 0.0))}
     one_mesh = trimesh.util.concatenate([*parts.values()])
-    for density in (None, 2.0, {"outer": 2.0, "far": 2.0}):
+    for density in (None, 2e3, {"outer": 2e3, "far": 2e3}):
         solid = Solid.from_mesh(scene(**parts), density=density)
         assert_same(solid, Solid.from_mesh(one_mesh))
         assert {each.name: round(each.volume, 12) for each in solid.regions} == {"outer": 0.992, "far": 1.0}
         assert solid.repairs == ("outer: 1 cavity of 0.008 m^3 taken as hollow",)
         assert solid.notes == ()
-    filled = Solid.from_mesh(scene(**parts), density={"outer": 2.0, "far": 2.0, "hollow": 1.0})
+    filled = Solid.from_mesh(scene(**parts), density={"outer": 2e3, "far": 2e3, "hollow": 1e3})
     assert filled.volume == pytest.approx(2.008)
     assert "outer and hollow overlap in" in filled.notes[0] or "hollow and outer overlap in" in filled.notes[0]
     # All turned inside out, and a cavity in the smaller piece of one mesh.
@@ -580,7 +580,7 @@ REFUSED = {
     "turn": (lambda: Solid.from_mesh(box(), turn=math.nan), "turn must be a finite number"),
     "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
     "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),
-    "no mesh": (lambda: Solid.from_mesh(3.0), "mesh must be text or a path, not 3"),
+    "no mesh": (lambda: Solid.from_mesh(3.0), "mesh must be the path of a file, or a mesh or scene of trimesh, not 3"),
     "inertia": (
         lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, 1), np.diag([1.0, 1.0, 3.0])),
         "inertia_over_mass is the tensor of no body",

@@ -20,6 +20,7 @@ from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 
+_SOME: Final = "Tendon, Spring, Damper, Thrust and Load are some"
 _ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
 
 
@@ -86,18 +87,14 @@ class RestrainedBlock:
         lean: float = 0.0,
         restitution: float | Sequence[float] | Restitution | None = None,
     ) -> None:
-        own = one_block(block)
-        for each in restraints:
-            if not isinstance(each, Restraint):
-                raise InvalidBlock(
-                    f"{checks.shown(each)} is no restraint: Tendon, Spring, Damper, Thrust and Load are some"
-                )
-        if restraints and own.mass is None:
-            raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
+        if isinstance(block, RestrainedBlock):
+            raise InvalidBlock("this block has restraints already: give all of them at once, after the Block itself")
+        own, one_way = one_block(block), checks.truth(one_sided, "one_sided", InvalidBlock)
+        _check(restraints, own)
         tilt = checks.finite(lean, "lean", InvalidBlock)
         loads = [each for each in restraints if isinstance(each, Load) and each.follows]
         standing = leaning(carrying(own, loads), tilt)
-        if one_sided and restitution is None:
+        if one_way and restitution is None:
             restitution = one_sided_restitution(own.sides[0].alpha)
         varying = Varying(), Varying()
         if isinstance(restitution, Restitution):
@@ -113,14 +110,14 @@ class RestrainedBlock:
             raise InvalidBlock("one tendon of a block may yield; let the others have no {}", "strength")
         tendon = (yielding[0], yielding[1]) if yielding else (Yielding(), Yielding())
         texts = [own.description, *map(str, restraints)]
-        texts += [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_sided
+        texts += [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_way
         texts += [str(restitution)] * isinstance(restitution, Restitution)
         text = ", ".join(texts)
-        _fill(self, standing, (held[0], held[1]), tendon, varying, one_sided, text, restraints, tilt)
+        _fill(self, standing, (held[0], held[1]), tendon, varying, one_way, text, restraints, tilt)
         if (least := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
                 f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
-                "a smaller thrust, load or lean lets it"
+                f"a smaller thrust, load or lean lets it{'; forces are in N, masses in kg' * (least < -self.gravity)}"
             )
 
     @property
@@ -275,7 +272,7 @@ class RestrainedBlocks:
         """
         given = list(bodies)
         if not given or not all(isinstance(each, RestrainedBlock) for each in given):
-            raise InvalidBlock("restrained blocks are needed, at least one: RestrainedBlock(block, restraint, ...)")
+            raise InvalidBlock("restrained blocks are needed, at least one, and of free ones RestrainedBlock(block)")
         if len({each.gravity for each in given}) > 1:
             raise InvalidBlock("all blocks must be under one {}", "gravity")
         rows = [
@@ -423,6 +420,16 @@ _PARAMETERS: Final = (
     "p", "alpha", "restitution", "sine", "cosine", "prestress", "spring", "damping", "opening", "stiffness", "yields",
     "slack", "restitution_least", "restitution_slope", "restitution_seed", "one_sided",
 )  # fmt: skip
+
+
+def _check(restraints: Sequence[object], block: Block) -> None:
+    """Refuse what is no restraint, and restraints of a block without a mass."""
+    for each in restraints:
+        if not isinstance(each, Restraint):
+            how = "give them one by one" if isinstance(each, (list, tuple)) else _SOME
+            raise InvalidBlock(f"{checks.shown(each)} is no restraint: {how}")
+    if restraints and block.mass is None:
+        raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
 
 
 def _fill(

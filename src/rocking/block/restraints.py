@@ -232,7 +232,7 @@ class Tendon(Restraint):
             )
         if stiffness == prestress == 0.0:
             raise InvalidBlock("a tendon needs {} (N/m) or {} (N)", "stiffness", "prestress")
-        object.__setattr__(self, "strength", float(self.strength))
+        object.__setattr__(self, "strength", checks.number(self.strength, "strength", InvalidBlock))
         if not self.strength > prestress:
             raise InvalidBlock(
                 f"{{}} of a tendon must be above its prestress, {prestress:g} N, not {self.strength:g}",
@@ -469,6 +469,7 @@ class Load(Restraint):
         self._positive("mass", "kg")
         self._positive("height", "m")
         self._finite("offset")
+        object.__setattr__(self, "follows", checks.truth(self.follows, "follows", InvalidBlock))
 
     def _held(self, pivot: Pivot) -> Held:
         """Return the moment of one that does not follow; of one that follows none, which is part of the block."""

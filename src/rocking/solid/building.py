@@ -12,7 +12,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidBlock
 from rocking.motion.directions import sine_cosine
-from rocking.plausibility import height_notes
+from rocking.plausibility import density_notes, height_notes
 from rocking.solid import support as polygons
 from rocking.solid.moments import moments, signed_volumes, together
 from rocking.solid.overlap import overlaps
@@ -64,10 +64,16 @@ def properties(
     inside = [moments(surface.vertices, surface.faces) for surface in surfaces]
     for name, each in zip(names, inside, strict=True):
         if not each.amount > _FLAT * size**3:
-            raise InvalidBlock(f"{name} encloses no volume: it is a surface without an inside", path=found.name)
+            raise InvalidBlock(
+                f"{name} encloses no volume: it is a surface without an inside; give it a thickness", path=found.name
+            )
     used = [densities[name] for name in names]
     whole = together(inside, [1.0 if each is None else each for each in used])
     within = _TOLERANCE * height if tolerance is None else checks.positive(tolerance, "tolerance", InvalidBlock, "m")
+    if within >= height:
+        raise InvalidBlock(
+            f"{{}} must be below the height of the mesh, {height:.4g} m, not {within:g}", "tolerance", value=tolerance
+        )
     polygon, notes = _support(every, support, within, found.name)
     return {
         "support": polygon,
@@ -78,7 +84,7 @@ def properties(
         "height": height,
         "regions": [Region(*each) for each in zip(names, (each.amount for each in inside), used, strict=True)],
         "repairs": _all_repairs(names, surfaces),
-        "notes": (*notes, *overlaps(names, surfaces), *height_notes(height)),
+        "notes": (*notes, *overlaps(names, surfaces), *height_notes(height), *density_notes(used)),
     }
 
 
