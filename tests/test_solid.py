@@ -471,7 +471,8 @@ def test_what_planar_rocking_leaves_out_is_measured():
 def test_a_body_needs_no_mesh():
     made = Solid.from_mesh(box(), density=1000.0)
     again = Solid(made.support, made.centre, made.inertia_over_mass, mass=made.mass)
-    assert again.block(20.0) == made.block(20.0)
+    assert again.block(20.0).sides == made.block(20.0).sides
+    assert again.block(20.0).description == "rigid body in the plane of 20 deg"
     assert again.volume is None and again.height is None
     assert again.summary().startswith("rigid body: 432 kg")
     assert again.to_dict()["volume_m3"] is None

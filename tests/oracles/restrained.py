@@ -150,6 +150,7 @@ def integrated(body, motion, end, u, v, j, rests=False):  # noqa: C901
         found = solve_ivp(
             rates, (t, stop), [u, v], "DOP853", rtol=1e-12, atol=1e-14 * (min(1.0, v * v) if step < 0.02 else 1.0),
             events=[landing, over, turning, slack, yields], max_step=step,
+            first_step=min(1e-4, stop - t) if v == 0.0 else None,  # or a turn soon after the start is passed over
         )  # fmt: skip
         peak = max(peak, found.y[0, -1], *(row[0] for row in found.y_events[2]), 0.0)
         t, (u, v) = found.t[-1], found.y[:, -1]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats
-from rocking.body import Body
+from rocking.body import Body, title_of
 from rocking.constants import Model
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import NEUTRAL, PeriodicOrbit, orbit_at
@@ -229,7 +229,7 @@ class Branch(DrawnResult, TableResult):
             stable=self.is_stable,
             marks=[(each.kind, each.value, _peak_at(self, each)) for each in self.bifurcations],
             labels=(f"{self.name}{unit}", f"largest {coordinate.name} ({coordinate.unit})"),
-            title=title or f"{body.description}, {self._headline()}",
+            title=title or f"{title_of(body)}, {self._headline()}",
             ax=ax,
             figsize=figsize,
         )

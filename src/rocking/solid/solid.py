@@ -14,6 +14,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.block.limits import checked_gravity, checked_mass
+from rocking.block.single import block_of_sides
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
 from rocking.result import Result, Row, dictionary_of, text_of
@@ -217,8 +218,8 @@ class Solid(Result):
         Returns
         -------
         Block
-            As `Block.from_pivots` makes it: the pivots are where the support ends in both directions, the radius of
-            gyration is that about the horizontal axis across the plane.
+            As `Block.from_pivots` makes it, with the azimuth in its description: the pivots are where the support ends
+            in both directions, the radius of gyration is that about the horizontal axis across the plane.
 
         Raises
         ------
@@ -235,7 +236,7 @@ class Solid(Result):
         plus, minus = polygons.extents(self._about_centre, [towards, towards + 180.0]).distance.tolist()
         squared, _ = about_axes(self.inertia_over_mass, np.array([towards]))
         height = float(self.centre[2])
-        return Block.from_pivots(
+        block = Block.from_pivots(
             (plus, minus),
             height,
             math.sqrt(float(squared[0])),
@@ -243,6 +244,8 @@ class Solid(Result):
             mass=self.mass,
             gravity=self.gravity,
         )
+        text = f"{self.description} in the plane of {towards:.5g} deg"
+        return block_of_sides(Block.__new__(Block), block.sides, block.gravity, text, block.mass)
 
     def rose(self, azimuths: ArrayLike | None = None) -> Rose:
         """Resistance in every direction.
