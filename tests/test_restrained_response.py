@@ -99,10 +99,10 @@ def test_a_summary_names_restraints_balance_and_the_forces_of_tendons():
     response = rocking.simulate(body_of("all"), PUSH)
     text = response.summary()
     for words in (
-        "tendon of 200000 N/m, prestress 4000 N, 0.05 m to side +",
-        "thrust of 300 N at a height of 2 m, 0.1 m to side +",
-        "load of 300 kg that only presses at a height of 3 m, 0.05 m to side -",
-        "spring of 1000 N m/rad",
+        "with a tendon of 200 kN/m, prestress 4 kN 0.05 m to side +, a thrust",
+        "thrust of 300 N at a height of 2 m 0.1 m to side +",
+        "load of 300 kg that only presses at a height of 3 m 0.05 m to side -",
+        ", a spring of 1 kN m/rad and a damper",
         "damper of 400 N m s/rad",
         "balance  ",
         "of the balance",
@@ -114,13 +114,26 @@ def test_a_summary_names_restraints_balance_and_the_forces_of_tendons():
     assert response.to_dict()["balance_rad"] == list(response.body.balance)
 
 
+def test_the_title_of_a_figure_tells_a_few_restraints_with_numbers_and_many_without():
+    many, one = body_of("all", 0.02), body_of("thrust")
+    own = "body on pivots 0.25 m and 0.3 m from its centre of mass, which is 1.5 m high"
+    assert many.title == f"{own}, with a tendon, a thrust, a load, a spring and a damper, leaning 0.02 rad to side +"
+    assert one.title == one.description == f"{own}, with a thrust of 300 N at a height of 2 m 0.1 m to side +"
+    titles = [rocking.simulate(many, PUSH).plot().get_suptitle()]
+    titles.append(rocking.incremental_dynamic_analysis(many, PUSH, levels=[1.0, 2.0]).plot().get_suptitle())
+    assert all(title.startswith(many.title) for title in titles)
+    assert rocking.RestrainedBlock(COLUMN, Tendon(0.0, prestress=3e6)).title.endswith(
+        "with a tendon of constant force, prestress 3 MN at the centre of mass"
+    )
+
+
 def test_what_is_not_known_of_a_wall_is_said():
     wall = RestrainedBlock(Block(width=0.5, height=5.0, mass=6e3), Thrust(8e2, height=4.0), one_sided=True)
     response = rocking.simulate(wall, rocking.pulses.one_sine(1.5, 0.8))
     assert "not judged: the forces of the ground are not known" in response.summary()
     assert "required_friction" not in response.to_dict()
     with pytest.raises(
-        InvalidOption, match=r"not known of this body: rectangular block, 0\.5 m x 5 m, thrust of 800 N"
+        InvalidOption, match=r"not known of this body: rectangular block, 0\.5 m x 5 m, with a thrust of 800 N"
     ):
         _ = response.required_friction
     yielding = RestrainedBlock(COLUMN, Tendon(3e5, strength=9e3))

@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.integrate import quad
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
 import rocking
 from rocking import Block, InvalidBlock, InvalidOption, Solid
 from rocking.solid.moments import moments
+from rocking.solid.overlap import overlaps
 from rocking.solid.reading import upright
 from rocking.solid.repair import agreeing, closed, is_closed, joined
 
@@ -272,12 +275,101 @@ def test_cavities_are_hollow_and_pieces_are_not():
     assert Solid.from_mesh(inverted).volume == pytest.approx(1.0 - 0.008)
     core = Solid.from_mesh(trimesh.util.concatenate([outer, inner]))
     assert core.volume == pytest.approx(1.008)
-    assert "turn them if they are cavities" in core.repairs[0]
+    assert core.repairs == ()
+    assert core.notes[0].startswith("two pieces of mesh overlap in at least 0.008 m^3, which is counted twice: ")
+    assert core.notes[0].endswith("if one is a cavity, turn its normals inwards")
     apart = box((0.2, 0.2, 0.2), at=(0.0, 2.0))
     apart.invert()
     pieces = Solid.from_mesh(trimesh.util.concatenate([outer, apart]))
     assert pieces.volume == pytest.approx(1.008)
     assert pieces.repairs == ("1 separate surface turned inside out",)
+
+
+def test_a_part_inside_another_that_is_turned_the_other_way_is_its_cavity():
+    hollow = trimesh.creation.box((0.2, 0.2, 0.2))
+    hollow.apply_translation([0.0, 0.0, 0.5])
+    hollow.invert()
+    parts = {"outer": box((1.0, 1.0, 1.0)), "hollow": hollow, "far": box((1.0, 1.0, 1.0), at=(3.0, 0.0))}
+    one_mesh = trimesh.util.concatenate([*parts.values()])
+    for density in (None, 2e3, {"outer": 2e3, "far": 2e3}):
+        solid = Solid.from_mesh(scene(**parts), density=density)
+        assert_same(solid, Solid.from_mesh(one_mesh))
+        assert {each.name: round(each.volume, 12) for each in solid.regions} == {"outer": 0.992, "far": 1.0}
+        assert solid.repairs == ("outer: 1 cavity of 0.008 m^3 taken as hollow",)
+        assert solid.notes == ()
+    filled = Solid.from_mesh(scene(**parts), density={"outer": 2e3, "far": 2e3, "hollow": 1e3})
+    assert filled.volume == pytest.approx(2.008)
+    assert "outer and hollow overlap in" in filled.notes[0] or "hollow and outer overlap in" in filled.notes[0]
+    # All turned inside out, and a cavity in the smaller piece of one mesh.
+    inverted = one_mesh.copy()
+    inverted.invert()
+    assert_same(Solid.from_mesh(inverted), Solid.from_mesh(one_mesh))
+    smaller = trimesh.util.concatenate([box((1.0, 1.0, 1.0)), hollow, box((2.0, 2.0, 1.0), at=(3.0, 0.0))])
+    assert Solid.from_mesh(smaller).volume == pytest.approx(4.992)
+
+
+@pytest.mark.parametrize(
+    ("at", "sizes", "common"),
+    [
+        ((0.5, 0.0, 0.5), (1.0, 1.0, 1.0), 0.25),
+        ((0.0, 0.0, 0.99), (1.0, 1.0, 1.0), 1e-2),
+        ((0.1, 0.2, 0.3), (0.2, 0.3, 0.4), 0.024),
+        ((0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 0.0),
+        ((1.0, 0.2, 0.0), (1.0, 1.0, 1.0), 0.0),
+        ((1.0, 1.0, 0.0), (1.0, 1.0, 1.0), 0.0),
+        ((3.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.0),
+    ],
+    ids=["corner", "sunk", "nested", "on", "beside", "edge", "apart"],
+)
+def test_what_two_boxes_have_in_common_is_said_once_and_exactly(at, sizes, common):
+    other = box(sizes, at[:2])
+    other.apply_translation([0.0, 0.0, at[2]])
+    parts = {"foot": box((1.0, 1.0, 1.0)), "post": other}
+    for mesh, names in ((scene(**parts), "foot and post"), (None, "two pieces of mesh")):
+        solid = Solid.from_mesh(trimesh.util.concatenate([*parts.values()]) if mesh is None else mesh)
+        if common == 0.0:
+            assert solid.notes == ()
+            continue
+        (note,) = solid.notes
+        assert note == (
+            f"{names} overlap in at least {common:.3g} m^3, which is counted twice: make one surface of the two, cut "
+            "one out of the other, or, if one is a cavity, turn its normals inwards"
+        )
+
+
+@pytest.mark.parametrize("pairs", [2, pytest.param(30, marks=pytest.mark.thorough)])
+def test_what_is_proven_in_common_is_never_more_than_there_is(pairs):
+    rng, shares = np.random.default_rng(3), []
+    for _ in range(pairs):
+        half, middles = rng.uniform(0.2, 0.5, (2, 3)), rng.uniform(-0.2, 0.2, (2, 3))
+        turns = Rotation.random(2, random_state=rng).as_matrix()
+        meshes, planes = [], []
+        for k in range(2):
+            mesh = trimesh.creation.box(2.0 * half[k])
+            mesh.vertices = mesh.vertices @ turns[k].T + middles[k]
+            meshes.append(closed(joined(np.asarray(mesh.vertices), np.asarray(mesh.faces))))
+            normals = np.vstack([turns[k].T, -turns[k].T])
+            planes.append(np.column_stack([normals, -np.tile(half[k], 2) - normals @ middles[k]]))
+        exact = convex_volume(np.vstack(planes))
+        found = overlaps(["one", "other"], meshes)
+        proven = float(found[0].partition("at least ")[2].partition(" ")[0]) if found else 0.0
+        assert proven <= exact * (1.0 + 1e-9)
+        shares.append(proven / exact)
+    assert len(shares) == pairs and min(shares) > 0.2
+
+
+def convex_volume(planes):
+    """Volume between planes, by linear programming for a place inside and the hull of the corners."""
+    normals, off = planes[:, :3], planes[:, 3]
+    place = linprog([0, 0, 0, -1], np.column_stack([normals, np.ones(len(off))]), -off, bounds=[(None, None)] * 4)
+    return ConvexHull(HalfspaceIntersection(planes, place.x[:3]).intersections).volume
+
+
+def test_three_pairs_are_named_and_the_others_counted():
+    towers = {f"t{k}": box((1.0, 0.5, 1.0), at=(0.9 * k, 0.0)) for k in range(6)}
+    (note,) = Solid.from_mesh(scene(**towers)).notes
+    assert note.count("overlap in at least 0.05 m^3") == 3
+    assert ", and so do 2 more pairs, which is counted twice: " in note
 
 
 def test_faces_that_are_none_or_come_twice_are_left_out():
@@ -379,7 +471,8 @@ def test_what_planar_rocking_leaves_out_is_measured():
 def test_a_body_needs_no_mesh():
     made = Solid.from_mesh(box(), density=1000.0)
     again = Solid(made.support, made.centre, made.inertia_over_mass, mass=made.mass)
-    assert again.block(20.0) == made.block(20.0)
+    assert again.block(20.0).sides == made.block(20.0).sides
+    assert again.block(20.0).description == "rigid body in the plane of 20 deg"
     assert again.volume is None and again.height is None
     assert again.summary().startswith("rigid body: 432 kg")
     assert again.to_dict()["volume_m3"] is None
@@ -417,7 +510,7 @@ def test_the_statue_is_what_quadrature_over_its_cross_sections_says():
     assert solid.mass == pytest.approx(masses.sum(), rel=1e-8)
     np.testing.assert_allclose(solid.centre, centre, rtol=1e-8)
     np.testing.assert_allclose(solid.inertia_over_mass, inertia, rtol=1e-8, atol=1e-9)
-    assert solid.repairs == ()
+    assert solid.repairs == () == solid.notes  # its parts touch, and do not overlap
 
 
 # What is refused
@@ -488,7 +581,7 @@ REFUSED = {
     "turn": (lambda: Solid.from_mesh(box(), turn=math.nan), "turn must be a finite number"),
     "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
     "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),
-    "no mesh": (lambda: Solid.from_mesh(3.0), "mesh must be text or a path, not 3"),
+    "no mesh": (lambda: Solid.from_mesh(3.0), "mesh must be the path of a file, or a mesh or scene of trimesh, not 3"),
     "inertia": (
         lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, 1), np.diag([1.0, 1.0, 3.0])),
         "inertia_over_mass is the tensor of no body",

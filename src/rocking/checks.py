@@ -102,6 +102,13 @@ def text(value: object, name: str, error: Error) -> str:
     return value
 
 
+def truth(value: object, name: str, error: Error) -> bool:
+    """Return `value` as a bool, or raise `error` unless it is True or False, of Python's or NumPy's."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise error(f"{{}} must be True or False, not {shown(value)}", name, value=value)
+    return bool(value)
+
+
 def path(value: object, name: str, error: Error) -> Path:
     """Return `value` as a path, or raise `error` unless it is one, or text."""
     if not isinstance(value, (str, PathLike)):
@@ -207,6 +214,11 @@ def hint_of_degrees(angle: float) -> str:
     if not 0.5 * math.pi <= abs(angle) < 90.0:
         return ""
     return f"; if it is in degrees, give math.radians({angle:g})"
+
+
+def hint_of_percent(factor: float) -> str:
+    """Return the end of a sentence that refuses a factor of at most 1 where it would make sense in per cent."""
+    return f"; if it is in per cent, give {factor / 100.0:g}" if 2.0 < factor <= 100.0 else ""
 
 
 def _real(value: object) -> float | None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
 
-from rocking.block import Block
+from rocking.block import Block, Load, RestrainedBlock, Thrust
 from rocking.block.rigid_body import rigid_bodies
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import Message
@@ -39,6 +39,11 @@ _UNCERTAIN: Final = 0.01
 _LARGEST: Final = 30.0
 #: Least plausible height of what is scanned or modelled, m.
 _LOWEST: Final = 0.02
+#: Densities of solids, from foam and cork to osmium, kg/m^3.
+_LIGHTEST: Final = 10.0
+_HEAVIEST: Final = 23_000.0
+#: Largest plausible moment of a restraint per radian, over weight times R.
+_MOST_HELD: Final = 1e5
 
 _VERTICAL: Final = re.compile(r"(up|down|dn|dwn|ver|vert|vertical|u-?d|z|v|[a-z]{2}z)\b.*", re.IGNORECASE)
 _HORIZONTAL: Final = re.compile(
@@ -188,6 +193,62 @@ def height_notes(height: float) -> tuple[str, ...]:
     return (
         () if _LOWEST <= height <= _LARGEST else (f"the body is {height:.4g} m high: are its coordinates in metres?",)
     )
+
+
+def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
+    """Return what looks like a mistake in densities, kg/m^3, of parts of a body; empty if nothing does.
+
+    Examples
+    --------
+    >>> density_notes([2700.0, None]), density_notes([2.7])
+    ((), ('a density is 2.7 kg/m^3, and no solid is so light or so heavy: is it in kg/m^3?',))
+    """
+    unlikely = [each for each in densities if each is not None and not _LIGHTEST <= each <= _HEAVIEST]
+    return tuple(
+        f"a density is {each:g} kg/m^3, and no solid is so light or so heavy: is it in kg/m^3?" for each in unlikely[:1]
+    )
+
+
+def restraint_notes(body: RestrainedBlock, top: float | None = None) -> tuple[str, ...]:
+    """Return what looks like a mistake in the restraints of a block; empty if nothing does.
+
+    Parameters
+    ----------
+    body : RestrainedBlock
+        The block.
+    top : float, optional
+        Its height, m, where it is known.
+
+    Returns
+    -------
+    tuple of str
+        Sentences.
+
+    Examples
+    --------
+    >>> from rocking import Block, RestrainedBlock, Tendon, Thrust
+    >>> column = Block(width=0.4, height=2.0, mass=2000.0)
+    >>> restraint_notes(RestrainedBlock(column, Thrust(5.0, height=3.0)), 2.0)
+    ('a thrust is at a height of 3 m, above the top of the block, 2 m: is it in metres?',)
+    >>> print(*restraint_notes(RestrainedBlock(column, Tendon(2e12))))
+    what a restraint does is 3.9e+06 times the weight or more: are forces in N, and masses in kg?
+    """
+    notes = []
+    for each in body.restraints or ():
+        if isinstance(each, (Thrust, Load)) and top is not None and each.height > top * (1.0 + 1e-9):
+            kind = type(each).__name__.lower()
+            notes.append(
+                f"a {kind} is at a height of {each.height:g} m, above the top of the block, {top:g} m: is it in metres?"
+            )
+    made = body.alone()
+    names = ("sine", "cosine", "prestress", "spring")
+    strongest = max(float(np.max(np.abs(getattr(made, name)))) for name in names)
+    strongest = max(strongest, float(np.max(made.stiffness * made.opening)))
+    if strongest > _MOST_HELD:
+        notes.append(
+            f"what a restraint does is {strongest:.2g} times the weight or more: are forces in N, and masses in kg?"
+        )
+    return tuple(notes)
 
 
 def _side_notes(block: Block) -> Iterator[Message | str]:

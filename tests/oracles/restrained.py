@@ -9,9 +9,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 #: Speeds after an impact below which the arcs are too short for the integrator's events.
 SLOWEST = 2e-2
+#: Speeds after an impact below which a body rests, if the motion does not lift it.
+AT_REST = 1e-5
 
 
 @dataclass
@@ -97,15 +100,22 @@ def clockwise(angle):
     return np.array([[c, s], [-s, c]])
 
 
-def integrated(body, motion, end, u, v, j):  # noqa: C901
-    """Impact times and speeds, highest rotation, and how it ended: "over", "overturned", "chatters"."""
+def integrated(body, motion, end, u, v, j, rests=False):  # noqa: C901
+    """Impact times and speeds, highest rotation, and how it ended: "over", "overturned", "chatters".
+
+    Where it `rests`, it does not end where it chatters: it goes on to speeds of `AT_REST`, and from there as the motion
+    lifts it again.
+    """
     times, speeds, t, peak = [], [], 0.0, u
     if body.yielding and body.force(j, u) > body.yielding[3]:
         body.turn_back(j, u)
 
-    def rates(time, y):
+    def pushes(time):
         lift = 0.0 if motion.vertical is None else float(motion.vertical.acceleration(time))
-        return [y[1], body.moment(j, y[0], y[1], float(motion.acceleration(time)), lift) / body.inertia(j)]
+        return float(motion.acceleration(time)), lift
+
+    def rates(time, y):
+        return [y[1], body.moment(j, y[0], y[1], *pushes(time)) / body.inertia(j)]
 
     def landing(_, y):
         return y[0]
@@ -129,30 +139,60 @@ def integrated(body, motion, end, u, v, j):  # noqa: C901
         motion.breakpoints if motion.vertical is None else np.union1d(motion.breakpoints, motion.vertical.breakpoints)
     )
     hangs = body.yielding is not None and body.force(j, u) < 0.0
-    for piece_end in np.unique(np.append(breaks[(breaks > 0.0) & (breaks < end)], end)):
-        while t < piece_end:
-            slack.direction = 1 if hangs else -1
-            found = solve_ivp(
-                rates, (t, piece_end), [u, v], "DOP853", rtol=1e-12, atol=1e-14,
-                events=[landing, over, turning, slack, yields], max_step=0.02,
-            )  # fmt: skip
-            peak = max(peak, found.y[0, -1], *(row[0] for row in found.y_events[2]), 0.0)
-            t, (u, v) = found.t[-1], found.y[:, -1]
-            if len(found.t_events[1]):
-                return times, speeds, peak, "overturned"
-            if body.flows and len(found.t_events[2]):
-                body.turn_back(j, u)
-            if len(found.t_events[3]):
-                hangs = not hangs
-            if len(found.t_events[4]):
-                body.flows, turning.terminal = True, True
-            if not body.flows:
-                turning.terminal = False
-            if len(found.t_events[0]):
-                times.append(t)
-                speeds.append(-v)
-                u, v = 0.0, -body.factor(j, -v, len(times) - 1) * v
-                j = j if body.one_sided else 1 - j
-                if v < SLOWEST:
-                    return times[:-1], speeds[:-1], peak, "chatters"
+    if rests and u == v == 0.0:
+        t, j = lifted(body, pushes, t, end)
+    pieces = np.unique(np.append(breaks[(breaks > 0.0) & (breaks < end)], end))
+    while t < end:
+        stop, step = pieces[np.searchsorted(pieces, t, side="right")], 0.02
+        if rests and u == 0.0 and 0.0 < v < SLOWEST and (back := -rates(t, (u, v))[1]) > 0.0:
+            stop, step = min(stop, t + 4.0 * v / back), 0.3 * v / back  # one arc that the motion hardly changes
+        slack.direction = 1 if hangs else -1
+        found = solve_ivp(
+            rates, (t, stop), [u, v], "DOP853", rtol=1e-12, atol=1e-14 * (min(1.0, v * v) if step < 0.02 else 1.0),
+            events=[landing, over, turning, slack, yields], max_step=step,
+            first_step=min(1e-4, stop - t) if v == 0.0 else None,  # or a turn soon after the start is passed over
+        )  # fmt: skip
+        peak = max(peak, found.y[0, -1], *(row[0] for row in found.y_events[2]), 0.0)
+        t, (u, v) = found.t[-1], found.y[:, -1]
+        if len(found.t_events[1]):
+            return times, speeds, peak, "overturned"
+        if body.flows and len(found.t_events[2]):
+            body.turn_back(j, u)
+        if len(found.t_events[3]):
+            hangs = not hangs
+        if len(found.t_events[4]):
+            body.flows, turning.terminal = True, True
+        if not body.flows:
+            turning.terminal = False
+        if len(found.t_events[0]):
+            times.append(t)
+            speeds.append(-v)
+            u, v = 0.0, -body.factor(j, -v, len(times) - 1) * v
+            j = j if body.one_sided else 1 - j
+            if v < SLOWEST and not rests:
+                return times[:-1], speeds[:-1], peak, "chatters"
+            if v < AT_REST and not lifts(body, pushes(t)):
+                v = 0.0
+                t, j = lifted(body, pushes, t, end)
+            hangs = body.yielding is not None and body.force(j, u) < 0.0
     return times, speeds, peak, "over"
+
+
+def lifts(body, forces):
+    """Side to which the motion lifts the body that stands, as a number in a list; an empty one where it stays."""
+    return [j for j in ((0,) if body.one_sided else (0, 1)) if body.moment(j, 0.0, 0.0, *forces) > 0.0]
+
+
+def lifted(body, pushes, start, end):
+    """When the motion next lifts the body that stands, and to which side; the end where it does not."""
+
+    def beyond(time, j):
+        return body.moment(j, 0.0, 0.0, *pushes(time))
+
+    step = 2e-3
+    for time in np.arange(start, end, step):
+        sides = lifts(body, pushes(min(time + step, end)))
+        if sides:
+            j = sides[0]
+            return (float(time) if beyond(time, j) > 0.0 else brentq(beyond, time, time + step, (j,), xtol=1e-14)), j
+    return end, 0

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rocking import bisection, checks
 from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
-from rocking.body import Bodies, Body
+from rocking.body import Bodies, Body, title_of
 from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
@@ -40,7 +40,7 @@ def described(blocks: Bodies | Body | Sequence[Body]) -> str:
     if only is None:
         return counted(len(bodies_of(blocks)), "block")
     if not isinstance(blocks, Blocks):
-        return only.description
+        return title_of(only)
     return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
 
 

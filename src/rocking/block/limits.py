@@ -29,6 +29,7 @@ def checked_parameter(value: float, name: str, *, origin: str = "", which: str =
     low, high, rule = _LIMITS[name]
     if not low <= value <= high:
         hint = checks.hint_of_degrees(value) if name == "alpha" else ""
+        hint = checks.hint_of_percent(value) if name == "restitution" else hint
         raise InvalidBlock(f"{{}}{origin} must be {rule}, not {value:g}{which}{hint}", name, value=value)
     return value
 

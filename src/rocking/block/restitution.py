@@ -220,7 +220,11 @@ class FallingRestitution(Restitution):
         """Check the numbers."""
         slopes = checked_pair(self.slope, "slope")
         if not all(0.0 <= slope < math.inf for slope in slopes):
-            raise InvalidBlock(f"{{}} must be at least 0, in s/rad, not {min(slopes):g}", "slope", value=self.slope)
+            raise InvalidBlock(
+                f"{{}} must be at least 0, in s/rad, not {min(slopes):g}: a faster impact loses more",
+                "slope",
+                value=self.slope,
+            )
         _check_bounds(self.least, self.largest)
 
     def _factors(self) -> tuple[float, float]:
@@ -294,8 +298,15 @@ def _check_bounds(least: float | Sequence[float], largest: float | Sequence[floa
     """Refuse bounds outside (0, 1], or in the wrong order."""
     for low, high in zip(checked_pair(least, "least"), checked_pair(largest, "largest"), strict=True):
         if not 0.0 < high <= 1.0:
-            raise InvalidBlock(f"{{}} must be in (0, 1], not {high:g}", "largest", value=largest)
+            raise InvalidBlock(
+                f"{{}} must be in (0, 1], not {high:g}{checks.hint_of_percent(high)}",
+                "largest",
+                value=largest,
+            )
         if not 0.0 < low <= high:
             raise InvalidBlock(
-                f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}", "least", "largest", value=least
+                f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}",
+                "least",
+                "largest",
+                value=least,
             )

@@ -20,6 +20,9 @@ from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 
+#: So many restraints are told with their numbers in the title of a figure.
+_FEW: Final = 2
+_SOME: Final = "Tendon, Spring, Damper, Thrust and Load are some"
 _ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
 
 
@@ -75,6 +78,7 @@ class RestrainedBlock:
     _varying: tuple[Varying, Varying]
     is_one_sided: bool
     description: str
+    title: str
     restraints: tuple[Restraint, ...] | None
     lean: float
 
@@ -86,18 +90,14 @@ class RestrainedBlock:
         lean: float = 0.0,
         restitution: float | Sequence[float] | Restitution | None = None,
     ) -> None:
-        own = one_block(block)
-        for each in restraints:
-            if not isinstance(each, Restraint):
-                raise InvalidBlock(
-                    f"{checks.shown(each)} is no restraint: Tendon, Spring, Damper, Thrust and Load are some"
-                )
-        if restraints and own.mass is None:
-            raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
+        if isinstance(block, RestrainedBlock):
+            raise InvalidBlock("this block has restraints already: give all of them at once, after the Block itself")
+        own, one_way = one_block(block), checks.truth(one_sided, "one_sided", InvalidBlock)
+        _check(restraints, own)
         tilt = checks.finite(lean, "lean", InvalidBlock)
         loads = [each for each in restraints if isinstance(each, Load) and each.follows]
         standing = leaning(carrying(own, loads), tilt)
-        if one_sided and restitution is None:
+        if one_way and restitution is None:
             restitution = one_sided_restitution(own.sides[0].alpha)
         varying = Varying(), Varying()
         if isinstance(restitution, Restitution):
@@ -112,15 +112,16 @@ class RestrainedBlock:
         if len(yielding) > len(pivots):
             raise InvalidBlock("one tendon of a block may yield; let the others have no {}", "strength")
         tendon = (yielding[0], yielding[1]) if yielding else (Yielding(), Yielding())
-        texts = [own.description, *map(str, restraints)]
-        texts += [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_sided
-        texts += [str(restitution)] * isinstance(restitution, Restitution)
-        text = ", ".join(texts)
-        _fill(self, standing, (held[0], held[1]), tendon, varying, one_sided, text, restraints, tilt)
+        rest = [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_way
+        rest += [str(restitution)] * isinstance(restitution, Restitution)
+        kinds = [type(each).__name__.lower() for each in restraints]
+        text, title = (", ".join([own.description, *_listed(words), *rest]) for words in (restraints, kinds))
+        title = title if len(restraints) > _FEW else text
+        _fill(self, standing, (held[0], held[1]), tendon, varying, one_way, (text, title), restraints, tilt)
         if (least := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
                 f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
-                "a smaller thrust, load or lean lets it"
+                f"a smaller thrust, load or lean lets it{'; forces are in N, masses in kg' * (least < -self.gravity)}"
             )
 
     @property
@@ -275,7 +276,7 @@ class RestrainedBlocks:
         """
         given = list(bodies)
         if not given or not all(isinstance(each, RestrainedBlock) for each in given):
-            raise InvalidBlock("restrained blocks are needed, at least one: RestrainedBlock(block, restraint, ...)")
+            raise InvalidBlock("restrained blocks are needed, at least one, and of free ones RestrainedBlock(block)")
         if len({each.gravity for each in given}) > 1:
             raise InvalidBlock("all blocks must be under one {}", "gravity")
         rows = [
@@ -319,7 +320,7 @@ class RestrainedBlocks:
         varying = Varying(*plus[9:]), Varying(*minus[9:])
         text = "block with restraints" + ", rocking one way" * bool(one_sided[0])
         made, one_way = RestrainedBlock.__new__(RestrainedBlock), bool(one_sided[0])
-        return _fill(made, block, held, tendon, varying, one_way, text, None, 0.0)
+        return _fill(made, block, held, tendon, varying, one_way, (text, text), None, 0.0)
 
     def __iter__(self) -> Iterator[RestrainedBlock]:
         return (self[index] for index in range(len(self)))
@@ -425,6 +426,24 @@ _PARAMETERS: Final = (
 )  # fmt: skip
 
 
+def _listed(restraints: Sequence[object]) -> list[str]:
+    """Restraints in words, if there are some: with a spring of ..., a load of ... and a tendon of ..."""
+    if not restraints:
+        return []
+    *first, last = [f"a {each}" for each in restraints]
+    return [f"with {', '.join(first)} and {last}" if first else f"with {last}"]
+
+
+def _check(restraints: Sequence[object], block: Block) -> None:
+    """Refuse what is no restraint, and restraints of a block without a mass."""
+    for each in restraints:
+        if not isinstance(each, Restraint):
+            how = "give them one by one" if isinstance(each, (list, tuple)) else _SOME
+            raise InvalidBlock(f"{checks.shown(each)} is no restraint: {how}")
+    if restraints and block.mass is None:
+        raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
+
+
 def _fill(
     made: RestrainedBlock,
     block: Block,
@@ -432,13 +451,13 @@ def _fill(
     tendon: tuple[Yielding, Yielding],
     varying: tuple[Varying, Varying],
     one_sided: bool,
-    description: str,
+    texts: tuple[str, str],
     restraints: tuple[Restraint, ...] | None,
     lean: float,
 ) -> RestrainedBlock:
     """Fill in what a restrained block is, and return it."""
-    names = ("block", "_held", "_tendon", "_varying", "is_one_sided", "description", "restraints", "lean")
-    values = (block, held, tendon, varying, bool(one_sided), description, restraints, lean)
+    names = ("block", "_held", "_tendon", "_varying", "is_one_sided", "description", "title", "restraints", "lean")
+    values = (block, held, tendon, varying, bool(one_sided), *texts, restraints, lean)
     for name, value in zip(names, values, strict=True):
         object.__setattr__(made, name, value)
     return made

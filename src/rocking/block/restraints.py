@@ -232,7 +232,7 @@ class Tendon(Restraint):
             )
         if stiffness == prestress == 0.0:
             raise InvalidBlock("a tendon needs {} (N/m) or {} (N)", "stiffness", "prestress")
-        object.__setattr__(self, "strength", float(self.strength))
+        object.__setattr__(self, "strength", checks.number(self.strength, "strength", InvalidBlock))
         if not self.strength > prestress:
             raise InvalidBlock(
                 f"{{}} of a tendon must be above its prestress, {prestress:g} N, not {self.strength:g}",
@@ -299,8 +299,12 @@ class Tendon(Restraint):
         return elongation, self.strength, (elastic - self.strength) / self.stiffness
 
     def __str__(self) -> str:
-        yields = "" if self.strength == math.inf else f", yielding at {self.strength:g} N"
-        return f"tendon of {self.stiffness:g} N/m, prestress {self.prestress:g} N{_at(self.offset)}{yields}"
+        parts = [
+            _thousands(self.stiffness, "N/m") if self.stiffness else "constant force",
+            f"prestress {_thousands(self.prestress, 'N')}" if self.prestress else "no prestress",
+            f"yielding at {_thousands(self.strength, 'N')}" if self.strength < math.inf else "",
+        ]
+        return f"tendon of {', '.join(filter(None, parts))}{_at(self.offset) or ' at the centre of mass'}"
 
     def _opening(self, pivot: Pivot) -> float:
         """Distance of the duct from the pivot, m."""
@@ -345,7 +349,7 @@ class Spring(Restraint):
         return Held(spring=self.stiffness / pivot.moment)
 
     def __str__(self) -> str:
-        return f"spring of {self.stiffness:g} N m/rad"
+        return f"spring of {_thousands(self.stiffness, 'N m/rad')}"
 
 
 @dataclass(frozen=True)
@@ -378,7 +382,7 @@ class Damper(Restraint):
         return Held(damping=self.coefficient * pivot.p**2 / pivot.moment)
 
     def __str__(self) -> str:
-        return f"damper of {self.coefficient:g} N m s/rad"
+        return f"damper of {_thousands(self.coefficient, 'N m s/rad')}"
 
 
 @dataclass(frozen=True)
@@ -430,7 +434,7 @@ class Thrust(Restraint):
         return np.full_like(rotation, self.force), np.zeros_like(rotation)
 
     def __str__(self) -> str:
-        return f"thrust of {self.force:g} N at a height of {self.height:g} m{_at(self.offset)}"
+        return f"thrust of {_thousands(self.force, 'N')} at a height of {self.height:.5g} m{_at(self.offset)}"
 
 
 @dataclass(frozen=True)
@@ -469,6 +473,7 @@ class Load(Restraint):
         self._positive("mass", "kg")
         self._positive("height", "m")
         self._finite("offset")
+        object.__setattr__(self, "follows", checks.truth(self.follows, "follows", InvalidBlock))
 
     def _held(self, pivot: Pivot) -> Held:
         """Return the moment of one that does not follow; of one that follows none, which is part of the block."""
@@ -485,9 +490,17 @@ class Load(Restraint):
 
     def __str__(self) -> str:
         follows = "that follows" if self.follows else "that only presses"
-        return f"load of {self.mass:g} kg {follows} at a height of {self.height:g} m{_at(self.offset)}"
+        return f"load of {self.mass:.5g} kg {follows} at a height of {self.height:.5g} m{_at(self.offset)}"
 
 
 def _at(offset: float) -> str:
     """Say where it is, if not at the centre of mass."""
-    return f", {abs(offset):g} m to side {'+' if offset > 0.0 else '-'}" if offset else ""
+    return f" {abs(offset):.5g} m to side {'+' if offset > 0.0 else '-'}" if offset else ""
+
+
+def _thousands(value: float, unit: str) -> str:
+    """Write a number with its unit: with kilo, mega or giga where it is large."""
+    for size, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if abs(value) >= size:
+            return f"{value / size:.5g} {prefix}{unit}"
+    return f"{value:.5g} {unit}"

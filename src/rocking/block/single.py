@@ -510,9 +510,12 @@ class Block:
 def one_block(block: Block) -> Block:
     """Return the block, or say that it is none."""
     if not isinstance(block, Block):
-        raise InvalidBlock(
-            f"a Block is needed, not a {type(block).__name__}: make one with Block(width=, height=), in m"
-        )
+        how = "make one with Block(width=, height=), in m"
+        if hasattr(block, "restraints"):
+            how = "here a block is free; among restrained ones, RestrainedBlock(block) is"
+        elif hasattr(block, "rose"):
+            how = "block(azimuth) of a Solid is what it is in a plane"
+        raise InvalidBlock(f"a Block is needed, not a {type(block).__name__}: {how}")
     return block
 
 

@@ -9,9 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from rocking import checks
 from rocking.bisection import bisected
-from rocking.block.limits import checked_parameter
+from rocking.block.limits import checked_pair, checked_parameter
 from rocking.block.restitution import Restitution
 from rocking.block.restraints import Held, Load, Pivot, Yielding
 from rocking.block.single import Block, Side, block_of_sides
@@ -35,6 +34,13 @@ def carrying(block: Block, loads: Sequence[Load]) -> Block:
     x, z = float(share @ across), float(share @ up)
     own = block.gravity * plus.radius / plus.p**2 - plus.radius**2
     gyration = float(share[0] * own + share @ ((across - x) ** 2 + (up - z) ** 2))
+    beyond = max(x - right, -x - left)
+    if beyond >= 0.0:
+        raise InvalidBlock(
+            f"with its loads the centre of mass of this block lies {beyond:.3g} m beyond its pivot, so that it falls: "
+            "give a load less mass, or less {}",
+            "offset",
+        )
     return Block.from_pivots(
         (right - x, left + x), z, math.sqrt(gyration), mass=float(masses.sum()), gravity=block.gravity
     )
@@ -47,7 +53,8 @@ def leaning(block: Block, lean: float) -> Block:
     plus, minus = block.sides
     if not -minus.alpha < lean < plus.alpha:
         raise InvalidBlock(
-            f"a block whose {{}} is {lean:g} rad falls: from {-minus.alpha:.4g} to {plus.alpha:.4g} rad it stands",
+            f"a block whose {{}} is {lean:g} rad falls: from {-minus.alpha:.4g} to {plus.alpha:.4g} rad it stands"
+            f"{f'; if it is in degrees, give math.radians({lean:g})' if 0.5 <= abs(lean) < 90.0 else ''}",
             "lean",
             value=lean,
         )
@@ -57,8 +64,9 @@ def leaning(block: Block, lean: float) -> Block:
 
 def with_restitution(block: Block, restitution: float | Sequence[float] | Restitution) -> Block:
     """Return a block with another restitution."""
-    given = restitution._factors() if isinstance(restitution, Restitution) else restitution
-    factors = np.broadcast_to(checks.numbers(given, "restitution", InvalidBlock), 2).tolist()
+    factors = (
+        restitution._factors() if isinstance(restitution, Restitution) else checked_pair(restitution, "restitution")
+    )
     plus, minus = (
         replace(side, restitution=checked_parameter(factor, "restitution"))
         for side, factor in zip(block.sides, factors, strict=True)

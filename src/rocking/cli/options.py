@@ -14,7 +14,7 @@ from cyclopts import Group, Parameter
 from rocking.constants import Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.plausibility import block_notes, level_notes
+from rocking.plausibility import block_notes, level_notes, restraint_notes
 from rocking.progress import note
 from rocking.quantities import Quantity, acceleration, length, number, sides, tilt, values, velocity
 
@@ -186,7 +186,10 @@ class HeldOptions(BlockOptions):
         couples = {"spring": Spring, "damper": Damper}
         restraints += [kind(held[name]) for name, kind in couples.items() if name in held]
         lean = 0.0 if self.lean is None else tilt(self.lean, "lean")
-        return RestrainedBlock(block, *restraints, one_sided=self.one_sided, lean=lean, restitution=e)
+        body = RestrainedBlock(block, *restraints, one_sided=self.one_sided, lean=lean, restitution=e)
+        for sentence in restraint_notes(body, None if block.half_height is None else 2.0 * block.half_height):
+            note(sentence)
+        return body
 
 
 @dataclass(frozen=True)

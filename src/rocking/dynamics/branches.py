@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rocking import checks
 from rocking.arrays import Flags, Floats
-from rocking.body import Body
+from rocking.body import Body, title_of
 from rocking.constants import Model
 from rocking.dynamics.courses import course_of
 from rocking.dynamics.maps import StroboscopicMap
@@ -271,21 +271,24 @@ class Branch(DrawnResult, TableResult):
         periods = ", ".join(str(each) for each in sorted({each.period for each in branches}))
         headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._headline()
         return branch_figure(
-            values=np.concatenate([np.append(each.values, np.nan) for each in branches])[:-1],
-            heights=np.concatenate([np.append(each.states[:, 0] if flat else each.peaks, np.nan) for each in branches])[
-                :-1
-            ],
-            stable=np.concatenate([np.append(each.is_stable, False) for each in branches])[:-1],
+            values=_apart([each.values for each in branches]),
+            heights=_apart([each.states[:, 0] if flat else each.peaks for each in branches]),
+            stable=_apart([each.is_stable for each in branches]) == 1.0,
             marks=[
                 (at.kind, at.value, float(at.orbit.state[0]) if flat else _peak_at(at))
                 for each in branches
                 for at in each.bifurcations
             ],
             labels=(f"{self.name}{unit}", f"{what} ({coordinate.unit})"),
-            title=title or f"{body.description}, {headline.replace('^2', '²')}",
+            title=title or f"{title_of(body)}, {headline.replace('^2', '²')}",
             ax=ax,
             figsize=figsize,
         )
+
+
+def _apart(lines: Sequence[NDArray[Any]]) -> Floats:
+    """Join lines, with a NaN between one and the next, where a plotted one breaks off."""
+    return np.concatenate([np.append(np.asarray(line, dtype=np.float64), np.nan) for line in lines])[:-1]
 
 
 def _peak_at(bifurcation: Bifurcation) -> float:

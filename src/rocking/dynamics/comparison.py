@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Floats
+from rocking.body import title_of
 from rocking.dynamics.stepping import SteppedResponse, TimeStepping
 from rocking.response import Response
 from rocking.result import DrawnResult, TableResult
@@ -286,7 +287,7 @@ class SchemeComparison(DrawnResult, TableResult):
             curves=curves,
             certified=self.certified.processor_time if self._is_timed else self.certified.cost,
             cost_label="processor time (s)" if self._is_timed else "arcs or steps",
-            title=title or f"{response.body.description}{shaken}",
+            title=title or f"{title_of(response.body)}{shaken}",
             ax=ax,
             figsize=figsize,
         )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Floats
-from rocking.body import Body
+from rocking.body import Body, title_of
 from rocking.constants import Model
 from rocking.dynamics.courses import response_of
 from rocking.dynamics.maps import StroboscopicMap
@@ -180,7 +180,7 @@ class PeriodicOrbit(DrawnResult, TableResult):
             impact_times=self.response.impacts["time"] / self._map.period,
             states=self.states,
             labels=(f"{coordinate.name} ({coordinate.unit})", f"velocity ({coordinate.unit}/s)"),
-            title=title or f"{self.body.description}, {self._kind}",
+            title=title or f"{title_of(self.body)}, {self._kind}",
             ax=ax,
             figsize=figsize,
         )

@@ -10,6 +10,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats
+from rocking.body import title_of
 from rocking.errors import InvalidOption
 from rocking.plot.response import RotationUnits
 from rocking.problem import thresholds_of
@@ -173,7 +174,7 @@ def figure(
         chattering=None if sequence is None else DrawnSequence(*sequence),
         units=units,
         label="" if coordinate.unit == "rad" else f"{coordinate.name} ({coordinate.unit})",
-        title=title or f"{body.description} under {'no motion' if motion is None else motion.label}",
+        title=title or f"{title_of(body)} under {'no motion' if motion is None else motion.label}",
         ax=ax,
         figsize=figsize,
     )

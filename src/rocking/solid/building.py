@@ -12,11 +12,12 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidBlock
 from rocking.motion.directions import sine_cosine
-from rocking.plausibility import height_notes
+from rocking.plausibility import density_notes, height_notes
 from rocking.solid import support as polygons
-from rocking.solid.moments import moments, together
+from rocking.solid.moments import moments, signed_volumes, together
+from rocking.solid.overlap import overlaps
 from rocking.solid.reading import length_of, parts_of, upright
-from rocking.solid.repair import Surface, agreeing, closed, is_closed, joined
+from rocking.solid.repair import Surface, agreeing, closed, is_closed, joined, winding
 
 if TYPE_CHECKING:
     from rocking.solid.reading import Mesh, Part
@@ -54,19 +55,25 @@ def properties(
     found = parts_of(mesh)
     rotation = _turned(turn) @ upright(found.up if up is None else up) * length_of(unit)
     parts = [part._replace(vertices=part.vertices @ rotation.T) for part in found.parts]
-    densities = _densities(density, [part.name for part in parts])
     every = np.vstack([part.vertices[np.unique(part.faces)] for part in parts])
     ground = float(every[:, 2].min())
     every[:, 2] -= ground
     height, size = float(every[:, 2].max()), float(np.ptp(every, axis=0).max())
-    names, surfaces = _surfaces(parts, not isinstance(density, Mapping))
+    names, surfaces = _surfaces(parts, density)
+    densities = _densities(density, names, [part.name for part in parts])
     inside = [moments(surface.vertices, surface.faces) for surface in surfaces]
     for name, each in zip(names, inside, strict=True):
         if not each.amount > _FLAT * size**3:
-            raise InvalidBlock(f"{name} encloses no volume: it is a surface without an inside", path=found.name)
-    used = [densities[name.partition(_AND)[0]] for name in names]  # joined parts are of one density
+            raise InvalidBlock(
+                f"{name} encloses no volume: it is a surface without an inside; give it a thickness", path=found.name
+            )
+    used = [densities[name] for name in names]
     whole = together(inside, [1.0 if each is None else each for each in used])
     within = _TOLERANCE * height if tolerance is None else checks.positive(tolerance, "tolerance", InvalidBlock, "m")
+    if within >= height:
+        raise InvalidBlock(
+            f"{{}} must be below the height of the mesh, {height:.4g} m, not {within:g}", "tolerance", value=tolerance
+        )
     polygon, notes = _support(every, support, within, found.name)
     return {
         "support": polygon,
@@ -77,7 +84,7 @@ def properties(
         "height": height,
         "regions": [Region(*each) for each in zip(names, (each.amount for each in inside), used, strict=True)],
         "repairs": _all_repairs(names, surfaces),
-        "notes": (*notes, *height_notes(height)),
+        "notes": (*notes, *overlaps(names, surfaces), *height_notes(height), *density_notes(used)),
     }
 
 
@@ -87,16 +94,18 @@ def _turned(turn: object) -> Floats:
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _densities(given: float | Mapping[str, float] | None, names: Sequence[str]) -> dict[str, float | None]:
-    """Density of each part, kg/m^3."""
+def _densities(
+    given: float | Mapping[str, float] | None, names: Sequence[str], every: Sequence[str]
+) -> dict[str, float | None]:
+    """Density of each surface, kg/m^3, by its name; every part of the mesh may have one."""
     if given is None:
         return dict.fromkeys(names)
     if not isinstance(given, Mapping):
         return dict.fromkeys(names, checks.positive(given, "density", InvalidBlock, "kg/m^3"))
-    known = f"its parts are {', '.join(names)}"
-    unknown, missing = [name for name in given if name not in names], [name for name in names if name not in given]
+    known = f"its parts are {', '.join(every)}"
+    unknown, missing = [name for name in given if name not in every], [name for name in names if name not in given]
     if unknown:
-        hint = checks.meant(str(unknown[0]), names, known)
+        hint = checks.meant(str(unknown[0]), every, known)
         raise InvalidBlock(
             f"{{}} has a part {checks.shown(unknown[0])}, which the mesh does not have; {hint}", "density"
         )
@@ -105,20 +114,55 @@ def _densities(given: float | Mapping[str, float] | None, names: Sequence[str]) 
     return {name: checks.positive(given[name], "density", InvalidBlock, "kg/m^3") for name in names}
 
 
-def _surfaces(parts: Sequence[Part], uniform: bool) -> tuple[list[str], list[Surface]]:
-    """Close the surfaces of the parts, and name them; open ones of one density are joined before."""
+def _surfaces(parts: Sequence[Part], density: float | Mapping[str, float] | None) -> tuple[list[str], list[Surface]]:
+    """Close the surfaces of the parts, and name them; open ones of one density are joined before.
+
+    A part that lies in another one, with its normals turned the other way, is a cavity of it, unless it has a density.
+    """
     names = [part.name for part in parts]
     found = [agreeing(joined(part.vertices, part.faces)) for part in parts]
     is_open = [not is_closed(surface.faces) for surface in found]
-    if uniform and sum(is_open) > 1:
+    if not isinstance(density, Mapping) and sum(is_open) > 1:
         some = [part for part, each in zip(parts, is_open, strict=True) if each]
-        starts = np.cumsum([0, *(len(part.vertices) for part in some)])
-        faces = np.vstack([part.faces + start for part, start in zip(some, starts[:-1], strict=True)])
-        whole = agreeing(joined(np.vstack([part.vertices for part in some]), faces))
+        rest = _one_of([Surface(part.vertices, part.faces) for part in some])
         kept = [k for k, each in enumerate(is_open) if not each]
         names = [*(names[k] for k in kept), _AND.join(part.name for part in some)]
-        found = [*(found[k] for k in kept), whole]
-    return names, [closed(surface) for surface in found]
+        found = [*(found[k] for k in kept), agreeing(joined(rest.vertices, rest.faces))]
+    given = density if isinstance(density, Mapping) else {}
+    cavities = _cavities(found, [name not in given for name in names])
+    whole = [_one_of([surface, *(found[k] for k, n in cavities.items() if n == j)]) for j, surface in enumerate(found)]
+    left = [k for k in range(len(found)) if k not in cavities]
+    return [names[k] for k in left], [closed(whole[k]) for k in left]
+
+
+def _one_of(surfaces: Sequence[Surface]) -> Surface:
+    """Return one surface of several."""
+    starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])
+    faces = np.vstack([each.faces + start for each, start in zip(surfaces, starts[:-1], strict=True)])
+    repairs = tuple(sentence for each in surfaces for sentence in each.repairs)
+    return Surface(np.vstack([each.vertices for each in surfaces]), faces, repairs)
+
+
+def _cavities(surfaces: Sequence[Surface], may: Sequence[bool]) -> dict[int, int]:
+    """Numbers of closed surfaces that are cavities, if they may be, each with that of the smallest one around it."""
+    if len(surfaces) == 1:
+        return {}
+    volumes = [float(signed_volumes(*each[:2]).sum()) for each in surfaces]
+    if max(volumes) <= 0.0 or min(volumes) >= 0.0:
+        return {}
+    volumes = [volume if is_closed(each.faces) else 0.0 for volume, each in zip(volumes, surfaces, strict=True)]
+    found = {}
+    for k, surface in enumerate(surfaces):
+        place = surface.vertices[surface.faces[0, 0]]
+        around = [
+            n
+            for n, volume in enumerate(volumes)
+            if may[k] and volume * volumes[k] < 0.0 and abs(volume) > abs(volumes[k])
+            and abs(winding(*surfaces[n][:2], place)) > 0.5
+        ]  # fmt: skip
+        if around:
+            found[k] = min(around, key=lambda n: abs(volumes[n]))
+    return found
 
 
 def _all_repairs(names: Sequence[str], surfaces: Sequence[Surface]) -> tuple[str, ...]:

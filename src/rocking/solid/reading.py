@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -12,8 +13,6 @@ from rocking.arrays import Floats, Integers
 from rocking.errors import InvalidBlock, InvalidOption, literal
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     from trimesh import Scene, Trimesh
 
     #: A file, the name of the mesh that ships with the package, or what trimesh has read.
@@ -54,7 +53,11 @@ def parts_of(mesh: Mesh) -> Parts:
     else:
         scene: Any = mesh
         if not hasattr(mesh, "geometry"):
-            file = SHIPPED.get(str(mesh)) or checks.path(mesh, "mesh", InvalidBlock)
+            if not isinstance(mesh, (str, PathLike)):
+                raise InvalidBlock(
+                    f"{{}} must be the path of a file, or a mesh or scene of trimesh, not {checks.shown(mesh)}", "mesh"
+                )
+            file = SHIPPED.get(str(mesh)) or Path(mesh)
             name, up, path = file.name, "y" if file.suffix.lower() in _Y_UP else "z", str(mesh)
             scene = _read(file, path)
         graph, geometry = scene.graph, scene.geometry
@@ -62,16 +65,22 @@ def parts_of(mesh: Mesh) -> Parts:
         found = [(node, geometry[shape], transform) for node, transform, shape in placed]
     parts = tuple(_part(node, each, transform) for node, each, transform in found if len(getattr(each, "faces", ())))
     if not parts:
-        raise InvalidBlock("holds no faces: a mesh of triangles is needed, not points or lines", path=path or name)
+        raise InvalidBlock(
+            "holds no faces: a mesh of triangles is needed, not points, lines or other text", path=path or name
+        )
     if not all(np.all(np.isfinite(part.vertices)) for part in parts):
-        raise InvalidBlock("has corners that are not finite numbers", path=path or name)
+        raise InvalidBlock("has corners that are not finite numbers: export the mesh again", path=path or name)
     return Parts(parts, name, up)
 
 
 def _read(file: Path, named: str) -> Scene:
+    if file.is_dir():
+        raise InvalidBlock("this is a folder, not a file: name the file in it", path=named)
     if not file.is_file():
         known = f"; the mesh that ships is {', '.join(SHIPPED)}" if not file.suffix else ""
         raise InvalidBlock(f"there is no such file{known}", path=named)
+    if not file.stat().st_size:
+        raise InvalidBlock("this file is empty: export the mesh again", path=named)
     try:
         import trimesh
     except ImportError:
@@ -84,7 +93,7 @@ def _read(file: Path, named: str) -> Scene:
         return trimesh.load_scene(file, process=False, **how)
     except Exception as error:  # what a reader of foreign files raises is of any kind
         formats = sorted(trimesh.available_formats())
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = f"{' '.join(str(error).split()) or type(error).__name__}; is it whole, and what its name says?"
         if file.suffix.lower().removeprefix(".") not in formats:
             reason = f"is of no format that trimesh reads ({', '.join(formats)})"
         raise InvalidBlock(f"cannot be read: {literal(reason)}", path=named) from None

@@ -150,6 +150,12 @@ def _filled(vertices: Floats, faces: Integers) -> tuple[Floats, Integers, tuple[
     return everything, np.vstack([faces, patches]), (said,)
 
 
+def shells_of(vertices: Floats, faces: Integers) -> Integers:
+    """Label the triangles of each connected surface, from 0 up."""
+    label = _components(len(vertices), _edges(faces))[faces[:, 0]]
+    return np.asarray(np.unique(label, return_inverse=True)[1].reshape(-1), dtype=np.int64)
+
+
 def _areas(vertices: Floats, faces: Integers) -> Floats:
     one, two, three = (vertices[faces[:, k]] for k in range(3))
     return np.asarray(0.5 * np.linalg.norm(np.cross(two - one, three - one), axis=1))
@@ -157,45 +163,34 @@ def _areas(vertices: Floats, faces: Integers) -> Floats:
 
 def _outward(vertices: Floats, faces: Integers) -> tuple[Integers, tuple[str, ...]]:
     """Turn normals outwards; a surface inside another, whose normals point into it, is a cavity."""
-    label = _components(len(vertices), _edges(faces))[faces[:, 0]]
-    shells, label = np.unique(label, return_inverse=True)
-    label = label.reshape(-1)
+    label = shells_of(vertices, faces)
     volume = np.bincount(label, weights=signed_volumes(vertices, faces))
     largest = int(np.argmax(np.abs(volume)))
     repairs: list[str] = []
-    sign = np.ones(len(shells))
+    sign = np.ones(len(volume))
     if volume[largest] < 0.0:
         repairs.append("normals pointed inwards: the surface was turned inside out")
         sign[:] = -1.0
-    cavities, apart, inner = [], 0, 0
-    for k in range(len(shells)):
-        if k == largest:
-            continue
+    cavities, apart = [], 0
+    outer = np.flatnonzero(sign * volume > 0.0)
+    for k in np.flatnonzero(sign * volume < 0.0):
         place = vertices[faces[np.argmax(label == k), 0]]
-        inside = abs(_winding(vertices, faces[label == largest], place)) > 0.5
-        if sign[k] * volume[k] < 0.0:
-            if inside:
-                cavities.append(abs(float(volume[k])))
-            else:
-                sign[k] *= -1.0
-                apart += 1
-        elif inside:
-            inner += 1
+        around = outer[np.abs(volume[outer]) > abs(volume[k])]
+        if any(abs(winding(vertices, faces[label == n], place)) > 0.5 for n in around):
+            cavities.append(abs(float(volume[k])))
+        else:
+            sign[k] *= -1.0
+            apart += 1
     if cavities:
         said = "1 cavity" if len(cavities) == 1 else f"{len(cavities)} cavities"
         repairs.append(f"{said} of {sum(cavities):.3g} m^3 taken as hollow")
     if apart:
         repairs.append(f"{counted(apart, 'separate surface')} turned inside out")
-    if inner:
-        repairs.append(
-            f"{counted(inner, 'closed surface')} inside another with normals outwards counted as more of the material; "
-            "turn them if they are cavities"
-        )
     return np.where(sign[label][:, None] < 0.0, faces[:, ::-1], faces), tuple(repairs)
 
 
-def _winding(vertices: Floats, faces: Integers, place: Floats) -> float:
-    """How often a surface goes round a place: solid angles over 4 pi (Van Oosterom and Strackee 1983)."""
+def winding(vertices: Floats, faces: Integers, place: Floats) -> float:
+    """Return how often a surface goes round a place: solid angles over 4 pi (Van Oosterom and Strackee 1983)."""
     a, b, c = (vertices[faces[:, k]] - place for k in range(3))
     la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
     above = np.einsum("ij,ij->i", a, np.cross(b, c))

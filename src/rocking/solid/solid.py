@@ -14,6 +14,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.block.limits import checked_gravity, checked_mass
+from rocking.block.single import block_of_sides
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
 from rocking.result import Result, Row, dictionary_of, text_of
@@ -140,8 +141,8 @@ class Solid(Result):
         mesh : path, trimesh.Trimesh or trimesh.Scene
             Triangles; "statue" is a mesh that ships with the package.
         density : float or mapping of str to float, optional
-            Density, kg/m^3: of all, or of each part (object, group, node) by its name. Parts must not overlap. Without
-            it all is of one density, and the mass not known.
+            Density, kg/m^3: of all, or of each part (object, group, node) by its name. Without it all is of one
+            density, and the mass not known. What parts have in common counts twice, and is noted.
         support : array_like, shape (k, 2), optional
             Corners of the support, m, in the mesh's own horizontal coordinates after `up`, `unit` and `turn`. By
             default the convex polygon around all corners of the mesh within `tolerance` of the lowest one.
@@ -161,7 +162,7 @@ class Solid(Result):
         -------
         Solid
             With what was repaired: triangles that are turned otherwise than their neighbours, holes, and normals that
-            point inwards.
+            point inwards; and with notes, as on parts that overlap.
 
         Raises
         ------
@@ -174,7 +175,8 @@ class Solid(Result):
         -----
         Volume, centre and inertia are sums over tetrahedra between the triangles and one place, exact for the mesh. A
         hole is filled by triangles between its edge and the mean of its corners, which is exact where it is flat. Where
-        several parts are of one density and some are open, these are joined first.
+        several parts are of one density and some are open, these are joined first. A surface in another one, with its
+        normals inwards, is a cavity; so is such a part to which `density` gives none.
 
         Examples
         --------
@@ -216,8 +218,8 @@ class Solid(Result):
         Returns
         -------
         Block
-            As `Block.from_pivots` makes it: the pivots are where the support ends in both directions, the radius of
-            gyration is that about the horizontal axis across the plane.
+            As `Block.from_pivots` makes it, with the azimuth in its description: the pivots are where the support ends
+            in both directions, the radius of gyration is that about the horizontal axis across the plane.
 
         Raises
         ------
@@ -234,7 +236,7 @@ class Solid(Result):
         plus, minus = polygons.extents(self._about_centre, [towards, towards + 180.0]).distance.tolist()
         squared, _ = about_axes(self.inertia_over_mass, np.array([towards]))
         height = float(self.centre[2])
-        return Block.from_pivots(
+        block = Block.from_pivots(
             (plus, minus),
             height,
             math.sqrt(float(squared[0])),
@@ -242,6 +244,8 @@ class Solid(Result):
             mass=self.mass,
             gravity=self.gravity,
         )
+        text = f"{self.description} in the plane of {towards:.5g} deg"
+        return block_of_sides(Block.__new__(Block), block.sides, block.gravity, text, block.mass)
 
     def rose(self, azimuths: ArrayLike | None = None) -> Rose:
         """Resistance in every direction.

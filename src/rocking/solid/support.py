@@ -66,7 +66,7 @@ def given_polygon(value: ArrayLike) -> Floats:
     """Return the convex polygon around points that somebody gives, shape (n, 2), or refuse them."""
     points = checks.numbers(value, "support", InvalidBlock)
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
-        raise InvalidBlock("{} must be corners of a polygon, (east, north) in m, of shape (n, 2)", "support")
+        raise InvalidBlock("{} must be corners of a polygon, finite (east, north) in m, of shape (n, 2)", "support")
     found = hull(points)
     if found is None:
         raise InvalidBlock("{} must have three corners or more that are not on one line", "support")

@@ -1,0 +1,200 @@
+"""What nobody can mean of meshes, walls, restraints and laws of restitution: one sentence says what, where and how."""
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+import rocking
+from rocking import (
+    Block,
+    Blocks,
+    Damper,
+    FallingRestitution,
+    InvalidBlock,
+    Load,
+    RandomRestitution,
+    RestrainedBlock,
+    RockingError,
+    Solid,
+    Spring,
+    Tendon,
+    Thrust,
+)
+from rocking.plausibility import density_notes, restraint_notes
+
+WALL = Block(width=0.5, height=4.0, mass=5e3)
+PULSE = rocking.pulses.one_sine(2.0, 1.0)
+
+
+def box(size=1.0):
+    made = trimesh.creation.box((0.6 * size, 0.4 * size, 1.8 * size))
+    made.apply_translation([0.0, 0.0, 0.9 * size])
+    return made
+
+
+def held(*restraints, **options):
+    return RestrainedBlock(WALL, *restraints, **options)
+
+
+def falling(largest=0.9, slope=0.1, least=0.5):
+    return held(restitution=FallingRestitution(largest, slope, least))
+
+
+def drawn(least=0.5, largest=0.9, seed=1):
+    return held(restitution=RandomRestitution(least, largest, seed))
+
+
+#: What is done, what it is about (an argument or nothing), and words that say what is wrong and how to correct it.
+WRONG = {
+    # Meshes
+    "density of text": (lambda: Solid.from_mesh(box(), density="2700"), "density", "in kg/m^3, not '2700'"),
+    "density of none": (lambda: Solid.from_mesh(box(), density={}), "density", "missing for mesh; its parts are mesh"),
+    "unit of nothing": (lambda: Solid.from_mesh(box(), unit=0.0), "unit", "positive number, in m, not 0"),
+    "support in mm": (
+        lambda: Solid.from_mesh(box(), support=[(300.0, 200.0), (-300.0, 200.0), (0.0, -200.0)]),
+        "support",
+        "reaches 300 m beyond the outline of the mesh, from -0.3 m to 0.3 m in the east",
+    ),
+    "support aside": (
+        lambda: Solid.from_mesh(box(), support=[(0.3, 0.2), (0.2, 0.2), (0.25, 0.1)]),
+        "support",
+        "its centre of mass lies 0.268 m outside its support, towards 243 deg; correct",
+    ),
+    "support of NaN": (
+        lambda: Solid.from_mesh(box(), support=[(0.1, 0.1), (math.nan, 0.0), (0.0, -0.1)]),
+        "support",
+        r"finite (east, north) in m, of shape (n, 2)",
+    ),
+    "tolerance of all": (lambda: Solid.from_mesh(box(), tolerance=5.0), "tolerance", "below the height of the mesh"),
+    "points": (lambda: Solid.from_mesh(np.zeros((3, 3))), "mesh", "the path of a file, or a mesh or scene of trimesh"),
+    "azimuth of text": (lambda: Solid.from_mesh(box()).block("north"), "azimuth", "a finite number, not 'north'"),
+    "gravity": (lambda: Solid.from_mesh(box(), gravity=0.0), "gravity", "positive number, in m/s^2, not 0"),
+    "restitution of a solid": (
+        lambda: Solid.from_mesh(box()).block(0.0, restitution=92.0),
+        "restitution",
+        "if it is in per cent, give 0.92",
+    ),
+    "a solid that rocks": (
+        lambda: rocking.simulate(Solid.from_mesh(box()), PULSE), "", "block(azimuth) of a Solid is what it is"
+    ),
+    # Restraints
+    "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is no restraint: give them one by one"),
+    "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them at once"),
+    "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "kg, beside its sizes"),
+    "NaN of a tendon": (lambda: Tendon(math.nan), "stiffness", "a finite number, not nan"),
+    "strength of text": (lambda: Tendon(1e5, strength="9 kN"), "strength", "a number, not '9 kN'"),
+    "a tendon beyond": (
+        lambda: held(Tendon(1e5, offset=2.0)), "offset", "beyond the pivot, which is 0.25 m from the centre of mass"
+    ),
+    "a tendon's place": (lambda: Tendon(1e5, offset="toe"), "offset", "a finite number, not 'toe'"),
+    "an infinite tendon": (lambda: Tendon(math.inf), "stiffness", "a finite number, not inf"),
+    "a spring that pushes": (lambda: Spring(-1e3), "stiffness", "positive number, in N m/rad, not -1000"),
+    "a damper that drives": (lambda: Damper(-5.0), "coefficient", "positive number, in N m s/rad, not -5"),
+    "a thrust below the ground": (lambda: Thrust(9.0, -1.0), "height", "positive number, in m, not -1"),
+    "a thrust in kN for N": (
+        lambda: held(Thrust(2e6, 3.0)), "", "a smaller thrust, load or lean lets it; forces are in N, masses in kg"
+    ),
+    "a load of less than nothing": (lambda: Load(-5.0, 4.0), "mass", "positive number, in kg, not -5"),
+    "a load outside": (
+        lambda: held(Load(1e5, 4.0, offset=1.0)), "offset", "0.702 m beyond its pivot, so that it falls: give"
+    ),
+    "a load that follows": (lambda: Load(5.0, 4.0, follows="no"), "follows", "must be True or False, not 'no'"),
+    "walls": (lambda: held(one_sided="yes"), "one_sided", "must be True or False, not 'yes'"),
+    "a lean in degrees": (
+        lambda: held(lean=2.0), "lean", "0.1244 rad it stands; if it is in degrees, give math.radians(2)"
+    ),
+    "a start behind a wall": (
+        lambda: rocking.simulate(held(one_sided=True), None, initial_rotation=-0.1),
+        "initial_rotation",
+        "at least 0 rad, in front of the body's stop",
+    ),
+    # Restitution
+    "a law above 1": (lambda: falling(largest=1.2), "largest", "in (0, 1], not 1.2"),
+    "a law of percents": (lambda: drawn(80.0, 90.0), "largest", "if it is in per cent, give 0.9"),
+    "a law that gains": (lambda: falling(slope=-0.1), "slope", "in s/rad, not -0.1: a faster impact loses more"),
+    "a law of NaN": (lambda: falling(slope=math.nan), "slope", "at least 0, in s/rad, not nan"),
+    "bounds swapped": (lambda: drawn(0.9, 0.5), "least", "above 0 and at most largest, 0.5, not 0.9"),
+    "a seed of a fraction": (lambda: drawn(seed=1.5), "seed", "a whole number from 0 to 9007199254740992, not 1.5"),
+    "three restitutions": (lambda: held(restitution=[0.9] * 3), "restitution", "a pair (side +, side -), not 3 values"),
+    "a law by its name": (lambda: held(restitution="housner"), "restitution", "an array of numbers, not 'housner'"),
+    "a law of a free block": (
+        lambda: Block(width=0.4, height=2.0, restitution=RandomRestitution(0.5, 0.9, 1)),
+        "restitution",
+        "a law goes to RestrainedBlock(block, restitution=...)",
+    ),
+    # Several bodies
+    "walls among blocks": (
+        lambda: rocking.simulate_many([held(), WALL], PULSE), "", "and of free ones RestrainedBlock(block)"
+    ),
+    "blocks among walls": (lambda: Blocks.of([WALL, held()]), "", "among restrained ones, RestrainedBlock(block) is"),
+    "two gravities": (
+        lambda: rocking.simulate_many([held(), RestrainedBlock(Block(width=0.5, height=4.0, gravity=1.6))], PULSE),
+        "gravity",
+        "all blocks must be under one gravity",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_cannot_be_meant_is_refused_in_one_sentence(case):
+    make, about, words = WRONG[case]
+    with pytest.raises(RockingError) as refused:
+        make()
+    said = str(refused.value)
+    assert words in said
+    assert "\n" not in said and not said.endswith(".")
+    assert not about or about in said
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("none.obj", b"", "this file is empty: export the mesh again"),
+        ("none.glb", b"", "this file is empty: export the mesh again"),
+        (
+            "letter.obj",
+            b"Dear all,\nplease find the mesh\n",
+            "a mesh of triangles is needed, not points, lines or other",
+        ),
+        ("cut.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "is it whole, and what its name says?"),
+        ("nan.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", "not finite numbers: export the mesh again"),
+        ("folder.obj", None, "this is a folder, not a file"),
+    ],
+)
+def test_a_file_that_is_no_mesh_is_refused_by_its_name(tmp_path, name, content, words):
+    if content is None:
+        (tmp_path / name).mkdir()
+    else:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(InvalidBlock, match=r"^[^\n]*$") as refused:
+        Solid.from_mesh(tmp_path / name)
+    assert refused.value.path == str(tmp_path / name)
+    assert words in str(refused.value)
+
+
+def test_units_that_may_be_mistaken_are_noted():
+    (note,) = Solid.from_mesh(box(1000.0)).notes
+    assert note == "the body is 1800 m high: are its coordinates in metres?"
+    (note,) = Solid.from_mesh(box(), density=2.7).notes
+    assert "2.7 kg/m^3" in note and note.endswith("is it in kg/m^3?")
+    assert density_notes([2700.0, 500.0, None]) == ()
+    usual = held(Tendon(2e8, prestress=1e5), Thrust(9.0, 4.0), Load(9.0, 4.0), Spring(1e6))
+    assert restraint_notes(usual, 4.0) == ()
+    for restraint, words in (
+        (Thrust(0.9, 4000.0), "a thrust is at a height of 4000 m, above the top of the block, 4 m"),
+        (Load(9.0, 5.0), "a load is at a height of 5 m, above the top of the block, 4 m"),
+        (Tendon(2e11), "times the weight or more: are forces in N, and masses in kg?"),
+        (Tendon(2e11, strength=2e9), "times the weight or more: are forces in N, and masses in kg?"),
+        (Spring(1e12), "times the weight or more: are forces in N, and masses in kg?"),
+    ):
+        (note,) = restraint_notes(held(restraint), 4.0)
+        assert words in note
+
+
+def test_the_command_line_notes_units_that_may_be_mistaken(run):
+    sizes = ["--width", "0.5", "--height", "4", "--mass", "5000", "--pulse", "one-sine:amplitude=2,frequency=1Hz"]
+    code, _, err = run("simulate", *sizes, "--load", "mass=5,height=4000")
+    assert code == 0
+    assert "a load is at a height of 4000 m" in err
