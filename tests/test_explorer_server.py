@@ -14,12 +14,12 @@ import time
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from urllib.parse import parse_qs, urlencode, urlsplit
+from urllib.parse import urlencode
 
 import httpx
 import numpy as np
 import pytest
-from explorer_client import Client, clients
+from explorer_client import Client, clients, let_in, opened_by
 
 import rocking
 from rocking.errors import InvalidOption, StudyError
@@ -50,9 +50,7 @@ def opened():
 
         def open_page(app):
             application = RequestAuthentication(app.asgi, PORT)
-            browser = Client(portal, application, OURS, {"sec-fetch-site": "same-origin"}, follow=True)
-            assert browser.get("/", params={"token": application.new_token()}).status_code == 200
-            return browser
+            return let_in(Client(portal, application, OURS), application.new_token())
 
         yield open_page
 
@@ -473,8 +471,8 @@ def running():
 
 @pytest.fixture(scope="module")
 def browser(running):
-    with httpx.Client(follow_redirects=True, headers={"sec-fetch-site": "same-origin"}, timeout=60) as client:
-        assert client.get(running.link()).status_code == 200
+    headers, _, _ = opened_by(running.link())
+    with httpx.Client(headers=headers, timeout=60) as client:
         yield client
 
 
@@ -536,11 +534,7 @@ def test_raw_requests_that_are_none_are_refused(running, raw):
 
 
 def test_the_command_prints_one_line_and_listens_here_alone():
-    command = (
-        [sys.executable, "-m", "rocking.cli.__main__"]
-        if False
-        else [sys.executable, "-c", "from rocking.cli import main; main()"]
-    )
+    command = [sys.executable, "-c", "from rocking.cli import main; main()"]
     process = subprocess.Popen(
         [*command, "explore", "el-centro-meloland-270", "--no-open"],
         stdout=subprocess.PIPE,
@@ -550,13 +544,13 @@ def test_the_command_prints_one_line_and_listens_here_alone():
     )
     try:
         line = process.stdout.readline()
-        link = re.search(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+", line)[0]
-        with httpx.Client(follow_redirects=True, timeout=60) as client:
-            assert "rocking explorer" in client.get(link).text
-            assert client.get(link.split("/?")[0] + "/api/start").json()["opening"] == {
-                "motion": "el-centro-meloland-270"
-            }
-        assert httpx.get(link, timeout=60).status_code == 403
+        link = re.search(r"http://127\.0\.0\.1:\d+/#token=[\w-]+", line)[0]
+        headers, _, base = opened_by(link)
+        with httpx.Client(headers=headers, timeout=60) as client:
+            assert "rocking explorer" in client.get(base).text
+            assert client.get(f"{base}/api/start").json()["opening"] == {"motion": "el-centro-meloland-270"}
+        with pytest.raises(AssertionError, match="opens once"):
+            opened_by(link)
     finally:
         process.send_signal(2)
         out, err = process.communicate(timeout=30)
@@ -642,13 +636,11 @@ def test_a_response_is_explored_in_a_frame():
     frame = rocking.explore(response)
     html = frame._repr_html_()
     assert "<iframe" in html
-    assert re.search(r"token=[\w-]+", html)
-    with httpx.Client(follow_redirects=True, timeout=60) as client:
-        answer = client.get(frame.link)
-        assert answer.status_code == 200
-        assert "frame-ancestors http://localhost:* http://127.0.0.1:*" in answer.headers["content-security-policy"]
-        texts = {name: values[0] for name, values in parse_qs(urlsplit(str(answer.url)).query).items()}
-        base = str(answer.url).split("/?")[0]
+    assert re.search(r'src="http://127\.0\.0\.1:\d+/\?[^"#]+#token=[\w-]+"', html)
+    headers, texts, base = opened_by(frame.link)
+    with httpx.Client(headers=headers, timeout=60) as client:
+        policy = client.get(base).headers["content-security-policy"]
+        assert "frame-ancestors http://localhost:* http://127.0.0.1:*" in policy
         header, arrays = unpacked(client.get(f"{base}/api/case", params=texts).content)
     assert header["peak_rotation"] == response.peak_rotation
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])

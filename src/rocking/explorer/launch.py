@@ -10,6 +10,7 @@ import webbrowser
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from html import escape
 from importlib import util
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
@@ -54,8 +55,8 @@ class Server:
 
     def link(self, texts: Mapping[str, str] | None = None) -> str:
         """Return a link that opens the page once, with the texts of a case."""
-        query = urlencode({**(texts or {}), "token": self.authentication.new_token()})
-        return f"http://{self.host}:{self.port}/?{query}"
+        query = f"?{urlencode(texts)}" if texts else ""
+        return f"http://{self.host}:{self.port}/{query}#token={self.authentication.new_token()}"
 
     def run(self) -> None:
         """Serve until it is interrupted."""
@@ -169,14 +170,8 @@ class Frame:
         return self._link(self.texts)
 
     def _repr_html_(self) -> str:
-        # The cookie goes to frames of the notebook's own site only: the frame takes the name that the notebook has.
-        choose = (
-            "const frame = document.currentScript.previousElementSibling;"
-            "const host = location.hostname === 'localhost' ? 'localhost' : '127.0.0.1';"
-            f"frame.src = `http://${{host}}{self.link.removeprefix(f'http://{HERE}')}`;"
-        )
         style = f"width:100%;height:{self.height}px;border:0"
-        return f'<iframe title="rocking explorer" style="{style}"></iframe><script>{choose}</script>'
+        return f'<iframe title="rocking explorer" src="{escape(self.link)}" style="{style}"></iframe>'
 
 
 _lock = threading.Lock()

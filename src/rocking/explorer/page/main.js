@@ -76,7 +76,7 @@ const afterPause = new Latest(async () => {
   chattering.window(header.window);
   if (state.view === "response") chattering.draw(page.shown, texts);
   if (!ofOwn(state.view)) {
-    showFiles(state);
+    showFiles(state, problem);
     const {python, command} = await json("/api/code", texts);
     if (state.texts === texts && !ofOwn(state.view)) showCode("case", python, command);
   }
@@ -92,7 +92,7 @@ const look = new Latest(async () => {
   Object.assign(page.shown.arrays, arrays);
   draw();
   chattering.window(header.window);
-  showFiles(state);
+  showFiles(state, problem);
   counted("drawn");
 }, problem);
 
