@@ -5,6 +5,7 @@ import math
 import os
 import random
 import re
+import socket
 import struct
 import subprocess
 import sys
@@ -23,7 +24,7 @@ from explorer_client import Client, clients, let_in, opened_by
 
 import rocking
 from rocking.errors import InvalidOption, StudyError
-from rocking.explorer import launch, server
+from rocking.explorer import connections, launch, server
 from rocking.explorer.authentication import RequestAuthentication
 from rocking.explorer.background import low_priority
 from rocking.explorer.core import Explorer
@@ -521,13 +522,87 @@ def test_a_map_that_nobody_reads_any_more_stops(running, browser, path, axes):
     ],
 )
 def test_raw_requests_that_are_none_are_refused(running, raw):
-    import socket
-
     with socket.create_connection(("127.0.0.1", running.port), timeout=10) as connection:
         connection.sendall(raw)
         connection.settimeout(10)
         answer = connection.recv(4096)
     assert re.match(rb"HTTP/1\.1 (400|403|421|431)", answer), answer[:60]
+
+
+# Connections that ask for nothing
+
+
+def connected(running, data, count, unread=False):
+    """Open connections that have sent some data, and read none where that is said."""
+    opened = []
+    for _ in range(count):
+        one = socket.socket()
+        if unread:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        one.connect(("127.0.0.1", running.port))
+        one.sendall(data.replace(b"PORT", str(running.port).encode()))
+        opened.append(one)
+    return opened
+
+
+def open_at_the_server(running):
+    return len(running.server.server_state.connections)
+
+
+HALF = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n"
+UNREAD = b"GET /library/bokeh.min.js HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n"
+BODY = b"POST /api/records HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nContent-Length: 99\r\nOrigin: http://127.0.0.1:PORT\r\n"
+
+
+@pytest.mark.parametrize(
+    ("data", "count"),
+    [
+        (HALF, 300),
+        pytest.param(b"", 300, marks=pytest.mark.thorough),
+        pytest.param(BODY + b"\r\nx", 300, marks=pytest.mark.thorough),
+        (UNREAD + b"\r\n" + UNREAD + b"\r\n", 130),
+    ],
+    ids=["half a head", "silence", "half a body", "two answers unread"],
+)
+def test_the_page_works_while_many_connections_wait(running, browser, data, count):
+    waiting = connected(running, data, count, unread=b"library" in data)
+    try:
+        for _ in range(3):
+            assert browser.get(f"http://127.0.0.1:{running.port}/api/start").status_code == 200
+        assert open_at_the_server(running) <= connections.MOST + 10
+    finally:
+        for one in waiting:
+            one.close()
+
+
+@pytest.mark.parametrize(
+    ("limit", "data"),
+    [("HEAD", HALF), ("BODY", BODY + b"Authorization: SECRET\r\n\r\n"), ("ANSWER", UNREAD + b"\r\n")],
+    ids=["head", "body", "answer"],
+)
+def test_what_comes_or_is_taken_too_slowly_ends(running, browser, monkeypatch, limit, data):
+    monkeypatch.setattr(connections, limit, 0.2)
+    running.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)  # so that the answer waits in the program
+    secret = browser.headers["authorization"].encode()
+    (slow,) = connected(running, data.replace(b"SECRET", secret), 1, unread=True)
+    start = time.monotonic()
+    with slow:
+        slow.settimeout(5.0)
+        while time.monotonic() < start + 5.0:
+            try:
+                slow.sendall(b"x")
+                time.sleep(0.02)
+            except OSError:
+                break
+    assert 0.15 < time.monotonic() - start < 3.0
+
+
+def test_a_map_may_take_longer_than_any_connection_may_wait(running, browser, monkeypatch):
+    for limit in ("HEAD", "BODY", "ANSWER"):
+        monkeypatch.setattr(connections, limit, 0.01)
+    params = {**SINE, "x": "omega", "y": "a", "points": "24"}
+    found = browser.get(f"http://127.0.0.1:{running.port}/api/map", params=params)
+    assert found.elapsed.total_seconds() > 0.02 and len([*frames(found.content)]) > 4
 
 
 # The command

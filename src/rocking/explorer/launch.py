@@ -33,7 +33,7 @@ HERE: Final = "127.0.0.1"
 _NOTEBOOKS: Final = "http://localhost:* http://127.0.0.1:*"
 
 #: Connections at the same time, and those that wait to be accepted.
-_MOST: Final = 200
+_MOST: Final = 400
 _WAITING: Final = 128
 
 
@@ -96,6 +96,7 @@ def served(
     require_packages()
     import uvicorn
 
+    from rocking.explorer.connections import BoundedProtocol
     from rocking.explorer.server import App
 
     application = App(explorer, opening, study, framed_by).asgi
@@ -108,7 +109,8 @@ def served(
         log_level="error",
         access_log=False,
         ws="none",
-        http="h11",
+        http=BoundedProtocol,
+        backlog=_WAITING,
         server_header=False,
         limit_concurrency=_MOST,
         timeout_graceful_shutdown=1,
