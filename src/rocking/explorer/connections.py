@@ -40,12 +40,10 @@ class BoundedProtocol(H11Protocol):
         return self.scope is not None and KNOWN in self.scope["state"]
 
     def connection_made(self, transport: Any) -> None:
-        """Begin to wait for a head; the connection that has waited for longest makes room."""
+        """Begin to wait for a head."""
         super().connection_made(transport)
         self._wait(HEAD)
-        waiting = [each for each in self.connections if isinstance(each, BoundedProtocol) and each.waits]
-        if len(waiting) > MOST:
-            min(waiting, key=lambda each: (each._is_known, each._since))._end()
+        self._make_room()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait no more."""
@@ -67,16 +65,24 @@ class BoundedProtocol(H11Protocol):
         """Wait for the next head, and until the answer is taken."""
         self._wait(ANSWER if self.transport.get_write_buffer_size() else HEAD)
         super().on_response_complete()
+        self._make_room()
 
     def pause_writing(self) -> None:
         """Note since when the other end does not read."""
         self._since = self.loop.time()
         super().pause_writing()
+        self._make_room()
 
     def _wait(self, limit: float) -> None:
         self._stop()
         self._since, self._unsent = self.loop.time(), self.transport.get_write_buffer_size()
         self._timer = self.loop.call_later(limit, self._expire)
+
+    def _make_room(self) -> None:
+        """End the connection that has waited for longest, if too many wait."""
+        waiting = [each for each in self.connections if isinstance(each, BoundedProtocol) and each.waits]
+        if len(waiting) > MOST:
+            min(waiting, key=lambda each: (each._is_known, each._since))._end()
 
     def _stop(self) -> None:
         if self._timer is not None:
