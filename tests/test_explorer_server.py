@@ -1,5 +1,6 @@
 """The server: what it answers, byte by byte; what it refuses; how much it takes."""
 
+import io
 import json
 import math
 import os
@@ -23,15 +24,15 @@ import pytest
 from explorer_client import Client, clients, let_in, opened_by
 
 import rocking
-from rocking.errors import InvalidOption, StudyError
-from rocking.explorer import connections, launch, server
+from rocking.errors import InvalidOption, RockingError, StudyError
+from rocking.explorer import connections, launch, server, uploads
 from rocking.explorer.authentication import RequestAuthentication
 from rocking.explorer.background import low_priority
 from rocking.explorer.core import Explorer
 from rocking.explorer.launch import served
 from rocking.explorer.server import App
 from rocking.explorer.studies import StudyView
-from rocking.explorer.uploads import LARGEST, MOST
+from rocking.explorer.uploads import LARGEST, MOST, UploadStore
 
 PORT = 8123
 OURS = f"http://127.0.0.1:{PORT}"
@@ -291,6 +292,67 @@ def test_a_body_that_is_too_large_is_refused_before_and_while_it_comes(page):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 4 * LARGEST
+
+
+def memory_of(act):
+    """Peak of the memory that Python and NumPy take meanwhile, bytes, and what came of it in words."""
+    tracemalloc.start()
+    try:
+        act()
+        words = "read"
+    except RockingError as error:
+        words = str(error)
+    finally:
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    return peak, words
+
+
+HEADED = b"time (s)" + b",a (g)" * 200 + b"\n"
+AT2 = (Path(__file__).parent / "data" / "formats" / "nga.at2").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"0\n" * (LARGEST // 2), "8388608 lines, of which at most 1000000 are read here"),
+        (b"0\r" * (LARGEST // 2), "8388608 lines, of which at most 1000000 are read here"),
+        (b"0\n" * 999_000, "999000 samples; at most 500000 are shown here"),
+        pytest.param(b"0 " * (LARGEST // 2), "each line holds 256 numbers", marks=pytest.mark.thorough),
+        pytest.param(b".1\n" * 490_000, "read", marks=pytest.mark.thorough),
+        pytest.param(b"0;0\n" * 490_000, "the time does not increase", marks=pytest.mark.thorough),
+        pytest.param(AT2 + b"0\n" * 999_000, "NPTS says", marks=pytest.mark.thorough),
+        pytest.param(AT2 + b"0 " * (LARGEST // 2 - 2000), "NPTS says", marks=pytest.mark.thorough),
+        pytest.param(HEADED + (b"0" + b",0" * 200 + b"\n") * 20_000, "the time does not", marks=pytest.mark.thorough),
+    ],
+    ids=lambda value: f"{len(value)}" if isinstance(value, bytes) else "",
+)  # fmt: skip
+def test_reading_a_file_takes_little_more_memory_than_the_file(data, words):
+    store = UploadStore()
+    peak, found = memory_of(lambda: store.contents(store.add_file("x", data)))
+    assert words in found
+    assert peak < 20 * len(data) + 60 * 2**20
+
+
+def test_a_file_that_is_refused_for_its_length_is_not_read_by_its_key_either():
+    store = UploadStore()
+    key = store.add_file("x", b"0\n" * 501_000)
+    peak, words = memory_of(lambda: store.read(key, None, 0.01, "g"))
+    assert "501000 samples; at most 500000 are shown here" in words
+    assert peak < 30 * 2**20
+
+
+def test_a_compressed_record_is_refused_before_it_is_unpacked(monkeypatch):
+    obspy = pytest.importorskip("obspy")
+    packed, quiet = io.BytesIO(), np.zeros(400_000, dtype=np.int32)
+    obspy.Stream([obspy.Trace(quiet)]).write(packed, format="MSEED", encoding="STEIM2", reclen=4096)
+    store = UploadStore()
+    key = store.add_file("x", packed.getvalue())
+    assert memory_of(lambda: store.contents(key))[1] == "read"
+    monkeypatch.setattr(uploads, "_MOST_SAMPLES", 399_999)
+    peak, words = memory_of(lambda: store.contents(key))
+    assert "400000 samples, of which at most 399999 are read here" in words
+    assert peak < 2 * quiet.nbytes
 
 
 @pytest.mark.parametrize(
