@@ -380,6 +380,45 @@ DROP = """async ([name, text]) => {
 }"""
 
 
+@pytest.mark.parametrize("kind", ["text/plain", "text/uri-list"])
+def test_dragged_text_opens_nothing_and_leads_nowhere(opened, kind):
+    page = opened(STATUE)
+    before = (page.page.url, page.js("document.body.dataset.drawn"))
+    drag = """async (kind) => {
+      const given = new DataTransfer();
+      given.setData(kind, 'http://127.0.0.1:1/');
+      const told = [];
+      for (const name of ['dragenter', 'dragover', 'drop']) {
+        const event = new DragEvent(name, {dataTransfer: given, bubbles: true, cancelable: true});
+        document.querySelector('main').dispatchEvent(event);
+        told.push(event.defaultPrevented, document.getElementById('dropping').hidden);
+      }
+      return told;
+    }"""
+    assert page.js(drag, kind) == [False, True, True, True, True, True]
+    title = page.page.locator("#chattering-title")
+    title.select_text()
+    title.drag_to(page.page.locator("#verdict"))
+    page.page.wait_for_timeout(200)
+    assert (page.page.url, page.js("document.body.dataset.drawn")) == before
+    assert page.js("document.getElementById('dropping').hidden && document.getElementById('problem').hidden")
+
+
+def test_every_view_and_every_case_has_a_title_of_its_own(opened):
+    page = opened(f"{SINE}&points=8&sweep_points=8")
+    titles = []
+    for view in VIEWS:
+        page.page.click(f"[data-view={view}]")
+        page.until(f"document.title.startsWith({view.capitalize()!r})")
+        titles.append(page.page.title())
+    page.page.click("[data-view=response]")
+    page.rested(lambda: page.page.select_option("#kind", "none"))
+    page.until("document.title.includes('no ground motion')")
+    titles.append(page.page.title())
+    assert titles[0] == "Response: p = 2 rad/s, α = 11.5°, sine 0.206 g – rocking explorer"
+    assert len({*titles}) == len(VIEWS) + 1
+
+
 def test_a_file_of_several_channels_is_dropped(opened):
     page = opened(STATUE)
     text = (Path(__file__).parent / "data" / "formats" / "two.v2").read_text("latin-1")
@@ -587,7 +626,12 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
         saved[name[-3:]] = Path(download.value.path()).read_bytes()
     assert saved["png"].startswith(b"\x89PNG")
     assert b"<svg" in saved["svg"][:200]
-    table = np.genfromtxt(saved["csv"].decode().splitlines(), delimiter=",", names=True)
+    lines = saved["csv"].decode().splitlines()
+    key = [line for line in lines if line.startswith("#")]
+    assert key[0].startswith("# outcome: 0 ") and "; 1 complete" in key[0]
+    assert [line.split(":")[0] for line in key] == ["# outcome", "# rest", "# peak", "# mode"]
+    assert "-1 rocks" in key[3] and "n overturns after n impacts" in key[3]
+    table = np.genfromtxt(lines[len(key) :], delimiter=",", names=True)
     assert table.dtype.names == ("omega", "a", "outcome", "rest", "peak", "mode")
     command = shlex.split(page.text("#command"))
     code = "import sys; from rocking.cli import main; main(sys.argv[1:])"
