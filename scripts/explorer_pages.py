@@ -12,6 +12,7 @@ import shutil
 import sys
 import time
 from pathlib import Path
+from urllib.parse import parse_qsl
 
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
@@ -56,12 +57,12 @@ def main() -> None:
                 context = browser.new_context(viewport={"width": across, "height": down}, color_scheme=scheme)
                 page = context.new_page()
                 for view in set(VIEWS) & set(wanted):
-                    visit(page, f"{here.link()}&{VIEWS[view]}", view)
+                    visit(page, here.link(dict(parse_qsl(VIEWS[view]))), view)
                     save(Image.open(io.BytesIO(page.screenshot())), f"explorer-{view}-{width}-{scheme}.png")
                 context.close()
         if "film" in wanted:
             page = browser.new_page(viewport={"width": 900, "height": 1000})
-            visit(page, f"{here.link()}&{FILM}", "block")
+            visit(page, here.link(dict(parse_qsl(FILM))), "block")
             film(page)
         browser.close()
 

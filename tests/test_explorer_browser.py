@@ -10,7 +10,7 @@ import sys
 import threading
 from contextlib import contextmanager
 from pathlib import Path
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, parse_qsl, urlsplit
 
 import numpy as np
 import pytest
@@ -81,7 +81,7 @@ def opened(contexts, here):
     def open_page(query="", viewport=DESK, scheme="light", server=here, allowed=(), **options):
         page = Watched(contexts(viewport=viewport, color_scheme=scheme, **options).new_page(), allowed)
         pages.append((page, server))
-        page.page.goto(server.link() + (f"&{query}" if query else ""))
+        page.page.goto(server.link(dict(parse_qsl(query))))
         page.until("document.body.dataset.ready && document.body.dataset.rested", "the page is ready")
         return page
 
@@ -380,6 +380,45 @@ DROP = """async ([name, text]) => {
 }"""
 
 
+@pytest.mark.parametrize("kind", ["text/plain", "text/uri-list"])
+def test_dragged_text_opens_nothing_and_leads_nowhere(opened, kind):
+    page = opened(STATUE)
+    before = (page.page.url, page.js("document.body.dataset.drawn"))
+    drag = """async (kind) => {
+      const given = new DataTransfer();
+      given.setData(kind, 'http://127.0.0.1:1/');
+      const told = [];
+      for (const name of ['dragenter', 'dragover', 'drop']) {
+        const event = new DragEvent(name, {dataTransfer: given, bubbles: true, cancelable: true});
+        document.querySelector('main').dispatchEvent(event);
+        told.push(event.defaultPrevented, document.getElementById('dropping').hidden);
+      }
+      return told;
+    }"""
+    assert page.js(drag, kind) == [False, True, True, True, True, True]
+    title = page.page.locator("#chattering-title")
+    title.select_text()
+    title.drag_to(page.page.locator("#verdict"))
+    page.page.wait_for_timeout(200)
+    assert (page.page.url, page.js("document.body.dataset.drawn")) == before
+    assert page.js("document.getElementById('dropping').hidden && document.getElementById('problem').hidden")
+
+
+def test_every_view_and_every_case_has_a_title_of_its_own(opened):
+    page = opened(f"{SINE}&points=8&sweep_points=8")
+    titles = []
+    for view in VIEWS:
+        page.page.click(f"[data-view={view}]")
+        page.until(f"document.title.startsWith({view.capitalize()!r})")
+        titles.append(page.page.title())
+    page.page.click("[data-view=response]")
+    page.rested(lambda: page.page.select_option("#kind", "none"))
+    page.until("document.title.includes('no ground motion')")
+    titles.append(page.page.title())
+    assert titles[0] == "Response: p = 2 rad/s, α = 11.5°, sine 0.206 g – rocking explorer"
+    assert len({*titles}) == len(VIEWS) + 1
+
+
 def test_a_file_of_several_channels_is_dropped(opened):
     page = opened(STATUE)
     text = (Path(__file__).parent / "data" / "formats" / "two.v2").read_text("latin-1")
@@ -472,7 +511,7 @@ def test_the_copied_command_and_the_script_have_the_same_peak(opened, tmp_path):
 
 def test_every_file_can_be_taken_away(opened):
     page = opened(f"{SINE}&from=0.5&to=2")
-    links = page.page.locator("#exports a")
+    files = page.page.locator("#exports button")
     starts = {
         "svg": b"<?xml",
         "png": b"\x89PNG",
@@ -481,10 +520,10 @@ def test_every_file_can_be_taken_away(opened):
         "impacts.csv": b"time_s,side",
         "nc": b"\x89HDF",
     }
-    assert links.count() == len(starts)
+    assert files.count() == len(starts)
     for k, (form, start) in enumerate(starts.items()):
         with page.page.expect_download() as download:
-            links.nth(k).click()
+            files.nth(k).click()
         assert download.value.suggested_filename == f"rocking-response.{form}"
         assert Path(download.value.path()).read_bytes().startswith(start)
 
@@ -587,7 +626,12 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
         saved[name[-3:]] = Path(download.value.path()).read_bytes()
     assert saved["png"].startswith(b"\x89PNG")
     assert b"<svg" in saved["svg"][:200]
-    table = np.genfromtxt(saved["csv"].decode().splitlines(), delimiter=",", names=True)
+    lines = saved["csv"].decode().splitlines()
+    key = [line for line in lines if line.startswith("#")]
+    assert key[0].startswith("# outcome: 0 ") and "; 1 complete" in key[0]
+    assert [line.split(":")[0] for line in key] == ["# outcome", "# rest", "# peak", "# mode"]
+    assert "-1 rocks" in key[3] and "n overturns after n impacts" in key[3]
+    table = np.genfromtxt(lines[len(key) :], delimiter=",", names=True)
     assert table.dtype.names == ("omega", "a", "outcome", "rest", "peak", "mode")
     command = shlex.split(page.text("#command"))
     code = "import sys; from rocking.cli import main; main(sys.argv[1:])"
@@ -864,11 +908,13 @@ def test_a_finger_scrolls_the_page_over_the_plots(opened):
 
 
 @contextmanager
-def notebook(html):
-    """Serve a page that shows a frame, as a notebook does, on a port of its own."""
+def notebook(html, asked=None):
+    """Serve a page that shows a frame, as a notebook does, on a port of its own; keep what it was asked for."""
 
     class Handler(http.server.BaseHTTPRequestHandler):
         def do_GET(self):
+            if asked is not None:
+                asked.append(f"{self.requestline} {self.headers}")
             self.send_response(200)
             self.send_header("content-type", "text/html; charset=utf-8")
             self.end_headers()
@@ -910,6 +956,57 @@ def test_a_foreign_page_cannot_show_the_explorer_in_a_frame(browser, here, opene
         other.goto(f"http://127.0.0.1:{port}/")
         other.wait_for_timeout(500)
         assert other.frames[1].evaluate("document.body?.textContent.includes('Ground motion') ?? false") is False
+
+
+# The secret
+
+READY = "document.body?.dataset.ready && document.body.dataset.rested"
+
+
+def test_a_reload_another_tab_and_the_way_back_know_the_secret_and_no_other_port_is_told(browser, here):
+    context = browser.new_context(viewport=DESK)
+    first = Watched(context.new_page(), allowed=["CORS", "Failed to load", "403"])
+    first.page.goto(here.link({"width": "0.3", "height": "1.2"}))
+    first.until(READY)
+    address, secret = first.page.url, first.js("localStorage.getItem('rocking-secret')")
+    assert len(secret) > 40 and "#" not in address and "token" not in address and secret not in address
+    first.page.reload()
+    first.until(READY)
+    second = Watched(context.new_page())
+    second.page.goto(address)  # typed, or from a bookmark
+    second.until(READY)
+    with context.expect_page() as opening:
+        second.js("void window.open(location.href)")
+    third = Watched(opening.value)
+    third.until(READY)
+    asked = []
+    with notebook("", asked) as port:
+        first.page.goto(f"http://127.0.0.1:{port}/")
+        there = [f"http://127.0.0.1:{here.port}{path}" for path in ("/api/start", "/", "/page/main.js")]
+        for mode in ("cors", "no-cors"):
+            read = "fetch(u, {mode: m, credentials: 'include'}).then((r) => r.text(), () => '')"
+            assert first.js(f"([us, m]) => Promise.all(us.map((u) => {read}))", [there, mode]) == ["", "", ""]
+        assert first.js("Object.keys(localStorage)") == []
+        first.page.evaluate("location.href = 'about:blank'")
+    assert len(asked) >= 1 and not any(secret in each or "ookie" in each for each in asked)
+    first.page.go_back()
+    first.page.go_back()
+    first.until(READY)
+    assert context.cookies() == []
+    assert second.complaints == third.complaints == []
+    context.close()
+
+
+def test_a_browser_without_the_link_is_told_so(browser, here):
+    context = browser.new_context(viewport=DESK)
+    page = Watched(context.new_page(), allowed=["403"])
+    for fragment in ("", "#token=spent"):
+        page.page.goto(f"http://127.0.0.1:{here.port}/?width=0.3&height=1.2{fragment}")
+        page.until("!document.getElementById('problem').hidden")
+        assert "needs the link that rocking explore printed" in page.text("#problem")
+        page.page.goto("about:blank")
+    assert page.complaints == []
+    context.close()
 
 
 # The modules

@@ -1,10 +1,12 @@
 """The server: what it answers, byte by byte; what it refuses; how much it takes."""
 
+import io
 import json
 import math
 import os
 import random
 import re
+import socket
 import struct
 import subprocess
 import sys
@@ -14,23 +16,23 @@ import time
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from urllib.parse import parse_qs, urlencode, urlsplit
+from urllib.parse import urlencode
 
 import httpx
 import numpy as np
 import pytest
-from explorer_client import Client, clients
+from explorer_client import Client, clients, let_in, opened_by
 
 import rocking
-from rocking.errors import InvalidOption, StudyError
-from rocking.explorer import launch, server
+from rocking.errors import InvalidOption, RockingError, StudyError
+from rocking.explorer import connections, launch, server, uploads
 from rocking.explorer.authentication import RequestAuthentication
 from rocking.explorer.background import low_priority
 from rocking.explorer.core import Explorer
 from rocking.explorer.launch import served
 from rocking.explorer.server import App
 from rocking.explorer.studies import StudyView
-from rocking.explorer.uploads import LARGEST, MOST
+from rocking.explorer.uploads import LARGEST, MOST, UploadStore
 
 PORT = 8123
 OURS = f"http://127.0.0.1:{PORT}"
@@ -50,9 +52,7 @@ def opened():
 
         def open_page(app):
             application = RequestAuthentication(app.asgi, PORT)
-            browser = Client(portal, application, OURS, {"sec-fetch-site": "same-origin"}, follow=True)
-            assert browser.get("/", params={"token": application.new_token()}).status_code == 200
-            return browser
+            return let_in(Client(portal, application, OURS), application.new_token())
 
         yield open_page
 
@@ -294,6 +294,67 @@ def test_a_body_that_is_too_large_is_refused_before_and_while_it_comes(page):
     assert peak < 4 * LARGEST
 
 
+def memory_of(act):
+    """Peak of the memory that Python and NumPy take meanwhile, bytes, and what came of it in words."""
+    tracemalloc.start()
+    try:
+        act()
+        words = "read"
+    except RockingError as error:
+        words = str(error)
+    finally:
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    return peak, words
+
+
+HEADED = b"time (s)" + b",a (g)" * 200 + b"\n"
+AT2 = (Path(__file__).parent / "data" / "formats" / "nga.at2").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"0\n" * (LARGEST // 2), "8388608 lines, of which at most 1000000 are read here"),
+        (b"0\r" * (LARGEST // 2), "8388608 lines, of which at most 1000000 are read here"),
+        (b"0\n" * 999_000, "999000 samples; at most 500000 are shown here"),
+        pytest.param(b"0 " * (LARGEST // 2), "each line holds 256 numbers", marks=pytest.mark.thorough),
+        pytest.param(b".1\n" * 490_000, "read", marks=pytest.mark.thorough),
+        pytest.param(b"0;0\n" * 490_000, "the time does not increase", marks=pytest.mark.thorough),
+        pytest.param(AT2 + b"0\n" * 999_000, "NPTS says", marks=pytest.mark.thorough),
+        pytest.param(AT2 + b"0 " * (LARGEST // 2 - 2000), "NPTS says", marks=pytest.mark.thorough),
+        pytest.param(HEADED + (b"0" + b",0" * 200 + b"\n") * 20_000, "the time does not", marks=pytest.mark.thorough),
+    ],
+    ids=lambda value: f"{len(value)}" if isinstance(value, bytes) else "",
+)  # fmt: skip
+def test_reading_a_file_takes_little_more_memory_than_the_file(data, words):
+    store = UploadStore()
+    peak, found = memory_of(lambda: store.contents(store.add_file("x", data)))
+    assert words in found
+    assert peak < 20 * len(data) + 60 * 2**20
+
+
+def test_a_file_that_is_refused_for_its_length_is_not_read_by_its_key_either():
+    store = UploadStore()
+    key = store.add_file("x", b"0\n" * 501_000)
+    peak, words = memory_of(lambda: store.read(key, None, 0.01, "g"))
+    assert "501000 samples; at most 500000 are shown here" in words
+    assert peak < 30 * 2**20
+
+
+def test_a_compressed_record_is_refused_before_it_is_unpacked(monkeypatch):
+    obspy = pytest.importorskip("obspy")
+    packed, quiet = io.BytesIO(), np.zeros(400_000, dtype=np.int32)
+    obspy.Stream([obspy.Trace(quiet)]).write(packed, format="MSEED", encoding="STEIM2", reclen=4096)
+    store = UploadStore()
+    key = store.add_file("x", packed.getvalue())
+    assert memory_of(lambda: store.contents(key))[1] == "read"
+    monkeypatch.setattr(uploads, "_MOST_SAMPLES", 399_999)
+    peak, words = memory_of(lambda: store.contents(key))
+    assert "400000 samples, of which at most 399999 are read here" in words
+    assert peak < 2 * quiet.nbytes
+
+
 @pytest.mark.parametrize(
     "path",
     [
@@ -473,8 +534,8 @@ def running():
 
 @pytest.fixture(scope="module")
 def browser(running):
-    with httpx.Client(follow_redirects=True, headers={"sec-fetch-site": "same-origin"}, timeout=60) as client:
-        assert client.get(running.link()).status_code == 200
+    headers, _, _ = opened_by(running.link())
+    with httpx.Client(headers=headers, timeout=60) as client:
         yield client
 
 
@@ -523,8 +584,6 @@ def test_a_map_that_nobody_reads_any_more_stops(running, browser, path, axes):
     ],
 )
 def test_raw_requests_that_are_none_are_refused(running, raw):
-    import socket
-
     with socket.create_connection(("127.0.0.1", running.port), timeout=10) as connection:
         connection.sendall(raw)
         connection.settimeout(10)
@@ -532,15 +591,87 @@ def test_raw_requests_that_are_none_are_refused(running, raw):
     assert re.match(rb"HTTP/1\.1 (400|403|421|431)", answer), answer[:60]
 
 
+# Connections that ask for nothing
+
+
+def connected(running, data, count, unread=False):
+    """Open connections that have sent some data, and read none where that is said."""
+    opened = []
+    for _ in range(count):
+        one = socket.socket()
+        if unread:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        one.connect(("127.0.0.1", running.port))
+        one.sendall(data.replace(b"PORT", str(running.port).encode()))
+        opened.append(one)
+    return opened
+
+
+def open_at_the_server(running):
+    return len(running.server.server_state.connections)
+
+
+HALF = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n"
+UNREAD = b"GET /library/bokeh.min.js HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n"
+BODY = b"POST /api/records HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nContent-Length: 99\r\nOrigin: http://127.0.0.1:PORT\r\n"
+
+
+@pytest.mark.parametrize(
+    ("data", "count"),
+    [
+        (HALF, 300),
+        pytest.param(b"", 300, marks=pytest.mark.thorough),
+        pytest.param(BODY + b"\r\nx", 300, marks=pytest.mark.thorough),
+        (UNREAD + b"\r\n" + UNREAD + b"\r\n", 130),
+    ],
+    ids=["half a head", "silence", "half a body", "two answers unread"],
+)
+def test_the_page_works_while_many_connections_wait(running, browser, data, count):
+    waiting = connected(running, data, count, unread=b"library" in data)
+    try:
+        for _ in range(3):
+            assert browser.get(f"http://127.0.0.1:{running.port}/api/start").status_code == 200
+        assert open_at_the_server(running) <= connections.MOST + 10
+    finally:
+        for one in waiting:
+            one.close()
+
+
+@pytest.mark.parametrize(
+    ("limit", "data"),
+    [("HEAD", HALF), ("BODY", BODY + b"Authorization: SECRET\r\n\r\n"), ("ANSWER", UNREAD + b"\r\n")],
+    ids=["head", "body", "answer"],
+)
+def test_what_comes_or_is_taken_too_slowly_ends(running, browser, monkeypatch, limit, data):
+    monkeypatch.setattr(connections, limit, 0.2)
+    running.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)  # so that the answer waits in the program
+    secret = browser.headers["authorization"].encode()
+    (slow,) = connected(running, data.replace(b"SECRET", secret), 1, unread=True)
+    start = time.monotonic()
+    with slow:
+        slow.settimeout(5.0)
+        while time.monotonic() < start + 5.0:
+            try:
+                slow.sendall(b"x")
+                time.sleep(0.02)
+            except OSError:
+                break
+    assert 0.15 < time.monotonic() - start < 3.0
+
+
+def test_a_map_may_take_longer_than_any_connection_may_wait(running, browser, monkeypatch):
+    for limit in ("HEAD", "BODY", "ANSWER"):
+        monkeypatch.setattr(connections, limit, 0.01)
+    params = {**SINE, "x": "omega", "y": "a", "points": "24"}
+    found = browser.get(f"http://127.0.0.1:{running.port}/api/map", params=params)
+    assert found.elapsed.total_seconds() > 0.02 and len([*frames(found.content)]) > 4
+
+
 # The command
 
 
 def test_the_command_prints_one_line_and_listens_here_alone():
-    command = (
-        [sys.executable, "-m", "rocking.cli.__main__"]
-        if False
-        else [sys.executable, "-c", "from rocking.cli import main; main()"]
-    )
+    command = [sys.executable, "-c", "from rocking.cli import main; main()"]
     process = subprocess.Popen(
         [*command, "explore", "el-centro-meloland-270", "--no-open"],
         stdout=subprocess.PIPE,
@@ -550,13 +681,13 @@ def test_the_command_prints_one_line_and_listens_here_alone():
     )
     try:
         line = process.stdout.readline()
-        link = re.search(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+", line)[0]
-        with httpx.Client(follow_redirects=True, timeout=60) as client:
-            assert "rocking explorer" in client.get(link).text
-            assert client.get(link.split("/?")[0] + "/api/start").json()["opening"] == {
-                "motion": "el-centro-meloland-270"
-            }
-        assert httpx.get(link, timeout=60).status_code == 403
+        link = re.search(r"http://127\.0\.0\.1:\d+/#token=[\w-]+", line)[0]
+        headers, _, base = opened_by(link)
+        with httpx.Client(headers=headers, timeout=60) as client:
+            assert "rocking explorer" in client.get(base).text
+            assert client.get(f"{base}/api/start").json()["opening"] == {"motion": "el-centro-meloland-270"}
+        with pytest.raises(AssertionError, match="opens once"):
+            opened_by(link)
     finally:
         process.send_signal(2)
         out, err = process.communicate(timeout=30)
@@ -642,13 +773,11 @@ def test_a_response_is_explored_in_a_frame():
     frame = rocking.explore(response)
     html = frame._repr_html_()
     assert "<iframe" in html
-    assert re.search(r"token=[\w-]+", html)
-    with httpx.Client(follow_redirects=True, timeout=60) as client:
-        answer = client.get(frame.link)
-        assert answer.status_code == 200
-        assert "frame-ancestors http://localhost:* http://127.0.0.1:*" in answer.headers["content-security-policy"]
-        texts = {name: values[0] for name, values in parse_qs(urlsplit(str(answer.url)).query).items()}
-        base = str(answer.url).split("/?")[0]
+    assert re.search(r'src="http://127\.0\.0\.1:\d+/\?[^"#]+#token=[\w-]+"', html)
+    headers, texts, base = opened_by(frame.link)
+    with httpx.Client(headers=headers, timeout=60) as client:
+        policy = client.get(base).headers["content-security-policy"]
+        assert "frame-ancestors http://localhost:* http://127.0.0.1:*" in policy
         header, arrays = unpacked(client.get(f"{base}/api/case", params=texts).content)
     assert header["peak_rotation"] == response.peak_rotation
     assert np.array_equal(arrays["impact_time"], response.impacts["time"])

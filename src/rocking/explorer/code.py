@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from rocking.analysis.overturning import PULSES
 from rocking.constants import STANDARD_GRAVITY
-from rocking.explorer.inputs import BLOCK_NAMES, NAMES, Case, arguments_of, is_pulse, pulse_call
+from rocking.explorer.inputs import BLOCK_NAMES, NAMES, Case, arguments_of, as_option, is_pulse, pulse_call
 from rocking.explorer.maps import QUANTITIES, Axis, MapGrid
 from rocking.explorer.periodic import KEPT, PASSED
 from rocking.explorer.sweeps import Sweep, call_at
@@ -237,8 +237,7 @@ def _block_options(texts: Mapping[str, str]) -> dict[str, str]:
 
 
 def _command(words: list[str], options: Mapping[str, str]) -> str:
-    given = ((f"--{each.replace('_', '-')}", value) for each, value in options.items())
-    return shlex.join([*words, *itertools.chain.from_iterable(given)])
+    return shlex.join([*words, *itertools.chain.from_iterable(itertools.starmap(as_option, options.items()))])
 
 
 def _is_overturning_map(grid: MapGrid) -> bool:

@@ -256,7 +256,7 @@ def _with_vertical(found: _Found, horizontal: str, values: Values, uploads: Uplo
     return _Found(
         _together(found.motion, vertical.motion),
         f"{found.python}.with_vertical({vertical.python})",
-        (*found.words, "--vertical", *words) if found.words and words else (),
+        (*found.words, *as_option("vertical", *words)) if found.words and words else (),
     )
 
 
@@ -269,7 +269,10 @@ def _unscaled(name: str, values: Values, uploads: UploadStore) -> _Found:
         return _Found(pulse_of(name), call, ("--pulse", name))
     if kind == "given":
         motion = uploads.motion(key)
-        return _Found(motion, f"...  # {motion.name}: the motion that this page was opened with", ())
+        name = "".join(
+            letter for letter in motion.name if letter.isprintable()
+        )  # one that ends the line ends the comment
+        return _Found(motion, f"...  # {name}: the motion that this page was opened with", ())
     if kind == "file":
         return _from_file(key, values, values.get("channel"), uploads)
     return _Found(_shipped(name), f"rocking.records.load({name!r})", (name,))
@@ -281,7 +284,24 @@ def _from_file(key: str, values: Values, channel: str | None, uploads: UploadSto
     file = uploads.file(key).name
     arguments = _written({name: value for name, value in given.items() if value is not None})
     call = f"rocking.read({file!r}{', ' if arguments else ''}{arguments})"
-    return _Found(uploads.read(key, **given), call, (file,))
+    return _Found(uploads.read(key, **given), call, (as_path(file),))
+
+
+def as_path(name: str) -> str:
+    """Write the name of a file as an argument that no program takes for an option, or for standard input."""
+    return f"./{name}" if name.startswith("-") else name
+
+
+def as_option(name: str, value: str) -> tuple[str, ...]:
+    """Write an option and its value, in one word where the value alone would be taken for another option.
+
+    Examples
+    --------
+    >>> as_option("channel", "HNE"), as_option("channel", "--out")
+    (('--channel', 'HNE'), ('--channel=--out',))
+    """
+    written = f"--{name.replace('_', '-')}"
+    return (f"{written}={value}",) if value.startswith("-") else (written, value)
 
 
 def is_pulse(text: str) -> bool:

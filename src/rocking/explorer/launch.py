@@ -10,6 +10,7 @@ import webbrowser
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from html import escape
 from importlib import util
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
@@ -32,7 +33,7 @@ HERE: Final = "127.0.0.1"
 _NOTEBOOKS: Final = "http://localhost:* http://127.0.0.1:*"
 
 #: Connections at the same time, and those that wait to be accepted.
-_MOST: Final = 200
+_MOST: Final = 400
 _WAITING: Final = 128
 
 
@@ -54,8 +55,8 @@ class Server:
 
     def link(self, texts: Mapping[str, str] | None = None) -> str:
         """Return a link that opens the page once, with the texts of a case."""
-        query = urlencode({**(texts or {}), "token": self.authentication.new_token()})
-        return f"http://{self.host}:{self.port}/?{query}"
+        query = f"?{urlencode(texts)}" if texts else ""
+        return f"http://{self.host}:{self.port}/{query}#token={self.authentication.new_token()}"
 
     def run(self) -> None:
         """Serve until it is interrupted."""
@@ -95,6 +96,7 @@ def served(
     require_packages()
     import uvicorn
 
+    from rocking.explorer.connections import BoundedProtocol
     from rocking.explorer.server import App
 
     application = App(explorer, opening, study, framed_by).asgi
@@ -107,7 +109,8 @@ def served(
         log_level="error",
         access_log=False,
         ws="none",
-        http="h11",
+        http=BoundedProtocol,
+        backlog=_WAITING,
         server_header=False,
         limit_concurrency=_MOST,
         timeout_graceful_shutdown=1,
@@ -169,14 +172,8 @@ class Frame:
         return self._link(self.texts)
 
     def _repr_html_(self) -> str:
-        # The cookie goes to frames of the notebook's own site only: the frame takes the name that the notebook has.
-        choose = (
-            "const frame = document.currentScript.previousElementSibling;"
-            "const host = location.hostname === 'localhost' ? 'localhost' : '127.0.0.1';"
-            f"frame.src = `http://${{host}}{self.link.removeprefix(f'http://{HERE}')}`;"
-        )
         style = f"width:100%;height:{self.height}px;border:0"
-        return f'<iframe title="rocking explorer" style="{style}"></iframe><script>{choose}</script>'
+        return f'<iframe title="rocking explorer" src="{escape(self.link)}" style="{style}"></iframe>'
 
 
 _lock = threading.Lock()

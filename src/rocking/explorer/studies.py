@@ -15,7 +15,7 @@ import rocking
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption, StudyError
-from rocking.explorer.inputs import texts_of_motion
+from rocking.explorer.inputs import as_path, texts_of_motion
 from rocking.explorer.parameters import PARAMETERS
 from rocking.explorer.payload import Payload
 from rocking.explorer.uploads import UploadStore
@@ -140,7 +140,7 @@ class StudyView:
             "quantity": quantity,
             "shape": values.shape,
             "python": f"import rocking\n\n{script}",
-            "command": shlex.join(["rocking", "study", "report", self.name]),
+            "command": shlex.join(["rocking", "study", "report", as_path(self.name)]),
         }
         return Payload(header, {"values": values.ravel()})
 

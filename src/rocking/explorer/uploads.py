@@ -6,11 +6,13 @@ import hashlib
 import io
 import threading
 from collections import OrderedDict
+from dataclasses import replace
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, Final, NamedTuple
 
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion import formats
+from rocking.motion.formats.channel import Channel
 from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
 from rocking.plausibility import motion_notes
@@ -21,8 +23,11 @@ LARGEST: Final = 16 * 2**20
 #: Files that are kept; the one that was not used for longest is the first to go.
 MOST: Final = 12
 
-#: Samples of one channel at most: an hour and a half at a hundred a second.
+#: Samples of one channel at most: an hour and a half at a hundred a second. A motion takes some 120 bytes for each.
 LONGEST: Final = 500_000
+
+#: Lines of a file at most: two such channels with a line for each sample. Samples that may be compressed in one.
+_MOST_LINES, _MOST_SAMPLES = 2 * LONGEST, 8 * LONGEST
 
 #: Letters of a name, and of a hash.
 _NAME, _HASH = 80, 24
@@ -59,6 +64,11 @@ class UploadStore:
         if len(data) > LARGEST:
             raise UnreadableRecord(
                 f"larger than {LARGEST // 2**20} MiB; cut the record into smaller files", path=upload.name
+            )
+        if (lines := max(data.count(b"\n"), data.count(b"\r"))) > _MOST_LINES and b"\0" not in data:
+            raise UnreadableRecord(
+                f"{lines} lines, of which at most {_MOST_LINES} are read here; cut the record into smaller files",
+                path=upload.name,
             )
         key = hashlib.sha256(data).hexdigest()[:_HASH]
         with self._lock:
@@ -100,11 +110,7 @@ class UploadStore:
             known = self._read.get(request)
         if known is not None:
             return known
-        motion = formats.read(upload.stream(), channel=channel, dt=dt, units=units)
-        if len(motion.coefficients) > LONGEST:
-            raise InvalidMotion(
-                f"{len(motion.coefficients)} samples; at most {LONGEST} are shown here", path=upload.name
-            )
+        motion = _shown(upload, formats.chosen(upload.stream(), _request(dt, units, channel)))
         with self._lock:
             _keep(self._read, request, motion)
         return motion
@@ -116,7 +122,7 @@ class UploadStore:
         missing: list[str] = []
         while True:
             try:
-                identification, channels = formats.content(upload.stream(), Request.checked(**given))
+                identification, channels = formats.content(upload.stream(), _request(**given))
                 break
             except (UnreadableRecord, InvalidMotion) as error:
                 name = error.argument
@@ -131,10 +137,22 @@ class UploadStore:
             "reason": identification.reason,
             "missing": missing,
             "channels": [
-                {"number": each.number, "name": each.name, "notes": list(motion_notes(each.motion()))}
+                {"number": each.number, "name": each.name, "notes": list(motion_notes(_shown(upload, each)))}
                 for each in channels
             ],
         }
+
+
+def _request(dt: float | None, units: str | None, channel: str | None = None) -> Request:
+    return replace(Request.checked(dt, units, channel), most=_MOST_SAMPLES)
+
+
+def _shown(upload: Upload, channel: Channel) -> Motion:
+    """Return a channel as a motion, unless it is longer than the page shows."""
+    samples = len(channel.acceleration)
+    if samples > LONGEST:
+        raise InvalidMotion(f"{samples} samples; at most {LONGEST} are shown here", path=upload.name)
+    return channel.motion()
 
 
 def bare_name(name: str) -> str:

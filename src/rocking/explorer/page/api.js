@@ -1,5 +1,7 @@
 // Requests to the server: one at a time for each purpose, and the latest wins.
 
+import {headers} from "./secret.js";
+
 /** @typedef {Record<string, string>} Texts */
 /** @typedef {{header: any, arrays: Record<string, Float64Array>}} Payload */
 
@@ -13,7 +15,7 @@ export class Problem extends Error {
 }
 
 /** @param {string} path @param {Texts} texts */
-export function address(path, texts) {
+function address(path, texts) {
   const query = new URLSearchParams(texts).toString();
   return query ? `${path}?${query}` : path;
 }
@@ -22,7 +24,7 @@ export function address(path, texts) {
 async function answer(path, texts, options) {
   let response;
   try {
-    response = await fetch(address(path, texts), options);
+    response = await fetch(address(path, texts), {...options, headers});
   } catch (error) {
     if (error instanceof DOMException) throw error;
     throw new Problem("The explorer does not answer: was it ended? Start it again with rocking explore.");
@@ -36,6 +38,11 @@ async function answer(path, texts, options) {
 /** @param {string} path @param {Texts} texts @param {RequestInit} [options] @returns {Promise<any>} */
 export async function json(path, texts, options) {
   return (await answer(path, texts, options)).json();
+}
+
+/** A file that the server makes. @param {string} path @param {Texts} texts @returns {Promise<Blob>} */
+export async function file(path, texts) {
+  return (await answer(path, texts)).blob();
 }
 
 /** Header and arrays; the arrays are views of what came, not copies.

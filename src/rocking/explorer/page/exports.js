@@ -1,7 +1,7 @@
 // What can be saved or copied: figures, data, and the case as code.
 
 import {ends} from "./parameters.js";
-import {address} from "./api.js";
+import {file} from "./api.js";
 import {make, one, say} from "./words.js";
 
 const FORMS = /** @type {[string, string, boolean][]} */ ([
@@ -9,17 +9,26 @@ const FORMS = /** @type {[string, string, boolean][]} */ ([
   ["impacts.csv", "Impacts, CSV", false], ["nc", "All, NetCDF", false],
 ]);
 
-/** Files of a case, which the server makes; figures show its window. @param {import("./parameters.js").State} state */
-export function showFiles(state) {
-  one("exports").replaceChildren(...FORMS.map(([form, label, windowed]) => make("a", {
-    href: address("/api/export", {...state.texts, form, ...(windowed ? ends(state) : {})}), download: `rocking-response.${form}`,
-  }, [label])));
+/** Files of a case, which the server makes; figures show its window. @param {import("./parameters.js").State} state
+ * @param {(error: unknown) => void} problem is told what went wrong */
+export function showFiles(state, problem) {
+  offer(FORMS.map(([form, label, windowed]) => [
+    `rocking-response.${form}`, label, () => file("/api/export", {...state.texts, form, ...(windowed ? ends(state) : {})}),
+  ]), problem);
+}
+
+/** @typedef {[string, string, () => Promise<Blob>][]} Files names, labels, and what makes them */
+/** Buttons that save files. @param {Files} files @param {(error: unknown) => void} [problem] is told what went wrong */
+function offer(files, problem) {
+  one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => {
+    try { save(name, await content()); } catch (error) { if (problem) problem(error); else throw error; }
+  }}}, [label])));
 }
 
 /** Files of a map or a diagram, which the page makes of what it has. @param {string} what @param {string} python @param {string | null} command
- * @param {[string, string, () => Promise<Blob>][]} files names, labels, and what makes them */
+ * @param {Files} files */
 export function showExports(what, python, command, files) {
-  one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => save(name, await content())}}, [label])));
+  offer(files);
   showCode(what, python, command);
 }
 

@@ -76,7 +76,7 @@ const afterPause = new Latest(async () => {
   chattering.window(header.window);
   if (state.view === "response") chattering.draw(page.shown, texts);
   if (!ofOwn(state.view)) {
-    showFiles(state);
+    showFiles(state, problem);
     const {python, command} = await json("/api/code", texts);
     if (state.texts === texts && !ofOwn(state.view)) showCode("case", python, command);
   }
@@ -92,7 +92,7 @@ const look = new Latest(async () => {
   Object.assign(page.shown.arrays, arrays);
   draw();
   chattering.window(header.window);
-  showFiles(state);
+  showFiles(state, problem);
   counted("drawn");
 }, problem);
 
@@ -154,6 +154,7 @@ async function go(name) {
 function draw() {
   if (!page.shown) return;
   const {header, arrays} = page.shown;
+  entitle(header);
   put(one("verdict"), header.verdict);
   showFigures(header);
   const [plus, minus] = header.block.thresholds_g;
@@ -165,6 +166,15 @@ function draw() {
     histories.draw(header, {lines, rest: arrays.rest, uplift: arrays.uplift, block: header.block});
   }
   views[state.view]?.draw?.();
+}
+
+/** Name the view and the case, for tabs and bookmarks. @param {any} header */
+function entitle({block, motion}) {
+  const view = document.querySelector("[data-view][aria-current]")?.textContent;
+  const {study} = specification, [{p, alpha}] = block.sides;
+  const shaken = motion ? `${motion.name} ${short(motion.pga_g)} g` : "no ground motion";
+  const shown = study && state.view === "map" ? `study ${study.name}` : `p = ${short(p)} rad/s, α = ${short((alpha * 180) / Math.PI)}°, ${shaken}`;
+  document.title = `${view}: ${shown} – rocking explorer`;
 }
 
 /** Write a text where it is another one. @param {Node} node @param {string} text */

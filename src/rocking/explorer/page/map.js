@@ -245,7 +245,18 @@ export class View {
     const rows = y.values.flatMap((/** @type {number} */ up, /** @type {number} */ row) => x.values.map((/** @type {number} */ right, /** @type {number} */ column) => [
       right, up, ...(this.values ?? []).map((/** @type {Float32Array} */ all) => Number(all[row * x.values.length + column].toPrecision(7))),
     ].map((each) => (Number.isNaN(each) ? "" : each === Infinity ? "inf" : String(each))).join(",")));
-    return [[...head, ...quantities].join(","), ...rows, ""].join("\n");
+    return [...this.meanings(quantities), [...head, ...quantities].join(","), ...rows, ""].join("\n");
+  }
+
+  /** What the codes in a table stand for, as comments at its head. @param {string[]} quantities */
+  meanings(quantities) {
+    /** @type {Record<string, string>} */
+    const measured = {rest: "s from uplift to rest, empty where it never rests", peak: "rotation over slenderness, inf where it overturns"};
+    return quantities.flatMap((name) => {
+      const kinds = this.kinds(name)?.map(([value, text]) => (name === "mode" && value === 2 ? "n overturns after n impacts" : `${value} ${text}`));
+      const words = kinds ? kinds.join("; ") : measured[name];
+      return words ? [`# ${name}: ${words}`] : [];
+    });
   }
 
   async slice() {

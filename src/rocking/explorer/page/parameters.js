@@ -1,14 +1,24 @@
 // What the server says about the parameters of a case, from which the forms are built; and the state of the page, as the
 // address has it: whoever opens the link sees the same.
 
-import {json} from "./api.js";
+import {Problem, json} from "./api.js";
+import {one} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts, sweep: Texts}} State */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
 
 /** @type {any} */
-export const specification = await json("/api/start", {});
+export const specification = await json("/api/start", {}).catch(stop);
+
+/** Say why the page cannot open, and wait for ever: without what the server says of the parameters there is no page.
+ * @param {unknown} error @returns {Promise<never>} */
+function stop(error) {
+  if (!(error instanceof Problem)) throw error;
+  one("problem").textContent = error.message;
+  one("problem").hidden = false;
+  return new Promise(() => {});
+}
 
 /** @param {string} name @returns {Parameter} */
 export const parameter = (name) => specification.parameters.find((/** @type {Parameter} */ each) => each.name === name);

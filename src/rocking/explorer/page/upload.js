@@ -24,10 +24,15 @@ export function acceptFiles(take) {
     input.value = "";
     if (file) void take(() => sendFile(file), upwards);
   });
+  // Text and links that are dragged are nothing to open, and the browser shall not go where they lead.
+  const brings = (/** @type {DragEvent} */ event) => event.dataTransfer?.types.includes("Files") ?? false;
   let depth = 0;
-  window.addEventListener("dragenter", () => { depth += 1; dropping.hidden = false; });
-  window.addEventListener("dragleave", () => { depth -= 1; dropping.hidden = depth <= 0; });
-  window.addEventListener("dragover", (event) => event.preventDefault());
+  window.addEventListener("dragenter", (event) => { if (brings(event)) { depth += 1; dropping.hidden = false; } });
+  window.addEventListener("dragleave", (event) => { if (brings(event)) { depth -= 1; dropping.hidden = depth <= 0; } });
+  window.addEventListener("dragover", (event) => {
+    event.preventDefault();
+    if (event.dataTransfer && !brings(event)) event.dataTransfer.dropEffect = "none";
+  });
   window.addEventListener("drop", (event) => {
     event.preventDefault();
     depth = 0;

@@ -91,8 +91,13 @@ def read(
 
 def read_as(path: str | os.PathLike[str] | BinaryIO, request: Request) -> Motion:
     """Read one channel as `read` does."""
+    return chosen(path, request).motion()
+
+
+def chosen(path: str | os.PathLike[str] | BinaryIO, request: Request) -> Channel:
+    """Return the channel of a record file that `read` makes a motion of."""
     source = open_source(path)
-    return _choose(source, _recognised(source).read(request), request).motion()
+    return _choose(source, _recognised(source).read(request), request)
 
 
 def read_vertical(path: str | os.PathLike[str], name: str, request: Request) -> Motion:

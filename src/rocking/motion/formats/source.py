@@ -207,7 +207,8 @@ _SAME_STEP = 1e-6
 class Request:
     """The arguments `dt` (s), `units` and `channel` of a read; None where the file should know.
 
-    Where they are given for several files at once they are for those that do not say, or hold several channels; for one
+    ``most`` is how many samples may be unpacked from a file that is compressed; None is any number. Where arguments are
+    given for several files at once they are for those that do not say, or hold several channels; for one
     alone they must not contradict it.
     """
 
@@ -215,6 +216,7 @@ class Request:
     unit: Unit | None = None
     channel: int | str | None = None
     several: bool = False
+    most: int | None = None
 
     @classmethod
     def checked(

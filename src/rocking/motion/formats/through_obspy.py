@@ -47,6 +47,8 @@ def recognise(source: Source) -> Recognised | None:
 def _read(source: Source, name: str, request: Request) -> list[Channel]:
     """Return all traces of the file, times their calibration factor."""
     unit = request.units(source, None, None)
+    if request.most is not None:
+        _refuse_long(source, name, request.most)
     traces = _traces(source, name)
     if isinstance(traces, str):
         raise source.error(f"ObsPy's {name} reader cannot read this ({traces}); get the record again")
@@ -74,6 +76,14 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, form: str
         station=station,
         metadata={"format": form, "file": source.file},
     )
+
+
+def _refuse_long(source: Source, name: str, most: int) -> None:
+    """Refuse a file that says it holds more samples, before they are unpacked."""
+    traces = _traces(source, name, headonly=True)
+    samples = 0 if isinstance(traces, str) else sum(int(trace.stats.npts) for trace in traces)
+    if samples > most:
+        raise source.error(f"{samples} samples, of which at most {most} are read here; cut it into smaller files")
 
 
 def _refuse_cut(source: Source, traces: Any) -> None:
@@ -110,8 +120,8 @@ def _claimed_by(name: str, source: Source) -> bool:
             return False
 
 
-def _traces(source: Source, name: str) -> Any:
-    """Return ObsPy's traces, or the reason why there are none."""
+def _traces(source: Source, name: str, *, headonly: bool = False) -> Any:
+    """Return ObsPy's traces, or the reason why there are none; their heads alone where the format knows them."""
     import obspy
     from obspy.io.mseed import InternalMSEEDWarning
 
@@ -120,7 +130,7 @@ def _traces(source: Source, name: str) -> Any:
         # What does not pass MiniSEED's own check of its numbers is a warning only.
         warnings.simplefilter("error", InternalMSEEDWarning)
         try:
-            traces = obspy.read(io.BytesIO(source.raw), format=name)
+            traces = obspy.read(io.BytesIO(source.raw), format=name, headonly=headonly)
         except Exception as error:
             # ObsPy's readers raise whatever their parsing ran into.
             return " ".join(str(error).split())[:_REASON_LENGTH] or type(error).__name__

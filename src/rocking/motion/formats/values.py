@@ -211,7 +211,7 @@ _NUMERIC = b"0123456789+-.eEdD"
 _BLANKS = b" \t\n\v"
 _IS_OTHER = bytes(0 if c in _NUMERIC + _BLANKS else 1 for c in range(256))
 #: Bytes at once: the numbers in them take some fifty times the memory while they are converted.
-_CHUNK = 2**20
+_CHUNK = 2**18
 _SPACE = re.compile(rb"\s")
 _LINE_END = re.compile(rb"\n")
 
