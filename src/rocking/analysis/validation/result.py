@@ -213,7 +213,7 @@ class ModelValidation(DrawnResult, TableResult):
             notes.append(f"{all_or_none} overturned the specimen: the base rate is perfect, and no skill is known")
         if self.brier.clusters < 10:
             few = counted(self.brier.clusters, "cluster")
-            notes.append(f"the tests are {few} only of such as belong together: standard errors are rough")
+            notes.append(f"the tests belong to {few} only: standard errors are rough")
         if math.isinf(self.log_loss.value):
             notes.append("the log loss is infinite, as a certainty failed: give what is not known of the specimen")
         if self.unexplained:
@@ -319,7 +319,9 @@ def _with_units(row: dict[str, Any]) -> dict[str, Any]:
 def _with_error(value: float, error: float) -> tuple[str, str]:
     """Value and standard error as text, to two digits of the error."""
     if not (math.isfinite(value) and math.isfinite(error)):
-        return ("-" if math.isnan(value) else "infinite" if math.isinf(value) else f"{value:.3g}"), "-"
+        if math.isinf(value):
+            return ("infinite" if value > 0.0 else "-infinite"), "-"
+        return ("-" if math.isnan(value) else f"{value:.3g}"), "-"
     digits = 3 if error == 0.0 else max(0, 1 - math.floor(math.log10(error)))
     return f"{value:.{digits}f}", f"{error:.{digits}f}"
 
