@@ -380,6 +380,26 @@ DROP = """async ([name, text]) => {
 }"""
 
 
+HOSTILE = ["x<img src=x id=hostile onerror=alert(1)>", '"><style id=hostile>*{display:none}', "$$hostile{$$"]
+
+
+def test_names_of_files_and_channels_are_shown_as_they_are_written(opened):
+    page = opened(STATUE)
+    channels = ["a", "&amp;&lt;b&gt;", "$$\\hostile{$$"]
+    rows = "".join(f"{0.01 * k:.2f},{0.3 * (-1) ** (k // 20)},0.1,0.2\n" for k in range(100))
+    text = "time (s)," + ",".join(f"{name} (g)" for name in channels) + "\n" + rows
+    for k, name in enumerate(HOSTILE):
+        page.rested(lambda name=name, k=k: page.js(DROP, [name, f"{text}1.{k},0,0,0\n"]))
+        shown = page.js("Array.from(document.getElementById('channel').options, (each) => each.textContent)")
+        assert len(shown) == 3 and all(channel in each for channel, each in zip(channels, shown, strict=True))
+        assert repr(name) in page.text("#python") and shlex.quote(name) in page.text("#command")
+        for view in VIEWS:
+            page.page.click(f"[data-view={view}]")
+            page.page.wait_for_timeout(150)
+        assert page.js("document.getElementById('hostile')") is None
+        page.rested(lambda: page.page.click("[data-view=response]"))
+
+
 @pytest.mark.parametrize("kind", ["text/plain", "text/uri-list"])
 def test_dragged_text_opens_nothing_and_leads_nowhere(opened, kind):
     page = opened(STATUE)

@@ -348,7 +348,7 @@ def test_a_compressed_record_is_refused_before_it_is_unpacked(monkeypatch):
     obspy.Stream([obspy.Trace(quiet)]).write(packed, format="MSEED", encoding="STEIM2", reclen=4096)
     store = UploadStore()
     key = store.add_file("x", packed.getvalue())
-    assert memory_of(lambda: store.contents(key))[1] == "read"
+    assert len(store.contents(key)["channels"]) == 1
     monkeypatch.setattr(uploads, "_MOST_SAMPLES", 399_999)
     peak, words = memory_of(lambda: store.contents(key))
     assert "400000 samples, of which at most 399999 are read here" in words
@@ -367,6 +367,8 @@ def test_a_compressed_record_is_refused_before_it_is_unpacked(monkeypatch):
         "/library/..%5c..%5cx.js",
         "/page/main.js%00",
         "/page/.",
+        "/page/main.js/",
+        "/page//evil.example/",
         "/page/",
         "/api/records/..%2f..%2fetc%2fpasswd",
         "//etc/passwd",
@@ -570,6 +572,76 @@ def test_a_map_that_nobody_reads_any_more_stops(running, browser, path, axes):
     assert browser.get(f"{base}/api/case", params=STATUE).status_code == 200
 
 
+def connected(running, data, count, unread=False):
+    """Open connections that have sent some data, and read none where that is said."""
+    opened = []
+    for _ in range(count):
+        one = socket.socket()
+        if unread:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        one.connect(("127.0.0.1", running.port))
+        one.sendall(data.replace(b"PORT", str(running.port).encode()))
+        opened.append(one)
+    return opened
+
+
+HEAD = b"HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: http://127.0.0.1:PORT\r\n"
+KNOWN = HEAD + b"Authorization: SECRET\r\n"
+PACKED = KNOWN + b"Transfer-Encoding: chunked\r\n\r\n"
+ATTACKS = [
+    (b"GET /api/start " + HEAD + b"\r\n", 403),
+    (b"GET /api/start " + KNOWN + b"\r\n", 200),
+    (b"GET /api/start?" + b"a=1&" * 15_000 + b" " + HEAD + b"\r\n", 403),
+    (b"GET /api/start?" + b"a=1&" * 15_000 + b" " + KNOWN + b"\r\n", 200),
+    (b"GET /api/start?" + b"a" * 200_000 + b" " + KNOWN + b"\r\n", 400),
+    (b"GET /%61pi/start " + HEAD + b"\r\n", 403),
+    (b"GET //api/start " + HEAD + b"\r\n", 403),
+    (b"GET http://127.0.0.1:PORT/api/start " + HEAD + b"\r\n", 403),
+    (b"GET /page/../api/start " + HEAD + b"\r\n", 404),
+    (b"GET /page/..%2f..%2fserver.py " + HEAD + b"\r\n", 404),
+    (b"GET /page/main.js%00.css " + HEAD + b"\r\n", 404),
+    (b"GET /page/%0d%0aset-cookie:a=b " + HEAD + b"\r\n", 404),
+    (b"GET /page/main.js/ " + HEAD + b"\r\n", 404),
+    (b"GET /api/start " + HEAD + b"X: a\r\n Authorization: SECRET\r\n\r\n", 403),
+    (b"GET /api/export?form=svg%0d%0aset-cookie:a " + KNOWN + b"\r\n", 422),
+    (b"POST /api/records?name=%0d%0aset-cookie:a " + KNOWN + b"Content-Length: 1\r\n\r\nx", 422),
+    (b"POST /api/records?name=x " + KNOWN + b"Content-Length: 4\r\nContent-Length: 5\r\n\r\nabcd", 400),
+    (b"POST /api/records?name=x " + KNOWN + b"Content-Length: 999999999\r\n\r\nx", 413),
+    (b"POST /api/records?name=x " + KNOWN + b"Content-Length: \xd9\xa3\r\n\r\nabc", 400),
+    (b"POST /api/records?name=x " + KNOWN + b"Transfer-Encoding: gzip\r\n\r\nx", 400),
+    (b"POST /api/records?name=x " + PACKED + b"-1\r\nx", 400),
+    (b"POST /api/records?name=x " + PACKED + b"1\r\nx\r\n0\r\n\r\n", 422),
+    (b"POST /api/records?name=x " + HEAD + b"Expect: 100-continue\r\nContent-Length: 9\r\n\r\n", 403),
+    (b"TRACE /api/start " + KNOWN + b"\r\n", 405),
+    (b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 421),
+    (b"GET / HTTP/1.0\r\n\r\n", 421),
+]
+
+
+@pytest.mark.parametrize(("raw", "status"), ATTACKS, ids=range(len(ATTACKS)))
+def test_what_an_attacker_writes_is_answered_as_it_should_be(running, browser, raw, status):
+    secret = browser.headers["authorization"].encode()
+    (connection,) = connected(running, raw.replace(b"SECRET", secret), 1)
+    with connection:
+        connection.settimeout(10)
+        answer = connection.recv(4096)
+    assert answer.startswith(b"HTTP/1.1 %d " % status), answer[:60]
+    assert b"set-cookie" not in answer.partition(b"\r\n\r\n")[0].lower()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux lists the sockets of a process as files")
+def test_nothing_listens_beyond_this_machine(running):
+    own = {str(each.readlink()) for each in Path("/proc/self/fd").iterdir() if each.is_symlink()}
+    found = []
+    for family, here in (("tcp", "0100007F"), ("tcp6", "00000000000000000000000001000000")):
+        for line in Path(f"/proc/self/net/{family}").read_text().splitlines()[1:]:
+            _, local, _, state, *_, inode = line.split()[:10]
+            if state == "0A" and f"socket:[{inode}]" in own:
+                found.append((local.split(":")[0] == here, int(local.split(":")[1], 16)))
+    assert (True, running.port) in found
+    assert all(loopback for loopback, _ in found)
+
+
 @pytest.mark.parametrize(
     "raw",
     [
@@ -592,19 +664,6 @@ def test_raw_requests_that_are_none_are_refused(running, raw):
 
 
 # Connections that ask for nothing
-
-
-def connected(running, data, count, unread=False):
-    """Open connections that have sent some data, and read none where that is said."""
-    opened = []
-    for _ in range(count):
-        one = socket.socket()
-        if unread:
-            one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
-        one.connect(("127.0.0.1", running.port))
-        one.sendall(data.replace(b"PORT", str(running.port).encode()))
-        opened.append(one)
-    return opened
 
 
 def open_at_the_server(running):

@@ -173,6 +173,7 @@ class App:
             exception_handlers={RockingError: _refusal, Exception: _failure},
             lifespan=self._lifespan,
         )
+        self.asgi.router.redirect_slashes = False
 
     @asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:

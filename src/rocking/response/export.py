@@ -157,6 +157,8 @@ def figure(
     if units == "slenderness" and any(map(math.isinf, balance)):
         units = "rad"
     sequence = _longest_sequence(response, start, end) if longest_sequence else None
+    # A dollar in a name begins no formula.
+    shaken = "no motion" if motion is None else motion.label.replace("$", r"\$")
     return response_figure(
         time=times,
         rotation=response.states(times)[:, 0],
@@ -174,7 +176,7 @@ def figure(
         chattering=None if sequence is None else DrawnSequence(*sequence),
         units=units,
         label="" if coordinate.unit == "rad" else f"{coordinate.name} ({coordinate.unit})",
-        title=title or f"{title_of(body)} under {'no motion' if motion is None else motion.label}",
+        title=title or f"{title_of(body)} under {shaken}",
         ax=ax,
         figsize=figsize,
     )
