@@ -2,9 +2,10 @@
 
 import json
 
+import numpy as np
 import pytest
 
-from rocking import dynamics, pulses
+from rocking import Block, Damper, RestrainedBlock, Tendon, Thrust, dynamics, pulses
 
 SINE = "sine:amplitude=12,frequency=5Hz"
 
@@ -58,6 +59,7 @@ def test_branches_that_begin_at_flips_are_followed_one_after_the_other_and_writt
         ("--oscillator", "frequency=1,restitution=0.8,stop=0.01,damping-ratio=0.05"),
         ("--pendulum", "p=3,gap=0.1,restitution=0.6"),
         ("--width", 0.8, "--height", 2.0, "--model", "linear"),
+        ("--width", 0.5, "--height", 3.0, "--mass", 4000, "--one-sided", "--thrust", "force=500,height=2"),
     ],
 )
 def test_every_body_is_shown_in_a_table(run, body):
@@ -86,6 +88,9 @@ def test_every_body_is_shown_in_a_table(run, body):
         (("--ball", 0.5, "--along", "amplitude:16:9"), "a lower value to a higher one"),
         (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", 12), "leave --switch"),
         (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", "wide"), "--switch"),
+        (("--ball", 0.5, "--spring", 9.0), "leave --spring out"),
+        (("--width", 0.5, "--height", 3.0, "--mass", 9, "--tendon", "stiffness=9,strength=5"), "a tendon that yields"),
+        (("--width", 0.5, "--height", 3.0, "--spring", 9.0), "needs its --mass"),
         ((), "a block is needed"),
     ],
 )
@@ -93,3 +98,38 @@ def test_a_mistake_is_one_line(run, arguments, words):
     code, out, err = run("orbits", "--pulse", SINE, *arguments)
     assert (code, out) == (2, "")
     assert words in err and len(err.splitlines()) == 1
+
+
+SIZES = ("--width", 0.5, "--height", 3.0, "--mass", 4000)
+COLUMN = Block(width=0.5, height=3.0, mass=4e3)
+
+
+def test_a_diagram_takes_restraints(run, tmp_path):
+    options = (*SIZES, "--tendon", "stiffness=3e5,prestress=1e3", "--damper", 2e3, "--pulse", "sine:frequency=1.5Hz")
+    few = ("--along", "amplitude:2,2.5", "--transient", 20, "--kept", 4, "--direction", "up")
+    code, _, err = run("bifurcation", *options, *few, "--out", tmp_path)
+    assert (code, err) == (0, "")
+    tied = RestrainedBlock(COLUMN, Tendon(3e5, prestress=1e3), Damper(2e3))
+    found = dynamics.bifurcation_diagram(
+        lambda a: (tied, pulses.sine(a, 1.5, cycles=1)), [2.0, 2.5], (0.01, 0.0), direction="up", transient=20, kept=4
+    )
+    header, *rows = (tmp_path / "states.csv").read_text().splitlines()
+    table = found.to_dataframe("states")
+    assert len(rows) == len(table) > 0
+    assert header.split(",")[0] == str(table.columns[0])
+    assert float(rows[-1].split(",")[-1]) == pytest.approx(float(table.iloc[-1, -1]), rel=1e-12)
+
+
+def test_a_basin_of_a_wall_lies_before_its_stop(run, tmp_path):
+    options = (*SIZES, "--one-sided", "--thrust", "force=500,height=2", "--pulse", "sine:amplitude=2.5,frequency=1.5Hz")
+    grid = ("--positions", "0.5deg:5deg:6", "--velocities=-0.3:0.3:5", "--periods", 50)
+    code, out, err = run("basin", *options, *grid, "--json", "--out", tmp_path)
+    assert (code, err) == (0, "")
+    wall = RestrainedBlock(COLUMN, Thrust(5e2, 2.0), one_sided=True)
+    at = np.deg2rad(np.linspace(0.5, 5.0, 6))
+    found = dynamics.basins(wall, pulses.sine(2.5, 1.5, cycles=1), at, np.linspace(-0.3, 0.3, 5), 50)
+    shares = [[(each["attractor"], each["share"]) for each in one["attractors"]]
+              for one in (json.loads(out), found.to_dict())]  # fmt: skip
+    assert shares[0] == shares[1]
+    assert len(shares[0]) >= 2
+    assert "basin.png" in {path.name for path in tmp_path.iterdir()}

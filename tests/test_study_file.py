@@ -365,3 +365,107 @@ def test_units_are_for_those_of_several_records_that_do_not_say_theirs(file, tmp
     )
     file.write_text(vertical)
     assert read_study(file).product.motions[0].vertical.pga == pytest.approx(says.pga)
+
+
+# Walls and blocks with restraints
+
+WALLS = """\
+[blocks]
+width = [0.5, 0.6]
+height = 4.0
+mass = 5000
+one_sided = true
+lean = ["0deg", "0.5deg"]
+restitution = 0.4
+spring = 2e3
+
+[[blocks.thrusts]]
+force = [300, 600]
+height = 3
+
+[[blocks.loads]]
+mass = 100
+height = 4
+follows = false
+
+[[blocks.tendons]]
+stiffness = 1e5
+offset = -0.1
+
+[motions]
+records = ["ridgecrest-clc-090", "el-centro-meloland-270"]
+
+[scales]
+pga = [1.0, 2.0, 3.0, 4.0]
+polarity = "both"
+
+[report.fragility]
+blocks = "together"
+"""
+
+
+@pytest.fixture
+def walls(tmp_path):
+    path = tmp_path / "walls.toml"
+    path.write_text(WALLS)
+    return path
+
+
+def test_a_file_may_describe_walls_and_restraints(walls):
+    truth = [
+        rocking.RestrainedBlock(
+            rocking.Block(width=width, height=4.0, mass=5e3, restitution=0.4),
+            rocking.Spring(2e3), rocking.Tendon(1e5, offset=-0.1), rocking.Thrust(force, 3.0),
+            rocking.Load(100.0, 4.0, follows=False), one_sided=True, lean=np.deg2rad(lean), restitution=0.4,
+        )
+        for width in (0.5, 0.6) for lean in (0.0, 0.5) for force in (300.0, 600.0)
+    ]  # fmt: skip
+    found, wanted = read_study(walls).product.bodies, truth[0].alone().of(truth)
+    assert len(found) == 8
+    for name, (values, _) in wanted.parameters().items():
+        np.testing.assert_allclose(found.parameters()[name][0], values, rtol=1e-12, err_msg=name)
+
+
+def test_the_fragility_of_a_study_of_walls_is_that_of_the_function(walls, run, tmp_path):
+    bodies = read_study(walls).product.bodies
+    folder = tmp_path / "study"
+    assert run("study", "create", str(walls), str(folder))[0] == 0
+    assert run("study", "run", str(folder))[0] == 0
+    code, _, err = run("study", "report", str(folder), "--out", str(tmp_path / "report"))
+    assert code == 0, err
+    motions = [rocking.records.load(name) for name in ("ridgecrest-clc-090", "el-centro-meloland-270")]
+    truth = rocking.fragility(bodies, motions, levels=[1.0, 2.0, 3.0, 4.0], polarity="both").curves[0]
+    study = rocking.study(folder)
+    assert study.fragility().curves[0].median == pytest.approx(truth.median, rel=1e-9)
+    assert study.fragility().curves[0].dispersion == pytest.approx(truth.dispersion, rel=1e-9)
+    written = json.loads((tmp_path / "report" / "result.json").read_text())["fragility"]["curves"][0]
+    assert written["median"] == pytest.approx(truth.median, rel=1e-9)
+    assert 0 < written["exceeded"] < written["outcomes"] == 8 * 2 * 2 * 4
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "sentence"),
+    [
+        ("mass = 5000\n", "", 1, "needs its mass, kg"),
+        ("width = [0.5, 0.6]\nheight = 4.0\nmass = 5000\n", "p = 2\nalpha = 0.1\n", 4, "goes with width and pivots"),
+        ("one_sided = true", "one_sided = 1", 5, "one_sided must be true or false"),
+        ('"0.5deg"', '"50deg"', 6, "0.872665 rad falls"),
+        ("spring = 2e3", "spring = 0", 8, "stiffness must be a positive number"),
+        ("[[blocks.thrusts]]", "[[blocks.thrust]]", 10, "no thrust; did you mean thrusts"),
+        ("[[blocks.thrusts]]", "[blocks.thrusts]", 10, r"thrusts must be tables, \[\[blocks.thrusts\]\]"),
+        ("force = [300, 600]", "forze = 300", 11, r"\[\[blocks.thrusts\]\] has no forze; did you mean force"),
+        ("force = [300, 600]", "force = [300, 0]", 11, "force of a thrust must not be zero"),
+        ("force = [300, 600]", "force = 9e5", 1, "does not stand"),
+        ("force = [300, 600]\n", "", 10, r"\[\[blocks.thrusts\]\] needs force as well"),
+        ("height = 3", "height = -3", 12, "height must be a positive length"),
+        ("follows = false", 'follows = "no"', 17, "follows takes a number|follows must be"),
+        ("offset = -0.1", "offset = -0.5", 1, "is beyond the pivot"),
+    ],
+)
+def test_a_mistake_in_restraints_is_a_sentence_with_its_line(walls, old, new, line, sentence):
+    assert old in WALLS
+    walls.write_text(WALLS.replace(old, new))
+    with pytest.raises(rocking.StudyError, match=sentence) as caught:
+        read_study(walls)
+    assert "\n" not in str(caught.value)
+    assert caught.value.line == line

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 #: Speeds after an impact below which the arcs are too short for the integrator's events.
 SLOWEST = 2e-2
 #: Speeds after an impact below which a body rests, if the motion does not lift it.
-AT_REST = 1e-5
+AT_REST = 1e-7
 
 
 @dataclass
@@ -38,6 +38,7 @@ class Held:
     plastic: float = 0.0
     flows: bool = False
     law: Callable[[int, float, int], float] | None = None  # of side, speed and impacts before
+    resumed: list[int] = field(default_factory=list)  # impacts that count as before, from each rest on
 
     def factor(self, j, speed, number):
         return self.restitution[j] if self.law is None else self.law(j, speed, number)
@@ -106,7 +107,7 @@ def integrated(body, motion, end, u, v, j, rests=False):  # noqa: C901
     Where it `rests`, it does not end where it chatters: it goes on to speeds of `AT_REST`, and from there as the motion
     lifts it again.
     """
-    times, speeds, t, peak = [], [], 0.0, u
+    times, speeds, t, peak, number = [], [], 0.0, u, 0
     if body.yielding and body.force(j, u) > body.yielding[3]:
         body.turn_back(j, u)
 
@@ -167,12 +168,12 @@ def integrated(body, motion, end, u, v, j, rests=False):  # noqa: C901
         if len(found.t_events[0]):
             times.append(t)
             speeds.append(-v)
-            u, v = 0.0, -body.factor(j, -v, len(times) - 1) * v
+            u, v, number = 0.0, -body.factor(j, -v, number) * v, number + 1
             j = j if body.one_sided else 1 - j
             if v < SLOWEST and not rests:
                 return times[:-1], speeds[:-1], peak, "chatters"
             if v < AT_REST and not lifts(body, pushes(t)):
-                v = 0.0
+                v, number = 0.0, body.resumed.pop(0) if body.resumed else number
                 t, j = lifted(body, pushes, t, end)
             hangs = body.yielding is not None and body.force(j, u) < 0.0
     return times, speeds, peak, "over"

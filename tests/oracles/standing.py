@@ -252,11 +252,19 @@ def lanes_and_single(kind: str, seed: int, pairs: int, most: int = 50) -> Count:
         model = str(rng.choice(["linear", "nonlinear"]))
         nearest = float(np.median([min(each.uplift_thresholds(model)) for each in bodies]))
         name, motion = shaking(rng, nearest, float(np.median([each.sides[0].p for each in bodies])))
-        together = rocking.simulate_many(bodies, motion, model=model)
+        # Springs and tendons may hold a body at a rotation for ever.
+        end = motion.end + 20.0
+        together = rocking.simulate_many(bodies, motion, model=model, duration=end)
         columns = {each: together[each].values.ravel() for each in ("overturned", "peak_rotation", "uplifts", "rests")}
         for k, one in enumerate(bodies):
             lanes = {each: values[k].item() for each, values in columns.items()}
-            _judge(found, one, motion, model, lanes, f"{kind}, seed {seed}, batch {number}, {name}, {model}, body {k}")
+            _judge(
+                found,
+                one,
+                (motion, model, end),
+                lanes,
+                f"{kind}, seed {seed}, batch {number}, {name}, {model}, body {k}",
+            )
         found.by_motion[f"{name}, {model}"] += most
     return found
 
@@ -284,8 +292,11 @@ def _apart(one: dict[str, float], other: dict[str, float]) -> float:
     return abs(one["peak_rotation"] - other["peak_rotation"]) / max(other["peak_rotation"], 1e-300)
 
 
-def _judge(found: Count, one: RestrainedBlock, motion: Motion, model: str, lanes: dict[str, Any], where: str) -> None:
-    response = rocking.simulate(one, motion, model=model)
+def _judge(
+    found: Count, one: RestrainedBlock, shaken: tuple[Motion, str, float], lanes: dict[str, Any], where: str
+) -> None:
+    motion, model, end = shaken
+    response = rocking.simulate(one, motion, model=model, duration=end)
     alone = _outcomes(response)
     found.pairs += 1
     found.overturned += response.overturned
@@ -299,7 +310,7 @@ def _judge(found: Count, one: RestrainedBlock, motion: Motion, model: str, lanes
         found.worst = max(found.worst, apart)
         return
     for ulps in (-16, -4, -1, 1, 4, 16):
-        near = _outcomes(rocking.simulate(one, motion.scaled(1.0 + ulps * ULP), model=model))
+        near = _outcomes(rocking.simulate(one, motion.scaled(1.0 + ulps * ULP), model=model, duration=end))
         gap = _apart(near, alone)
         if gap >= EXPLAINED * apart or gap == math.inf:
             found.explained += 1
@@ -341,13 +352,16 @@ def single_and_integrated(kind: str, seed: int, cases: int) -> Judged:
         tendon = ours._tendon[0]
         near = min(0.3 * min(*ours.balance, 0.5), 0.1, 0.8 * tendon.yields / max(tendon.opening, 1e-9))
         start = near if number % 2 else 0.0
-        times, _, peak, ended = integrated(held, motion, end, start, 0.0, 0, rests=True)
 
         def simulated(factor: float = 1.0, ours=ours, motion=motion, end=end, start=start) -> rocking.Response:
             shaken = motion if factor == 1.0 else motion.scaled(factor)
             return rocking.simulate(ours, shaken, duration=end, initial_rotation=start)
 
         response = simulated()
+        # Draws go on after a rest from the impacts that were resolved, of which a sequence has more the finer it is.
+        rested = response.events["time"][response.events["kind"] == "rest"]
+        held.resumed = np.searchsorted(response.impacts["time"], rested).tolist()
+        times, _, peak, ended = integrated(held, motion, end, start, 0.0, 0, rests=True)
         found.cases += 1
         found.impacts += len(times)
         found.rested += bool(len(response.chattering))

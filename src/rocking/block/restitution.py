@@ -250,6 +250,7 @@ class RandomRestitution(Restitution):
     seed : int
         Whole number from 0 to 2^53. The factor depends on it and on the number of the impact alone: a body draws the
         same ones whatever shakes it, and whether it is simulated alone or with others. Give bodies seeds of their own.
+        After a rest it goes on from the impacts that were resolved, of which a finer treatment has more.
 
     Raises
     ------

@@ -155,22 +155,87 @@ class RestrainedBlock:
     def contact(self) -> ContactLaw | None:
         """Forces of the ground over the weight of the block with the loads that follow it (see `rocking.body`).
 
-        None where they are not known: of a block of one side, which at rest the wall behind it holds as well; with a
-        tendon that yields; and of one that was made of the arrays of `RestrainedBlocks`.
+        They are those of `contact_forces`, without a tendon that yields. None where they are not known: of one that was
+        made of the arrays of `RestrainedBlocks`.
         """
-        yields = any(tendon.stiffness > 0.0 for tendon in self._tendon)
-        return None if self.is_one_sided or yields or self.restraints is None else self._contact_forces
+        return None if self.restraints is None else self.contact_forces
 
-    def _contact_forces(
-        self, motion: tuple[Floats, Floats, Floats], ground_over_g: tuple[Floats, Floats], side: Integers
+    @property
+    def yielding(self) -> tuple[Yielding, Yielding]:
+        """Its tendon that yields, on each side; one without stiffness where there is none."""
+        return self._tendon
+
+    def tension(self, elongation: Floats) -> Floats:
+        """Force of its tendon that yields, N, from its elongation beyond the plastic one, m.
+
+        Parameters
+        ----------
+        elongation : ndarray
+            Elongation since the block stood, less the plastic one.
+
+        Returns
+        -------
+        ndarray
+            Of the same shape; none where no tendon yields.
+
+        Examples
+        --------
+        >>> from rocking import Tendon
+        >>> column = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0), Tendon(2e5, 1e3, strength=3e3))
+        >>> column.tension(np.array([-0.02, 0.0, 0.005, 0.1]))
+        array([   0., 1000., 2000., 3000.])
+        """
+        for each in self.restraints or ():
+            if isinstance(each, Tendon) and each.strength < math.inf:
+                return np.clip(each.prestress + each.stiffness * elongation, 0.0, each.strength)
+        return np.zeros_like(elongation)
+
+    def contact_forces(
+        self,
+        motion: tuple[Floats, Floats, Floats],
+        ground_over_g: tuple[Floats, Floats],
+        side: Integers,
+        tension: Floats | float = 0.0,
     ) -> tuple[Floats, Floats]:
+        """Return the forces of the ground over the weight, horizontal and vertical.
+
+        What stands behind a block of one side pushes it to side +, without friction, as far as that is needed while it
+        is at rest; so what is left for the ground is least then.
+
+        Parameters
+        ----------
+        motion : tuple of ndarray
+            Rotation and its two rates, rad and s.
+        ground_over_g : tuple of ndarray
+            Accelerations of the ground, horizontal and vertical, over g.
+        side : ndarray of int
+            0 on side +, 1 on side -, -1 at rest.
+        tension : ndarray or float
+            Force of a tendon that yields, N.
+
+        Returns
+        -------
+        (ndarray, ndarray)
+            To side + and up.
+
+        Examples
+        --------
+        >>> wall = Block.one_sided(width=0.4, height=4.0)
+        >>> still, at_rest = np.zeros(2), np.array([-1, -1])
+        >>> wall.contact_forces((still, still, still), (np.array([-0.05, 0.3]), still), at_rest)
+        (array([-0.05,  0.  ]), array([1., 1.]))
+        """
         horizontal, vertical = self.block.contact(motion, ground_over_g, side)
-        if not self.restraints or self.block.mass is None:
-            return horizontal, vertical
-        pivots, weight = pivots_of(self.block, self.lean), self.block.mass * self.gravity
-        for each in self.restraints:
-            across, up = each._acting(pivots, motion[0], side)
-            horizontal, vertical = horizontal - across / weight, vertical - up / weight
+        if self.restraints and self.block.mass is not None:
+            pivots, weight = pivots_of(self.block, self.lean), self.block.mass * self.gravity
+            for each in self.restraints:
+                if isinstance(each, Tendon) and each.strength < math.inf:
+                    across, up = each._along(pivots, motion[0], tension)
+                else:
+                    across, up = each._acting(pivots, motion[0], side)
+                horizontal, vertical = horizontal - across / weight, vertical - up / weight
+        if self.is_one_sided:
+            horizontal = np.where(side < 0, np.minimum(horizontal, 0.0), horizontal)
         return horizontal, vertical
 
     def tendons_at(self, largest: tuple[float, float]) -> list[tuple[float, float, float]]:

@@ -263,9 +263,12 @@ class Tendon(Restraint):
         )
 
     def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
-        """Return its pull along the chord from its end in the block to that in the ground, while it is elastic."""
+        """Return its pull while it is elastic."""
         x = np.where(side == 1, self._opening(pivots[1]), self._opening(pivots[0]))
-        pull = self.prestress + self.stiffness * 2.0 * x * np.sin(0.5 * np.abs(rotation))
+        return self._along(pivots, rotation, self.prestress + self.stiffness * 2.0 * x * np.sin(0.5 * np.abs(rotation)))
+
+    def _along(self, pivots: tuple[Pivot, Pivot], rotation: Floats, pull: Floats | float) -> tuple[Floats, Floats]:
+        """Return a pull along the chord from its end in the block to that in the ground."""
         along = 0.5 * rotation + pivots[0].lean
         return -pull * np.sin(along), -pull * np.cos(along)
 

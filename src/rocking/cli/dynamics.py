@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,7 @@ from cyclopts import Parameter
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block import Block
+from rocking.block import Block, RestrainedBlock
 from rocking.body import Body
 from rocking.cli.options import BLOCK, MODEL, BodyOptions, ModelOptions, written
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results, write_tables
@@ -55,7 +56,8 @@ def orbits(
 ) -> None:
     """Find periodic orbits of a body under a pulse that repeats for ever, and follow one along a parameter.
 
-    The body is a block (--width, --height, or --p, --alpha), or --ball, --oscillator or --pendulum. --out holds
+    The body is a block (--width, --height, or --p, --alpha), perhaps a wall or with restraints (--one-sided,
+    --tendon, ...), or --ball, --oscillator or --pendulum. --out holds
     orbit-1.png, .pdf, orbit-1-histories.csv, ... of every orbit and result.json; with --along, branch.png, .pdf,
     points.csv and bifurcations.csv; with --switch, switched-1-points.csv, switched-1-bifurcations.csv, ...
 
@@ -111,7 +113,8 @@ def bifurcation(
 ) -> None:
     """Follow a body under a pulse that repeats for ever as a parameter changes, and keep where it settles.
 
-    The body is a block (--width, --height, or --p, --alpha), or --ball, --oscillator or --pendulum. --out holds
+    The body is a block (--width, --height, or --p, --alpha), perhaps a wall or with restraints (--one-sided,
+    --tendon, ...), or --ball, --oscillator or --pendulum. --out holds
     bifurcation.png, .pdf, .nc, states.csv (at the starts of periods), orbits.csv (periods, impacts) and result.json.
 
     Parameters
@@ -154,10 +157,10 @@ def basin(
     pulse: str,
     positions: Annotated[
         str | None,
-        written("Rotations of a block, rad, or positions, m; by default up to its slenderness, or between the stops."),
+        written("Rotations of a block, rad, or positions, m; by default up to its balance, or between the stops."),
     ] = None,
     velocities: Annotated[
-        str | None, written("Velocities, rad/s or m/s; by default up to p times the slenderness, or what is natural.")
+        str | None, written("Velocities, rad/s or m/s; by default up to p times the balance, or what is natural.")
     ] = None,
     periods: int = 200,
     folder: KEPT = None,
@@ -167,7 +170,8 @@ def basin(
 ) -> None:
     """Find what becomes of a body under a pulse that repeats for ever, for every initial state of a grid.
 
-    The body is a block (--width, --height, or --p, --alpha), or --ball, --oscillator or --pendulum. Lists of numbers
+    The body is a block (--width, --height, or --p, --alpha), perhaps a wall or with restraints (--one-sided,
+    --tendon, ...), or --ball, --oscillator or --pendulum. Lists of numbers
     are 1,2,5 or START:STOP:COUNT. An interrupt (Ctrl-C) ends it with what was computed so far, coarse to fine. --out
     holds basin.png, .pdf, .nc, attractors.csv, outcomes.csv, orbits.csv and result.json.
 
@@ -180,7 +184,7 @@ def basin(
         Most periods that a state is followed for.
     """
     moving, motion = body.body(), _Repeating(pulse).motion()
-    read = tilt if isinstance(moving, Block) else position
+    read = tilt if moving.coordinate.unit == "rad" else position
     at, rates = _natural_axes(moving, motion)
     with output.folder() as place:
         found = basins(
@@ -309,10 +313,12 @@ def _write(folder: Path, found: list[PeriodicOrbit], branches: list[Branch], res
 
 def _natural_axes(body: Body, motion: Motion) -> tuple[Floats, Floats]:
     """Return coordinates and velocities that are natural to a body under a motion."""
-    if isinstance(body, Block):
-        lean, rate = max(side.alpha for side in body.sides), max(side.p * side.alpha for side in body.sides)
-        return np.linspace(-lean, lean, _CELLS), np.linspace(-rate, rate, _CELLS)
+    middles = (np.arange(_CELLS) + 0.5) / _CELLS
+    if isinstance(body, (Block, RestrainedBlock)):
+        ends = [side.alpha if math.isinf(at) else at for side, at in zip(body.sides, body.balance, strict=False)]
+        lean, rate = max(ends), max(side.p * end for side, end in zip(body.sides, ends, strict=True))
+        one_way = isinstance(body, RestrainedBlock) and body.is_one_sided
+        return lean * middles if one_way else np.linspace(-lean, lean, _CELLS), np.linspace(-rate, rate, _CELLS)
     (low, high), scale = body.stops, scale_of(stroboscopic_map(body, motion))
     width = high - low or scale.coordinate
-    middles = (np.arange(_CELLS) + 0.5) / _CELLS
     return low + width * middles, scale.velocity * (2.0 * middles - 1.0)

@@ -225,8 +225,8 @@ def _one_of(descriptions: Iterable[Sequence[str]]) -> str:
 
 
 @dataclass(frozen=True)
-class BodyOptions(BlockOptions):
-    """A block, or another body in its place."""
+class BodyOptions(HeldOptions):
+    """A block with what holds it back, or another body in its place."""
 
     ball: Annotated[
         float | None,
@@ -251,8 +251,8 @@ class BodyOptions(BlockOptions):
         names = ("ball", "oscillator", "pendulum", "restitution")
         first, *others = [name for name in names if getattr(self, name) is not None] or ["restitution"]
         if first == "restitution":
-            return self.block()
-        others = [*others, *self.given()]
+            return super().body()
+        others = [*others, *self.given(), *self.held()]
         if others:
             raise InvalidBlock(f"{{}} is a body of its own: leave {_all_of(others)} out", first, *others)
         if self.ball is not None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import inspect
 import itertools
+import math
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -16,7 +18,19 @@ import numpy as np
 
 from rocking import checks, quantities
 from rocking.arrays import Floats
-from rocking.block import Block, Blocks
+from rocking.block import (
+    Block,
+    Blocks,
+    Damper,
+    Load,
+    RestrainedBlock,
+    RestrainedBlocks,
+    Restraint,
+    Spring,
+    Tendon,
+    Thrust,
+)
+from rocking.body import Bodies
 from rocking.ensemble import Product, Scales
 from rocking.errors import InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
 from rocking.motion.formats.source import Request
@@ -55,16 +69,25 @@ _TEXTS: Final = _Kind("a list of texts", lambda value: isinstance(value, list) a
 _CHANNEL: Final = _Kind("text or a whole number", lambda value: _is_text(value) or type(value) is int)
 _TRUTH: Final = _Kind("true or false", lambda value: isinstance(value, bool))
 _TABLE: Final = _Kind("a table", lambda value: isinstance(value, dict))
-_TABLES: Final = _Kind(
-    "tables, [[motions.pulses]]", lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value)
-)
+
+
+def _tables(name: str) -> _Kind:
+    return _Kind(
+        f"tables, [[{name}]]", lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value)
+    )
+
 
 #: What says together what a block is, and what may go with it.
 _BODIES: Final[Mapping[tuple[str, ...], tuple[str, ...]]] = {
     ("p", "alpha"): ("restitution",),
-    ("width", "height"): ("offset", "restitution"),
-    ("pivots", "height_of_mass", "gyration"): ("restitution",),
+    ("width", "height"): ("offset", "restitution", "mass"),
+    ("pivots", "height_of_mass", "gyration"): ("restitution", "mass"),
 }
+#: What needs to be given of a block that is held back, and what holds it: couples by a number, forces by tables.
+_MASSIVE: Final = ("width", "pivots")
+_COUPLES: Final[Mapping[str, Callable[[float], Restraint]]] = {"spring": Spring, "damper": Damper}
+_FORCES: Final[Mapping[str, Callable[..., Restraint]]] = {"tendons": Tendon, "thrusts": Thrust, "loads": Load}
+_HELD: Final = ("one_sided", "lean", *_COUPLES, *_FORCES)
 _PARAMETERS: Final = sorted({name for needed, more in _BODIES.items() for name in (*needed, *more)})
 
 #: What motions may be scaled to.
@@ -74,9 +97,15 @@ _MEASURES: Final = ("factor", "pga", "pgv", "sa")
 _SIDED: Final = ("p", "alpha", "pivots", "restitution")
 _SIDES: Final = ("_plus", "_minus")
 
+_OF_HELD: Final[Mapping[str, _Kind]] = {
+    "one_sided": _TRUTH,
+    **dict.fromkeys(("lean", *_COUPLES), _ANY),
+    **{name: _tables(f"blocks.{name}") for name in _FORCES},
+}
+
 #: Tables of a file, the keys of each, and what their values must be; numbers are read by `_QUANTITIES`.
 _SCHEMA: Final[Mapping[str, Mapping[str, _Kind]]] = {
-    "blocks": {"csv": _TEXT, **dict.fromkeys(_PARAMETERS, _ANY)},
+    "blocks": {"csv": _TEXT, **dict.fromkeys(_PARAMETERS, _ANY), **_OF_HELD},
     "motions": {
         "records": _TEXTS,
         "channel": _CHANNEL,
@@ -84,7 +113,7 @@ _SCHEMA: Final[Mapping[str, Mapping[str, _Kind]]] = {
         "units": _TEXT,
         "dt": _ANY,
         "skip_unreadable": _TRUTH,
-        "pulses": _TABLES,
+        "pulses": _tables("motions.pulses"),
     },
     "scales": {**dict.fromkeys((*_MEASURES, "period", "damping", "refine"), _ANY), "polarity": _TEXT},
     "simulation": {"model": _TEXT, "chattering": _TEXT, "duration": _ANY, "outcomes": _TEXTS},
@@ -93,7 +122,7 @@ _SCHEMA: Final[Mapping[str, Mapping[str, _Kind]]] = {
 }
 
 _QUANTITIES: Final[Mapping[str, quantities.Quantity]] = {
-    "alpha": quantities.tilt,
+    **dict.fromkeys(("alpha", "lean"), quantities.tilt),
     **dict.fromkeys(("width", "height", "pivots", "height_of_mass", "gyration"), quantities.length),
     "pga": quantities.acceleration,
     "sa": quantities.acceleration,
@@ -256,8 +285,12 @@ class _Reader:
                 check_part(plans[name], kept)
         return ReportPlan(**plans) if "report" in self.tables else None
 
-    def _blocks(self) -> Blocks:
-        given = self._table("blocks")
+    def _blocks(self) -> Bodies:
+        given = dict(self._table("blocks"))
+        held = {name: given.pop(name) for name in _HELD if name in given}
+        if held and not {*_MASSIVE} & given.keys():
+            first = next(iter(held))
+            raise self._wrong("blocks", first, f"{{}} goes with {_listed(_MASSIVE)} of a block", first)
         if "csv" in given:
             if len(given) > 1:
                 raise self._wrong("blocks", "csv", "{} goes without other keys", "csv")
@@ -270,11 +303,49 @@ class _Reader:
             name: self._pivots(value) if name == "pivots" else self._numbers("blocks", name, value)
             for name, value in given.items()
         }
+        restraints = self._restraints(held)
+        lean = self._numbers("blocks", "lean", held["lean"]) if "lean" in held else [0.0]
         with self._located("blocks"):
             if "p" in axes:
                 return Blocks.grid(**axes)
             checks.grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
-            return Blocks.of([_body(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())])
+            rows = [dict(zip(axes, row, strict=True)) for row in itertools.product(*axes.values())]
+            if not held:
+                return Blocks.of([_body(row) for row in rows])
+            checks.grid_size({"body": len(rows) * len(lean) * math.prod(map(len, restraints))}, StudyError)
+            return RestrainedBlocks.of(
+                [
+                    RestrainedBlock(
+                        _body(row), *chosen, one_sided=held.get("one_sided", False), lean=angle,
+                        restitution=row.get("restitution"),
+                    )
+                    for row, angle, *chosen in itertools.product(rows, lean, *restraints)
+                ]
+            )  # fmt: skip
+
+    def _restraints(self, held: Mapping[str, Any]) -> list[list[Restraint]]:
+        """Return what each restraint may be: one, or several where its numbers are lists or ranges."""
+        found: list[list[Restraint]] = []
+        for name, couple in _COUPLES.items():
+            if name in held:
+                with self._located("blocks", key=name):
+                    found.append([couple(value) for value in _read(name, held[name]).tolist()])
+        for name, kind in _FORCES.items():
+            for k, given in enumerate(held.get(name, [])):
+                table, known = f"blocks.{name}", inspect.signature(kind).parameters
+                axes: dict[str, Any] = {}
+                for key, value in given.items():
+                    with self._located(table, key=key, occurrence=k):
+                        if key not in known:
+                            raise StudyError(f"[[{table}]] has no {{}}; {_nearest(key, known)}", key)
+                        axes[key] = [value] if isinstance(value, bool) else _read(key, value).tolist()
+                with self._located(table, occurrence=k):
+                    missing = [key for key, each in known.items() if each.default is each.empty and key not in axes]
+                    if missing:
+                        raise StudyError(f"[[{table}]] needs {_listed(missing)} as well")
+                    rows = itertools.product(*axes.values())
+                    found.append([kind(**dict(zip(axes, row, strict=True))) for row in rows])
+        return found
 
     def _pivots(self, value: Any) -> list[Floats]:
         """Pairs of distances: one, or several."""
@@ -461,7 +532,11 @@ def _body(given: Mapping[str, Any]) -> Block:
     if "width" in given:
         return Block(**given)
     return Block.from_pivots(
-        given["pivots"], given["height_of_mass"], given["gyration"], restitution=given.get("restitution")
+        given["pivots"],
+        given["height_of_mass"],
+        given["gyration"],
+        restitution=given.get("restitution"),
+        mass=given.get("mass"),
     )
 
 
