@@ -3,6 +3,7 @@
 import http.server
 import json
 import math
+import random
 import runpy
 import shlex
 import subprocess
@@ -10,8 +11,9 @@ import sys
 import threading
 from contextlib import contextmanager
 from pathlib import Path
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, urlencode, urlsplit
 
+import explorer_addresses
 import numpy as np
 import pytest
 from explorer_browser import Watched, chromium, flags, missing, tool
@@ -183,6 +185,19 @@ def test_a_link_reproduces_what_is_shown(opened):
     motion = rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665)
     response = rocking.simulate(block, motion, model="linear", chattering="velocity=0.001")
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+
+
+def test_whatever_an_address_says_the_page_has_no_fault(opened, here):
+    page, draw, told = opened(allowed=["422", "404"]), random.Random(7), 0
+    corners = [{"width": "0.24", "height": "1.1", "motion": "none"}, {"from": "0", "to": "1e-300"}]
+    corners += [{"motion": "constructor"}, {"chattering": "toString=1"}, {"view": "compare", "compare": "toString"}]
+    for texts in [*corners, *(explorer_addresses.case(draw) | explorer_addresses.shown(draw) for _ in range(20))]:
+        page.page.goto(f"{here.link().split('?')[0]}?{urlencode(texts)}")
+        page.until("document.body.dataset.ready", texts)
+        page.until("document.body.dataset.rested || !document.getElementById('problem').hidden", texts)
+        assert "has a fault" not in (page.text("#problem") or ""), texts
+        told += page.js("!document.getElementById('problem').hidden")
+    assert 5 <= told <= 22
 
 
 def plotted(page, name="first", where="histories"):

@@ -273,7 +273,7 @@ export class MotionForm {
   show(texts) {
     const motion = texts.motion ?? specification.default.motion;
     const family = motion.split(":")[0];
-    const kind = family in specification.pulses ? "pulse" : ["none", "file", "given"].includes(family) ? family : "record";
+    const kind = Object.hasOwn(specification.pulses, family) ? "pulse" : ["none", "file", "given"].includes(family) ? family : "record";
     this.kind.select.value = kind;
     if (kind === "record") this.record.select.value = motion;
     if (kind === "given") this.given = motion;
@@ -425,7 +425,7 @@ export class TreatmentForm {
   show(texts) {
     const [name, value] = (texts.chattering ?? "certified").split("=");
     this.kind.select.value = name;
-    if (value) this.limits[name]?.show(value);
+    if (value && Object.hasOwn(this.limits, name)) this.limits[name].show(value);
     this.showFields();
   }
 

@@ -8,7 +8,7 @@ import {BlockForm, ModelForm, MotionForm} from "./forms.js";
 import {Histories} from "./histories.js";
 import {coarse} from "./theme.js";
 import {acceptFiles} from "./upload.js";
-import {counted, legend, make, one, say, short} from "./words.js";
+import {counted, fixed, legend, make, one, say, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
@@ -183,7 +183,7 @@ function showLegend(vertical) {
 function showFigures(header) {
   const degrees = (header.peak_rotation * 180) / Math.PI;
   const rows = [
-    ["Peak rotation", header.overturned ? "overturns" : `${short(header.peak_over_slenderness)} α`, header.overturned ? `at ${header.overturn_time.toFixed(3)} s` : `${short(degrees)}° at ${header.peak_time.toFixed(2)} s`],
+    ["Peak rotation", header.overturned ? "overturns" : `${short(header.peak_over_slenderness)} α`, header.overturned ? `at ${fixed(header.overturn_time, 3)} s` : `${short(degrees)}° at ${fixed(header.peak_time, 2)} s`],
     ["Comes to rest", `${header.rests} ×`, header.rests ? (header.proven === header.rests ? "each time proven" : `${header.proven} proven`) : "not at all"],
     ["Impacts", String(header.impacts), "resolved one by one"],
     ["At rest", header.share_at_rest === null ? "–" : `${short(100 * header.share_at_rest, 2)} %`, "of the strong shaking"],

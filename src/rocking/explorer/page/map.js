@@ -116,7 +116,7 @@ export class View {
     }
     const motion = texts.motion ?? "";
     const family = motion.split(":")[0];
-    const pulse = family in specification.pulses;
+    const pulse = Object.hasOwn(specification.pulses, family);
     const frequency = pulse && motion.includes("frequency=");
     const names = specification.axes.map((/** @type {any} */ each) => each.name).filter((/** @type {string} */ name) => name !== "omega" || frequency);
     const right = names.filter((/** @type {string} */ name) => name !== "a" && name !== "pga");

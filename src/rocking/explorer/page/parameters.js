@@ -18,6 +18,7 @@ export const namesOf = (...groups) =>
   specification.parameters.filter((/** @type {Parameter} */ each) => !groups.length || groups.includes(each.group)).map((/** @type {Parameter} */ each) => each.name);
 
 const VIEWS = ["response", "block", "map", "periodic", "compare"];
+const COMPARED = ["treatment", "block", "motion"];
 
 /** @returns {State} */
 export function readAddress() {
@@ -33,7 +34,7 @@ export function readAddress() {
     view: VIEWS.includes(view) ? view : "response",
     texts: complete(Object.keys(texts).length ? texts : opening),
     other: those(namesOf(), "other."),
-    compare: given.get("compare") ?? "treatment",
+    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0],
     window: from < to ? [from, to] : null,
     map: those(specification.map),
     sweep: those(specification.sweep),

@@ -26,6 +26,9 @@ export function short(value, digits = 3) {
 /** A number as its text is sent: so many digits, no exponent where that can be helped. @param {number} value */
 export const sent = (value) => String(Number(value.toPrecision(4)));
 
+/** A number with so many decimals, or a dash where there is none. @param {number | null | undefined} value @param {number} digits */
+export const fixed = (value, digits) => (Number.isFinite(value) ? /** @type {number} */ (value).toFixed(digits) : "–");
+
 const UNITS = /** @type {[number, string][]} */ ([[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"], [1e-12, "ps"]]);
 
 /** A short time with its unit. @param {number} seconds */
