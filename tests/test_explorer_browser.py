@@ -152,6 +152,72 @@ def test_a_number_may_be_typed_and_a_bad_one_is_answered_with_a_sentence(opened)
     assert page.js(MARKED) == []
 
 
+@pytest.mark.parametrize(
+    ("typed", "address", "shown"), [("50 cm", "50 cm", "0.5"), ("1 ft", "1 ft", "0.3048"), ("0,3", "0.3", "0.3")]
+)
+def test_a_field_takes_units_and_shows_the_number_in_its_own(opened, typed, address, shown):
+    page = opened(STATUE)
+    width = page.page.locator("#width")
+    page.rested(lambda: (width.fill(typed), width.press("Enter")))
+    assert query_of(page)["width"] == address and width.input_value() == shown
+    block = rocking.Block(width={"50 cm": 0.5, "1 ft": 0.3048}.get(typed, 0.3), height=1.1)
+    response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665))
+    assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+    assert f"width={block.half_width * 2!r}" in page.text("#python")
+
+
+@pytest.mark.parametrize("typed", ["abc", "-1", "0.5 kg"])
+def test_what_is_refused_is_marked_and_leaves_the_last_good_case_in_grey(opened, typed):
+    page = opened(STATUE, allowed=["422"])
+    width, before = page.page.locator("#width"), page.text("#python")
+    width.fill(typed)
+    width.press("Enter")
+    page.until("!document.getElementById('problem').hidden")
+    assert width.input_value() == typed and page.js(MARKED) == ["width"]
+    assert page.js("document.querySelector('.number[data-problem]').dataset.problem") == page.text("#problem")
+    assert page.js("document.getElementById('main').classList.contains('old')")
+    assert "last case that could be computed" in page.text("#old") and page.page.locator("#old").is_visible()
+    assert query_of(page)["width"] == "0.24" and page.text("#python") == before
+    page.rested(lambda: (width.fill("0.3"), width.press("Enter")))
+    assert not page.js("document.getElementById('main').classList.contains('old')")
+    assert page.page.locator("#old").is_hidden() and query_of(page)["width"] == "0.3"
+
+
+def test_free_rocking_is_released_from_the_rotation_that_is_shown(opened):
+    page = opened(STATUE)
+    page.rested(lambda: page.page.select_option("#kind", "none"))
+    start = page.page.locator("#initial_rotation")
+    assert start.input_value() == "3" and query_of(page)["initial_rotation"] == "3deg"
+    page.rested(lambda: (start.fill("0"), start.press("Enter")))
+    assert "initial_rotation" not in query_of(page) and "nothing shakes it" in page.text("#verdict")
+    page.rested(lambda: page.page.select_option("#kind", "record"))
+    assert "initial_rotation" not in query_of(page) and start.is_hidden()
+
+
+def test_a_release_under_shaking_is_shown_and_stays(opened):
+    page = opened(SINE + "&initial_rotation=0.01&initial_velocity=-0.02")
+    assert page.page.locator("#initial_rotation").is_visible() and page.page.locator("#initial_velocity").is_visible()
+    slider = page.page.locator("#pulse-amplitude-slider")
+    page.rested(lambda: (slider.focus(), slider.press("ArrowRight")))
+    found = query_of(page)
+    assert (found["initial_rotation"], found["initial_velocity"]) == ("0.01", "-0.02")
+
+
+@pytest.mark.parametrize("more", ["", "&offset=0.02", "&restitution=0.93"])
+def test_another_description_is_the_same_block(opened, more):
+    page = opened("width=0.237&height=1.103&motion=ridgecrest-clc-090&pga=0.4g" + more)
+    impacts = page.text("#figures div:nth-child(3) dd")
+    for shape in ("parameters", "pivots", "parameters", "sizes"):
+        page.rested(lambda: page.page.select_option("#shape", shape))  # noqa: B023
+        assert page.text("#figures div:nth-child(3) dd") == impacts, shape
+    assert page.page.locator("#housner").is_checked() == ("restitution" not in more)
+    found = query_of(page)
+    assert (
+        float(found["width"]) == pytest.approx(0.237, rel=1e-14)
+        and page.page.locator("#width").input_value() == "0.237"
+    )
+
+
 def test_a_number_that_is_being_typed_stays_when_a_response_arrives(opened):
     page = opened(STATUE)
     width, move = page.page.locator("#width"), "document.getElementById('pga-slider')"

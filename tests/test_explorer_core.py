@@ -168,7 +168,7 @@ def test_a_motion_that_is_no_pulse_any_more_is_not_written_as_one():
     [
         ({"width": "0.2"}, InvalidBlock, "either width and height"),
         ({**STATUE, "p": "3"}, InvalidBlock, "either width and height"),
-        ({**STATUE, "width": "wide"}, InvalidOption, "width takes a number"),
+        ({**STATUE, "width": "wide"}, InvalidOption, "width takes a length"),
         ({**STATUE, "width": "-1"}, InvalidBlock, "positive"),
         ({**STATUE, "width": "nan"}, InvalidBlock, "positive"),
         ({**STATUE, "colour": "red"}, InvalidOption, "no 'colour'"),

@@ -75,7 +75,7 @@ export class View {
     if (name === "x" || name === "y") { delete map[`${name}_from`]; delete map[`${name}_to`]; }
     if (name === "quantity" && this.about && !this.study) {
       this.fill();
-      this.page.remember();
+      this.page.remember({map});
       if (JSON.stringify(this.asked()) === this.drawn) { this.recolour(); this.offer(); return; }
     }
     this.update();
@@ -155,7 +155,7 @@ export class View {
   /** @param {AbortSignal} signal */
   async stream(signal) {
     this.fill();
-    this.page.remember();
+    const map = {...this.page.state.map};
     const started = performance.now();
     const body = document.body.dataset;
     this.drawn = JSON.stringify(this.asked());
@@ -170,6 +170,7 @@ export class View {
         const count = this.about.shape[0] * this.about.shape[1];
         this.values = this.about.quantities.map(() => new Float32Array(count).fill(NaN));
         this.covered = new Uint8Array(count).fill(255);
+        this.page.remember({map});
         this.drawAxes();
         this.offer();
         done = 1;
@@ -251,6 +252,7 @@ export class View {
   async slice() {
     this.fill();
     const {header, arrays} = await payload("/api/study", this.page.state.map);
+    this.page.remember({map: this.page.state.map});
     this.about = {...header, quantities: [header.quantity], curves: {}, outcomes: []};
     this.values = [Float32Array.from(arrays.values)];
     this.drawAxes();
