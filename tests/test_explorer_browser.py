@@ -1,5 +1,6 @@
 """The explorer's page in a browser: every view, every way in and out, against the package's own numbers."""
 
+import hashlib
 import http.server
 import json
 import math
@@ -441,15 +442,25 @@ def test_a_file_is_chosen_told_about_and_shown(opened, tmp_path):
     file = tmp_path / "station 7.txt"
     file.write_text("\n".join(f"{value / 9.80665:.12g}" for value in samples), "utf-8")
     page = opened(STATUE, allowed=["422"])
+    before = page.text("#python")
     page.page.set_input_files("#file", file)
-    page.until("getComputedStyle(document.getElementById('units').parentElement).display !== 'none'")
-    for step in ("0.02", "0.01"):
-        page.rested(lambda step=step: (page.page.locator("#dt").fill(step), page.page.locator("#dt").press("Enter")))
-    for units in ("m/s2", "g"):
-        page.rested(lambda units=units: page.page.select_option("#units", units))
-    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.records.load("el-centro-meloland-270"))
+    page.until("document.getElementById('main').classList.contains('old')", "nothing is computed before units and step")
+    said = page.page.locator(".missing button").all_text_contents()
+    record = rocking.records.load("el-centro-meloland-270")
+    assert f"g: PGA {record.pga / 9.80665:.3g} g" in said
+    assert f"m/s2: PGA {record.pga / 9.80665**2:.3g} g" in said
+    assert f"0.01 s: it lasts {record.duration:.4g} s" in said and len(said) == 10
+    assert "motion=ridgecrest" in page.page.url and page.text("#python") == before
+    page.page.locator(".missing button", has_text="0.02 s").click()
+    page.until("document.querySelectorAll('.missing button').length === 6")
+    assert page.page.locator("#dt").input_value() == "0.02" and page.text("#python") == before
+    page.rested(lambda: page.page.locator(".missing button", has_text="m/s2: PGA").first.click())
+    assert {"dt": "0.02", "units": "m/s2"}.items() <= query_of(page).items()
+    page.rested(lambda: (page.page.locator("#dt").fill("0.01"), page.page.locator("#dt").press("Enter")))
+    page.rested(lambda: page.page.select_option("#units", "g"))
+    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), record)
     assert ("overturns" in page.text("#verdict")) == response.overturned
-    assert "'station 7.txt'" in page.text("#python")
+    assert "'station 7.txt'" in page.text("#python") and page.page.locator(".missing").is_hidden()
 
 
 DROP = """async ([name, text]) => {
@@ -474,8 +485,25 @@ def test_a_file_of_several_channels_is_dropped(opened):
     assert page.js("document.getElementById('vertical').options[1].textContent").startswith("channel 1")
 
 
+def test_a_link_whose_file_is_opened_again_is_the_same_case(opened, explorer):
+    record = rocking.records.load("el-centro-meloland-270")
+    text = "\n".join(f"{value:.9g}" for value in record.samples[1])
+    key = hashlib.sha256(text.encode()).hexdigest()[:24]
+    link = f"width=0.24&height=1.1&motion=file:{key}&vertical=ridgecrest-clc-up&dt=0.01&units=m/s2&pga=0.4g"
+    page = opened(STATUE, allowed=["422"])
+    page.page.goto(page.page.url.split("?")[0] + "?" + link)
+    page.until("!document.getElementById('problem').hidden", "the file is not here")
+    page.rested(lambda: page.js(DROP, ["again.txt", text]))
+    found = {"motion": f"file:{key}", "vertical": "ridgecrest-clc-up", "dt": "0.01", "units": "m/s2", "pga": "0.4g"}
+    assert found.items() <= query_of(page).items()
+    assert page.js("['scaled', 'pga', 'dt', 'units', 'vertical'].map((id) => document.getElementById(id).value)") == [
+        "pga", "0.4", "0.01", "m/s2", "ridgecrest-clc-up",
+    ]  # fmt: skip
+    assert page.text("#python").count("scaled_to(") == 1 and "dt=0.01, units='m/s2'" in page.text("#python")
+
+
 def test_a_record_shakes_upwards_as_well(opened, tmp_path):
-    page = opened(STATUE)
+    page = opened(STATUE, allowed=["422"])
     assert "vertical" not in page.text("#legend")
     page.rested(lambda: page.page.select_option("#vertical", "ridgecrest-clc-up"))
     assert query_of(page)["vertical"] == "ridgecrest-clc-up"
@@ -492,7 +520,8 @@ def test_a_record_shakes_upwards_as_well(opened, tmp_path):
         page.page.click("#choose-vertical")
     chooser.value.set_files(file)
     page.until("getComputedStyle(document.getElementById('units').parentElement).display !== 'none'")
-    page.rested(lambda: (page.page.locator("#dt").fill("0.01"), page.page.locator("#dt").press("Enter")))
+    page.page.locator("#dt").fill("0.01")
+    page.page.locator("#dt").press("Enter")
     page.rested(lambda: page.page.select_option("#units", "m/s2"))
     assert query_of(page)["vertical"].startswith("file:")
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, abs=6e-4)

@@ -480,9 +480,19 @@ def test_a_file_that_needs_no_word_is_read_at_once(explorer):
 
 def test_a_file_says_what_must_be_told(explorer):
     key = explorer.uploads.add_file("one column.txt", "\n".join(["0.1", "-0.2", "0.3"] * 50).encode())
-    assert explorer.uploads.contents(key)["missing"] == ["units", "dt"] or set(
-        explorer.uploads.contents(key)["missing"]
-    ) == {"units", "dt"}
+    found = explorer.uploads.contents(key)
+    assert set(found["missing"]) == {"units", "dt"}
+    assert found["channels"][0]["choices"] == {
+        "units": [
+            ["g", "g: PGA 0.3 g"],
+            ["m/s2", "m/s2: PGA 0.0306 g"],
+            ["cm/s2", "cm/s2: PGA 0.000306 g"],
+            ["gal", "gal: PGA 0.000306 g"],
+            ["mm/s2", "mm/s2: PGA 3.06e-05 g"],
+            ["mg", "mg: PGA 0.0003 g"],
+        ],
+        "dt": [[f"{step:g}", f"{step:g} s: it lasts {149 * step:.4g} s"] for step in (0.002, 0.005, 0.01, 0.02)],
+    }
     texts = {"width": "0.24", "height": "1.1", "motion": f"file:{key}", "dt": "0.02", "units": "g"}
     assert read_case(texts, explorer.uploads).motion.duration == pytest.approx(149 * 0.02)
 

@@ -232,7 +232,7 @@ export class MotionForm {
     this.files = [];
     this.given = "";
     this.upwards = "";
-    const tell = () => this.tell(), chosen = () => { this.showFields(); this.tell(); };
+    const chosen = () => { this.showFields(); this.tell(); };
     const another = () => { this.upwards = ""; chosen(); };
     const shaken = () => { this.release(); another(); };
     /** @param {string} name */
@@ -244,9 +244,14 @@ export class MotionForm {
     this.numbers = make("div");
     this.channel = choice(prefix, "channel", field("channel"), [], chosen);
     this.vertical = choice(prefix, "vertical", field("vertical"), [["", "none"]], (value) => { this.upwards = value; chosen(); });
-    this.units = choice(prefix, "units", field("units"), specification.units.map((/** @type {string} */ each) => [each, each]), tell);
-    const {label, unit, default: step} = parameter("dt");
-    const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, value: step, "data-argument": "dt", on: {change: tell}}));
+    this.units = choice(prefix, "units", field("units"), [["", "not chosen yet"], ...specification.units.map((/** @type {string} */ each) => [each, each])], chosen);
+    this.units.select.dataset.argument = "units";
+    /** What is missing of a file, with what each choice would make of it. */
+    this.missing = make("div", {className: "missing", role: "group", "aria-label": "What the file does not say", hidden: true});
+    /** Texts that were shown and not changed here since. @type {Texts | null} */
+    this.linked = null;
+    const {label, unit} = parameter("dt");
+    const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, "data-argument": "dt", on: {change: chosen}}));
     this.dt = {field: dt, element: make("div", {className: "choice"}, [make("label", {className: "field", for: dt.id}, [`${label}, ${unit}`]), dt])};
     this.starts = namesOf("start").map((name) => new NumberControl(parameter(name), this, prefix));
     this.scale = choice(prefix, "scaled", "Scaled", specification.scalings, chosen);
@@ -254,7 +259,7 @@ export class MotionForm {
     this.scales = specification.scalings.slice(1).map((/** @type {string[]} */ [name]) => new NumberControl(parameter(name), this, prefix));
     this.period = new NumberControl(specification.period, this, prefix);
     element.replaceChildren(
-      this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.channel.element, this.vertical.element, this.units.element,
+      this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.channel.element, this.missing, this.vertical.element, this.units.element,
       this.dt.element, ...this.starts.map((each) => each.element), this.scale.element, ...this.scales.map((each) => each.element), this.period.element,
     );
     this.showPulse("sine");
@@ -292,8 +297,9 @@ export class MotionForm {
     for (const each of this.scales) if (texts[each.spec.name]) each.show(texts[each.spec.name].split("@")[0]);
     if (texts.sa) this.period.show(texts.sa.split("@")[1] ?? "1");
     this.upwards = texts.vertical ?? "";
-    if (texts.units) this.units.select.value = texts.units;
-    if (texts.dt) this.dt.field.value = texts.dt;
+    this.units.select.value = texts.units ?? "";
+    this.dt.field.value = texts.dt ?? "";
+    this.linked = texts;
     this.showFields();
     void this.fetchFiles(texts);
   }
@@ -326,12 +332,19 @@ export class MotionForm {
   /** Take a file that the server keeps: it shakes the block, or moves it up and down as well. @param {any} file @param {boolean} [upwards] */
   take(file, upwards = false) {
     this.files = [...this.files.filter((each) => each.key !== file.key), file];
+    const {linked} = this;
+    if (linked && [linked.motion, linked.vertical].some((name) => name?.split("#")[0] === `file:${file.key}`)) {
+      this.show(linked);
+      this.changed(Object.fromEntries(MOTION.filter((name) => linked[name]).map((name) => [name, linked[name]])), MOTION);
+      return;
+    }
     if (upwards) this.upwards = file.channels.length > 1 ? `file:${file.key}#${file.channels.at(-1).number}` : `file:${file.key}`;
     else {
       this.use(file);
       this.upwards = "";
       this.kind.select.value = "file";
-      this.scale.select.value = "";
+      this.scale.select.value = this.units.select.value = this.dt.field.value = "";
+      this.release();
     }
     this.showFields();
     this.tell();
@@ -370,8 +383,9 @@ export class MotionForm {
     this.offerVertical();
     const file = kind === "file" ? this.file : null;
     this.channel.element.hidden = !file || file.channels.length < 2;
-    this.units.element.hidden = !this.needs("units");
-    this.dt.element.hidden = !this.needs("dt");
+    this.units.element.hidden = !this.needing("units");
+    this.dt.element.hidden = !this.needing("dt");
+    this.showMissing();
     for (const each of this.starts) each.element.hidden = each.value(each.text) === 0 && (kind !== "none" || each !== this.starts[0]);
     this.scale.element.hidden = !scalable;
     for (const each of this.scales) each.element.hidden = !scalable || scaled !== each.spec.name;
@@ -382,18 +396,38 @@ export class MotionForm {
     this.about.hidden = !this.about.textContent;
   }
 
-  /** Whether a file that is used does not say something itself. @param {string} name */
-  needs(name) {
+  /** Ask for what a file does not say, by what each choice would make of it. */
+  showMissing() {
+    /** @type {[string, string, HTMLInputElement | HTMLSelectElement][]} */
+    const asked = [["units", "units", this.units.select], ["dt", "sampling step", this.dt.field]];
+    const open = asked.flatMap(([name, words, input]) => {
+      const file = this.needing(name);
+      if (!file || input.value) return [];
+      const channel = file === this.file ? file.channels.find((/** @type {any} */ each) => String(each.number) === this.channel.select.value) : null;
+      const choices = (channel ?? file.channels[0]).choices[name].map((/** @type {string[]} */ [value, says]) => make("button", {type: "button", on: {click: () => {
+        input.value = value;
+        this.showFields();
+        this.tell();
+      }}}, [says]));
+      return [make("p", {className: "derived"}, [`${file.name} does not say its ${words}. Choose what is true:`]), make("div", {className: "toolbar"}, choices)];
+    });
+    this.missing.replaceChildren(...open);
+    this.missing.hidden = !open.length;
+  }
+
+  /** A file that is used and does not say something itself. @param {string} name @returns {any} */
+  needing(name) {
     const kind = this.kind.select.value;
     const beside = this.files.find((file) => this.upwards.startsWith(`file:${file.key}`));
     const used = kind === "file" ? [this.file, beside] : kind === "record" ? [beside] : [];
-    return used.some((file) => file?.missing.includes(name));
+    return used.find((file) => file?.missing.includes(name));
   }
 
   tell() {
     const kind = this.kind.select.value, scaled = this.scale.select.value;
     /** @type {Texts} */
     const texts = {};
+    this.linked = null;
     if (kind === "record") texts.motion = this.record.select.value;
     else if (kind === "none") texts.motion = "none";
     else if (kind === "given") texts.motion = this.given;
@@ -406,8 +440,8 @@ export class MotionForm {
       if (this.file.channels.length > 1) texts.channel = this.channel.select.value;
     }
     if (this.upwards && !this.vertical.element.hidden) texts.vertical = this.upwards;
-    if (this.needs("units")) texts.units = this.units.select.value;
-    if (this.needs("dt")) texts.dt = this.dt.field.value;
+    if (this.needing("units") && this.units.select.value) texts.units = this.units.select.value;
+    if (this.needing("dt") && this.dt.field.value) texts.dt = this.dt.field.value;
     for (const each of this.starts) if (each.value(each.text) !== 0) texts[each.spec.name] = each.text;
     const control = this.scales.find(({spec}) => spec.name === scaled);
     if (control && kind !== "none" && kind !== "pulse") texts[scaled] = scaled === "sa" ? `${control.text}@${this.period.text}` : control.text;
