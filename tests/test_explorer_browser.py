@@ -5,6 +5,7 @@ import http.server
 import json
 import math
 import random
+import re
 import runpy
 import shlex
 import subprocess
@@ -21,7 +22,9 @@ from explorer_browser import Watched, chromium, flags, missing, tool
 
 import rocking
 from rocking.chattering.families import sine
+from rocking.explorer import maps
 from rocking.explorer.core import Explorer
+from rocking.explorer.inputs import read_case
 from rocking.explorer.launch import served
 from rocking.explorer.studies import StudyView
 
@@ -710,6 +713,24 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
     page.until("document.getElementById('python').textContent.includes('chattering_map')")
     page.page.click("[data-view=response]")
     page.until("document.getElementById('python-title').textContent === 'This case as Python'")
+
+
+def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(opened, explorer):
+    page = opened("view=map&width=0.24&height=1.1&motion=el-centro-meloland-270&points=100&y_from=0.1&y_to=2")
+    page.until("document.body.dataset.map === 'complete'", timeout=120)
+    assert page.page.locator("#map-quantity").input_value() == "mode"
+    texts = {"width": "0.24", "height": "1.1", "motion": "el-centro-meloland-270"}
+    axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "2", "points": "100"}
+    found = [part.values for part in maps.parts(maps.grid_of(read_case(texts, explorer.uploads), axes))]
+    outcome, mode = np.concatenate(found, axis=1)[[0, 3]]
+    falls, at_once = (mode >= 0) | (mode == -4), outcome == 4
+    shares = [float(each) for each in re.findall(r"overturns [^,]*, ([\d.e−]+) %", page.text("#map-legend"))]
+    assert sum(shares) == pytest.approx(100 * falls.mean(), rel=0.05) and len(shares) >= 2
+    page.page.select_option("#map-quantity", "outcome")
+    page.until("document.getElementById('map-legend').textContent.includes('hatched: overturns later')")
+    assert "End of the first rocking" in page.text("#map-quantity option:checked")
+    (later,) = re.findall(r"hatched: overturns later, ([\d.]+) %", page.text("#map-legend"))
+    assert float(later) == pytest.approx(100 * (falls & ~at_once).mean(), rel=0.05) and float(later) > 1.0
 
 
 def test_a_map_of_a_record_offers_a_sine_whose_critical_amplitude_is_known(opened):

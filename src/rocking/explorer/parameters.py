@@ -323,10 +323,10 @@ _TREATMENTS: Final = (
 
 #: Quantities of a map, and how the page calls each.
 QUANTITIES: Final = {
-    "outcome": "Chattering: complete or not",
+    "outcome": "End of the first rocking: chattering complete or not",
     "rest": "Time from uplift to rest",
     "peak": "Peak rotation over slenderness",
-    "mode": "Overturning mode",
+    "mode": "Final fate",
 }
 
 

@@ -13,6 +13,8 @@ const MODES = /** @type {[number, string, string][]} */ ([
   [0, "overturns without impact", "#1c2c47"], [1, "overturns after 1 impact", "#c76b29"], [2, "overturns after 2 impacts or more", "#e9a94f"],
   [-4, "overturns after a rest", "#7a3b69"],
 ]);
+/** What overturns after a rest, as a mode; and the colour of the hatch over what overturns later than in the first rocking. */
+const AFTER_REST = -4, LATER = "#b0390c";
 /** Dark to light, even steps of lightness. */
 const RAMP = ["#0b1a3a", "#14346b", "#1f5190", "#3a74a8", "#5f97b8", "#8bb8c6", "#b9d6d4", "#e6efe4", "#fdf3d6"];
 
@@ -138,7 +140,7 @@ export class View {
     }
     const quantities = this.study ? this.study.quantities : specification.quantities;
     this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each.name}, [each.label])));
-    if (!quantities.some((/** @type {any} */ each) => each.name === map.quantity)) map.quantity = quantities[0].name;
+    if (!quantities.some((/** @type {any} */ each) => each.name === map.quantity)) map.quantity = this.first(quantities);
     this.select("quantity").value = map.quantity;
     this.select("points").value = map.points ?? "200";
     if (this.study) return;
@@ -150,6 +152,13 @@ export class View {
         if (document.activeElement !== field) field.value = map[`${which}_${end}`] ?? String((wide ? axis.wide : axis.close)[k]);
       }
     }
+  }
+
+  /** The quantity with which a map begins: under a pulse how the first rocking ends; a record goes on, and what counts is the end.
+   * @param {any[]} quantities @returns {string} */
+  first(quantities) {
+    const family = (this.page.state.texts.motion ?? "").split(":")[0];
+    return this.study || Object.hasOwn(specification.pulses, family) ? quantities[0].name : "mode";
   }
 
   /** @param {AbortSignal} signal */
@@ -336,6 +345,7 @@ export class View {
     const out = new Uint32Array(values.length);
     const kinds = this.kinds(quantity);
     if (kinds) {
+      const later = quantity === "outcome" ? this.later() : null;
       const known = new Map(kinds.map(([value, , ink]) => [value, rgba(ink)]));
       /** @type {Map<number, number>} */
       const seen = new Map();
@@ -343,11 +353,11 @@ export class View {
         if (Number.isNaN(value)) return;
         const kind = quantity === "mode" && value > 2 ? 2 : value;
         seen.set(kind, (seen.get(kind) ?? 0) + 1);
-        out[k] = known.get(kind) ?? 0;
+        out[k] = later?.[k] && striped(k, this.about.shape[1]) ? rgba(LATER) : known.get(kind) ?? 0;
       });
       this.bar.visible = false;
       const share = (/** @type {number} */ value) => (this.complete ? `, ${short((100 * (seen.get(value) ?? 0)) / values.length, 2)} %` : "");
-      this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]));
+      this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]), later?.some(Boolean) ? later.filter(Boolean).length / values.length : 0);
       return out;
     }
     const finite = values.filter((each) => Number.isFinite(each));
@@ -382,8 +392,16 @@ export class View {
     return null;
   }
 
-  /** @param {[string, string][]} entries */
-  legend(entries) {
+  /** Where a block overturns after its first rocking has ended otherwise. @returns {boolean[] | null} */
+  later() {
+    const [outcome, mode] = ["outcome", "mode"].map((name) => (this.values ?? [])[this.about.quantities.indexOf(name)]);
+    if (!outcome || !mode) return null;
+    return Array.from(mode, (each, k) => (each >= 0 || each === AFTER_REST) && outcome[k] !== this.about.outcomes.indexOf("overturns"));
+  }
+
+  /** @param {[string, string][]} entries @param {number} [later] share of the points that overturn later */
+  legend(entries, later = 0) {
+    if (later) entries = [...entries, [`hatched: overturns later${this.complete ? `, ${short(100 * later, 2)} %` : ""}`, LATER]];
     this.entries = entries;
     const parts = entries.map(([text, ink]) => {
       const key = make("i", {className: "key swatch"});
@@ -469,6 +487,9 @@ export class View {
     this.page.restate({...block, motion});
   }
 }
+
+/** Whether a point lies on a stripe of a hatch. @param {number} k @param {number} columns */
+const striped = (k, columns) => (Math.floor(k / columns) + (k % columns)) % 4 === 0;
 
 /** Colour as the image takes it: red in the lowest byte. @param {string} ink */
 function rgba(ink) {
