@@ -121,13 +121,34 @@ def test_a_weight_that_falls_lifts_a_block_whose_motion_does_not_reach_the_thres
 
 def test_the_title_of_a_map_says_what_is_the_same_all_over_it():
     sine = chattering_map(families.sine(BLOCK, model="linear"), {"a": [0.9, 1.03], "omega": [1.0, 2.0]})
-    assert sine.plot().get_suptitle() == "first uplift under sine, alpha = 0.2 rad, restitution = 0.92, linear model"
+    assert sine.plot().get_suptitle() == (
+        "end of the first rocking under sine, alpha = 0.2 rad, restitution = 0.92, linear model"
+    )
     assert sine.plot(title="mine").get_suptitle() == "mine"
     slenderness = chattering_map(
         lambda a, alpha: families.sine(rocking.Block.from_parameters(2.0, alpha, 0.9))(a, 2.0),
         {"a": [0.9, 1.03], "alpha": [0.1, 0.2]},
     )
-    assert slenderness.plot().get_suptitle() == "first uplift under sine, restitution = 0.9, nonlinear model"
+    assert (
+        slenderness.plot().get_suptitle() == "end of the first rocking under sine, restitution = 0.9, nonlinear model"
+    )
+
+
+def test_what_overturns_after_its_first_rocking_is_counted_and_hatched():
+    record = rocking.records.load("el-centro-meloland-270")
+
+    def case(pga, p):
+        return families.SimulationInput(rocking.Block.from_parameters(p, 0.15, 0.93), record.scaled_to(pga * 9.80665))
+
+    found = chattering_map(case, {"pga": np.linspace(0.3, 0.9, 5), "p": np.linspace(2.0, 6.0, 5)})
+    later = (found.overturned & (found.outcome != Outcome.OVERTURNS)).values
+    assert 2 <= later.sum() < found.overturned.values.sum() or later.sum() == found.overturned.values.sum() >= 2
+    share = f"{100 * found.overturned.values.mean():.1f} %, {100 * later.mean():.1f} % after a first rest"
+    assert found.summary().endswith(f"overturns in the end: {share}")
+    figure = found.plot()
+    hatched = [each for each in figure.axes[0].collections if each.get_hatch()]
+    assert [len(each.get_paths()) for each in hatched] == [later.sum()] * 2
+    assert "overturns later" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def test_a_map_tells_its_outcomes_and_units_and_can_be_stored(tmp_path):

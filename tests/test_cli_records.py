@@ -91,6 +91,36 @@ def test_angles_may_have_a_unit(text, expected):
     assert quantities.angle(text, "--alpha") == pytest.approx(expected, rel=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("read", "text", "expected"),
+    [
+        ("length", "50 cm", 0.5),
+        ("length", "240mm", 0.24),
+        ("length", "1 ft", 0.3048),
+        ("position", "-2in", -0.0508),
+        ("angle", "12 °", np.pi / 15),
+        ("acceleration", "30 %g", 0.3 * 9.80665),
+        ("acceleration", "3.2 m/s²", 3.2),
+        ("acceleration", "250 gal", 2.5),
+        ("velocity", "40 cm/s", 0.4),
+        ("duration", "5 ms", 0.005),
+        ("frequency", "2 Hz", 2.0),
+        ("rate", "3.6 rad/s", 3.6),
+        ("rate", "90deg/s", np.pi / 2),
+    ],
+)
+def test_units_are_taken_as_people_write_them(read, text, expected):
+    assert getattr(quantities, read)(text, "--x") == pytest.approx(expected, rel=1e-15)
+
+
+def test_sizes_speeds_and_steps_of_the_command_line_have_units(run):
+    plain = run("simulate", "el-centro-meloland-270", "--width", "0.24", "--height", "1", "--pgv", "0.4")
+    assert (
+        run("simulate", "el-centro-meloland-270", "--width", "24cm", "--height", "1000mm", "--pgv", "40cm/s") == plain
+    )
+    assert plain[0] == 0
+
+
 @pytest.mark.parametrize(("read", "text"), [("acceleration", "0.5ft"), ("angle", "12grad"), ("number", "3g")])
 def test_a_unit_of_another_quantity_is_refused(read, text):
     with pytest.raises(InvalidOption, match="--x takes"):

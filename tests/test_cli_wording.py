@@ -257,8 +257,8 @@ def test_the_peak_of_a_block_that_overturns_is_one_number_everywhere(run, tmp_pa
     ("arguments", "sentence"),
     [
         (
-            f"simulate {RECORD} --width 24cm --height 1",
-            "--width takes a number, not '24cm'; see rocking simulate --help",
+            f"simulate {RECORD} --width 24kg --height 1",
+            "--width takes a length as 0.2, 0.2m or 20cm, not '24kg'",
         ),
         ("chatter one 2 0.9", "A takes a number, not 'one'; see rocking chatter --help"),
         ("explore --port http", "--port takes a whole number, not 'http'; see rocking explore --help"),

@@ -1,8 +1,11 @@
 """The explorer's page in a browser: every view, every way in and out, against the package's own numbers."""
 
+import hashlib
 import http.server
 import json
 import math
+import random
+import re
 import runpy
 import shlex
 import subprocess
@@ -10,15 +13,18 @@ import sys
 import threading
 from contextlib import contextmanager
 from pathlib import Path
-from urllib.parse import parse_qs, parse_qsl, urlsplit
+from urllib.parse import parse_qs, parse_qsl, urlencode, urlsplit
 
+import explorer_addresses
 import numpy as np
 import pytest
 from explorer_browser import Watched, chromium, flags, missing, tool
 
 import rocking
 from rocking.chattering.families import sine
+from rocking.explorer import maps
 from rocking.explorer.core import Explorer
+from rocking.explorer.inputs import read_case
 from rocking.explorer.launch import served
 from rocking.explorer.studies import StudyView
 
@@ -150,6 +156,72 @@ def test_a_number_may_be_typed_and_a_bad_one_is_answered_with_a_sentence(opened)
     assert page.js(MARKED) == []
 
 
+@pytest.mark.parametrize(
+    ("typed", "address", "shown"), [("50 cm", "50 cm", "0.5"), ("1 ft", "1 ft", "0.3048"), ("0,3", "0.3", "0.3")]
+)
+def test_a_field_takes_units_and_shows_the_number_in_its_own(opened, typed, address, shown):
+    page = opened(STATUE)
+    width = page.page.locator("#width")
+    page.rested(lambda: (width.fill(typed), width.press("Enter")))
+    assert query_of(page)["width"] == address and width.input_value() == shown
+    block = rocking.Block(width={"50 cm": 0.5, "1 ft": 0.3048}.get(typed, 0.3), height=1.1)
+    response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665))
+    assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+    assert f"width={block.half_width * 2!r}" in page.text("#python")
+
+
+@pytest.mark.parametrize("typed", ["abc", "-1", "0.5 kg"])
+def test_what_is_refused_is_marked_and_leaves_the_last_good_case_in_grey(opened, typed):
+    page = opened(STATUE, allowed=["422"])
+    width, before = page.page.locator("#width"), page.text("#python")
+    width.fill(typed)
+    width.press("Enter")
+    page.until("!document.getElementById('problem').hidden")
+    assert width.input_value() == typed and page.js(MARKED) == ["width"]
+    assert page.js("document.querySelector('.number[data-problem]').dataset.problem") == page.text("#problem")
+    assert page.js("document.getElementById('main').classList.contains('old')")
+    assert "last case that could be computed" in page.text("#old") and page.page.locator("#old").is_visible()
+    assert query_of(page)["width"] == "0.24" and page.text("#python") == before
+    page.rested(lambda: (width.fill("0.3"), width.press("Enter")))
+    assert not page.js("document.getElementById('main').classList.contains('old')")
+    assert page.page.locator("#old").is_hidden() and query_of(page)["width"] == "0.3"
+
+
+def test_free_rocking_is_released_from_the_rotation_that_is_shown(opened):
+    page = opened(STATUE)
+    page.rested(lambda: page.page.select_option("#kind", "none"))
+    start = page.page.locator("#initial_rotation")
+    assert start.input_value() == "3" and query_of(page)["initial_rotation"] == "3deg"
+    page.rested(lambda: (start.fill("0"), start.press("Enter")))
+    assert "initial_rotation" not in query_of(page) and "nothing shakes it" in page.text("#verdict")
+    page.rested(lambda: page.page.select_option("#kind", "record"))
+    assert "initial_rotation" not in query_of(page) and start.is_hidden()
+
+
+def test_a_release_under_shaking_is_shown_and_stays(opened):
+    page = opened(SINE + "&initial_rotation=0.01&initial_velocity=-0.02")
+    assert page.page.locator("#initial_rotation").is_visible() and page.page.locator("#initial_velocity").is_visible()
+    slider = page.page.locator("#pulse-amplitude-slider")
+    page.rested(lambda: (slider.focus(), slider.press("ArrowRight")))
+    found = query_of(page)
+    assert (found["initial_rotation"], found["initial_velocity"]) == ("0.01", "-0.02")
+
+
+@pytest.mark.parametrize("more", ["", "&offset=0.02", "&restitution=0.93"])
+def test_another_description_is_the_same_block(opened, more):
+    page = opened("width=0.237&height=1.103&motion=ridgecrest-clc-090&pga=0.4g" + more)
+    impacts = page.text("#figures div:nth-child(3) dd")
+    for shape in ("parameters", "pivots", "parameters", "sizes"):
+        page.rested(lambda: page.page.select_option("#shape", shape))  # noqa: B023
+        assert page.text("#figures div:nth-child(3) dd") == impacts, shape
+    assert page.page.locator("#housner").is_checked() == ("restitution" not in more)
+    found = query_of(page)
+    assert (
+        float(found["width"]) == pytest.approx(0.237, rel=1e-14)
+        and page.page.locator("#width").input_value() == "0.237"
+    )
+
+
 def test_a_number_that_is_being_typed_stays_when_a_response_arrives(opened):
     page = opened(STATUE)
     width, move = page.page.locator("#width"), "document.getElementById('pga-slider')"
@@ -183,6 +255,19 @@ def test_a_link_reproduces_what_is_shown(opened):
     motion = rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665)
     response = rocking.simulate(block, motion, model="linear", chattering="velocity=0.001")
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+
+
+def test_whatever_an_address_says_the_page_has_no_fault(opened, here):
+    page, draw, told = opened(allowed=["422", "404"]), random.Random(7), 0
+    corners = [{"width": "0.24", "height": "1.1", "motion": "none"}, {"from": "0", "to": "1e-300"}]
+    corners += [{"motion": "constructor"}, {"chattering": "toString=1"}, {"view": "compare", "compare": "toString"}]
+    for texts in [*corners, *(explorer_addresses.case(draw) | explorer_addresses.shown(draw) for _ in range(20))]:
+        page.page.goto(f"{here.link().split('?')[0]}?{urlencode(texts)}")
+        page.until("document.body.dataset.ready", texts)
+        page.until("document.body.dataset.rested || !document.getElementById('problem').hidden", texts)
+        assert "has a fault" not in (page.text("#problem") or ""), texts
+        told += page.js("!document.getElementById('problem').hidden")
+    assert 5 <= told <= 22
 
 
 def plotted(page, name="first", where="histories"):
@@ -360,15 +445,25 @@ def test_a_file_is_chosen_told_about_and_shown(opened, tmp_path):
     file = tmp_path / "station 7.txt"
     file.write_text("\n".join(f"{value / 9.80665:.12g}" for value in samples), "utf-8")
     page = opened(STATUE, allowed=["422"])
+    before = page.text("#python")
     page.page.set_input_files("#file", file)
-    page.until("getComputedStyle(document.getElementById('units').parentElement).display !== 'none'")
-    for step in ("0.02", "0.01"):
-        page.rested(lambda step=step: (page.page.locator("#dt").fill(step), page.page.locator("#dt").press("Enter")))
-    for units in ("m/s2", "g"):
-        page.rested(lambda units=units: page.page.select_option("#units", units))
-    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.records.load("el-centro-meloland-270"))
+    page.until("document.getElementById('main').classList.contains('old')", "nothing is computed before units and step")
+    said = page.page.locator(".missing button").all_text_contents()
+    record = rocking.records.load("el-centro-meloland-270")
+    assert f"g: PGA {record.pga / 9.80665:.3g} g" in said
+    assert f"m/s2: PGA {record.pga / 9.80665**2:.3g} g" in said
+    assert f"0.01 s: it lasts {record.duration:.4g} s" in said and len(said) == 10
+    assert "motion=ridgecrest" in page.page.url and page.text("#python") == before
+    page.page.locator(".missing button", has_text="0.02 s").click()
+    page.until("document.querySelectorAll('.missing button').length === 6")
+    assert page.page.locator("#dt").input_value() == "0.02" and page.text("#python") == before
+    page.rested(lambda: page.page.locator(".missing button", has_text="m/s2: PGA").first.click())
+    assert {"dt": "0.02", "units": "m/s2"}.items() <= query_of(page).items()
+    page.rested(lambda: (page.page.locator("#dt").fill("0.01"), page.page.locator("#dt").press("Enter")))
+    page.rested(lambda: page.page.select_option("#units", "g"))
+    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), record)
     assert ("overturns" in page.text("#verdict")) == response.overturned
-    assert "'station 7.txt'" in page.text("#python")
+    assert "'station 7.txt'" in page.text("#python") and page.page.locator(".missing").is_hidden()
 
 
 DROP = """async ([name, text]) => {
@@ -452,8 +547,25 @@ def test_a_file_of_several_channels_is_dropped(opened):
     assert page.js("document.getElementById('vertical').options[1].textContent").startswith("channel 1")
 
 
+def test_a_link_whose_file_is_opened_again_is_the_same_case(opened, explorer):
+    record = rocking.records.load("el-centro-meloland-270")
+    text = "\n".join(f"{value:.9g}" for value in record.samples[1])
+    key = hashlib.sha256(text.encode()).hexdigest()[:24]
+    link = f"width=0.24&height=1.1&motion=file:{key}&vertical=ridgecrest-clc-up&dt=0.01&units=m/s2&pga=0.4g"
+    page = opened(STATUE, allowed=["422"])
+    page.page.goto(page.page.url.split("?")[0] + "?" + link)
+    page.until("!document.getElementById('problem').hidden", "the file is not here")
+    page.rested(lambda: page.js(DROP, ["again.txt", text]))
+    found = {"motion": f"file:{key}", "vertical": "ridgecrest-clc-up", "dt": "0.01", "units": "m/s2", "pga": "0.4g"}
+    assert found.items() <= query_of(page).items()
+    assert page.js("['scaled', 'pga', 'dt', 'units', 'vertical'].map((id) => document.getElementById(id).value)") == [
+        "pga", "0.4", "0.01", "m/s2", "ridgecrest-clc-up",
+    ]  # fmt: skip
+    assert page.text("#python").count("scaled_to(") == 1 and "dt=0.01, units='m/s2'" in page.text("#python")
+
+
 def test_a_record_shakes_upwards_as_well(opened, tmp_path):
-    page = opened(STATUE)
+    page = opened(STATUE, allowed=["422"])
     assert "vertical" not in page.text("#legend")
     page.rested(lambda: page.page.select_option("#vertical", "ridgecrest-clc-up"))
     assert query_of(page)["vertical"] == "ridgecrest-clc-up"
@@ -470,7 +582,8 @@ def test_a_record_shakes_upwards_as_well(opened, tmp_path):
         page.page.click("#choose-vertical")
     chooser.value.set_files(file)
     page.until("getComputedStyle(document.getElementById('units').parentElement).display !== 'none'")
-    page.rested(lambda: (page.page.locator("#dt").fill("0.01"), page.page.locator("#dt").press("Enter")))
+    page.page.locator("#dt").fill("0.01")
+    page.page.locator("#dt").press("Enter")
     page.rested(lambda: page.page.select_option("#units", "m/s2"))
     assert query_of(page)["vertical"].startswith("file:")
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, abs=6e-4)
@@ -664,6 +777,24 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
     page.until("document.getElementById('python').textContent.includes('chattering_map')")
     page.page.click("[data-view=response]")
     page.until("document.getElementById('python-title').textContent === 'This case as Python'")
+
+
+def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(opened, explorer):
+    page = opened("view=map&width=0.24&height=1.1&motion=el-centro-meloland-270&points=100&y_from=0.1&y_to=2")
+    page.until("document.body.dataset.map === 'complete'", timeout=120)
+    assert page.page.locator("#map-quantity").input_value() == "mode"
+    texts = {"width": "0.24", "height": "1.1", "motion": "el-centro-meloland-270"}
+    axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "2", "points": "100"}
+    found = [part.values for part in maps.parts(maps.grid_of(read_case(texts, explorer.uploads), axes))]
+    outcome, mode = np.concatenate(found, axis=1)[[0, 3]]
+    falls, at_once = (mode >= 0) | (mode == -4), outcome == 4
+    shares = [float(each) for each in re.findall(r"overturns [^,]*, ([\d.e−]+) %", page.text("#map-legend"))]
+    assert sum(shares) == pytest.approx(100 * falls.mean(), rel=0.05) and len(shares) >= 2
+    page.page.select_option("#map-quantity", "outcome")
+    page.until("document.getElementById('map-legend').textContent.includes('hatched: overturns later')")
+    assert "End of the first rocking" in page.text("#map-quantity option:checked")
+    (later,) = re.findall(r"hatched: overturns later, ([\d.]+) %", page.text("#map-legend"))
+    assert float(later) == pytest.approx(100 * (falls & ~at_once).mean(), rel=0.05) and float(later) > 1.0
 
 
 def test_a_map_of_a_record_offers_a_sine_whose_critical_amplitude_is_known(opened):

@@ -2,10 +2,12 @@
 
 import json
 import math
+import random
 import runpy
 import shlex
 from pathlib import Path
 
+import explorer_addresses
 import numpy as np
 import pytest
 
@@ -18,6 +20,7 @@ from rocking.explorer.core import Explorer, extremes
 from rocking.explorer.inputs import NAMES, pulse_as_text, pulse_of, read_case, texts_of
 from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.parameters import PULSES as OFFERED
+from rocking.explorer.payload import pack
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
 from rocking.motion.exceedance import exceedances
@@ -165,7 +168,7 @@ def test_a_motion_that_is_no_pulse_any_more_is_not_written_as_one():
     [
         ({"width": "0.2"}, InvalidBlock, "either width and height"),
         ({**STATUE, "p": "3"}, InvalidBlock, "either width and height"),
-        ({**STATUE, "width": "wide"}, InvalidOption, "width takes a number"),
+        ({**STATUE, "width": "wide"}, InvalidOption, "width takes a length"),
         ({**STATUE, "width": "-1"}, InvalidBlock, "positive"),
         ({**STATUE, "width": "nan"}, InvalidBlock, "positive"),
         ({**STATUE, "colour": "red"}, InvalidOption, "no 'colour'"),
@@ -391,6 +394,40 @@ def test_verdicts_are_those_of_the_response(explorer):
     assert f"comes to rest {header['rests']} times, and does not overturn" in header["verdict"]
 
 
+def test_a_block_that_nothing_moves_is_shown_at_rest_for_a_second(explorer):
+    payload = explorer.case({"width": "0.24", "height": "1.1", "motion": "none"})
+    assert payload.header["verdict"] == "It does not move: nothing shakes it, and it is released upright and at rest."
+    assert payload.header["window"] == {"from": 0.0, "to": 1.0, "impacts": 0, "unresolved": None}
+    assert payload.header["duration"] == 0.0 and payload.arrays["rotation"].tolist() == [0.0]
+
+
+def test_whatever_an_address_says_is_answered_with_numbers_or_a_sentence():
+    draw, explorer, answered, refused = random.Random(5), Explorer(), 0, 0
+    changes = [
+        {"motion": "none"},
+        {"chattering": "velocity=0.05"},
+        {"width": "0.5", "height": "1"},
+        {"motion": "none", "initial_rotation": "1deg"},
+    ]
+    for _ in range(200):
+        texts = explorer_addresses.case(draw)
+        try:
+            payload = explorer.case(texts)
+            other = explorer.compare(texts, draw.choice(changes), draw.choice([None, (0.0, 0.5)]))
+        except RockingError as error:
+            assert str(error), texts
+            refused += 1
+            continue
+        for each in (payload, other):
+            assert 0.0 <= each.header["window"]["from"] < each.header["window"]["to"] < math.inf, texts
+            assert pack(each)
+        for header in (payload.header, *other.header["cases"]):
+            assert math.isfinite(header["overturn_time"]) == header["overturned"], texts
+            assert math.isfinite(header["peak_time"]) and math.isfinite(header["peak_rotation"]), texts
+        answered += 1
+    assert answered >= 25 and refused >= 100
+
+
 def test_a_comparison_holds_both_cases(explorer):
     payload = explorer.compare(STATUE, {"chattering": "velocity=0.05"})
     first, second = payload.header["cases"]
@@ -443,9 +480,19 @@ def test_a_file_that_needs_no_word_is_read_at_once(explorer):
 
 def test_a_file_says_what_must_be_told(explorer):
     key = explorer.uploads.add_file("one column.txt", "\n".join(["0.1", "-0.2", "0.3"] * 50).encode())
-    assert explorer.uploads.contents(key)["missing"] == ["units", "dt"] or set(
-        explorer.uploads.contents(key)["missing"]
-    ) == {"units", "dt"}
+    found = explorer.uploads.contents(key)
+    assert set(found["missing"]) == {"units", "dt"}
+    assert found["channels"][0]["choices"] == {
+        "units": [
+            ["g", "g: PGA 0.3 g"],
+            ["m/s2", "m/s2: PGA 0.0306 g"],
+            ["cm/s2", "cm/s2: PGA 0.000306 g"],
+            ["gal", "gal: PGA 0.000306 g"],
+            ["mm/s2", "mm/s2: PGA 3.06e-05 g"],
+            ["mg", "mg: PGA 0.0003 g"],
+        ],
+        "dt": [[f"{step:g}", f"{step:g} s: it lasts {149 * step:.4g} s"] for step in (0.002, 0.005, 0.01, 0.02)],
+    }
     texts = {"width": "0.24", "height": "1.1", "motion": f"file:{key}", "dt": "0.02", "units": "g"}
     assert read_case(texts, explorer.uploads).motion.duration == pytest.approx(149 * 0.02)
 

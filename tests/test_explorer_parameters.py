@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from rocking import quantities
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import FAMILIES
 from rocking.explorer.parameters import (
@@ -68,8 +69,24 @@ def test_a_pulse_of_the_defaults_of_its_fields_can_be_made(name):
 def test_two_sides_are_read_where_a_parameter_may_have_them_and_refused_elsewhere():
     assert PARAMETERS["restitution"].read("0.9,0.8") == (0.9, 0.8)
     assert PARAMETERS["pivots"].read("20cm,0.1") == (0.2, 0.1)
-    with pytest.raises(InvalidOption, match="takes a number"):
+    with pytest.raises(InvalidOption, match="takes a length"):
         PARAMETERS["width"].read("0.2,0.3")
+
+
+def test_the_page_reads_every_unit_as_the_program_does():
+    judged = 0
+    for parameter in (*PARAMETERS.values(), *(each for pulse in PULSES.values() for each in pulse["parameters"])):
+        described = parameter.described()
+        kind = "acceleration" if parameter.name == "sa" else parameter.kind
+        if kind == "text":
+            continue
+        read = getattr(quantities, kind)
+        suffix = described["suffix"] or ("" if parameter.unit != "Hz" else "Hz")
+        for spelling, factor in described["units"].items():
+            expected = read(f"0.7{spelling}", "x") / read(f"1{suffix}", "x")
+            assert 0.7 * factor == pytest.approx(expected, rel=1e-15), (parameter.name, spelling)
+            judged += 1
+    assert judged >= 150
 
 
 def test_a_field_is_called_by_its_label_and_another_argument_by_its_name():

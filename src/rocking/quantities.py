@@ -13,7 +13,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import FACTOR, Measure
-from rocking.motion.units import find_unit
+from rocking.motion.units import Unit, accelerations, plain_spelling, times
 from rocking.tables import decimal
 
 #: What reads one number: its text and the name of the argument that it is of, to SI units.
@@ -26,12 +26,39 @@ _WRITTEN: Final = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)\s*(\D.*?)?\s*", re.IGNORECASE
 )
 
-#: What one of these units is in SI units and radians.
-_ANGLES: Final = {"": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0}
-_FREQUENCIES: Final = {"": 1.0, "hz": 1.0, "rad/s": 0.5 / math.pi}
-_VELOCITIES: Final = {"": 1.0, "m/s": 1.0, "cm/s": 0.01}
-_LENGTHS: Final = {"": 1.0, "m": 1.0, "cm": 0.01}
-_TIMES: Final = {"": 1.0, "s": 1.0}
+_SI: Final = Unit("", 1.0, 1.0)
+_DEGREE: Final = Unit("deg", math.pi / 180.0, 1.0)
+
+
+def _units(*units: Unit, **spellings: str) -> dict[str, Unit]:
+    """Units by their plain spellings, with that of a number without a unit, and more spellings of some."""
+    known = {plain_spelling(unit.name): unit for unit in units}
+    return {"": _SI, **known, **{other: known[name] for name, others in spellings.items() for other in others.split()}}
+
+
+_LENGTHS: Final = _units(
+    _SI._replace(name="m"),
+    Unit("cm", 1.0, 100.0),
+    Unit("mm", 1.0, 1000.0),
+    Unit("ft", 3048.0, 1e4),
+    Unit("in", 254.0, 1e4),
+)
+_ANGLES: Final = _units(_SI._replace(name="rad"), _DEGREE, deg="° º degree degrees", rad="radian radians")
+_VELOCITIES: Final = _units(*(unit._replace(name=f"{name}/s") for name, unit in _LENGTHS.items() if name))
+_RATES: Final = _units(_SI._replace(name="rad/s"), _DEGREE._replace(name="deg/s"), degs="°s")
+
+#: Units by their plain spellings, for SI units and radians: the one list, which the explorer's page has too.
+UNITS: Final[Mapping[str, Mapping[str, Unit]]] = {
+    "length": _LENGTHS,
+    "position": _LENGTHS,
+    "angle": _ANGLES,
+    "acceleration": {"": _SI, **accelerations()},
+    "velocity": _VELOCITIES,
+    "frequency": _units(_SI._replace(name="Hz"), Unit("rad/s", 0.5 / math.pi, 1.0)),
+    "rate": _RATES,
+    "duration": {"": _SI, **{plain_spelling(each): unit for each, unit in times().items()}},
+    "number": {"": _SI},
+}
 
 
 def number(text: str, name: str) -> float:
@@ -44,37 +71,37 @@ def number(text: str, name: str) -> float:
 
 def acceleration(text: str, name: str) -> float:
     """Return an acceleration, m/s^2, from "0.5g", "4.9m/s2", "490gal" or "4.9" (m/s^2)."""
-    value, spelling = _parts(text)
-    unit = find_unit(spelling or "m/s2")
-    if value is None or unit is None:
-        sentence = f"{{}} takes an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2), not {text.strip()!r}"
-        raise InvalidOption(sentence, name)
-    return value * unit.multiplier / unit.divisor
+    return _in_units("acceleration", text, name, "an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2)")
 
 
 def angle(text: str, name: str) -> float:
     """Return an angle, rad, from "12deg", "0.2rad" or "0.2" (rad)."""
-    return _in_units(_ANGLES, text, name, "an angle as 12deg or 0.2 (rad)")
+    return _in_units("angle", text, name, "an angle as 12deg or 0.2 (rad)")
 
 
 def frequency(text: str, name: str) -> float:
     """Return a frequency, Hz, from "2Hz", "12.6rad/s" or "2" (Hz)."""
-    return _in_units(_FREQUENCIES, text, name, "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
+    return _in_units("frequency", text, name, "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
 
 
 def velocity(text: str, name: str) -> float:
     """Return a velocity, m/s, from "0.4m/s", "40cm/s" or "0.4" (m/s)."""
-    return _in_units(_VELOCITIES, text, name, "a velocity as 40cm/s or 0.4 (m/s)")
+    return _in_units("velocity", text, name, "a velocity as 40cm/s or 0.4 (m/s)")
+
+
+def rate(text: str, name: str) -> float:
+    """Return an angular velocity, rad/s, from "2rad/s", "5deg/s" or "2" (rad/s)."""
+    return _in_units("rate", text, name, "a number of rad/s as 2 or 2rad/s")
 
 
 def duration(text: str, name: str) -> float:
-    """Return a time, s, from "1.5s" or "1.5"."""
-    return _in_units(_TIMES, text, name, "a time as 1.5 (s)")
+    """Return a time, s, from "1.5s", "5ms" or "1.5"."""
+    return _in_units("duration", text, name, "a time as 1.5 (s)")
 
 
 def length(text: str, name: str) -> float:
     """Return a positive length, m, from "0.2m", "20cm" or "0.2" (m)."""
-    value = _in_units(_LENGTHS, text, name, "a length as 0.2, 0.2m or 20cm")
+    value = _in_units("length", text, name, "a length as 0.2, 0.2m or 20cm")
     if not value > 0.0:
         raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", name)
     return value
@@ -82,7 +109,7 @@ def length(text: str, name: str) -> float:
 
 def position(text: str, name: str) -> float:
     """Return a position, m, from "-0.2m", "20cm" or "0.2" (m)."""
-    return _in_units(_LENGTHS, text, name, "a position as 0.2, 0.2m or 20cm")
+    return _in_units("position", text, name, "a length as 0.2, 0.2m or 20cm")
 
 
 def tilt(text: str, name: str) -> float:
@@ -160,8 +187,9 @@ def scaling(given: Mapping[str, str | float | None], quantity: Quantity = accele
         level, at, period = str(value).partition("@")
         if not at:
             raise InvalidOption(f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {value!r}", name)
-        return quantity(level, name), Measure("sa", number(period, name))
-    plain = number(value, name) if isinstance(value, str) else float(value)
+        return quantity(level, name), Measure("sa", duration(period, name))
+    read = number if name == "scale" else velocity
+    plain = read(value, name) if isinstance(value, str) else float(value)
     if name == "scale":
         return checks.finite(plain, name, InvalidOption), FACTOR
     return checks.positive(plain, name, InvalidOption, "m/s"), Measure("pgv")
@@ -172,11 +200,12 @@ def _decimals(numbers: Floats) -> Floats:
     return np.array([decimal(value) for value in numbers])
 
 
-def _in_units(units: Mapping[str, float], text: str, name: str, wanted: str) -> float:
-    value, unit = _parts(text)
-    if value is None or unit.lower() not in units:
+def _in_units(kind: str, text: str, name: str, wanted: str) -> float:
+    value, spelling = _parts(text)
+    unit = UNITS[kind].get(plain_spelling(spelling))
+    if value is None or unit is None:
         raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", name)
-    return value * units[unit.lower()]
+    return value * unit.multiplier / unit.divisor
 
 
 def _parts(text: str) -> tuple[float | None, str]:

@@ -190,8 +190,15 @@ class ChatteringMap(DatasetResult):
             for value, count in zip(values, counts, strict=True)
         ]
         first, second = self.data.outcome.dims
-        head = f"chattering after the first uplift, over {first} and {second}"
-        return f"{head}\n\n{text_table(['outcome', 'share of the map'], rows)}"
+        head = f"end of the first rocking, over {first} and {second}"
+        overturned, later = (100.0 * float(each.mean()) for each in (self.data.overturned, self._later()))
+        fate = f"overturns in the end: {overturned:.1f} %" + (f", {later:.1f} % after a first rest" if later else "")
+        return f"{head}\n\n{text_table(['outcome', 'share of the map'], rows)}\n\n{fate}"
+
+    def _later(self) -> NDArray[np.bool_]:
+        """Whether a block overturns after its first rocking has ended otherwise."""
+        found: NDArray[np.bool_] = (self.data.overturned & (self.data.outcome != Outcome.OVERTURNS)).values
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         columns = {str(name): self.data[name].values for name in (*self.data.outcome.dims, *self.data.data_vars)}
@@ -206,6 +213,8 @@ class ChatteringMap(DatasetResult):
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
         """Draw the outcomes, the first parameter upwards, the second to the right.
+
+        They are of the first rocking; where the block overturns in a later one, it is hatched.
 
         Parameters
         ----------
@@ -241,9 +250,10 @@ class ChatteringMap(DatasetResult):
             y=self.data[first].values,
             outcome=self.data.outcome.values,
             meanings=[outcome.words for outcome in Outcome],
+            later=self._later(),
             x_label=written.get(str(second), str(second)),
             y_label=written.get(str(first), str(first)),
-            title=title or f"first uplift under {self.data.attrs['case']}",
+            title=title or f"end of the first rocking under {self.data.attrs['case']}",
             ax=ax,
             figsize=figsize,
         )

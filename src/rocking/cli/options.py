@@ -9,14 +9,14 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final
 
-from cyclopts import Group, Parameter
+from cyclopts import Group, Parameter, Token
 
 from rocking.constants import Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.plausibility import block_notes, level_notes, restraint_notes
 from rocking.progress import note
-from rocking.quantities import Quantity, acceleration, length, number, sides, tilt, values, velocity
+from rocking.quantities import Quantity, acceleration, length, number, position, rate, sides, tilt, values, velocity
 
 if TYPE_CHECKING:
     from rocking.block import Block
@@ -53,17 +53,32 @@ def written(text: str) -> Parameter:
     return Parameter(help=text, allow_leading_hyphen=True)
 
 
+def measured(text: str, quantity: Quantity) -> Parameter:
+    """Return the help of an option whose value is a number with or without a unit, which `quantity` reads."""
+
+    def read(_: Any, tokens: Sequence[Token]) -> float:
+        return quantity(tokens[0].value, (tokens[0].keyword or "").lstrip("-").replace("-", "_"))
+
+    return Parameter(help=text, converter=read, allow_leading_hyphen=True)
+
+
 @dataclass(frozen=True)
 class BlockOptions:
     """A block by its sizes, by its parameters, or by its pivots."""
 
-    half_width: Annotated[float | None, hint("Half the width of a rectangular block, m.")] = None
-    half_height: Annotated[float | None, hint("Half its height, m.")] = None
-    width: Annotated[float | None, hint("Width of a rectangular block, m; with --height.")] = None
-    height: Annotated[float | None, hint("Its height, m.")] = None
+    half_width: Annotated[
+        float | None, measured("Half the width of a rectangular block, 0.12 (m) or 12cm.", position)
+    ] = None
+    half_height: Annotated[float | None, measured("Half its height, m.", position)] = None
+    width: Annotated[
+        float | None, measured("Width of a rectangular block, 0.24 (m) or 24cm; with --height.", position)
+    ] = None
+    height: Annotated[float | None, measured("Its height, m.", position)] = None
     offset: Annotated[
         float | None,
-        hint("How far its centre of mass is off the middle of the width, m; positive to side + (the right)."),
+        measured(
+            "How far its centre of mass is off the middle of the width, m; positive to side + (the right).", position
+        ),
     ] = None
     p: Annotated[str | None, written("Frequency parameter, rad/s; one number or two; with --alpha.")] = None
     alpha: Annotated[
@@ -110,7 +125,7 @@ class BlockOptions:
                     "the restitution of two different sides follows from {} and {} of both: give {}, too",
                     *("p", "alpha", "p"),
                 )
-            block = Block.from_parameters(1.0 if self.p is None else sides(self.p, "p"), alpha, e)
+            block = Block.from_parameters(1.0 if self.p is None else sides(self.p, "p", rate), alpha, e)
         else:
             block = Block(**given, restitution=e)
         for sentence in block_notes(block):

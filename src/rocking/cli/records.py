@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, NamedTuple
 
 from cyclopts import Group, Parameter
 
-from rocking.cli.options import hint, noted_acceleration, written
+from rocking.cli.options import hint, measured, noted_acceleration, written
 from rocking.cli.output import OUTPUT, PrintOptions
 from rocking.cli.wording import option_of
 from rocking.errors import InvalidMotion, InvalidOption, RockingError, UnreadableRecord
@@ -30,7 +30,7 @@ from rocking.motion.scaling import Measure
 from rocking.named_pulses import FAMILIES, PulseFamily, named_pulse
 from rocking.plausibility import motion_notes, reading_notes, vertical_notes
 from rocking.progress import Progress, note
-from rocking.quantities import scaling
+from rocking.quantities import duration, scaling, velocity
 from rocking.tables import text_table, to_json
 
 #: What a message about a record file may name.
@@ -60,7 +60,9 @@ class FileOptions:
     """What a record file does not say."""
 
     channel: Annotated[str | None, hint("Channel, by number or name, of files that hold several.")] = None
-    dt: Annotated[float | None, hint("Sampling step, s, of files that do not say theirs.")] = None
+    dt: Annotated[
+        float | None, measured("Sampling step, 0.01 (s) or 10ms, of files that do not say theirs.", duration)
+    ] = None
     units: Annotated[str | None, hint("Units of files that do not say theirs: g, m/s2, cm/s2, gal, mm/s2, mg.")] = None
 
     def read(self, name: str, *, several: bool = False) -> Motion:
@@ -109,7 +111,7 @@ class ScaledOptions(VerticalOptions):
 
     scale: Annotated[float | None, hint("Factor on the motion; negative: reversed.")] = None
     pga: Annotated[str | None, written("Scale to this peak ground acceleration: 0.5g, 4.9m/s2 or 4.9 (m/s^2).")] = None
-    pgv: Annotated[float | None, hint("Scale to this peak ground velocity, m/s.")] = None
+    pgv: Annotated[float | None, measured("Scale to this peak ground velocity, 0.4 (m/s) or 40cm/s.", velocity)] = None
     sa: Annotated[
         str | None,
         written("Scale to this spectral acceleration (5 % damping) at a period: 0.4g@1.0 is 0.4 g at 1.0 s."),

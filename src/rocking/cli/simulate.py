@@ -8,13 +8,13 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from rocking import quantities
 from rocking.analysis.rules.check import check as apply_rules
 from rocking.analysis.survey import folder_names, survey
-from rocking.cli.options import BLOCK, MODEL, BlockOptions, HeldOptions, ModelOptions, TreatmentOptions
+from rocking.cli.options import BLOCK, MODEL, BlockOptions, HeldOptions, ModelOptions, TreatmentOptions, measured
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.errors import InvalidOption
-from rocking.quantities import tilt
 from rocking.response import Response
 from rocking.response.history import friction_coefficient
 from rocking.simulation import simulate as run
@@ -26,7 +26,10 @@ class _Start:
 
     duration: Annotated[
         float | None,
-        Parameter(help="Time to stop at, s; by default when the block is at rest after the motion, or has overturned."),
+        measured(
+            "Time to stop at, s; by default when the block is at rest after the motion, or has overturned.",
+            quantities.duration,
+        ),
     ] = None
     initial_rotation: Annotated[
         str, Parameter(help="Rotation at the start, 2deg or 0.03 (rad).", allow_leading_hyphen=True)
@@ -65,7 +68,7 @@ def simulate(
     options: dict[str, Any] = {
         **model.chosen(),
         "duration": start.duration,
-        "initial_rotation": tilt(start.initial_rotation, "initial_rotation"),
+        "initial_rotation": quantities.tilt(start.initial_rotation, "initial_rotation"),
         "initial_velocity": start.initial_velocity,
     }
     if each and output.out is None:

@@ -34,6 +34,10 @@ from rocking.treatment import Certified
 _TIMES: Final = 12_000
 _POINTS: Final = 3_000
 
+#: Narrowest window, s: times have no more digits; and what is shown of a response that lasts no time.
+_NARROWEST: Final = 1e-12
+_OF_NOTHING: Final = 1.0
+
 #: Impacts of a window whose times are added to the line's.
 _MARKED: Final = 2_000
 
@@ -126,7 +130,7 @@ class Explorer:
         """Return all that the page says of a case, and its arrays in a window (s; by default where it moves)."""
         shown = self.show(texts)
         response = shown.response
-        start, end = active_span(response) if window is None else _checked(window, response)
+        start, end = active_span(response) if window is None else _checked(window, response.duration)
         header = {**_facts(shown), "window": _window(shown, start, end)}
         return Payload(header, {**_window_arrays(shown, start, end), **_whole_arrays(response)})
 
@@ -135,7 +139,7 @@ class Explorer:
     ) -> Payload:
         """Return the arrays of a window (s), evaluated anew; with those of the ground's displacement."""
         shown = self.show(texts)
-        start, end = _checked(window, shown.response)
+        start, end = _checked(window, shown.response.duration)
         arrays = _window_arrays(shown, start, end, min(max(points, 2), _POINTS))
         if ground:
             arrays |= _ground_arrays(shown, start, end)
@@ -147,9 +151,11 @@ class Explorer:
         second = self.show(_changed(first.case.texts, changed))
         spans = [active_span(shown.response) for shown in (first, second)]
         longest = max(first.response.duration, second.response.duration)
-        start, end = window or (min(span[0] for span in spans), max(span[1] for span in spans))
-        start, end = max(start, 0.0), min(end, longest)
-        header: dict[str, Any] = {"window": {"from": start, "to": end}, "duration": longest, "cases": []}
+        if window is None:
+            start, end = min(span[0] for span in spans), max(span[1] for span in spans)
+        else:
+            start, end = _checked(window, longest)
+        header: dict[str, Any] = {"window": _ends(start, end), "duration": longest, "cases": []}
         arrays: dict[str, Floats] = {}
         for name, shown in (("first", first), ("second", second)):
             header["cases"].append(_facts(shown))
@@ -194,7 +200,7 @@ class Explorer:
                 response.to_netcdf(file)
             else:
                 with self._drawing:
-                    _draw(response, file, None if window is None else _checked(window, response))
+                    _draw(response, file, None if window is None else _checked(window, response.duration))
             return file.read_bytes()
 
     def _steps(self) -> int:
@@ -214,7 +220,11 @@ def _window(shown: Simulated, start: float, end: float) -> dict[str, Any]:
     times = response.impacts["time"]
     count = np.searchsorted(times, end, "right") - np.searchsorted(times, start, "left")
     left = [each for each in _unresolved(response, start, end) if each > _SEEN * (end - start)]
-    return {"from": start, "to": end, "impacts": int(count), "unresolved": max(left, default=None)}
+    return {**_ends(start, end), "impacts": int(count), "unresolved": max(left, default=None)}
+
+
+def _ends(start: float, end: float) -> dict[str, float]:
+    return {"from": start, "to": end if end > start else start + _OF_NOTHING}
 
 
 def _unresolved(response: Response, start: float, end: float) -> list[float]:
@@ -243,13 +253,15 @@ def extremes(values: Floats, most: int) -> Integers:
     return np.minimum(kept, len(values) - 1)
 
 
-def _checked(window: tuple[float, float], response: Response) -> tuple[float, float]:
+def _checked(window: tuple[float, float], duration: float) -> tuple[float, float]:
     start, end = window
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
         raise InvalidOption("the window must go from a time to a later one, both in s", value=window)
-    start, end = max(start, 0.0), min(end, response.duration)
+    start, end = max(start, 0.0), min(end, duration)
     if not start < end:
-        raise InvalidOption(f"the window is outside the response, which lasts {response.duration:.6g} s")
+        raise InvalidOption(f"the window is outside the response, which lasts {duration:.6g} s")
+    if end - start < _NARROWEST:
+        raise InvalidOption(f"the window is {end - start:.3g} s wide; widen it to {_NARROWEST:g} s or more")
     return start, end
 
 
@@ -368,8 +380,10 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> str:
         words = in_words(response, "")
         return f"{words[0].upper()}{words[1:]}."
     if not len(response.events) and not len(response.impacts) and response.peak_rotation == 0.0:
+        if response.motion is None:
+            return "It does not move: nothing shakes it, and it is released upright and at rest."
         lifting = min(thresholds) / response.block.gravity
-        if response.motion is not None and response.motion.vertical is not None:
+        if response.motion.vertical is not None:
             return "It does not move: the ground acceleration never passes what would lift it."
         return f"It does not move: the ground acceleration never passes {lifting:.3g} g, which would lift it."
     rests = int(np.sum(response.events["kind"] == "rest"))

@@ -14,18 +14,39 @@ from typing import Any, Final, Literal, NamedTuple
 from rocking.constants import VERSION
 from rocking.errors import InvalidOption
 from rocking.motion import records
-from rocking.motion.units import CHOICES
-from rocking.quantities import Quantity, acceleration, angle, length, number, sides
+from rocking.motion.units import CHOICES, plain_spelling
+from rocking.quantities import (
+    UNITS,
+    Quantity,
+    acceleration,
+    angle,
+    duration,
+    frequency,
+    length,
+    number,
+    position,
+    rate,
+    sides,
+    velocity,
+)
 
 #: Parameters that one form sets together, and that a comparison replaces together.
 Group = Literal["block", "motion", "start", "model", "map", "sweep", "pulse", "treatment"]
 
-Kind = Literal["text", "number", "length", "angle", "acceleration", "acceleration at a period"]
+Kind = Literal[
+    "text", "number", "length", "position", "angle", "rate", "duration", "velocity", "frequency", "acceleration",
+    "acceleration at a period",
+]  # fmt: skip
 
 _READERS: Final[Mapping[Kind, Quantity]] = {
     "number": number,
     "length": length,
+    "position": position,
     "angle": angle,
+    "rate": rate,
+    "duration": duration,
+    "velocity": velocity,
+    "frequency": frequency,
     "acceleration": acceleration,
 }
 
@@ -71,7 +92,7 @@ class Parameter:
                 raise InvalidOption(
                     f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {text!r}", self.name, value=text
                 )
-            return acceleration(level, self.name), number(period, self.name)
+            return acceleration(level, self.name), duration(period, self.name)
         if self.values == "one":
             return _READERS[self.kind](text, self.name)
         found = sides(text, self.name, _READERS[self.kind])
@@ -79,7 +100,16 @@ class Parameter:
 
     def described(self) -> dict[str, Any]:
         """Return all of it in plain values, as the page takes it."""
-        return {**asdict(self), "suffix": _SUFFIXES.get(self.unit, "")}
+        return {**asdict(self), "suffix": _SUFFIXES.get(self.unit, ""), "units": self._units()}
+
+    def _units(self) -> dict[str, float]:
+        """Return what one of each unit is in the unit that is shown, by plain spellings as in `quantities.UNITS`."""
+        kind = "acceleration" if self.kind == "acceleration at a period" else self.kind
+        if kind == "text":
+            return {}
+        units = UNITS[kind]
+        shown = units[plain_spelling(_SUFFIXES.get(self.unit, ""))]
+        return {each: unit.multiplier * shown.divisor / unit.divisor / shown.multiplier for each, unit in units.items()}
 
 
 def _by_name(*parameters: Parameter) -> dict[str, Parameter]:
@@ -89,25 +119,25 @@ def _by_name(*parameters: Parameter) -> dict[str, Parameter]:
 #: All texts of a case by name, in the order of the address and of the command line.
 PARAMETERS: Final = _by_name(
     Parameter(
-        "width", "Width", "block", "number", "m", "0.24", 0.02, 5.0, True,
+        "width", "Width", "block", "position", "m", "0.24", 0.02, 5.0, True,
         explanation="Full width 2b of a rectangular block.",
     ),
     Parameter(
-        "height", "Height", "block", "number", "m", "1.1", 0.1, 20.0, True,
+        "height", "Height", "block", "position", "m", "1.1", 0.1, 20.0, True,
         explanation="Full height 2h of a rectangular block.",
     ),
     Parameter(
-        "offset", "Offset of the centre of mass", "block", "number", "m", "0", -0.25, 0.25,
+        "offset", "Offset of the centre of mass", "block", "position", "m", "0", -0.25, 0.25,
         explanation="Distance of the centre of mass from the middle of the width, positive to the right (side +). It "
         "is a quarter of the width at most. The two sides then differ.",
     ),
     Parameter(
-        "p", "Frequency parameter p", "block", "number", "rad/s", "3.61", 0.3, 12.0, True, "one or two",
+        "p", "Frequency parameter p", "block", "rate", "rad/s", "3.61", 0.3, 12.0, True, "one or two",
         explanation="It says how fast the block tips: p² = 3g/4R for a rectangle with half diagonal R. Large blocks "
         "have a small p. It is not a frequency of vibration: a rocking block has none.",
     ),
     Parameter(
-        "alpha", "Slenderness α", "block", "angle", "°", "12.3deg", 1.0, 40.0, False, "one or two",
+        "alpha", "Slenderness α", "block", "angle", "°", "12.3deg", 1.5, 40.0, False, "one or two",
         explanation="Angle between the vertical and the line from a corner to the centre of mass. The block lifts when "
         "the ground acceleration passes g tan α, and it stands on its corner in balance when it is rotated by α.",
     ),
@@ -128,11 +158,11 @@ PARAMETERS: Final = _by_name(
         explanation="Angular speed just after an impact over the speed just before. Housner's value, 1 − 1.5 sin² α, "
         "keeps the angular momentum about the new corner; that of two different sides follows from both p and α.",
     ),
-    Parameter("gravity", "Gravity", "model", "number", "m/s²"),
+    Parameter("gravity", "Gravity", "model", "acceleration", "m/s²"),
     Parameter("motion", "Record", "motion", "text", default="ridgecrest-clc-090"),
     Parameter("channel", "Channel", "motion", "text"),
     Parameter("vertical", "Vertical component", "motion", "text"),
-    Parameter("dt", "Sampling step", "motion", "number", "s", "0.01"),
+    Parameter("dt", "Sampling step", "motion", "duration", "s", "0.01"),
     Parameter("units", "Units of the numbers", "motion", "text"),
     Parameter(
         "scale", "Factor", "motion", "number", "", "1", 0.1, 10.0, True,
@@ -143,7 +173,7 @@ PARAMETERS: Final = _by_name(
         explanation="Largest ground acceleration (PGA).",
     ),
     Parameter(
-        "pgv", "Peak velocity", "motion", "number", "m/s", "0.5", 0.05, 3.0, True,
+        "pgv", "Peak velocity", "motion", "velocity", "m/s", "0.5", 0.05, 3.0, True,
         explanation="Largest ground velocity (PGV).",
     ),
     Parameter(
@@ -152,12 +182,15 @@ PARAMETERS: Final = _by_name(
     ),
     Parameter("model", "Equation of motion", "model", "text", default="nonlinear"),
     Parameter("chattering", "Chattering ends by", "treatment", "text", default="certified"),
-    Parameter("duration", "Duration", "model", "number", "s"),
+    Parameter("duration", "Duration", "model", "duration", "s"),
     Parameter(
         "initial_rotation", "Release from a rotation of", "start", "angle", "°", "0deg", -20.0, 20.0,
         explanation="Rotation at time zero; positive leans to the right corner.",
     ),
-    Parameter("initial_velocity", "Release with a velocity of", "start", "number", "rad/s"),
+    Parameter(
+        "initial_velocity", "Release with a velocity of", "start", "rate", "rad/s", "0", -2.0, 2.0,
+        explanation="Angular velocity at time zero; positive turns to the right corner.",
+    ),
 )  # fmt: skip
 
 #: What an address says about a map, of a case or of a study.
@@ -212,23 +245,38 @@ SCALINGS: Final = {
 }
 
 _PERIOD: Final = Parameter(
-    "period", "at a period of", "motion", "number", "s", "1", 0.05, 5.0, True, explanation="Period of that oscillator."
+    "period",
+    "at a period of",
+    "motion",
+    "duration",
+    "s",
+    "1",
+    0.05,
+    5.0,
+    True,
+    explanation="Period of that oscillator.",
 )
 
 
-def _of_pulse(name: str, label: str, unit: str, default: str, ends: tuple[float, float], words: str) -> Parameter:
+def _of_pulse(
+    name: str, label: str, kind: Kind, unit: str, default: str, ends: tuple[float, float], words: str
+) -> Parameter:
     """Return a parameter of a pulse, which `named_pulses` reads; its slider is logarithmic where it can be."""
     logarithmic = ends[0] > 0.0 and name not in ("cycles", "gamma")
-    return Parameter(name, label, "pulse", "text", unit, default, *ends, logarithmic, explanation=words)
+    return Parameter(name, label, "pulse", kind, unit, default, *ends, logarithmic, explanation=words)
 
 
-_AMPLITUDE = _of_pulse("amplitude", "Amplitude", "g", "0.3g", (0.02, 2.0), "Largest acceleration of the pulse.")
-_FREQUENCY = _of_pulse("frequency", "Frequency", "Hz", "1", (0.1, 10.0), "Cycles per second.")
-_DURATION = _of_pulse("duration", "Duration", "s", "0.5", (0.05, 5.0), "How long the pulse lasts.")
-_CYCLES = _of_pulse("cycles", "Cycles", "", "2.5", (0.5, 20.0), "Duration times frequency; any number.")
-_PHASE = _of_pulse("phase", "Phase", "°", "0deg", (0.0, 360.0), "Where in its cycle the pulse begins.")
-_VELOCITY = _of_pulse("amplitude", "Velocity amplitude", "m/s", "0.6", (0.05, 3.0), "Amplitude of the velocity pulse.")
-_GAMMA = _of_pulse("gamma", "Length γ", "cycles", "2", (1.0, 6.0), "How many cycles its envelope holds.")
+_AMPLITUDE = _of_pulse(
+    "amplitude", "Amplitude", "acceleration", "g", "0.3g", (0.02, 2.0), "Largest acceleration of the pulse."
+)
+_FREQUENCY = _of_pulse("frequency", "Frequency", "frequency", "Hz", "1", (0.1, 10.0), "Cycles per second.")
+_DURATION = _of_pulse("duration", "Duration", "duration", "s", "0.5", (0.05, 5.0), "How long the pulse lasts.")
+_CYCLES = _of_pulse("cycles", "Cycles", "number", "", "2.5", (0.5, 20.0), "Duration times frequency; any number.")
+_PHASE = _of_pulse("phase", "Phase", "angle", "°", "0deg", (0.0, 360.0), "Where in its cycle the pulse begins.")
+_VELOCITY = _of_pulse(
+    "amplitude", "Velocity amplitude", "velocity", "m/s", "0.6", (0.05, 3.0), "Amplitude of the velocity pulse."
+)
+_GAMMA = _of_pulse("gamma", "Length γ", "number", "cycles", "2", (1.0, 6.0), "How many cycles its envelope holds.")
 
 #: Label and parameters of each pulse, and choices.
 PULSES: Final[Mapping[str, dict[str, Any]]] = {
@@ -275,10 +323,10 @@ _TREATMENTS: Final = (
 
 #: Quantities of a map, and how the page calls each.
 QUANTITIES: Final = {
-    "outcome": "Chattering: complete or not",
+    "outcome": "End of the first rocking: chattering complete or not",
     "rest": "Time from uplift to rest",
     "peak": "Peak rotation over slenderness",
-    "mode": "Overturning mode",
+    "mode": "Final fate",
 }
 
 

@@ -10,11 +10,13 @@ from dataclasses import replace
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, Final, NamedTuple
 
+from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion import formats
 from rocking.motion.formats.channel import Channel
 from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
+from rocking.motion.units import CHOICES, find_unit
 from rocking.plausibility import motion_notes
 
 #: Largest file, bytes: twenty times a long record of three channels.
@@ -33,7 +35,10 @@ _MOST_LINES, _MOST_SAMPLES = 2 * LONGEST, 8 * LONGEST
 _NAME, _HASH = 80, 24
 
 #: What a file is read with to learn its channels while it is not known what it leaves out.
-_STAND_INS: Final[dict[str, Any]] = {"dt": 0.01, "units": "m/s2"}
+_STAND_INS: Final[dict[str, Any]] = {"dt": 1.0, "units": "m/s2"}
+
+#: Steps that are offered for a file that does not say its own, s.
+_STEPS: Final = (0.002, 0.005, 0.01, 0.02)
 
 
 class Upload(NamedTuple):
@@ -137,8 +142,7 @@ class UploadStore:
             "reason": identification.reason,
             "missing": missing,
             "channels": [
-                {"number": each.number, "name": each.name, "notes": list(motion_notes(_shown(upload, each)))}
-                for each in channels
+                {"number": each.number, "name": each.name, **_told(_shown(upload, each), missing)} for each in channels
             ],
         }
 
@@ -153,6 +157,21 @@ def _shown(upload: Upload, channel: Channel) -> Motion:
     if samples > LONGEST:
         raise InvalidMotion(f"{samples} samples; at most {LONGEST} are shown here", path=upload.name)
     return channel.motion()
+
+
+def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
+    """Say what looks like a mistake in a channel; or what it would be with each choice of what is missing."""
+    if not missing:
+        return {"notes": list(motion_notes(motion)), "choices": {}}
+    choices: dict[str, list[list[str]]] = {}
+    if "units" in missing:
+        units = {name: unit for name in CHOICES if (unit := find_unit(name)) is not None}
+        peaks = {name: motion.pga * unit.multiplier / unit.divisor / STANDARD_GRAVITY for name, unit in units.items()}
+        choices["units"] = [[name, f"{name}: PGA {peak:.3g} g"] for name, peak in peaks.items()]
+    if "dt" in missing:
+        steps = motion.duration / _STAND_INS["dt"]
+        choices["dt"] = [[f"{step:g}", f"{step:g} s: it lasts {steps * step:.4g} s"] for step in _STEPS]
+    return {"notes": [], "choices": choices}
 
 
 def bare_name(name: str) -> str:

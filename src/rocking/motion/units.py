@@ -67,8 +67,23 @@ _ACCELERATIONS = _by_spelling(
 
 def find_unit(spelling: str) -> Unit | None:
     """Return the unit that one spells "CM/SEC/SEC", "cm/sec2", "cm/s^2", "cm/s²", "cm_s2", "gal", "G", ..., or None."""
+    return _ACCELERATIONS.get(plain_spelling(spelling))
+
+
+def plain_spelling(spelling: str) -> str:
+    """Return a unit's spelling without signs: "ms2" of "m/s^2", "M/SEC/SEC" has none and is "mss"."""
     plain = re.sub(r"[\s^*._/·'’]", "", spelling.lower().replace("²", "2").replace("⁻", "-"))
-    return _ACCELERATIONS.get(plain.replace("sec", "s").replace("s-2", "s2"))
+    return plain.replace("sec", "s").replace("s-2", "s2")
+
+
+def accelerations() -> dict[str, Unit]:
+    """Return the units of acceleration by their plain spellings."""
+    return dict(_ACCELERATIONS)
+
+
+def times() -> dict[str, Unit]:
+    """Return the units of time by their spellings."""
+    return dict(_TIMES)
 
 
 def find_time_unit(spelling: str) -> Unit | None:

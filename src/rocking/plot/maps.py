@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 #: From harmless to the worst, each darker than the one before; the last stands out.
 _COLOURS: Final = ("#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a23c")
 
+#: Colour of the hatch over what overturns later.
+_LATER: Final = "#b0390c"
+
 #: Colour and hatch of regions in which the block stays, and of those in which it overturns after 0, 1, ... impacts,
 #: from darkest to lightest: hatched, so that none is taken for one of the others in grey. The second one of those in
 #: which it stays is the darkest, as it is often a strip and must be seen between the others.
@@ -53,6 +56,7 @@ def outcome_figure(
     y: Floats,
     outcome: NDArray[np.integer],
     meanings: Sequence[str],
+    later: NDArray[np.bool_],
     x_label: str,
     y_label: str,
     title: str = "",
@@ -61,8 +65,10 @@ def outcome_figure(
 ) -> Figure:
     """Draw which of up to six outcomes each point of a grid has: numbers of shape (len(y), len(x)).
 
-    The meanings are named from the lightest colour to the darkest; the last one stands out.
+    The meanings are named from the lightest colour to the darkest; the last one stands out. Hatched are the points at
+    which the block overturns later.
     """
+    from matplotlib import rc_context
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     count = len(meanings)
@@ -70,9 +76,19 @@ def outcome_figure(
         axes = ax or figure.add_subplot()
         colours, norm = ListedColormap(_COLOURS[:count]), BoundaryNorm(np.arange(count + 1) - 0.5, count)
         axes.pcolormesh(x, y, outcome, cmap=colours, norm=norm, shading="nearest", rasterized=True)
-        add_labels(axes, x_label, y_label)
         present = sorted(set(np.unique(outcome).tolist()))
-        add_legend(figure, ax, [_patch((_COLOURS[k], ""), meanings[k]) for k in present])
+        handles = [_patch((_COLOURS[k], ""), meanings[k]) for k in present]
+        if later.any():
+            # Two hatches over each other are seen on the lightest colours and on the darkest.
+            for ink, width in (("#ffffff", 2.0), (_LATER, 0.9)):
+                with rc_context({"hatch.linewidth": width}):
+                    axes.pcolor(
+                        x, y, np.ma.masked_where(~later, outcome), shading="nearest", facecolor="none",
+                        cmap=ListedColormap(["none"]), hatch="////", edgecolor=ink, linewidth=0.0,
+                    )  # fmt: skip
+            handles.append(_patch(("#ffffff", "////"), "overturns later"))
+        add_labels(axes, x_label, y_label)
+        add_legend(figure, ax, handles)
     return figure
 
 

@@ -2,7 +2,7 @@
 
 import {json} from "./api.js";
 import {bokeh, colour, figure, themed} from "./theme.js";
-import {fill, make, one, short, span} from "./words.js";
+import {fill, fixed, make, one, short, span} from "./words.js";
 
 export class ChatteringPanel {
   /** @param {(ends: [number, number]) => void} go */
@@ -54,7 +54,7 @@ export class ChatteringPanel {
     fill(table, ["", "Uplift, s", "Complete from, s", "At rest, s", "Known to", "Impacts"], this.sequences.map((each, k) => {
       const proven = Number.isFinite(each.upper);
       const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; this.list(); this.plot(); this.showSequence(each); }}}, [`Show ${k + 1}`]);
-      return [button, each.uplift.toFixed(3), proven ? each.start.toFixed(4) : "not proven", each.end.toFixed(9), proven ? `± ${span(0.5 * (each.upper - each.lower))}` : "–", String(this.count(each))];
+      return [button, fixed(each.uplift, 3), proven ? fixed(each.start, 4) : "not proven", fixed(each.end, 9), proven ? `± ${span(0.5 * (each.upper - each.lower))}` : "–", String(this.count(each))];
     }));
   }
 

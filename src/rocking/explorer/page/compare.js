@@ -44,14 +44,15 @@ export class View {
   }
 
   update() {
-    this.page.remember();
     void this.load.ask();
   }
 
   async run() {
     const {state} = this.page;
-    const other = Object.fromEntries(Object.entries(state.other).map(([name, value]) => [`other.${name}`, value]));
+    const {other: chosen, compare: kind} = state;
+    const other = Object.fromEntries(Object.entries(chosen).map(([name, value]) => [`other.${name}`, value]));
     const {header, arrays} = await payload("/api/compare", {...state.texts, ...other, ...ends(state)});
+    this.page.remember({other: chosen, compare: kind});
     this.draw(header, arrays);
     counted("compared");
     if (this.with.value === "treatment") await this.schemes();

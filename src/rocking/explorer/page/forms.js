@@ -2,7 +2,7 @@
 
 import {json} from "./api.js";
 import {namesOf, parameter, specification} from "./parameters.js";
-import {make, one, sent, explained} from "./words.js";
+import {explained, make, measured, one, shown, whole} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {import("./parameters.js").Parameter} Parameter */
@@ -11,7 +11,7 @@ import {make, one, sent, explained} from "./words.js";
 
 const STEPS = 1000;
 const G = 9.80665;
-const BLOCK = namesOf("block"), MOTION = namesOf("motion", "start");
+const BLOCK = namesOf("block"), MOTION = namesOf("motion", "start"), RELEASED = "3deg";
 
 /** A number with a slider, a field, its unit and its explanation. */
 class NumberControl {
@@ -37,23 +37,20 @@ class NumberControl {
   }
 
   /** Value in the control's unit of a text in any unit. @param {string} text */
-  value(text) {
-    const number = parseFloat(text);
-    const plain = text.trim() !== "" && !Number.isNaN(Number(text));
-    if (this.spec.suffix === "deg" && (plain || text.endsWith("rad"))) return (number * 180) / Math.PI;
-    if (this.spec.suffix === "g" && (plain || /m\/s/.test(text))) return number / G;
-    return number;
-  }
+  value(text) { return measured(text, this.spec.units); }
 
   /** Show a text without telling anybody. @param {string} text */
   show(text) {
     this.text = text;
     const value = this.value(text);
-    if (!Number.isFinite(value)) return;
+    if (!Number.isFinite(value)) {
+      if (!this.typing) this.field.value = text;
+      return;
+    }
     const {low, high, logarithmic} = this.spec;
     const part = logarithmic ? Math.log(Math.max(value, 1e-300) / low) / Math.log(high / low) : (value - low) / (high - low);
     this.slider.value = String(Math.round(STEPS * Math.min(1, Math.max(0, part))));
-    const written = sent(value);
+    const written = shown(value);
     if (!this.typing) this.field.value = written;
     this.slider.setAttribute("aria-valuetext", `${written} ${this.spec.unit}`.trim());
   }
@@ -71,7 +68,11 @@ class NumberControl {
   typed() {
     this.typing = false;
     const given = this.field.value.trim().replace("−", "-").replace(",", ".");
-    this.show(given !== "" && !Number.isNaN(Number(given)) ? given + this.spec.suffix : given);
+    if (given === "") {
+      this.show(this.text);
+      return;
+    }
+    this.show(Number.isNaN(Number(given)) ? given : given + this.spec.suffix);
     this.form.tell();
   }
 }
@@ -94,9 +95,6 @@ function check(id, label, changed) {
   return {box, element: make("label", {className: "check"}, [box, ` ${label}`])};
 }
 
-/** @param {number} angle rad */
-const degrees = (angle) => (angle * 180) / Math.PI;
-
 export class BlockForm {
   /** @param {HTMLElement} element @param {Changed} changed @param {string} [prefix] */
   constructor(element, changed, prefix = "") {
@@ -105,6 +103,8 @@ export class BlockForm {
     this.texts = {};
     /** @type {any[] | undefined} sides as they are, for what the texts leave out */
     this.known = undefined;
+    /** Whether the restitution followed from angular momentum before the sides were told apart. @type {boolean | undefined} */
+    this.byMomentum = undefined;
     this.shape = choice(prefix, "shape", "Given by", specification.shapes.map((/** @type {any} */ each) => [each.name, each.label]), () => this.reshape());
     this.two = check(`${prefix}two`, "Two different sides", () => this.separate());
     this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => { this.showFields(); this.tell(); });
@@ -133,7 +133,7 @@ export class BlockForm {
     for (const {name} of this.specs) {
       const text = texts[name] ?? (name === "offset" ? "0" : "");
       if (text) this.put(name, text.split(","));
-      else if (name === "restitution" && this.known) this.put(name, this.known.map((side) => sent(side.restitution)));
+      else if (name === "restitution" && this.known) this.put(name, this.known.map((side) => String(side.restitution)));
     }
     this.showFields();
   }
@@ -175,19 +175,17 @@ export class BlockForm {
     if (this.known) {
       const [right, left] = this.known;
       const distances = this.known.map((side) => side.radius * Math.sin(side.alpha));
-      const height = right.radius * Math.cos(right.alpha), gravity = Number(this.texts.gravity ?? G);
+      const height = right.radius * Math.cos(right.alpha), gravity = measured(this.texts.gravity ?? "", parameter("gravity").units) || G;
       const same = {
-        width: [distances[0] + distances[1]], height: [2 * height], offset: [0.5 * (distances[1] - distances[0])],
-        p: this.known.map((side) => side.p), alpha: this.known.map((side) => degrees(side.alpha)),
-        pivots: distances, height_of_mass: [height], gyration: [Math.sqrt(Math.max((gravity * right.radius) / right.p ** 2 - right.radius ** 2, 0))],
+        width: [whole(distances[0] + distances[1])], height: [whole(2 * height)], offset: [whole(0.5 * (distances[1] - distances[0]))],
+        p: this.known.map((side) => String(side.p)), alpha: this.known.map((side) => `${side.alpha}rad`),
+        pivots: distances.map(whole), height_of_mass: [whole(height)], gyration: [whole(Math.sqrt(Math.max((gravity * right.radius) / right.p ** 2 - right.radius ** 2, 0)))],
       };
-      for (const [name, values] of Object.entries(same)) if (this.names().includes(name)) this.put(name, values.map((value) => sent(value) + parameter(name).suffix));
-      if (this.shape.select.value === "parameters") {
-        this.two.box.checked = right.p !== left.p || right.alpha !== left.alpha;
-        this.controls.restitution.pair.forEach((each, k) => each.show(sent([right, left][k].restitution)));
-        // Rounded p and alpha need not be those of a body.
-        if (this.two.box.checked) this.housner.box.checked = false;
-      }
+      for (const [name, texts] of Object.entries(same)) if (this.names().includes(name)) this.put(name, texts);
+      this.two.box.checked = this.shape.select.value === "parameters" && (right.p !== left.p || right.alpha !== left.alpha);
+      this.put("restitution", this.known.map((side) => String(side.restitution)));
+      if (this.byMomentum !== undefined) this.housner.box.checked = this.byMomentum;
+      this.byMomentum = undefined;
     }
     this.showFields();
     this.tell();
@@ -199,7 +197,11 @@ export class BlockForm {
       if (this.two.box.checked) for (const side of pair) side.show(both.text);
       else if (pair.length) both.show(pair[0].text);
     }
-    if (this.two.box.checked) this.housner.box.checked = false;
+    // Two sides that are changed one by one need not be those of a body, which has a momentum.
+    if (this.two.box.checked) {
+      this.byMomentum = this.housner.box.checked;
+      this.housner.box.checked = false;
+    } else if (this.byMomentum !== undefined) this.housner.box.checked = this.byMomentum;
     this.showFields();
     this.tell();
   }
@@ -230,29 +232,35 @@ export class MotionForm {
     this.files = [];
     this.given = "";
     this.upwards = "";
-    const tell = () => this.tell(), chosen = () => { this.showFields(); this.tell(); };
+    const chosen = () => { this.showFields(); this.tell(); };
     const another = () => { this.upwards = ""; chosen(); };
+    const shaken = () => { this.release(); another(); };
     /** @param {string} name */
     const field = (name) => parameter(name).label;
-    this.kind = choice(prefix, "kind", "Shaken by", KINDS, another);
+    this.kind = choice(prefix, "kind", "Shaken by", KINDS, shaken);
     this.record = choice(prefix, "record", field("motion"), specification.records.map((/** @type {any} */ each) => [each.name, each.name]), another);
     this.about = make("p", {className: "derived"});
     this.pulse = choice(prefix, "pulse", "Pulse", Object.entries(specification.pulses).map(([name, each]) => [name, each.label]), (name) => { this.showPulse(name); chosen(); });
     this.numbers = make("div");
     this.channel = choice(prefix, "channel", field("channel"), [], chosen);
     this.vertical = choice(prefix, "vertical", field("vertical"), [["", "none"]], (value) => { this.upwards = value; chosen(); });
-    this.units = choice(prefix, "units", field("units"), specification.units.map((/** @type {string} */ each) => [each, each]), tell);
-    const {label, unit, default: step} = parameter("dt");
-    const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, value: step, "data-argument": "dt", on: {change: tell}}));
+    this.units = choice(prefix, "units", field("units"), [["", "not chosen yet"], ...specification.units.map((/** @type {string} */ each) => [each, each])], chosen);
+    this.units.select.dataset.argument = "units";
+    /** What is missing of a file, with what each choice would make of it. */
+    this.missing = make("div", {className: "missing", role: "group", "aria-label": "What the file does not say", hidden: true});
+    /** Texts that were shown and not changed here since. @type {Texts | null} */
+    this.linked = null;
+    const {label, unit} = parameter("dt");
+    const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, "data-argument": "dt", on: {change: chosen}}));
     this.dt = {field: dt, element: make("div", {className: "choice"}, [make("label", {className: "field", for: dt.id}, [`${label}, ${unit}`]), dt])};
-    this.start = new NumberControl(parameter("initial_rotation"), this, prefix);
+    this.starts = namesOf("start").map((name) => new NumberControl(parameter(name), this, prefix));
     this.scale = choice(prefix, "scaled", "Scaled", specification.scalings, chosen);
     /** @type {NumberControl[]} */
     this.scales = specification.scalings.slice(1).map((/** @type {string[]} */ [name]) => new NumberControl(parameter(name), this, prefix));
     this.period = new NumberControl(specification.period, this, prefix);
     element.replaceChildren(
-      this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.channel.element, this.vertical.element, this.units.element,
-      this.dt.element, this.start.element, this.scale.element, ...this.scales.map((each) => each.element), this.period.element,
+      this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.channel.element, this.missing, this.vertical.element, this.units.element,
+      this.dt.element, ...this.starts.map((each) => each.element), this.scale.element, ...this.scales.map((each) => each.element), this.period.element,
     );
     this.showPulse("sine");
   }
@@ -273,7 +281,7 @@ export class MotionForm {
   show(texts) {
     const motion = texts.motion ?? specification.default.motion;
     const family = motion.split(":")[0];
-    const kind = family in specification.pulses ? "pulse" : ["none", "file", "given"].includes(family) ? family : "record";
+    const kind = Object.hasOwn(specification.pulses, family) ? "pulse" : ["none", "file", "given"].includes(family) ? family : "record";
     this.kind.select.value = kind;
     if (kind === "record") this.record.select.value = motion;
     if (kind === "given") this.given = motion;
@@ -285,13 +293,21 @@ export class MotionForm {
       for (const each of this.choices ?? []) each.select.value = parts[each.name] ?? each.select.value;
     }
     this.scale.select.value = this.scales.find(({spec}) => texts[spec.name])?.spec.name ?? "";
-    for (const each of [this.start, ...this.scales]) if (texts[each.spec.name]) each.show(texts[each.spec.name].split("@")[0]);
+    for (const each of this.starts) each.show(texts[each.spec.name] ?? each.spec.default);
+    for (const each of this.scales) if (texts[each.spec.name]) each.show(texts[each.spec.name].split("@")[0]);
     if (texts.sa) this.period.show(texts.sa.split("@")[1] ?? "1");
     this.upwards = texts.vertical ?? "";
-    if (texts.units) this.units.select.value = texts.units;
-    if (texts.dt) this.dt.field.value = texts.dt;
+    this.units.select.value = texts.units ?? "";
+    this.dt.field.value = texts.dt ?? "";
+    this.linked = texts;
     this.showFields();
     void this.fetchFiles(texts);
+  }
+
+  /** Release the block from a rotation that is shown where nothing shakes it, and else from rest. */
+  release() {
+    for (const each of this.starts) each.show(each.spec.default);
+    if (this.kind.select.value === "none") this.starts[0].show(RELEASED);
   }
 
   /** Learn what the files of a link are, which the server has kept. @param {Texts} texts */
@@ -316,12 +332,19 @@ export class MotionForm {
   /** Take a file that the server keeps: it shakes the block, or moves it up and down as well. @param {any} file @param {boolean} [upwards] */
   take(file, upwards = false) {
     this.files = [...this.files.filter((each) => each.key !== file.key), file];
+    const {linked} = this;
+    if (linked && [linked.motion, linked.vertical].some((name) => name?.split("#")[0] === `file:${file.key}`)) {
+      this.show(linked);
+      this.changed(Object.fromEntries(MOTION.filter((name) => linked[name]).map((name) => [name, linked[name]])), MOTION);
+      return;
+    }
     if (upwards) this.upwards = file.channels.length > 1 ? `file:${file.key}#${file.channels.at(-1).number}` : `file:${file.key}`;
     else {
       this.use(file);
       this.upwards = "";
       this.kind.select.value = "file";
-      this.scale.select.value = "";
+      this.scale.select.value = this.units.select.value = this.dt.field.value = "";
+      this.release();
     }
     this.showFields();
     this.tell();
@@ -360,9 +383,10 @@ export class MotionForm {
     this.offerVertical();
     const file = kind === "file" ? this.file : null;
     this.channel.element.hidden = !file || file.channels.length < 2;
-    this.units.element.hidden = !this.needs("units");
-    this.dt.element.hidden = !this.needs("dt");
-    this.start.element.hidden = kind !== "none";
+    this.units.element.hidden = !this.needing("units");
+    this.dt.element.hidden = !this.needing("dt");
+    this.showMissing();
+    for (const each of this.starts) each.element.hidden = each.value(each.text) === 0 && (kind !== "none" || each !== this.starts[0]);
     this.scale.element.hidden = !scalable;
     for (const each of this.scales) each.element.hidden = !scalable || scaled !== each.spec.name;
     this.period.element.hidden = !scalable || scaled !== "sa";
@@ -372,23 +396,41 @@ export class MotionForm {
     this.about.hidden = !this.about.textContent;
   }
 
-  /** Whether a file that is used does not say something itself. @param {string} name */
-  needs(name) {
+  /** Ask for what a file does not say, by what each choice would make of it. */
+  showMissing() {
+    /** @type {[string, string, HTMLInputElement | HTMLSelectElement][]} */
+    const asked = [["units", "units", this.units.select], ["dt", "sampling step", this.dt.field]];
+    const open = asked.flatMap(([name, words, input]) => {
+      const file = this.needing(name);
+      if (!file || input.value) return [];
+      const channel = file === this.file ? file.channels.find((/** @type {any} */ each) => String(each.number) === this.channel.select.value) : null;
+      const choices = (channel ?? file.channels[0]).choices[name].map((/** @type {string[]} */ [value, says]) => make("button", {type: "button", on: {click: () => {
+        input.value = value;
+        this.showFields();
+        this.tell();
+      }}}, [says]));
+      return [make("p", {className: "derived"}, [`${file.name} does not say its ${words}. Choose what is true:`]), make("div", {className: "toolbar"}, choices)];
+    });
+    this.missing.replaceChildren(...open);
+    this.missing.hidden = !open.length;
+  }
+
+  /** A file that is used and does not say something itself. @param {string} name @returns {any} */
+  needing(name) {
     const kind = this.kind.select.value;
     const beside = this.files.find((file) => this.upwards.startsWith(`file:${file.key}`));
     const used = kind === "file" ? [this.file, beside] : kind === "record" ? [beside] : [];
-    return used.some((file) => file?.missing.includes(name));
+    return used.find((file) => file?.missing.includes(name));
   }
 
   tell() {
     const kind = this.kind.select.value, scaled = this.scale.select.value;
     /** @type {Texts} */
     const texts = {};
+    this.linked = null;
     if (kind === "record") texts.motion = this.record.select.value;
-    else if (kind === "none") {
-      texts.motion = "none";
-      texts.initial_rotation = Number.parseFloat(this.start.text) === 0 ? "3deg" : this.start.text;
-    } else if (kind === "given") texts.motion = this.given;
+    else if (kind === "none") texts.motion = "none";
+    else if (kind === "given") texts.motion = this.given;
     else if (kind === "pulse") {
       const numbers = (this.controls ?? []).map((each) => `${each.spec.name}=${each.text}`);
       const chosen = (this.choices ?? []).map((each) => `${each.name}=${each.select.value}`);
@@ -398,8 +440,9 @@ export class MotionForm {
       if (this.file.channels.length > 1) texts.channel = this.channel.select.value;
     }
     if (this.upwards && !this.vertical.element.hidden) texts.vertical = this.upwards;
-    if (this.needs("units")) texts.units = this.units.select.value;
-    if (this.needs("dt")) texts.dt = this.dt.field.value;
+    if (this.needing("units") && this.units.select.value) texts.units = this.units.select.value;
+    if (this.needing("dt") && this.dt.field.value) texts.dt = this.dt.field.value;
+    for (const each of this.starts) if (each.value(each.text) !== 0) texts[each.spec.name] = each.text;
     const control = this.scales.find(({spec}) => spec.name === scaled);
     if (control && kind !== "none" && kind !== "pulse") texts[scaled] = scaled === "sa" ? `${control.text}@${this.period.text}` : control.text;
     this.changed(texts, MOTION);
@@ -425,7 +468,7 @@ export class TreatmentForm {
   show(texts) {
     const [name, value] = (texts.chattering ?? "certified").split("=");
     this.kind.select.value = name;
-    if (value) this.limits[name]?.show(value);
+    if (value && Object.hasOwn(this.limits, name)) this.limits[name].show(value);
     this.showFields();
   }
 

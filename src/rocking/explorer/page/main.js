@@ -1,6 +1,6 @@
 // The page: one state, in its address; forms that change it, and five views that show it.
 
-import {ends, readAddress, specification, writeAddress} from "./parameters.js";
+import {accepted, ends, readAddress, specification, writeAddress} from "./parameters.js";
 import {Latest, Problem, json, payload} from "./api.js";
 import {ChatteringPanel} from "./chattering.js";
 import {makeCopying, showCode, showFiles} from "./exports.js";
@@ -8,15 +8,15 @@ import {BlockForm, ModelForm, MotionForm} from "./forms.js";
 import {Histories} from "./histories.js";
 import {coarse} from "./theme.js";
 import {acceptFiles} from "./upload.js";
-import {counted, legend, make, one, say, short} from "./words.js";
+import {counted, fixed, legend, make, one, say, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
 const state = readAddress();
 
 /** What the views share.
- * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, remember: () => void}} */
-const page = {state, shown: null, go, problem, restate, remember: () => writeAddress(state)};
+ * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, remember: (parts: Partial<import("./parameters.js").Good>) => void}} */
+const page = {state, shown: null, go, problem, restate, remember: (parts) => accepted(state, parts)};
 /** @type {Record<string, any>} */
 const views = {};
 
@@ -46,6 +46,8 @@ function problem(error, place = "settings") {
     each.setAttribute("aria-errormessage", "problem");
     each.closest(".number, .choice")?.setAttribute("data-problem", problems[place] ?? "");
   }
+  one(place === "settings" ? "main" : place).classList.toggle("old", Boolean(error && page.shown));
+  one("old").hidden = !(problems.settings && page.shown);
   const sentence = Object.values(problems).find(Boolean);
   one("problem").hidden = !sentence;
   if (sentence) one("problem").textContent = sentence;
@@ -59,7 +61,9 @@ let pause = 0;
 /** The whole case, where a form has changed it. */
 const load = new Latest(async () => {
   window.clearTimeout(pause);
-  page.shown = await payload("/api/case", {...state.texts, ...ends(state)});
+  const {texts} = state;
+  page.shown = await payload("/api/case", {...texts, ...ends(state)});
+  accepted(state, {texts});
   draw();
   counted("drawn");
   pause = window.setTimeout(() => afterPause.ask(), PAUSE);
@@ -108,7 +112,6 @@ function changed(texts, replaced) {
   if (replaced.includes("motion") && state.texts.motion !== texts.motion) state.window = null;
   const kept = Object.entries(state.texts).filter(([name]) => !replaced.includes(name));
   state.texts = {...Object.fromEntries(kept), ...texts};
-  writeAddress(state);
   views[state.view]?.update?.();
   void load.ask();
 }
@@ -193,7 +196,7 @@ function showLegend(vertical) {
 function showFigures(header) {
   const degrees = (header.peak_rotation * 180) / Math.PI;
   const rows = [
-    ["Peak rotation", header.overturned ? "overturns" : `${short(header.peak_over_slenderness)} α`, header.overturned ? `at ${header.overturn_time.toFixed(3)} s` : `${short(degrees)}° at ${header.peak_time.toFixed(2)} s`],
+    ["Peak rotation", header.overturned ? "overturns" : `${short(header.peak_over_slenderness)} α`, header.overturned ? `at ${fixed(header.overturn_time, 3)} s` : `${short(degrees)}° at ${fixed(header.peak_time, 2)} s`],
     ["Comes to rest", `${header.rests} ×`, header.rests ? (header.proven === header.rests ? "each time proven" : `${header.proven} proven`) : "not at all"],
     ["Impacts", String(header.impacts), "resolved one by one"],
     ["At rest", header.share_at_rest === null ? "–" : `${short(100 * header.share_at_rest, 2)} %`, "of the strong shaking"],

@@ -13,6 +13,8 @@ const MODES = /** @type {[number, string, string][]} */ ([
   [0, "overturns without impact", "#1c2c47"], [1, "overturns after 1 impact", "#c76b29"], [2, "overturns after 2 impacts or more", "#e9a94f"],
   [-4, "overturns after a rest", "#7a3b69"],
 ]);
+/** What overturns after a rest, as a mode; and the colour of the hatch over what overturns later than in the first rocking. */
+const AFTER_REST = -4, LATER = "#b0390c";
 /** Dark to light, even steps of lightness. */
 const RAMP = ["#0b1a3a", "#14346b", "#1f5190", "#3a74a8", "#5f97b8", "#8bb8c6", "#b9d6d4", "#e6efe4", "#fdf3d6"];
 
@@ -75,7 +77,7 @@ export class View {
     if (name === "x" || name === "y") { delete map[`${name}_from`]; delete map[`${name}_to`]; }
     if (name === "quantity" && this.about && !this.study) {
       this.fill();
-      this.page.remember();
+      this.page.remember({map});
       if (JSON.stringify(this.asked()) === this.drawn) { this.recolour(); this.offer(); return; }
     }
     this.update();
@@ -116,7 +118,7 @@ export class View {
     }
     const motion = texts.motion ?? "";
     const family = motion.split(":")[0];
-    const pulse = family in specification.pulses;
+    const pulse = Object.hasOwn(specification.pulses, family);
     const frequency = pulse && motion.includes("frequency=");
     const names = specification.axes.map((/** @type {any} */ each) => each.name).filter((/** @type {string} */ name) => name !== "omega" || frequency);
     const right = names.filter((/** @type {string} */ name) => name !== "a" && name !== "pga");
@@ -138,7 +140,7 @@ export class View {
     }
     const quantities = this.study ? this.study.quantities : specification.quantities;
     this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each.name}, [each.label])));
-    if (!quantities.some((/** @type {any} */ each) => each.name === map.quantity)) map.quantity = quantities[0].name;
+    if (!quantities.some((/** @type {any} */ each) => each.name === map.quantity)) map.quantity = this.first(quantities);
     this.select("quantity").value = map.quantity;
     this.select("points").value = map.points ?? "200";
     if (this.study) return;
@@ -152,10 +154,17 @@ export class View {
     }
   }
 
+  /** The quantity with which a map begins: under a pulse how the first rocking ends; a record goes on, and what counts is the end.
+   * @param {any[]} quantities @returns {string} */
+  first(quantities) {
+    const family = (this.page.state.texts.motion ?? "").split(":")[0];
+    return this.study || Object.hasOwn(specification.pulses, family) ? quantities[0].name : "mode";
+  }
+
   /** @param {AbortSignal} signal */
   async stream(signal) {
     this.fill();
-    this.page.remember();
+    const map = {...this.page.state.map};
     const started = performance.now();
     const body = document.body.dataset;
     this.drawn = JSON.stringify(this.asked());
@@ -170,6 +179,7 @@ export class View {
         const count = this.about.shape[0] * this.about.shape[1];
         this.values = this.about.quantities.map(() => new Float32Array(count).fill(NaN));
         this.covered = new Uint8Array(count).fill(255);
+        this.page.remember({map});
         this.drawAxes();
         this.offer();
         done = 1;
@@ -262,6 +272,7 @@ export class View {
   async slice() {
     this.fill();
     const {header, arrays} = await payload("/api/study", this.page.state.map);
+    this.page.remember({map: this.page.state.map});
     this.about = {...header, quantities: [header.quantity], curves: {}, outcomes: []};
     this.values = [Float32Array.from(arrays.values)];
     this.drawAxes();
@@ -345,6 +356,7 @@ export class View {
     const out = new Uint32Array(values.length);
     const kinds = this.kinds(quantity);
     if (kinds) {
+      const later = quantity === "outcome" ? this.later() : null;
       const known = new Map(kinds.map(([value, , ink]) => [value, rgba(ink)]));
       /** @type {Map<number, number>} */
       const seen = new Map();
@@ -352,11 +364,11 @@ export class View {
         if (Number.isNaN(value)) return;
         const kind = quantity === "mode" && value > 2 ? 2 : value;
         seen.set(kind, (seen.get(kind) ?? 0) + 1);
-        out[k] = known.get(kind) ?? 0;
+        out[k] = later?.[k] && striped(k, this.about.shape[1]) ? rgba(LATER) : known.get(kind) ?? 0;
       });
       this.bar.visible = false;
       const share = (/** @type {number} */ value) => (this.complete ? `, ${short((100 * (seen.get(value) ?? 0)) / values.length, 2)} %` : "");
-      this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]));
+      this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]), later?.some(Boolean) ? later.filter(Boolean).length / values.length : 0);
       return out;
     }
     const finite = values.filter((each) => Number.isFinite(each));
@@ -391,8 +403,16 @@ export class View {
     return null;
   }
 
-  /** @param {[string, string][]} entries */
-  legend(entries) {
+  /** Where a block overturns after its first rocking has ended otherwise. @returns {boolean[] | null} */
+  later() {
+    const [outcome, mode] = ["outcome", "mode"].map((name) => (this.values ?? [])[this.about.quantities.indexOf(name)]);
+    if (!outcome || !mode) return null;
+    return Array.from(mode, (each, k) => (each >= 0 || each === AFTER_REST) && outcome[k] !== this.about.outcomes.indexOf("overturns"));
+  }
+
+  /** @param {[string, string][]} entries @param {number} [later] share of the points that overturn later */
+  legend(entries, later = 0) {
+    if (later) entries = [...entries, [`hatched: overturns later${this.complete ? `, ${short(100 * later, 2)} %` : ""}`, LATER]];
     this.entries = entries;
     const parts = entries.map(([text, ink]) => {
       const key = make("i", {className: "key swatch"});
@@ -478,6 +498,9 @@ export class View {
     this.page.restate({...block, motion});
   }
 }
+
+/** Whether a point lies on a stripe of a hatch. @param {number} k @param {number} columns */
+const striped = (k, columns) => (Math.floor(k / columns) + (k % columns)) % 4 === 0;
 
 /** Colour as the image takes it: red in the lowest byte. @param {string} ink */
 function rgba(ink) {

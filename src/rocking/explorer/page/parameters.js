@@ -5,8 +5,9 @@ import {Problem, json} from "./api.js";
 import {one} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts, sweep: Texts}} State */
-/** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts, sweep: Texts, good: Good}} State */
+/** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts}} Good */
+/** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
 
 /** @type {any} */
 export const specification = await json("/api/start", {}).catch(stop);
@@ -28,6 +29,7 @@ export const namesOf = (...groups) =>
   specification.parameters.filter((/** @type {Parameter} */ each) => !groups.length || groups.includes(each.group)).map((/** @type {Parameter} */ each) => each.name);
 
 const VIEWS = ["response", "block", "map", "periodic", "compare"];
+const COMPARED = ["treatment", "block", "motion"];
 
 /** @returns {State} */
 export function readAddress() {
@@ -39,14 +41,15 @@ export function readAddress() {
   const {view: first, ...opening} = specification.opening;
   const view = given.get("view") ?? first ?? "response";
   const from = Number(given.get("from") ?? NaN), to = Number(given.get("to") ?? NaN);
+  const parts = {
+    texts: complete(Object.keys(texts).length ? texts : opening), other: those(namesOf(), "other."),
+    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], map: those(specification.map), sweep: those(specification.sweep),
+  };
   return {
+    ...parts,
+    good: {...parts},
     view: VIEWS.includes(view) ? view : "response",
-    texts: complete(Object.keys(texts).length ? texts : opening),
-    other: those(namesOf(), "other."),
-    compare: given.get("compare") ?? "treatment",
     window: from < to ? [from, to] : null,
-    map: those(specification.map),
-    sweep: those(specification.sweep),
   };
 }
 
@@ -60,6 +63,12 @@ function complete(texts) {
 /** The window as texts. @param {State} state @returns {Texts} */
 export const ends = ({window: chosen}) => (chosen ? {from: String(chosen[0]), to: String(chosen[1])} : {});
 
+/** Parts of the state were answered: what they were then belongs into the address. @param {State} state @param {Partial<Good>} parts */
+export function accepted(state, parts) {
+  Object.assign(state.good, structuredClone(parts));
+  writeAddress(state);
+}
+
 let waiting = 0;
 
 /** Write the state into the address, at most a few times a second.
@@ -71,13 +80,14 @@ export function writeAddress(state) {
     /** @param {Texts} texts @param {string[]} names @param {string} [prefix] */
     const put = (texts, names, prefix = "") => { for (const name of names) if (texts[name]) given.set(prefix + name, texts[name]); };
     if (state.view !== "response") given.set("view", state.view);
-    put(state.texts, namesOf());
+    const {good} = state;
+    put(good.texts, namesOf());
     if (state.view === "compare") {
-      given.set("compare", state.compare);
-      put(state.other, namesOf(), "other.");
+      given.set("compare", good.compare);
+      put(good.other, namesOf(), "other.");
     }
-    if (state.view === "map") put(state.map, specification.map);
-    if (state.view === "periodic") put(state.sweep, specification.sweep);
+    if (state.view === "map") put(good.map, specification.map);
+    if (state.view === "periodic") put(good.sweep, specification.sweep);
     put(ends(state), ["from", "to"]);
     history.replaceState(null, "", `?${given}`);
   }, 150);

@@ -49,7 +49,6 @@ export class View {
 
   /** The case has changed. */
   update() {
-    this.page.remember();
     void this.orbit.ask();
   }
 
@@ -105,7 +104,7 @@ export class View {
   async stream() {
     this.running = new AbortController();
     const {signal} = this.running;
-    const {sweep, texts} = this.page.state;
+    const {sweep, texts} = this.page.state, chosen = {...sweep};
     const body = document.body.dataset;
     body.sweep = "running";
     this.complete = false;
@@ -116,6 +115,7 @@ export class View {
       for await (const frame of frames("/api/sweep", {...texts, ...sweep}, signal)) {
         if (!this.about) {
           this.about = JSON.parse(new TextDecoder().decode(frame));
+          this.page.remember({sweep: chosen});
           this.fill();
           this.drawAxes();
           this.offerFiles();

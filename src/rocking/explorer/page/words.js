@@ -23,8 +23,24 @@ export function short(value, digits = 3) {
   return text.replace("-", "−");
 }
 
-/** A number as its text is sent: so many digits, no exponent where that can be helped. @param {number} value */
-export const sent = (value) => String(Number(value.toPrecision(4)));
+/** A number as its field shows it; its text is sent whole. @param {number} value */
+export const shown = (value) => String(Number(value.toPrecision(4)));
+
+/** A number that was computed, without the last digits, which the computation rounds. @param {number} value */
+export const whole = (value) => String(Number(value.toPrecision(15)));
+
+const WRITTEN = /^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(\D.*?)?\s*$/i;
+
+/** The number of a text with one of these units, in the unit that is shown; NaN where there is none. Units are spelled as
+ * the command line reads them. @param {string} text @param {Record<string, number>} units */
+export function measured(text, units) {
+  const [, number, spelling = ""] = WRITTEN.exec(text) ?? [];
+  const plain = spelling.toLowerCase().replaceAll("²", "2").replaceAll("⁻", "-").replace(/[\s^*._/·'’]/g, "").replaceAll("sec", "s").replaceAll("s-2", "s2");
+  return number !== undefined && Object.hasOwn(units, plain) ? Number(number) * units[plain] : NaN;
+}
+
+/** A number with so many decimals, or a dash where there is none. @param {number | null | undefined} value @param {number} digits */
+export const fixed = (value, digits) => (Number.isFinite(value) ? /** @type {number} */ (value).toFixed(digits) : "–");
 
 const UNITS = /** @type {[number, string][]} */ ([[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"], [1e-12, "ps"]]);
 
