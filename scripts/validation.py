@@ -42,6 +42,9 @@ LIMITS = ((0.25, 0.9, 7.58, 7.4, 9.9), (0.349, 0.825, 5.8, 5.3, 5.6))
 #: Random cases that are compared with SciPy, of each model.
 RANDOM = 12
 
+#: Random cases of each kind of body with restraints, of walls, and of laws of restitution.
+STANDING = 200
+
 #: A rock of 0.4 kg on a small table: the bounds of its calibrations, and their seeds.
 SMALL_P = (3.0, 40.0)
 SMALL_ALPHA = (0.005, 0.6)
@@ -59,9 +62,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Write the tables of docs/validation.md.")
     parser.add_argument("--shake-table", type=Path, metavar="FOLDER")
     parser.add_argument("--small-table", type=Path, metavar="FILE")
-    parser.add_argument("tables", nargs="*", help="quick, limits, random, opensees, shake-table, small-table, judged")
+    parser.add_argument(
+        "tables", nargs="*", help="quick, limits, random, standing, opensees, shake-table, small-table, judged"
+    )
     options = parser.parse_args()
-    parts = {"quick": quick_tables, "limits": limits_tables, "random": random_tables}
+    parts = {"quick": quick_tables, "limits": limits_tables, "random": random_tables, "standing": standing_tables}
     if importlib.util.find_spec("openseespy"):
         parts["opensees"] = opensees_tables
     if options.shake_table:
@@ -293,6 +298,21 @@ def random_tables():
         rows.append((model, RANDOM, falls, agree, *(below(np.max(values)) for values in (impacts, peaks))))
     heading = ("model", "cases", "overturn", "same verdict", "first 10 impacts, s", "peak, relative")
     return {"validation-random.txt": markdown(heading, rows)}
+
+
+def standing_tables():
+    """Differences from DOP853 over forces on points, of bodies with restraints, walls and laws of restitution."""
+    sys.path.insert(0, str(ROOT / "tests"))
+    from oracles.standing import KINDS, single_and_integrated
+
+    rows = []
+    for kind in KINDS:
+        found = single_and_integrated(kind, 1, STANDING)
+        same = found.cases - found.ill - len(found.different)
+        rows.append((kind, found.cases, found.impacts, found.overturned, same, found.ill, below(found.worst)))
+        sys.stdout.writelines(f"{where}\n" for where in found.different)
+    heading = ("body", "cases", "impacts", "overturn", "same", "ill-conditioned", "peak, relative")
+    return {"validation-standing.txt": markdown(heading, rows)}
 
 
 def noise(rng):

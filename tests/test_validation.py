@@ -66,6 +66,18 @@ def test_repetitions_on_the_small_table_differ_as_the_page_says(script, shared):
     assert len(found) == 2 and said == found
 
 
+def test_every_kind_of_body_is_judged_and_none_differs():
+    from oracles.standing import KINDS
+
+    rows = (ROOT / "docs" / "_tables" / "validation-standing.txt").read_text("utf-8").splitlines()[2:]
+    cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
+    assert [row[0] for row in cells] == [*KINDS]
+    for kind, cases, impacts, _, same, ill, worst in cells:
+        assert int(cases) >= 200 and int(impacts) >= 1000, kind
+        assert int(same) + int(ill) == int(cases) and int(ill) <= 10, kind
+        assert float(worst.removeprefix("below ")) <= 1e-8, kind
+
+
 def test_every_table_of_the_page_exists():
     text = (ROOT / "docs" / "validation.md").read_text("utf-8")
     names = re.findall(r"^```\{include\} (\S+)$", text, re.MULTILINE)

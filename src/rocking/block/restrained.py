@@ -160,11 +160,6 @@ class RestrainedBlock:
         """
         return None if self.restraints is None else self.contact_forces
 
-    @property
-    def yielding(self) -> tuple[Yielding, Yielding]:
-        """Its tendon that yields, on each side; one without stiffness where there is none."""
-        return self._tendon
-
     def tension(self, elongation: Floats) -> Floats:
         """Force of its tendon that yields, N, from its elongation beyond the plastic one, m.
 

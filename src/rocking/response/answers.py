@@ -270,7 +270,7 @@ class Answers:
         if law is None:
             raise InvalidOption(f"the forces of the ground are not known of this body: {self.body.description}")
         until = self.duration if math.isnan(self.tipping_time) else self.tipping_time
-        if isinstance(self.body, RestrainedBlock) and any(tendon.stiffness > 0.0 for tendon in self.body.yielding):
+        if isinstance(self.body, RestrainedBlock) and any(tendon.stiffness > 0.0 for tendon in self.body._tendon):
             return TendonContact(self._history, law, until, self.body)
         return Contact(self._history, law, until)
 

@@ -29,7 +29,7 @@ class TendonContact(Contact):
 
     def _elongations(self, rotations: Floats, side: Integers) -> Floats:
         """Elongation of the tendon at rotations to each side, m."""
-        opening = np.array([tendon.opening for tendon in self.body.yielding])[np.maximum(side, 0)]
+        opening = np.array([tendon.opening for tendon in self.body._tendon])[np.maximum(side, 0)]
         bend = 2.0 * np.sin(0.5 * rotations) if self.history.trail.rules["nonlinear"] else rotations
         return np.asarray(opening * bend)
 
@@ -38,7 +38,7 @@ class TendonContact(Contact):
         nodes = self.history.trail.nodes
         law, side = nodes["law"], nodes["side"]
         changes = np.append(side[:1] >= 0, (law[1:] == TendonLaw.ELASTIC) & (law[:-1] == TendonLaw.PLASTIC))
-        yields = self.body.yielding[0].yields
+        yields = self.body._tendon[0].yields
         after = np.maximum(0.0, self._elongations(nodes["u"], side) - yields)
         last = np.maximum.accumulate(np.where(changes, np.arange(len(nodes)), -1))
         return np.where(last >= 0, after[last], 0.0)
