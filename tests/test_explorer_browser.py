@@ -126,6 +126,10 @@ def test_the_first_page_shows_a_block_that_chatters(opened):
         row.query_selector_all("td")[3].text_content() for row in page.page.query_selector_all("#sequences tbody tr")
     ]
     assert rests == [f"{time:.9f}" for time in response.chattering["end"]]
+    cells = page.page.locator("#sequences tbody tr:last-child td").all_text_contents()
+    assert cells[4] == "± 7.1 s" and cells[5].endswith(" ps")
+    head = page.page.locator("#sequences th").all_text_contents()
+    assert head[3:5] == ["Off, if the motion is by a millionth", "Bracket of the computation"]
 
 
 def test_a_slider_changes_the_response(opened):
