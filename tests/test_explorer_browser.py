@@ -21,6 +21,7 @@ import pytest
 from explorer_browser import Watched, chromium, flags, missing, tool
 
 import rocking
+from rocking import quantities
 from rocking.chattering.families import sine
 from rocking.explorer import maps
 from rocking.explorer.core import Explorer
@@ -391,7 +392,7 @@ def test_a_block_by_its_parameters_with_two_sides(opened):
     assert found["alpha"].endswith(",9deg")
     block = rocking.Block.from_parameters(
         [float(each) for each in found["p"].split(",")],
-        [math.radians(float(each[:-3])) for each in found["alpha"].split(",")],
+        [quantities.angle(each, "alpha") for each in found["alpha"].split(",")],
         [float(each) for each in found["restitution"].split(",")],
     )
     response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665))
