@@ -21,6 +21,7 @@ import pytest
 from explorer_browser import Watched, chromium, flags, missing, tool
 
 import rocking
+from rocking import quantities
 from rocking.chattering.families import sine
 from rocking.explorer import maps
 from rocking.explorer.core import Explorer
@@ -126,6 +127,10 @@ def test_the_first_page_shows_a_block_that_chatters(opened):
         row.query_selector_all("td")[3].text_content() for row in page.page.query_selector_all("#sequences tbody tr")
     ]
     assert rests == [f"{time:.9f}" for time in response.chattering["end"]]
+    cells = page.page.locator("#sequences tbody tr:last-child td").all_text_contents()
+    assert cells[4] == "± 7.1 s" and cells[5].endswith(" ps")
+    head = page.page.locator("#sequences th").all_text_contents()
+    assert head[3:5] == ["Off, if the motion is by a millionth", "Bracket of the computation"]
 
 
 def test_a_slider_changes_the_response(opened):
@@ -387,7 +392,7 @@ def test_a_block_by_its_parameters_with_two_sides(opened):
     assert found["alpha"].endswith(",9deg")
     block = rocking.Block.from_parameters(
         [float(each) for each in found["p"].split(",")],
-        [math.radians(float(each[:-3])) for each in found["alpha"].split(",")],
+        [quantities.angle(each, "alpha") for each in found["alpha"].split(",")],
         [float(each) for each in found["restitution"].split(",")],
     )
     response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(0.4 * 9.80665))

@@ -370,6 +370,20 @@ def test_ratios_of_intervals_tend_to_the_product_of_both_restitutions(explorer):
     assert ratios[-1] == pytest.approx(0.9 * 0.8, rel=1e-4)
 
 
+def test_what_a_millionth_of_the_motion_moves_a_rest_by_is_told_beside_its_bracket(explorer):
+    rows = explorer.case(STATUE).arrays["sequence"].reshape(-1, 6)
+    response = explorer.show(STATUE).response
+    assert np.array_equal(rows[:, 1], response.chattering["end"]) and len(rows) == 4
+    moved = []
+    for sign in (1.0, -1.0):
+        motion = response.motion.scaled(1.0 + sign * 1e-10)
+        moved.append(rocking.simulate(response.block, motion).chattering["end"][:3])
+    # Of the three short sequences a change by 1e-10 is linear; the motion drives the block by more than its scale.
+    by_scale = 1e4 * 0.5 * np.abs(moved[0] - moved[1])
+    assert (rows[:3, 5] >= 0.5 * by_scale).all() and (rows[:3, 5] < 1e-5).all()
+    assert 1.0 < rows[3, 5] < 20.0 and (rows[:, 3] - rows[:, 2] < 1e-9).all()
+
+
 def test_intervals_do_not_reach_across_a_rest(explorer):
     arrays = explorer.case(STATUE).arrays
     finite = np.flatnonzero(np.isfinite(arrays["interval"]))

@@ -28,6 +28,8 @@ from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
 from rocking.response import Response, active_span, in_words, trail_of
+from rocking.response.history import driving
+from rocking.response.summary import KNOWN
 from rocking.treatment import Certified
 
 #: Times at which a rotation is evaluated across a window, and points of a line that are sent.
@@ -312,6 +314,7 @@ def _whole_arrays(response: Response) -> dict[str, Floats]:
     intervals, ratios = _intervals(response)
     sequences = response.chattering
     columns = [np.asarray(sequences[name], dtype=float) for name in ("start", "end", "lower", "upper", "impacts")]
+    columns.append(_uncertain(response))
     return {
         "impact_time": np.asarray(response.impacts["time"], dtype=float),
         "impact_speed": np.asarray(response.impacts["speed_after"], dtype=float),
@@ -321,6 +324,15 @@ def _whole_arrays(response: Response) -> dict[str, Floats]:
         "uplift": np.asarray(response.events["time"][response.events["kind"] == "uplift"], dtype=float),
         "sequence": np.column_stack(columns).ravel(),
     }
+
+
+def _uncertain(response: Response) -> Floats:
+    """Return by how much the rest of each sequence moves if what drives the block is off by a millionth, s."""
+    if not len(response.chattering):
+        return np.empty(0)
+    changes = driving(response.sensitivity)[1]
+    rests = np.searchsorted(response.events["time"], response.chattering["end"])
+    return KNOWN * changes[rests]
 
 
 def _intervals(response: Response) -> tuple[Floats, Floats]:

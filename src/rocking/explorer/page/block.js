@@ -62,7 +62,7 @@ export class View {
   /** @param {string} to */
   jump(to) {
     const {arrays} = this.page.shown;
-    const sequences = Array.from({length: arrays.sequence.length / 5}, (_, k) => arrays.sequence[5 * k + 1] - 0.4 * Math.min(1, arrays.sequence[5 * k + 1] - arrays.sequence[5 * k] + 0.5));
+    const sequences = Array.from({length: arrays.sequence.length / 6}, (_, k) => arrays.sequence[6 * k + 1] - 0.4 * Math.min(1, arrays.sequence[6 * k + 1] - arrays.sequence[6 * k] + 0.5));
     const times = to === "uplift" ? Array.from(arrays.uplift, (each) => /** @type {number} */ (each) - 0.1) : sequences;
     const next = times.find((each) => each > this.time + 0.05) ?? times[0];
     if (next !== undefined) this.seek(Math.max(0, next));

@@ -19,10 +19,10 @@ export class ChatteringPanel {
   draw(shown, texts) {
     this.shown = shown;
     const rows = shown.arrays.sequence;
-    this.sequences = Array.from({length: rows.length / 5}, (_, k) => {
-      const [start, end, lower, upper, impacts] = rows.subarray(5 * k, 5 * k + 5);
+    this.sequences = Array.from({length: rows.length / 6}, (_, k) => {
+      const [start, end, lower, upper, impacts, off] = rows.subarray(6 * k, 6 * k + 6);
       const before = shown.arrays.uplift.filter((each) => each <= start);
-      return {uplift: before.length ? before[before.length - 1] : 0, start, end, lower, upper, impacts};
+      return {uplift: before.length ? before[before.length - 1] : 0, start, end, lower, upper, impacts, off};
     });
     if (this.key !== JSON.stringify(texts)) this.chosen = this.longest();
     this.key = JSON.stringify(texts);
@@ -51,10 +51,10 @@ export class ChatteringPanel {
       table.replaceChildren(make("caption", {}, ["No sequence of impacts ends at rest: chattering, if any, is incomplete."]));
       return;
     }
-    fill(table, ["", "Uplift, s", "Complete from, s", "At rest, s", "Known to", "Impacts"], this.sequences.map((each, k) => {
+    fill(table, ["", "Uplift, s", "Complete from, s", "At rest, s, as computed", "Off, if the motion is by a millionth", "Bracket of the computation", "Impacts"], this.sequences.map((each, k) => {
       const proven = Number.isFinite(each.upper);
       const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; this.list(); this.plot(); this.showSequence(each); }}}, [`Show ${k + 1}`]);
-      return [button, fixed(each.uplift, 3), proven ? fixed(each.start, 4) : "not proven", fixed(each.end, 9), proven ? `± ${span(0.5 * (each.upper - each.lower))}` : "–", String(this.count(each))];
+      return [button, fixed(each.uplift, 3), proven ? fixed(each.start, 4) : "not proven", fixed(each.end, 9), Number.isFinite(each.off) ? `± ${span(each.off)}` : "–", proven ? `± ${span(0.5 * (each.upper - each.lower))}` : "–", String(this.count(each))];
     }));
   }
 
