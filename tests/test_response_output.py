@@ -13,8 +13,8 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
-from rocking.response import QUANTITIES, answers, history, summary
-from rocking.response.history import Contact
+from rocking.response import QUANTITIES, answers, history, sensitivity, summary
+from rocking.response.contact import Contact
 from rocking.response.summary import time_text
 from rocking.tables import named
 
@@ -84,7 +84,7 @@ def test_a_summary_and_a_dictionary_pass_once_along_the_response_for_each_quanti
 
         return call
 
-    monkeypatch.setattr(history, "vary", counting("vary", history.vary))
+    monkeypatch.setattr(sensitivity, "vary", counting("vary", sensitivity.vary))
     monkeypatch.setattr(history, "trace", counting("trace", history.trace))
     response = simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
     response.summary()

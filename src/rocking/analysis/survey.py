@@ -19,7 +19,7 @@ from rocking.motion.named import Motions, motions_by_name, names_of
 from rocking.problem import one_body
 from rocking.progress import Progress, note
 from rocking.response import Response, in_brief, ratio_text
-from rocking.response.history import friction_coefficient
+from rocking.response.contact import friction_coefficient
 from rocking.result import TableResult
 from rocking.simulation import simulate
 from rocking.tables import counted, decimal, frame_of, named, text_table, write_bytes

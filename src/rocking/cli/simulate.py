@@ -16,7 +16,7 @@ from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_result
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.errors import InvalidOption
 from rocking.response import Response
-from rocking.response.history import friction_coefficient
+from rocking.response.contact import friction_coefficient
 from rocking.simulation import simulate as run
 
 

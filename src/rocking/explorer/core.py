@@ -28,7 +28,7 @@ from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
 from rocking.response import Response, active_span, in_words, trail_of
-from rocking.response.history import driving
+from rocking.response.sensitivity import driving
 from rocking.response.summary import KNOWN
 from rocking.treatment import Certified
 

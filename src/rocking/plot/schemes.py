@@ -28,7 +28,7 @@ _BRACKET: Final = 1e-12
 _LETTERS: Final = 7.5
 _LINE: Final = 0.065
 
-#: Ratio of the greatest cost to the least up to which there is room for more numbers than powers of ten.
+#: Ratio of the greatest cost to the least up to which ticks stand between the powers of ten, too.
 _FEW: Final = 300.0
 
 

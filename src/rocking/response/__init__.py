@@ -3,8 +3,8 @@
 from rocking.response.answers import trail_of
 from rocking.response.derivatives import Gradient, gradient
 from rocking.response.export import active_span, drawing_times
-from rocking.response.history import AMBIGUITY, QUANTITIES, Sensitivity
 from rocking.response.response import Response
+from rocking.response.sensitivity import AMBIGUITY, QUANTITIES, Sensitivity
 from rocking.response.summary import in_brief, in_words, ratio_text
 
 __all__ = [

@@ -18,17 +18,9 @@ from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
-from rocking.response.history import (
-    Contact,
-    History,
-    Sensitivity,
-    ambiguities,
-    friction_coefficient,
-    friction_demand,
-    sensitivity_along,
-    with_all_impacts,
-)
-from rocking.response.tension import TendonContact
+from rocking.response.contact import Contact, TendonContact, friction_coefficient, friction_demand
+from rocking.response.history import History, with_all_impacts
+from rocking.response.sensitivity import Sensitivity, ambiguities, sensitivity_along
 from rocking.treatment import Treatment
 
 

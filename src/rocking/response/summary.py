@@ -12,7 +12,7 @@ from rocking.body import Body
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers
 from rocking.response.export import records
-from rocking.response.history import driving
+from rocking.response.sensitivity import driving
 from rocking.result import Row
 from rocking.tables import counted, named
 

@@ -28,6 +28,7 @@ from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response, drawing_times
 from rocking.response.answers import history_of
+from rocking.response.sensitivity import changes_along
 from rocking.result import DrawnResult
 from rocking.simulation import simulate
 from rocking.tables import counted, text_table
@@ -323,7 +324,7 @@ class _Problem:
         times = self.times[:count]
         response = self.response(logs, float(times[-1]))
         fallen = times > response.duration
-        changes = history_of(response).changes(times[~fallen], [one.name for one in self.unknowns])
+        changes = changes_along(history_of(response), times[~fallen], [one.name for one in self.unknowns])
         found = np.zeros((count, len(logs)))
         found[~fallen] = -np.column_stack([changes[one.name] for one in self.unknowns])
         return found

@@ -1,0 +1,177 @@
+"""How a response changes with what it was computed from, and what one unit in the last place of that would change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.errors import InvalidOption
+from rocking.kernels import state
+from rocking.kernels.trace import Trail, vary
+from rocking.response.history import History
+from rocking.tables import counted
+
+#: A response is ambiguous when changes of the motion, the initial state and the block by one unit in the last place
+#: move its peak by more than this fraction, or one of its events or impacts by more than this many seconds.
+AMBIGUITY: Final = 1e-6
+
+#: What a sensitivity is to.
+QUANTITIES: Final = ("motion", "initial_rotation", "initial_velocity", "p", "alpha", "restitution")
+
+#: What drives the block, as against what it is.
+DRIVING: Final = QUANTITIES[:3]
+
+#: What a rotation may be differentiated by, in the order of the kernels.
+_NAMES: Final = (*QUANTITIES, *(f"{name}_{side}" for side in ("plus", "minus") for name in QUANTITIES[3:]))
+
+_ULP: Final = 2.0**-52
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Changes of a response per unit of relative change of what it was computed from.
+
+    Structured arrays with the fields motion, initial_rotation, initial_velocity, p, alpha and restitution (of both
+    sides together): a field times 1e-3 is what 0.1 % more of that quantity changes, to first order.
+
+    Attributes
+    ----------
+    peak : structured array, shape (1,)
+        Of the peak rotation, rad; 0 when overturned.
+    impacts, events : structured array
+        Of the times of the response's impacts and events, s.
+    """
+
+    peak: NDArray[np.void]
+    impacts: NDArray[np.void]
+    events: NDArray[np.void]
+    _history: History
+
+    def rotation(self, time: ArrayLike, of: Iterable[str] = QUANTITIES) -> dict[str, Floats]:
+        """Return the change of the rotation at given times with each quantity.
+
+        Parameters
+        ----------
+        time : array_like
+            Times, s, of any shape.
+        of : iterable of str
+            Quantities: "motion", "initial_rotation", "initial_velocity", "p", "alpha" or "restitution"; the last three
+            also with "_plus" or "_minus", of that side alone.
+
+        Returns
+        -------
+        dict of str to ndarray
+            By quantity, for each time: rad (of another body in the unit of its coordinate) per unit of relative change,
+            with the sign of the rotation. 0 at rest; just before an impact, at one; NaN outside the response.
+
+        Raises
+        ------
+        InvalidOption
+            If a time is not a number, or there is no such quantity.
+
+        Notes
+        -----
+        One pass along the response for each quantity, whatever the number of times. At a fixed time the rotation is
+        continuous, and its derivative jumps at each impact (see "Impacts: restitution and sensitivity" in the
+        documentation).
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+        >>> response = rocking.simulate(block, None, initial_rotation=0.1)
+        >>> changes = response.sensitivity.rotation([0.2, 1.0], of=["p", "restitution_plus"])
+        >>> {name: [f"{each:.5f}" for each in values] for name, values in changes.items()}
+        {'p': ['-0.01640', '-0.09310'], 'restitution_plus': ['0.00000', '-0.11430']}
+        """
+        return changes_along(self._history, time, of)
+
+    def __repr__(self) -> str:
+        event = np.max(np.abs(self.events["motion"]), initial=0.0)
+        return (
+            f"<Sensitivity: 0.1 % more of the motion changes the peak by {1e-3 * self.peak['motion'][0]:.2g} rad and "
+            f"the times of {counted(len(self.events), 'event')} by up to {1e-3 * event:.2g} s; "
+            f"{counted(len(self.impacts), 'impact')}>"
+        )
+
+
+def sensitivity_along(
+    trail: Trail, history: History, peak_time: float, impacts: int, events: int, *, fixed: bool
+) -> Sensitivity:
+    """Sensitivity of a response with that many impacts and events: one pass along its steps for each quantity.
+
+    A fixed peak is that of a body that has fallen, or has reached a stop.
+    """
+    at = np.array([peak_time])
+    at.flags.writeable = False
+    found = [_varied(trail, k, at, impacts, events) for k in range(len(QUANTITIES))]
+    peak, impact_times, event_times = (np.array(values) for values in zip(*found, strict=True))
+    if fixed:
+        peak[:] = 0.0
+    return Sensitivity(_by_quantity(peak), _by_quantity(impact_times), _by_quantity(event_times), history)
+
+
+def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: int) -> tuple[Floats, Floats, Floats]:
+    """Change heights at given times, so many impacts, and so many events with a quantity."""
+    heights, at_impacts, at_events = np.empty(len(times)), np.zeros(impacts), np.zeros(events)
+    vary(trail, state.new_scratch(), state.record(state.VARIATION), quantity, times, heights, at_impacts, at_events)
+    return heights, at_impacts, at_events
+
+
+def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str, ...]:
+    """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly.
+
+    ``height`` is that of the peak above the stop.
+    """
+    peak, *times = (_ULP * _total(values, QUANTITIES) for values in (found.peak, found.events, found.impacts))
+    known = {
+        "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
+        "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
+        "touch": near_ties == 0,
+    }
+    return tuple(name for name, is_known in known.items() if not is_known)
+
+
+def driving(found: Sensitivity) -> tuple[float, Floats, Floats]:
+    """Sizes of the changes of peak, events and impacts with all that drives the block, per relative change."""
+    return float(_total(found.peak, DRIVING)[0]), _total(found.events, DRIVING), _total(found.impacts, DRIVING)
+
+
+def _total(values: NDArray[np.void], quantities: tuple[str, ...]) -> Floats:
+    total: Floats = np.sum([np.abs(values[name]) for name in quantities], axis=0)
+    return total
+
+
+def _by_quantity(values: Floats) -> NDArray[np.void]:
+    table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
+    for name, row in zip(QUANTITIES, values, strict=True):
+        table[name] = row
+    return table
+
+
+def changes_along(history: History, time: ArrayLike, of: Iterable[str]) -> dict[str, Floats]:
+    """Change the coordinate at times of any shape with each quantity, see `Sensitivity.rotation`."""
+    times, nodes = checks.numbers(time, "time", InvalidOption), history.trail.nodes
+    flat = times.ravel()
+    order = np.argsort(flat, kind="stable")
+    order = order[~history.outside(flat[order])]
+    ascending = flat[order]
+    ascending.flags.writeable = False
+    rows = np.maximum(np.searchsorted(nodes["time"], ascending) - 1, 0)
+    signs = np.where(nodes["side"][rows] == 1, -1.0, 1.0)
+    rests = nodes["side"] < 0
+    events = int(np.count_nonzero(rests[:-1] | rests[1:]))
+    found = {}
+    for name in of:
+        if name not in _NAMES:
+            raise InvalidOption(f"{{}} must be among {', '.join(_NAMES)}, not {name!r}", "of", value=name)
+        values = np.full(flat.shape, np.nan)
+        values[order] = signs * _varied(history.trail, _NAMES.index(name), ascending, len(nodes), events)[0]
+        found[name] = values.reshape(times.shape)
+    return found
