@@ -320,10 +320,10 @@ AT2 = (Path(__file__).parent / "data" / "formats" / "nga.at2").read_bytes()
         (b"0\n" * 999_000, "999000 samples; at most 500000 are shown here"),
         pytest.param(b"0 " * (LARGEST // 2), "each line holds 256 numbers", marks=pytest.mark.thorough),
         pytest.param(b".1\n" * 490_000, "read", marks=pytest.mark.thorough),
-        pytest.param(b"0;0\n" * 490_000, "the time does not increase", marks=pytest.mark.thorough),
+        pytest.param(b"0;0\n" * 490_000, "the time does not increase", marks=pytest.mark.slow),
         pytest.param(AT2 + b"0\n" * 999_000, "NPTS says", marks=pytest.mark.thorough),
-        pytest.param(AT2 + b"0 " * (LARGEST // 2 - 2000), "NPTS says", marks=pytest.mark.thorough),
-        pytest.param(HEADED + (b"0" + b",0" * 200 + b"\n") * 20_000, "the time does not", marks=pytest.mark.thorough),
+        pytest.param(AT2 + b"0 " * (LARGEST // 2 - 2000), "NPTS says", marks=pytest.mark.slow),
+        pytest.param(HEADED + (b"0" + b",0" * 200 + b"\n") * 20_000, "the time does not", marks=pytest.mark.slow),
     ],
     ids=lambda value: f"{len(value)}" if isinstance(value, bytes) else "",
 )  # fmt: skip
@@ -406,7 +406,7 @@ def malformed(rng):
     return ("\n".join(rng.choice(["nan", "inf", "1e999", "-", "0x1", "1" * 400, "1.0"]) for _ in range(50))).encode()
 
 
-@pytest.mark.parametrize("count", [200, pytest.param(1000, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("count", [200, pytest.param(1000, marks=pytest.mark.slow)])
 def test_malformed_files_links_and_headers_are_refused_in_words(page, explorer, tmp_path, monkeypatch, count):
     rng = random.Random(7)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "private"))

@@ -19,7 +19,7 @@ def test_an_ensemble_of_each_kind_gives_what_single_simulations_give(kind, pairs
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
-    "cases", [2, pytest.param(20, marks=pytest.mark.thorough), pytest.param(100, marks=pytest.mark.slow)]
+    "cases", [2, pytest.param(8, marks=pytest.mark.thorough), pytest.param(100, marks=pytest.mark.slow)]
 )
 def test_each_kind_moves_as_an_integration_of_forces_says(kind, cases):
     found = single_and_integrated(kind, 2, cases)
@@ -28,4 +28,4 @@ def test_each_kind_moves_as_an_integration_of_forces_says(kind, cases):
     assert found.ill <= 0.1 * cases
     if cases > 2:
         assert found.peaks >= 0.2 * cases
-        assert found.impacts >= 2 * cases
+        assert found.impacts >= cases
