@@ -1,0 +1,88 @@
+"""Motions of a study's file: records beside it or shipped, and pulses of every combination of their parameters."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rocking.arrays import Floats
+from rocking.ensemble import Scales
+from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.motion.formats.source import Request
+from rocking.motion.motion import Motion
+from rocking.motion.named import expanded, named_motion, named_vertical
+from rocking.named_pulses import pulse_family
+from rocking.plausibility import vertical_notes
+from rocking.progress import note
+from rocking.studies.file.tables import Tables, read
+
+
+def motions_of(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
+    """Motions that can be read and scaled, their records, and a sentence for each that cannot, if it may be so."""
+    given = tables.table("motions")
+    with tables.located("motions", key="dt"):
+        Request.checked(given.get("dt"), None)
+    with tables.located("motions", key="units"):
+        Request.checked(None, given.get("units"))
+    records: dict[str, str] = {}  # by their paths or names, what stands for each in the file
+    for name in given.get("records", []):
+        with tables.located_record(name):
+            records |= dict.fromkeys(expanded([_beside(tables, name)]), name)
+    motions, names, skipped = [], [], []
+    for path, name in records.items():
+        try:
+            with tables.located_record(name):
+                motion = _record(tables, path, several=len(records) > 1)
+                scales.factors(motion)  # it can be scaled
+        except (UnreadableRecord, InvalidMotion) as error:
+            if not given.get("skip_unreadable", False):
+                raise
+            skipped.append(str(error))
+        else:
+            motions.append(motion)
+            names.append(_as_written(tables, path))
+    for k in range(len(given.get("pulses", []))):
+        motions += _pulses(tables, k)
+    if not motions:
+        raise tables.wrong("motions", None, "[motions] holds no motion that can be read: name records or pulses")
+    return motions, names + [""] * (len(motions) - len(names)), skipped
+
+
+def _record(tables: Tables, path: str, *, several: bool) -> Motion:
+    given = tables.table("motions")
+    about = {"dt": given.get("dt"), "units": given.get("units")}
+    channel = None if "channel" not in given else str(given["channel"])
+    motion = named_motion(path, channel=channel, several=several, **about)
+    if "vertical" not in given:
+        return motion
+    both = motion.with_vertical(named_vertical(_beside(tables, given["vertical"]), path, channel=channel, **about))
+    for sentence in vertical_notes(both):
+        note(f"{path}: {sentence}")
+    return both
+
+
+def _beside(tables: Tables, name: str) -> str:
+    """Path of a file that lies beside the study's own, or the name of anything else."""
+    path = str(tables.file.parent / name)
+    return path if Path(path).exists() or any(mark in name for mark in "*?[") else name
+
+
+def _as_written(tables: Tables, path: str) -> str:
+    """Return the path of a record relative to the file, as it names those beside it."""
+    beside = Path(path).is_relative_to(tables.file.parent) and Path(path).exists()
+    return str(Path(path).relative_to(tables.file.parent)) if beside else path
+
+
+def _pulses(tables: Tables, k: int) -> list[Motion]:
+    pulse, table = dict(tables.table("motions.pulses", k)), "motions.pulses"
+    with tables.located(table, key="family", occurrence=k):
+        family = pulse_family(str(pulse.pop("family", "")))
+    axes: dict[str, Sequence[Any] | Floats] = {}
+    for key, value in pulse.items():
+        with tables.located(table, key=key, occurrence=k):
+            quantity = family.quantity(key)
+            axes[key] = [value] if quantity is None else read(key, value, quantity)
+    with tables.located(table, occurrence=k):
+        return [family.motion(dict(zip(axes, values, strict=True))) for values in itertools.product(*axes.values())]
