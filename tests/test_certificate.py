@@ -87,20 +87,14 @@ MOTIONS = {
     "ricker": lambda: rocking.pulses.ricker(1.4, 1.0),
     "shipped record": shipped,
 }
-#: With these the ball arithmetic of the nonlinear model takes some ten seconds.
-LONG = {"sine", "shipped record"}
-#: With these, and in the linear model, some tenths.
+#: With these, and in the linear model, ball arithmetic takes some tenths of a second.
 SHORT = {(SYMMETRIC, "ricker"), (TWO_SIDED, "record"), (TWO_SIDED, "sine")}
 
 
 def time_of(model: str, block: tuple[Pair, Pair, Pair], motion: str) -> list[pytest.MarkDecorator]:
-    """Tenths of a second; or about a second each, or more than ten, which no more than a second law is worth."""
+    """Tenths of a second; or, in the linear model, about a second each; or, in the nonlinear one, up to ten."""
     if model == "nonlinear":
-        return (
-            [pytest.mark.slow]
-            if motion in LONG
-            else [pytest.mark.thorough] * ((block, motion) != (TWO_SIDED, "ricker"))
-        )
+        return [] if (block, motion) == (TWO_SIDED, "ricker") else [pytest.mark.slow]
     return [pytest.mark.thorough] * ((block, motion) not in SHORT)
 
 

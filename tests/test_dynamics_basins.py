@@ -119,7 +119,9 @@ def integrated(block, push, period, state, periods, orbits):
     return None
 
 
-@pytest.mark.parametrize("count", [5, pytest.param(100, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "count", [5, pytest.param(40, marks=pytest.mark.thorough), pytest.param(100, marks=pytest.mark.slow)]
+)
 def test_cells_drawn_at_random_go_where_an_integration_by_scipy_goes(count):
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
     shaking = pulses.sine(2.4, 1.2, cycles=1)

@@ -171,7 +171,9 @@ def table_of(ball):
 @pytest.mark.parametrize(
     ("restitution", "n"),
     [
-        pytest.param(e, n, marks=() if (e, n) == (0.5, 1) else pytest.mark.thorough if n < 3 else pytest.mark.slow)
+        pytest.param(
+            e, n, marks=() if (e, n) == (0.5, 1) else pytest.mark.thorough if (e, n) == (0.3, 2) else pytest.mark.slow
+        )
         for e in (0.3, 0.5, 0.8)
         for n in (1, 2, 3)
     ],

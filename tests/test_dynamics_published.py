@@ -148,8 +148,10 @@ def test_beyond_that_boundary_attractors_come_in_a_cascade_with_one_impact_more_
     assert impacts == list(range(10, 22))
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize(("frequency", "tilted"), [(1.6, 1.0), (2.5, -1.0)])
+@pytest.mark.parametrize(
+    ("frequency", "tilted"),
+    [pytest.param(1.6, 1.0, marks=pytest.mark.slow), pytest.param(2.5, -1.0, marks=pytest.mark.thorough)],
+)
 def test_speeds_of_orbits_with_one_impact_are_half_an_ellipse_over_the_place_of_the_stop(frequency, tilted):
     """As F. Dux found (1992): centred on the origin, and tilted to one side below the frequency 2, to the other above.
 
@@ -209,8 +211,10 @@ def test_asymmetric_orbits_double_where_their_two_equations_say(ratio, restituti
     assert np.linalg.det(change) == pytest.approx(restitution**4, rel=1e-8)
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize(("ratio", "restitution", "m"), HOGAN)
+@pytest.mark.parametrize(
+    ("ratio", "restitution", "m"),
+    [pytest.param(*each, marks=pytest.mark.thorough if each[0] == 4.0 else pytest.mark.slow) for each in HOGAN],
+)
 def test_branches_of_a_slender_block_bifurcate_where_closed_forms_say(ratio, restitution, m):
     """The first fold is sharp beside the range of the parameter, and an impact there is near the start of a period."""
     exact, unit, family = slender(ratio, restitution, m)

@@ -121,9 +121,10 @@ def test_the_rotation_at_any_time_changes_as_thirty_digits_say(model: Model) -> 
     assert judged_rotations(4, model, names) >= 24
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(k, marks=pytest.mark.slow if k else pytest.mark.thorough) for k in range(4)]
+)
 def test_the_rotation_at_any_time_changes_with_everything_as_thirty_digits_say(seed: int, model: Model) -> None:
     assert judged_rotations(seed, model, EVERY) >= 120
 

@@ -56,8 +56,9 @@ def test_median_and_dispersion_change_as_differences_of_fits_say(model: str) -> 
     assert judged_by_differences(PULSES, (1.5, 2.8), 12, model, STEPS) == 3
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize(
+    "model", [pytest.param("linear", marks=pytest.mark.slow), pytest.param("nonlinear", marks=pytest.mark.thorough)]
+)
 def test_median_and_dispersion_change_so_with_each_parameter(model: str) -> None:
     assert judged_by_differences(PULSES, (1.5, 2.8), 12, model) == 3
 

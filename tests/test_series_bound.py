@@ -13,7 +13,7 @@ from rocking.kernels.state import new_scratch
 
 TERMS = 90
 
-CASES = pytest.mark.parametrize("cases", [24, pytest.param(80, marks=pytest.mark.thorough)])
+CASES = pytest.mark.parametrize("cases", [24, pytest.param(80, marks=pytest.mark.slow)])
 
 Polynomial = list[float]
 
