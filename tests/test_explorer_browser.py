@@ -319,6 +319,66 @@ def test_ten_times_closer_again_and_again(opened):
     page.until("!new URLSearchParams(location.search).has('from')")
 
 
+def test_the_phase_plane_and_the_energy_are_drawn_where_they_are_seen(opened):
+    page = opened(f"{STATUE}&from=231&to=235&at=232.5", viewport={"width": 1280, "height": 700})
+    assert page.js("document.body.dataset.phases") is None
+    page.page.locator("#phase-legend").scroll_into_view_if_needed()
+    page.until("document.body.dataset.phases === '1'")
+    response = statue(0.4 * 9.80665)
+    line = page.js(
+        f"({MODELS}).filter((each) => each.name === 'phase-total').map((each) => Array.from(each.data.y))[0]"
+    )
+    times = np.linspace(231.0, 235.0, 4001)
+    assert max(line) == pytest.approx(
+        (response.kinetic_energy(times) + response.potential_energy(times)).max(), rel=1e-3
+    )
+    now = page.js(
+        f"({MODELS}).filter((each) => each.name === 'phase-now').map(({{data}}) => [data.x[0], data.y[0]])[0]"
+    )
+    block, (theta, rate, _) = response.block, response.states(232.5)
+    assert now == pytest.approx([theta / block.alpha, rate / (block.p * block.alpha)], abs=1e-4)
+    slider = page.page.locator("#pga-slider")
+    page.page.evaluate("scrollTo(0, 0)")
+    page.rested(lambda: (slider.focus(), slider.press("ArrowRight")))
+    assert page.js("document.body.dataset.phases") == "1"
+
+
+def test_a_time_is_read_by_mouse_by_keys_and_typed_and_the_block_follows(opened):
+    page = opened(f"{STATUE}&from=231&to=235", allowed=["422"])
+    response = statue(0.4 * 9.80665)
+
+    def read(time):
+        page.until(f"Math.abs(Number(document.getElementById('cursor').dataset.time) - {time}) < 1e-9")
+        assert float(query_of(page)["at"]) == pytest.approx(time, abs=1e-12)
+        degrees = page.text("#cursor").split("rotation ")[1].split("°")[0].replace("−", "-")
+        assert float(degrees) == pytest.approx(math.degrees(response.rotation(time)), rel=6e-3)
+
+    field, slider, plots = (page.page.locator(name) for name in ("#at", "#at-slider", "#histories"))
+    field.fill("232500 ms")
+    field.press("Enter")
+    read(232.5)
+    plots.focus()
+    plots.press("Shift+ArrowRight")
+    read(232.52)
+    slider.focus()
+    slider.press("ArrowLeft")
+    read(232.516)
+    page.until("document.getElementById('said').textContent.startsWith('At 232.516 s')")
+    field.fill("1e9")
+    field.press("Enter")
+    page.until("document.getElementById('at').getAttribute('aria-invalid') === 'true'")
+    assert "must be within the response" in page.text("#problem")
+    box = plots.bounding_box()
+    page.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 100)
+    page.until("document.getElementById('problem').hidden")
+    clicked = float(query_of(page)["at"])
+    assert 232.0 < clicked < 234.0
+    page.page.click("[data-view=block]")
+    page.until(f"Math.abs(Number(document.getElementById('stage').dataset.shown) - {clicked}) < 1e-9")
+    page.page.locator("#scrub").press("End")
+    read(235.0)
+
+
 def test_keys_move_and_zoom_the_plots(opened):
     page = opened(f"{STATUE}&from=231&to=235")
     plots = page.page.locator("#histories")
@@ -343,7 +403,7 @@ def test_dragging_across_a_plot_zooms_in(opened):
     page.until(
         "((given) => Number(given.get('to')) - Number(given.get('from')) < 3)(new URLSearchParams(location.search))"
     )
-    assert "θ =" in page.text("#cursor")
+    page.until("document.getElementById('cursor').textContent.includes('the block')")
 
 
 def test_ratios_of_intervals_are_drawn_against_eta_squared(opened):

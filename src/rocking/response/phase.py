@@ -111,6 +111,12 @@ def boundary_of(response: Answers) -> tuple[Floats, Floats]:
     return np.concatenate(x), np.concatenate(y)
 
 
+def needed_of(response: Answers) -> tuple[float, float]:
+    """Return the energy that overturns a body to side + and to side -, over the least; infinite to one it has not."""
+    plus, minus = energy_in(response).needed.tolist()
+    return plus, minus
+
+
 def marked(response: Answers, start: float, end: float) -> dict[str, Floats]:
     """Return the times of uplift and rest within a stretch, s."""
     events = response.events
@@ -159,7 +165,7 @@ def energy_over_time(
         time=course.time,
         kinetic=course.kinetic,
         potential=course.potential,
-        needed=tuple(energy_in(response).needed.tolist()),
+        needed=needed_of(response),
         impact_times=course.time[course.before],
         rest_intervals=response.rest_intervals,
         title=title or titled(response),
