@@ -810,6 +810,63 @@ def test_a_map_is_read_by_keys_and_by_another_quantity(opened):
     assert "restitution" in query_of(page)
 
 
+def test_a_map_is_zoomed_by_a_rectangle_and_by_keys_and_back(opened):
+    page = opened(SINE + "&view=map&x=omega&y=a&y_from=1&y_to=1.1&points=16")
+    complete = "document.body.dataset.map === 'complete'"
+    page.until(complete)
+    box = page.page.locator("#map").bounding_box()
+    x, y = box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"]
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x + 120, y + 100, steps=5)
+    assert page.page.locator("#map-small").is_hidden()
+    page.page.mouse.up()
+    page.until("document.body.dataset.map === 'running' || Number(document.getElementById('map-x-from').value) > 0.5")
+    page.until(complete)
+    found = {name: float(query_of(page)[name]) for name in ("x_from", "x_to", "y_from", "y_to")}
+    assert 0.5 < found["x_from"] < found["x_to"] < 8.0 and found["x_to"] - found["x_from"] < 2.5
+    assert 1.0 < found["y_from"] < found["y_to"] < 1.1
+    shown = page.js(f"({MODELS}).filter((each) => each.type === 'ImageRGBA').length")
+    assert shown == 1 and page.js("document.getElementById('map-x-from').value") == query_of(page)["x_from"]
+    plots = page.page.locator("#map")
+    plots.focus()
+    plots.press("+")
+    page.until(f"Number(document.getElementById('map-x-from').value) > {found['x_from']}")
+    page.until(complete)
+    plots.press("-")
+    page.until(f"Number(document.getElementById('map-x-from').value) === {found['x_from']}")
+    page.until(complete)
+    page.page.click("#map-out")
+    page.until("document.getElementById('map-y-to').value === '1.1'")
+    page.until(complete)
+
+
+def test_a_small_response_is_shown_where_the_pointer_lies_still(opened, explorer):
+    page = opened(SINE + "&view=map&x=omega&y=a&y_from=1&y_to=1.1&points=8")
+    page.until("document.body.dataset.map === 'complete'")
+    asked = []
+    page.page.on("request", lambda request: asked.append(request.url) if "/api/map/response" in request.url else None)
+    box = page.page.locator("#map").bounding_box()
+    for k in range(8):  # on the way nothing is asked for
+        page.page.mouse.move(box["x"] + 120 + 40 * k, box["y"] + 120)
+    small = page.page.locator("#map-small")
+    small.wait_for(state="visible", timeout=20_000)
+    assert len(asked) == 1
+    x, y = map(float, small.get_attribute("data-at").split(","))
+    grid = {"x": "omega", "y": "a", "y_from": "1", "y_to": "1.1", "points": "8"}
+    case = read_case(dict(parse_qsl(SINE)), explorer.uploads)
+    verdict = explorer.case(maps.texts_at(maps.grid_of(case, grid), x, y)).header["verdict"]
+    assert page.text("#map-small p").startswith(verdict)
+    plots = page.page.locator("#map")
+    plots.focus()
+    plots.press("Escape")
+    assert small.is_hidden()
+    plots.press("ArrowRight")
+    small.wait_for(state="visible", timeout=20_000)
+    page.until("document.getElementById('said').textContent.startsWith('It ')")
+    assert len(asked) == 2
+
+
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
     page = opened(f"view=map&{SINE}&points=8&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=8&quantity=mode")
     complete(page)
