@@ -811,7 +811,7 @@ def test_a_map_is_read_by_keys_and_by_another_quantity(opened):
 
 
 def test_a_map_is_zoomed_by_a_rectangle_and_by_keys_and_back(opened):
-    page = opened(SINE + "&view=map&x=omega&y=a&y_from=1&y_to=1.1&points=16")
+    page = opened(SINE + "&view=map&x=omega&y=a&y_from=1&y_to=1.1&points=8")
     complete = "document.body.dataset.map === 'complete'"
     page.until(complete)
     box = page.page.locator("#map").bounding_box()
@@ -944,6 +944,23 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
     complete(page)
     assert "Study museum" in page.text("#study-tools")
     assert "overturns" in page.text("#map-legend")
+    # A rectangle of its cells is shown larger, and left again; a response is shown where the pointer lies still.
+    ends = f"({MODELS}).filter((each) => each.type === 'Figure').map((each) => [each.x_range.start, each.x_range.end])"
+    (whole,) = page.js(ends)
+    box = page.page.locator("#map").bounding_box()
+    x, y = box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"]
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x + 150, y + 120, steps=4)
+    page.page.mouse.up()
+    page.until("!document.getElementById('map-out').disabled")
+    ((low, high),) = page.js(ends)
+    assert whole[0] < low < high < whole[1]
+    page.page.mouse.move(x + 40, y + 40)
+    page.page.locator("#map-small").wait_for(state="visible", timeout=20_000)
+    assert page.text("#map-small p").startswith("It ")
+    page.page.click("#map-out")
+    assert page.js(ends) == [whole] and page.page.locator("#map-out").is_disabled()
     page.rested(lambda: page.page.click("#map-open"))
     texts = query_of(page)
     response = rocking.simulate(

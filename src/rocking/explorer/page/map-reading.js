@@ -28,7 +28,8 @@ export class MapReading {
     map.addEventListener("keydown", (event) => this.key(event));
     map.addEventListener("pointerdown", () => { this.dragging = true; this.leave(); });
     map.addEventListener("pointerleave", () => this.leave());
-    for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, () => { this.dragging = false; });
+    // Before the plotting library, which keeps the end of a drag to itself.
+    for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, () => { this.dragging = false; }, {capture: true});
   }
 
   /** The pointer is here. @param {number} x @param {number} y */
