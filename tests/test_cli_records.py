@@ -179,6 +179,18 @@ def test_the_table_is_written_and_each_record_only_on_request(run, folder, tmp_p
     assert "--out" in run("simulate", folder, *BLOCK, "--each")[2]
 
 
+@pytest.mark.thorough
+def test_the_phase_plane_and_the_energy_are_drawn_on_request(run, tmp_path):
+    assert run("simulate", "el-centro-meloland-270", *BLOCK, "--energy", "--out", tmp_path)[0] == 0
+    drawn = {path.name for path in tmp_path.glob("*.png")}
+    assert drawn == {"response.png", "phase-plane.png", "energy.png"}
+
+
+def test_an_energy_is_drawn_of_one_record_into_a_folder(run, folder, tmp_path):
+    assert "--energy writes files" in run("simulate", "el-centro-meloland-270", *BLOCK, "--energy")[2]
+    assert "of several records give --each" in run("simulate", folder, *BLOCK, "--energy", "--out", tmp_path / "b")[2]
+
+
 def test_the_table_is_a_workbook_where_openpyxl_is_installed(run, folder, tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     assert run("simulate", folder, *BLOCK, "--out", tmp_path)[0] == 0

@@ -319,6 +319,66 @@ def test_ten_times_closer_again_and_again(opened):
     page.until("!new URLSearchParams(location.search).has('from')")
 
 
+def test_the_phase_plane_and_the_energy_are_drawn_where_they_are_seen(opened):
+    page = opened(f"{STATUE}&from=231&to=235&at=232.5", viewport={"width": 1280, "height": 700})
+    assert page.js("document.body.dataset.phases") is None
+    page.page.locator("#phase-legend").scroll_into_view_if_needed()
+    page.until("document.body.dataset.phases === '1'")
+    response = statue(0.4 * 9.80665)
+    line = page.js(
+        f"({MODELS}).filter((each) => each.name === 'phase-total').map((each) => Array.from(each.data.y))[0]"
+    )
+    times = np.linspace(231.0, 235.0, 4001)
+    assert max(line) == pytest.approx(
+        (response.kinetic_energy(times) + response.potential_energy(times)).max(), rel=1e-3
+    )
+    now = page.js(
+        f"({MODELS}).filter((each) => each.name === 'phase-now').map(({{data}}) => [data.x[0], data.y[0]])[0]"
+    )
+    block, (theta, rate, _) = response.block, response.states(232.5)
+    assert now == pytest.approx([theta / block.alpha, rate / (block.p * block.alpha)], abs=1e-4)
+    slider = page.page.locator("#pga-slider")
+    page.page.evaluate("scrollTo(0, 0)")
+    page.rested(lambda: (slider.focus(), slider.press("ArrowRight")))
+    assert page.js("document.body.dataset.phases") == "1"
+
+
+def test_a_time_is_read_by_mouse_by_keys_and_typed_and_the_block_follows(opened):
+    page = opened(f"{STATUE}&from=231&to=235", allowed=["422"])
+    response = statue(0.4 * 9.80665)
+
+    def read(time):
+        page.until(f"Math.abs(Number(document.getElementById('cursor').dataset.time) - {time}) < 1e-9")
+        assert float(query_of(page)["at"]) == pytest.approx(time, abs=1e-12)
+        degrees = page.text("#cursor").split("rotation ")[1].split("°")[0].replace("−", "-")
+        assert float(degrees) == pytest.approx(math.degrees(response.rotation(time)), rel=6e-3)
+
+    field, slider, plots = (page.page.locator(name) for name in ("#at", "#at-slider", "#histories"))
+    field.fill("232500 ms")
+    field.press("Enter")
+    read(232.5)
+    plots.focus()
+    plots.press("Shift+ArrowRight")
+    read(232.52)
+    slider.focus()
+    slider.press("ArrowLeft")
+    read(232.516)
+    page.until("document.getElementById('said').textContent.startsWith('At 232.516 s')")
+    field.fill("1e9")
+    field.press("Enter")
+    page.until("document.getElementById('at').getAttribute('aria-invalid') === 'true'")
+    assert "must be within the response" in page.text("#problem")
+    box = plots.bounding_box()
+    page.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 100)
+    page.until("document.getElementById('problem').hidden")
+    clicked = float(query_of(page)["at"])
+    assert 232.0 < clicked < 234.0
+    page.page.click("[data-view=block]")
+    page.until(f"Math.abs(Number(document.getElementById('stage').dataset.shown) - {clicked}) < 1e-9")
+    page.page.locator("#scrub").press("End")
+    read(235.0)
+
+
 def test_keys_move_and_zoom_the_plots(opened):
     page = opened(f"{STATUE}&from=231&to=235")
     plots = page.page.locator("#histories")
@@ -343,7 +403,7 @@ def test_dragging_across_a_plot_zooms_in(opened):
     page.until(
         "((given) => Number(given.get('to')) - Number(given.get('from')) < 3)(new URLSearchParams(location.search))"
     )
-    assert "θ =" in page.text("#cursor")
+    page.until("document.getElementById('cursor').textContent.includes('the block')")
 
 
 def test_ratios_of_intervals_are_drawn_against_eta_squared(opened):
@@ -750,6 +810,63 @@ def test_a_map_is_read_by_keys_and_by_another_quantity(opened):
     assert "restitution" in query_of(page)
 
 
+def test_a_map_is_zoomed_by_a_rectangle_and_by_keys_and_back(opened):
+    page = opened(SINE + "&view=map&x=omega&y=a&y_from=1&y_to=1.1&points=8")
+    complete = "document.body.dataset.map === 'complete'"
+    page.until(complete)
+    box = page.page.locator("#map").bounding_box()
+    x, y = box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"]
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x + 120, y + 100, steps=5)
+    assert page.page.locator("#map-small").is_hidden()
+    page.page.mouse.up()
+    page.until("document.body.dataset.map === 'running' || Number(document.getElementById('map-x-from').value) > 0.5")
+    page.until(complete)
+    found = {name: float(query_of(page)[name]) for name in ("x_from", "x_to", "y_from", "y_to")}
+    assert 0.5 < found["x_from"] < found["x_to"] < 8.0 and found["x_to"] - found["x_from"] < 2.5
+    assert 1.0 < found["y_from"] < found["y_to"] < 1.1
+    shown = page.js(f"({MODELS}).filter((each) => each.type === 'ImageRGBA').length")
+    assert shown == 1 and page.js("document.getElementById('map-x-from').value") == query_of(page)["x_from"]
+    plots = page.page.locator("#map")
+    plots.focus()
+    plots.press("+")
+    page.until(f"Number(document.getElementById('map-x-from').value) > {found['x_from']}")
+    page.until(complete)
+    plots.press("-")
+    page.until(f"Number(document.getElementById('map-x-from').value) === {found['x_from']}")
+    page.until(complete)
+    page.page.click("#map-out")
+    page.until("document.getElementById('map-y-to').value === '1.1'")
+    page.until(complete)
+
+
+def test_a_small_response_is_shown_where_the_pointer_lies_still(opened, explorer):
+    page = opened(SINE + "&view=map&x=omega&y=a&y_from=1&y_to=1.1&points=8")
+    page.until("document.body.dataset.map === 'complete'")
+    asked = []
+    page.page.on("request", lambda request: asked.append(request.url) if "/api/map/response" in request.url else None)
+    box = page.page.locator("#map").bounding_box()
+    for k in range(8):  # on the way nothing is asked for
+        page.page.mouse.move(box["x"] + 120 + 40 * k, box["y"] + 120)
+    small = page.page.locator("#map-small")
+    small.wait_for(state="visible", timeout=20_000)
+    assert len(asked) == 1
+    x, y = map(float, small.get_attribute("data-at").split(","))
+    grid = {"x": "omega", "y": "a", "y_from": "1", "y_to": "1.1", "points": "8"}
+    case = read_case(dict(parse_qsl(SINE)), explorer.uploads)
+    verdict = explorer.case(maps.texts_at(maps.grid_of(case, grid), x, y)).header["verdict"]
+    assert page.text("#map-small p").startswith(verdict)
+    plots = page.page.locator("#map")
+    plots.focus()
+    plots.press("Escape")
+    assert small.is_hidden()
+    plots.press("ArrowRight")
+    small.wait_for(state="visible", timeout=20_000)
+    page.until("document.getElementById('said').textContent.startsWith('It ')")
+    assert len(asked) == 2
+
+
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
     page = opened(f"view=map&{SINE}&points=8&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=8&quantity=mode")
     complete(page)
@@ -827,6 +944,23 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
     complete(page)
     assert "Study museum" in page.text("#study-tools")
     assert "overturns" in page.text("#map-legend")
+    # A rectangle of its cells is shown larger, and left again; a response is shown where the pointer lies still.
+    ends = f"({MODELS}).filter((each) => each.type === 'Figure').map((each) => [each.x_range.start, each.x_range.end])"
+    (whole,) = page.js(ends)
+    box = page.page.locator("#map").bounding_box()
+    x, y = box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"]
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x + 150, y + 120, steps=4)
+    page.page.mouse.up()
+    page.until("!document.getElementById('map-out').disabled")
+    ((low, high),) = page.js(ends)
+    assert whole[0] < low < high < whole[1]
+    page.page.mouse.move(x + 40, y + 40)
+    page.page.locator("#map-small").wait_for(state="visible", timeout=20_000)
+    assert page.text("#map-small p").startswith("It ")
+    page.page.click("#map-out")
+    assert page.js(ends) == [whole] and page.page.locator("#map-out").is_disabled()
     page.rested(lambda: page.page.click("#map-open"))
     texts = query_of(page)
     response = rocking.simulate(

@@ -24,6 +24,7 @@ import pytest
 from explorer_client import Client, clients, let_in, opened_by
 
 import rocking
+from rocking.engine import _AHEAD, cores
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.explorer import connections, launch, server, uploads
 from rocking.explorer.authentication import RequestAuthentication
@@ -126,8 +127,11 @@ def test_a_map_comes_coarse_to_fine_and_whole(page):
         seen[np.frombuffer(part, "<u4", count, 8)] += 1
         assert len(part) == 8 + 4 * count + 16 * count
     assert (seen == 1).all()
-    assert strides[0] == 8
-    assert strides[-1] == 1
+    # Tasks begin coarse to fine, a few at a time: no part comes before more coarser ones than may be under way.
+    order = np.array(strides)
+    overtaken = [int(np.sum(order[k:] > stride)) for k, stride in enumerate(strides)]
+    assert sorted(set(strides)) == [1, 2, 4, 8] and len(strides) == 45
+    assert max(overtaken) < _AHEAD * cores()
 
 
 def test_the_case_at_a_point_of_a_map(page):
@@ -135,6 +139,26 @@ def test_the_case_at_a_point_of_a_map(page):
     texts = page.get("/api/map/point", params=params).json()
     header, _ = unpacked(page.get("/api/case", params=texts).content)
     assert header["motion"]["pga_g"] == pytest.approx(1.03 * math.tan(0.2), rel=1e-9)
+
+
+def test_the_response_at_a_point_of_a_map_comes_small_with_its_fate(page):
+    params = {**SINE, "x": "omega", "y": "a", "at_x": "2", "at_y": "1.03"}
+    header, arrays = unpacked(page.get("/api/map/response", params=params).content)
+    texts = page.get("/api/map/point", params=params).json()
+    whole, _ = unpacked(page.get("/api/case", params=texts).content)
+    assert header["verdict"] == whole["verdict"]
+    assert 100 < len(arrays["time"]) == len(arrays["rotation"]) <= 300
+    assert page.get("/api/map/response", params={**params, "at_x": ""}).status_code == 422
+
+
+def test_phase_plane_and_instant_are_answered_or_refused_by_name(page):
+    header, arrays = unpacked(page.get("/api/phase", params={**SINE, "from": "0", "to": "3"}).content)
+    assert header["needed"] == [1.0, 1.0] and len(arrays["time"]) == len(arrays["kinetic"]) > 3000
+    assert page.get("/api/phase", params=SINE).status_code == 422
+    assert page.get("/api/at", params={**SINE, "at": "1.5 s"}).json()["time"] == 1.5
+    refused = page.get("/api/at", params={**SINE, "at": "-3"})
+    assert refused.status_code == 422 and refused.json()["argument"] == "at"
+    assert refused.json()["problem"].startswith("“Time” must be within the response")
 
 
 def test_what_a_case_settles_on_comes_as_header_and_arrays(page):

@@ -15,6 +15,7 @@ from rocking.plot.histories import intervals_figure
 from rocking.plot.ida import ScaledMotion, ida_figure, levels_reaching
 from rocking.plot.maps import outcome_figure, regions_figure
 from rocking.plot.orbits import branch_figure, orbit_figure
+from rocking.plot.phase import energy_figure, phase_figure
 from rocking.plot.response import DrawnSequence, response_figure
 from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
 from rocking.plot.rose import rose_figure, shares_figure
@@ -102,6 +103,35 @@ def response_of(**options):
         "chattering": DrawnSequence(times, 239.0 - 1e-9, 239.0),
     }
     return response_figure(**(arrays | options))
+
+
+def phase_of(**options):
+    angle = np.linspace(0.0, 20.0, 800)
+    rotation, velocity = 0.9 * np.exp(-0.05 * angle) * np.array([np.cos(angle), np.sin(angle)])
+    ends = np.array([-1.0, 0.0, np.nan, 0.0, 1.0])
+    arrays = {
+        "rotation": rotation,
+        "velocity": velocity,
+        "jumps": np.array([[-0.8, -0.7], [0.6, 0.5]]),
+        "boundary": (ends, 1.0 - np.abs(ends)),
+        "uplifts": True,
+        "rests": True,
+    }
+    return phase_figure(**(arrays | options))
+
+
+def energy_over_time_of(**options):
+    time = np.linspace(0.0, 10.0, 1001)
+    energy = 1.1 * np.exp(-0.3 * time)
+    arrays = {
+        "time": time,
+        "kinetic": energy * np.sin(3.0 * time) ** 2,
+        "potential": energy * np.cos(3.0 * time) ** 2,
+        "needed": (1.0, 1.4),
+        "impact_times": np.arange(0.5, 9.0),
+        "rest_intervals": np.array([[9.0, 10.0]]),
+    }
+    return energy_figure(**(arrays | options))
 
 
 def outcomes_of(**options):
@@ -249,6 +279,8 @@ FIGURES = {
     "measured": (measured_of, 3.8),
     "factors": (factors_of, 3.8),
     "response": (response_of, 4.8),
+    "phase plane": (phase_of, 4.2),
+    "energy": (energy_over_time_of, 3.4),
     "spectrum of two": (lambda **options: spectrum_of(2, 2, **options), 4.2),
     "spectrum of twelve": (lambda **options: spectrum_of(12, 4, **options), 4.2),
     "spectrum of many curves": (lambda **options: spectrum_of(12, 30, **options), 4.8),

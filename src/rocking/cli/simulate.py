@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -43,6 +44,7 @@ class _Start:
 def simulate(
     *names: Names,
     each: Annotated[bool, Parameter(negative="")] = False,
+    energy: Annotated[bool, Parameter(negative="")] = False,
     start: Annotated[_Start, MODEL] = _Start(),
     block: Annotated[HeldOptions, BLOCK] = HeldOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
@@ -61,6 +63,8 @@ def simulate(
     ----------
     each
         Of several records: write the files of each into a folder of its own below --out, too.
+    energy
+        Draw the phase plane (phase-plane.png, .pdf) and the energy over time (energy.png, .pdf) into --out, too.
     """
     if start.friction is not None:
         friction_coefficient(start.friction)  # before the work
@@ -71,15 +75,17 @@ def simulate(
         "initial_rotation": quantities.tilt(start.initial_rotation, "initial_rotation"),
         "initial_velocity": start.initial_velocity,
     }
-    if each and output.out is None:
-        raise InvalidOption("{} writes files; name the folder for them with {}", "each", "out")
+    for name in [name for name, chosen in (("each", each), ("energy", energy)) if chosen and output.out is None]:
+        raise InvalidOption("{} writes files; name the folder for them with {}", name, "out")
     with output.folder() as folder:
         read = motion.read_all(names)
         if read.single:
             ((record, shaking),) = read.motions.items()
             response = run(body, shaking, **options)
-            result, text = _result(response, record, start.friction, folder), response.summary(start.friction)
+            result, text = _result(response, record, start.friction, folder, energy), response.summary(start.friction)
         else:
+            if energy and not each:
+                raise InvalidOption("{} draws single responses; of several records give {}, too", "energy", "each")
             found = replace(survey(body, read.motions, friction=start.friction, **options), skipped=read.skipped)
             if folder is not None:
                 found.write(folder)
@@ -87,12 +93,14 @@ def simulate(
                 folders = folder_names(found.records)
                 for name, record, response in zip(folders, found.records, found.responses, strict=True):
                     (folder / name).mkdir(exist_ok=True)
-                    _result(response, record, start.friction, folder / name)
+                    _result(response, record, start.friction, folder / name, energy)
             result, text = found.to_dict(), found.summary()
         print_result(result, text, as_json=output.as_json, folder=folder)
 
 
-def _result(response: Response, record: str, friction: float | None, folder: Path | None) -> dict[str, Any]:
+def _result(
+    response: Response, record: str, friction: float | None, folder: Path | None, energy: bool
+) -> dict[str, Any]:
     """Return the result, and write it with figures, histories and events into a folder where there is one."""
     result = response.to_dict(friction)
     # Its motion is named by the record that was read, too, as in tables of many.
@@ -102,7 +110,10 @@ def _result(response: Response, record: str, friction: float | None, folder: Pat
         response.to_csv(folder / "events.csv", "events")
         response.to_csv(folder / "impacts.csv", "impacts")
         response.to_netcdf(folder / "response.nc")
-        write_results(folder, figures={"response": response.plot}, result=result)
+        figures: dict[str, Callable[[], Any]] = {"response": response.plot}
+        if energy:
+            figures |= {"phase-plane": response.plot_phase_plane, "energy": response.plot_energy}
+        write_results(folder, figures=figures, result=result)
     return result
 
 

@@ -132,7 +132,7 @@ class Explorer:
         """Return all that the page says of a case, and its arrays in a window (s; by default where it moves)."""
         shown = self.show(texts)
         response = shown.response
-        start, end = active_span(response) if window is None else _checked(window, response.duration)
+        start, end = active_span(response) if window is None else checked_window(window, response.duration)
         header = {**_facts(shown), "window": _window(shown, start, end)}
         return Payload(header, {**_window_arrays(shown, start, end), **_whole_arrays(response)})
 
@@ -141,7 +141,7 @@ class Explorer:
     ) -> Payload:
         """Return the arrays of a window (s), evaluated anew; with those of the ground's displacement."""
         shown = self.show(texts)
-        start, end = _checked(window, shown.response.duration)
+        start, end = checked_window(window, shown.response.duration)
         arrays = _window_arrays(shown, start, end, min(max(points, 2), _POINTS))
         if ground:
             arrays |= _ground_arrays(shown, start, end)
@@ -156,7 +156,7 @@ class Explorer:
         if window is None:
             start, end = min(span[0] for span in spans), max(span[1] for span in spans)
         else:
-            start, end = _checked(window, longest)
+            start, end = checked_window(window, longest)
         header: dict[str, Any] = {"window": _ends(start, end), "duration": longest, "cases": []}
         arrays: dict[str, Floats] = {}
         for name, shown in (("first", first), ("second", second)):
@@ -202,7 +202,7 @@ class Explorer:
                 response.to_netcdf(file)
             else:
                 with self._drawing:
-                    _draw(response, file, None if window is None else _checked(window, response.duration))
+                    _draw(response, file, None if window is None else checked_window(window, response.duration))
             return file.read_bytes()
 
     def _steps(self) -> int:
@@ -255,7 +255,8 @@ def extremes(values: Floats, most: int) -> Integers:
     return np.minimum(kept, len(values) - 1)
 
 
-def _checked(window: tuple[float, float], duration: float) -> tuple[float, float]:
+def checked_window(window: tuple[float, float], duration: float) -> tuple[float, float]:
+    """Return the ends of a window, s, within a response that lasts so long; refuse what is none."""
     start, end = window
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
         raise InvalidOption("the window must go from a time to a later one, both in s", value=window)

@@ -31,7 +31,7 @@ from rocking.quantities import (
 )
 
 #: Parameters that one form sets together, and that a comparison replaces together.
-Group = Literal["block", "motion", "start", "model", "map", "sweep", "pulse", "treatment"]
+Group = Literal["block", "motion", "start", "model", "map", "sweep", "reading", "pulse", "treatment"]
 
 Kind = Literal[
     "text", "number", "length", "position", "angle", "rate", "duration", "velocity", "frequency", "acceleration",
@@ -217,6 +217,9 @@ SWEEP: Final = _by_name(
     Parameter("sweep_points", "Values", "sweep", default="200"),
 )
 
+#: What an address says about the time that is read.
+READING: Final = _by_name(Parameter("at", "Time", "reading", "duration", "s"))
+
 #: The case that is shown when nothing is asked for: it chatters, rests and rocks on several times.
 DEFAULT: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
 
@@ -354,7 +357,7 @@ def field_label(name: str, motion: str = "") -> str:
     ('“Amplitude”', '“Velocity amplitude”')
     """
     shown = PULSES.get(motion.partition(":")[0])
-    known = PARAMETERS | MAP | SWEEP | _by_name(_PERIOD)
+    known = PARAMETERS | MAP | SWEEP | READING | _by_name(_PERIOD)
     labels = {
         each.label
         for pulse in (PULSES.values() if shown is None else [shown])

@@ -24,7 +24,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer import maps, periodic, sweeps
+from rocking.explorer import maps, periodic, readings, sweeps
 from rocking.explorer.background import Compilation, low_priority
 from rocking.explorer.code import map_as_code, sweep_as_code
 from rocking.explorer.core import EXPORTS, Explorer
@@ -148,15 +148,23 @@ class App:
             "/api/start": self._start,
             "/api/case": lambda query: explorer.case(query.texts(), query.window),
             "/api/window": self._window,
+            "/api/phase": lambda query: readings.phase(explorer, query.texts(), query.numbers("from", "to")),
+            "/api/at": lambda query: readings.at(explorer, query.texts(), query.given.get("at", ""), query.window),
             "/api/summary": lambda query: explorer.summary(query.texts()),
             "/api/code": lambda query: explorer.code(query.texts()),
             "/api/schemes": lambda query: explorer.schemes(query.texts()),
             "/api/compare": lambda query: explorer.compare(query.texts(), query.texts(OTHER), query.window),
             "/api/map/point": lambda query: maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y")),
+            "/api/map/response": lambda query: readings.thumbnail(
+                explorer, maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y"))
+            ),
             "/api/orbit": lambda query: periodic.orbit(self._case(query)),
             "/api/sweep/point": self._point_of_sweep,
             "/api/study": lambda query: self._study().slice(query.others),
             "/api/study/point": lambda query: self._study().texts_at(query.others, explorer.uploads),
+            "/api/study/response": lambda query: readings.thumbnail(
+                explorer, self._study().texts_at(query.others, explorer.uploads)
+            ),
         }
         self.asgi = Starlette(
             routes=[

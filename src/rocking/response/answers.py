@@ -19,6 +19,7 @@ from rocking.kernels import state
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
 from rocking.response.contact import Contact, TendonContact, friction_coefficient, friction_demand
+from rocking.response.energy import Energy, energy_of
 from rocking.response.history import History, with_all_impacts
 from rocking.response.sensitivity import Sensitivity, ambiguities, sensitivity_along
 from rocking.treatment import Treatment
@@ -191,6 +192,80 @@ class Answers:
         """Angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
         return as_asked(self.states(time)[..., 2])
 
+    def kinetic_energy(self, time: ArrayLike) -> Floats:
+        """Kinetic energy over the least that overturns the block, at any time (just after an impact, at one).
+
+        Parameters
+        ----------
+        time : array_like
+            Times, s, of any shape.
+
+        Returns
+        -------
+        ndarray
+            Over the energy that takes the block, without ground motion, from rest to the unstable balance of the side
+            where that is less; NaN outside [0, duration]. Velocities are relative to the ground.
+
+        Raises
+        ------
+        InvalidOption
+            If a time is not a number, the body is no block, one of its tendons yields, or its restraints hold it back
+            at any rotation.
+
+        Notes
+        -----
+        Of a free block m g R (1 - cos alpha) overturns it, or m g R alpha^2/2 in the linear model. (Derived in the
+        documentation.)
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block = rocking.Block(width=0.24, height=1.1)
+        >>> response = rocking.simulate(block, None, initial_rotation=0.5 * block.alpha)
+        >>> time = response.impacts["time"][0] - 1e-9
+        >>> energies = [response.kinetic_energy([0.0, time]), response.potential_energy([0.0, time])]
+        >>> [energy.round(6).tolist() for energy in energies]
+        [[0.0, 0.749278], [0.749278, 0.0]]
+        """
+        states, sides = self._history.states_and_sides(time)
+        return as_asked(self._energy.kinetic(states[..., 1], sides))
+
+    def potential_energy(self, time: ArrayLike) -> Floats:
+        """Potential energy of weight and restraints, zero upright, in the unit of `kinetic_energy`.
+
+        Between impacts the sum of both stays the same where nothing shakes or damps the block.
+
+        Parameters
+        ----------
+        time : array_like
+            Times, s, of any shape.
+
+        Returns
+        -------
+        ndarray
+            As of `kinetic_energy`.
+
+        Raises
+        ------
+        InvalidOption
+            As `kinetic_energy`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block = rocking.Block(width=0.24, height=1.1)
+        >>> response = rocking.simulate(block, rocking.pulses.one_sine(3.0, 1.0))
+        >>> f"{response.potential_energy(response.tipping_time):.6f}"
+        '1.000000'
+        """
+        states, sides = self._history.states_and_sides(time)
+        return as_asked(self._energy.potential(states[..., 0], sides))
+
+    @cached_property
+    def impact_losses(self) -> Floats:
+        """Energy that each of `impacts` takes, over the least that overturns the block, as `kinetic_energy`."""
+        return self._energy.losses(self.impacts)
+
     def normal_force(self, time: ArrayLike) -> Floats:
         """Return the normal force over the weight at any time; impulses at impacts are not part of it."""
         return as_asked(self._contact.forces(time)[1])
@@ -257,6 +332,10 @@ class Answers:
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
     @cached_property
+    def _energy(self) -> Energy:
+        return energy_of(self.body, self._trail.block, nonlinear=bool(self._trail.rules["nonlinear"]))
+
+    @cached_property
     def _contact(self) -> Contact:
         law = self.body.contact
         if law is None:
@@ -275,6 +354,17 @@ def trail_of(response: Answers) -> Trail:
 def history_of(response: Answers) -> History:
     """Return the course of a response in time."""
     return response._history
+
+
+def energy_in(response: Answers) -> Energy:
+    """Return what the energy of a response's body is.
+
+    Raises
+    ------
+    InvalidOption
+        If that is not known.
+    """
+    return response._energy
 
 
 def _pull(_: Floats, vertical: Floats) -> Floats:

@@ -143,7 +143,7 @@ def figure(
     from rocking.plot.response import DrawnSequence, response_figure
 
     checks.one_of(units, "units", InvalidOption, get_args(RotationUnits))
-    start, end = active_span(response) if window is None else _checked(window, response.duration)
+    start, end = active_span(response) if window is None else checked_window(window, response.duration)
     times = drawing_times(response, start, end)
     body, motion, gravity = response.body, response.motion, response.body.gravity
     coordinate = body.coordinate
@@ -157,8 +157,6 @@ def figure(
     if units == "slenderness" and any(map(math.isinf, balance)):
         units = "rad"
     sequence = _longest_sequence(response, start, end) if longest_sequence else None
-    # A dollar in a name begins no formula.
-    shaken = "no motion" if motion is None else motion.label.replace("$", r"\$")
     return response_figure(
         time=times,
         rotation=response.states(times)[:, 0],
@@ -176,10 +174,17 @@ def figure(
         chattering=None if sequence is None else DrawnSequence(*sequence),
         units=units,
         label="" if coordinate.unit == "rad" else f"{coordinate.name} ({coordinate.unit})",
-        title=title or f"{title_of(body)} under {shaken}",
+        title=title or titled(response),
         ax=ax,
         figsize=figsize,
     )
+
+
+def titled(response: Answers) -> str:
+    """Return what was simulated, for the title of a figure."""
+    # A dollar in a name begins no formula.
+    shaken = "no motion" if response.motion is None else response.motion.label.replace("$", r"\$")
+    return f"{title_of(response.body)} under {shaken}"
 
 
 def active_span(response: Answers) -> tuple[float, float]:
@@ -200,7 +205,14 @@ def drawing_times(response: Answers, start: float, end: float) -> Floats:
     return np.union1d(even, steps[visible])
 
 
-def _checked(window: Sequence[float], duration: float) -> tuple[float, float]:
+def checked_window(window: Sequence[float], duration: float) -> tuple[float, float]:
+    """Return a stretch of time, s, of a response that lasts so long.
+
+    Raises
+    ------
+    InvalidOption
+        If it is none.
+    """
     ends: Any = checks.numbers(window, "window", InvalidOption)
     if ends.shape != (2,) or not 0.0 <= ends[0] < ends[1] <= duration:
         raise InvalidOption(

@@ -43,11 +43,17 @@ class History:
 
     def states(self, time: ArrayLike) -> Floats:
         """Coordinate and its two rates at times of any shape, in one more dimension; NaN outside [0, end]."""
+        return self.states_and_sides(time)[0]
+
+    def states_and_sides(self, time: ArrayLike) -> tuple[Floats, Integers]:
+        """Return `states`, and the side at each time: 0, 1, or negative at rest."""
         times = checks.numbers(time, "time", InvalidOption)
         flat = times.ravel()
-        found = self.states_in(flat, self.rows(flat))
+        rows = self.rows(flat)
+        found = self.states_in(flat, rows)
         found[self.outside(flat)] = np.nan
-        return found.reshape((*times.shape, 3))
+        sides = self.trail.nodes["side"][rows].astype(np.int64)
+        return found.reshape((*times.shape, 3)), sides.reshape(times.shape)
 
     def states_in(self, times: Floats, rows: Integers) -> Floats:
         """Coordinate and its two rates at each time in the step that starts at the node of its row, shape (n, 3)."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from rocking import svg
 from rocking.plot.response import RotationUnits
-from rocking.response import export, summary
+from rocking.response import export, phase, summary
 from rocking.response.answers import Answers
 from rocking.result import DrawnResult, Row, dictionary_of, text_of
 from rocking.tables import write_csv, write_netcdf
@@ -328,3 +328,86 @@ class Response(Answers, DrawnResult):
             If there is no such unit, the window is not a stretch of the response, or the size is not one.
         """
         return export.figure(self, units, window, title, ax, figsize, longest_sequence=longest_sequence)
+
+    def plot_phase_plane(
+        self,
+        ax: Axes | None = None,
+        *,
+        window: tuple[float, float] | None = None,
+        title: str = "",
+        figsize: tuple[float, float] | None = None,
+    ) -> Figure:
+        """Figure of the velocity against the rotation, with impacts as jumps and what overturns if nothing shakes.
+
+        Rotations are over the slenderness of their side (of a restrained block over its balance), velocities over p
+        times that.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Draw here.
+        window : (start, end), optional
+            Stretch of time to draw, s; by default as of `plot`.
+        title : str
+            Title; by default what was simulated.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure.
+
+        Raises
+        ------
+        InvalidOption
+            As `kinetic_energy`, and if the window is not a stretch of the response, or the size is not one.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response.plot_phase_plane(window=(0.0, 1.2)).axes[0].get_xlabel()
+        'rotation / slenderness'
+        """
+        return phase.phase_plane(self, window, title, ax, figsize)
+
+    def plot_energy(
+        self,
+        ax: Axes | None = None,
+        *,
+        window: tuple[float, float] | None = None,
+        title: str = "",
+        figsize: tuple[float, float] | None = None,
+    ) -> Figure:
+        """Figure of kinetic, potential and total energy over time, over the least energy that overturns the block.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Draw here.
+        window : (start, end), optional
+            Stretch of time to draw, s; by default as of `plot`.
+        title : str
+            Title; by default what was simulated.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure.
+
+        Raises
+        ------
+        InvalidOption
+            As `plot_phase_plane`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response.plot_energy(window=(0.0, 1.2)).axes[0].get_ylabel()
+        'energy / least that overturns'
+        """
+        return phase.energy_over_time(self, window, title, ax, figsize)

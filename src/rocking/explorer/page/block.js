@@ -41,7 +41,10 @@ export class View {
   left() { return this.page.shown?.header.window.from ?? 0; }
   right() { return this.page.shown?.header.window.to ?? 1; }
 
-  enter() { this.draw(); }
+  enter() {
+    this.time = this.page.state.at ?? this.time;
+    this.draw();
+  }
 
   leave() { this.stop(); }
 
@@ -51,7 +54,7 @@ export class View {
     if (this.of !== JSON.stringify(this.page.state.texts)) {
       this.of = JSON.stringify(this.page.state.texts);
       const before = this.page.shown.arrays.uplift.filter((/** @type {number} */ each) => each <= header.peak_time);
-      this.time = Math.max(this.left(), (before.at(-1) ?? 0) - 0.2);
+      this.time = this.page.state.at ?? Math.max(this.left(), (before.at(-1) ?? 0) - 0.2);
       this.lines = null;
     }
     this.seek(Math.min(Math.max(this.time, 0), header.duration));
@@ -82,6 +85,7 @@ export class View {
     this.playing = false;
     one("play").textContent = "Play";
     one("play").setAttribute("aria-pressed", "false");
+    if (this.page.shown) this.page.follow(this.time, false);
   }
 
   /** @param {number} now */
@@ -127,7 +131,7 @@ export class View {
     const said = `${this.time.toFixed(decimals(Math.min(1, this.pace)))} s`;
     this.scrubber.setAttribute("aria-valuetext", said);
     one("clock").textContent = said;
-    this.histories.mark(this.time);
+    this.page.follow(this.time, this.playing);
   }
 
   /** @param {number} from @param {number} to */

@@ -1,7 +1,6 @@
 // Rotation over ground acceleration: one axis of time, which keeps its digits however far it is zoomed.
 
 import {bokeh, coarse, colour, figure, themed} from "./theme.js";
-import {decimals, short} from "./words.js";
 
 /** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, weight?: Float64Array, impact: Float64Array}} Lines */
 /** @typedef {{lines: Lines, rest: Float64Array, uplift: Float64Array, block: {sides: {alpha: number}[], thresholds_g: number[]}}} Drawn */
@@ -13,7 +12,7 @@ const NAMES = ["first", "second"];
 const SIGNS = [1, -1];
 
 /** Time as it is plotted: counted from an origin, in a unit that suits the window. */
-class Scale {
+export class Scale {
   /** @param {number} from @param {number} to */
   constructor(from, to) {
     const width = to - from;
@@ -42,7 +41,7 @@ class Scale {
 }
 
 export class Histories {
-  /** @param {HTMLElement} element @param {{window: (ends: [number, number] | null) => void, cursor?: (text: string) => void, pick?: (time: number) => void}} tell */
+  /** @param {HTMLElement} element @param {{window: (ends: [number, number] | null) => void, cursor?: (time: number | null) => void, pick?: (time: number) => void}} tell */
   constructor(element, tell) {
     this.element = element;
     this.tell = tell;
@@ -102,7 +101,8 @@ export class Histories {
       plot.toolbar.setv({active_drag: zoom, active_scroll: wheel});
     }
     plot.on_event("mousemove", (/** @type {any} */ event) => this.point(event.x));
-    plot.on_event("tap", (/** @type {any} */ event) => { this.point(event.x); this.tell.pick?.(this.scale.time(event.x)); });
+    plot.on_event("mouseleave", () => this.tell.cursor?.(null));
+    plot.on_event("tap", (/** @type {any} */ event) => { if (this.tell.pick) this.tell.pick(this.scale.time(event.x)); else this.point(event.x); });
   }
 
   /** @param {any} plot */
@@ -299,30 +299,24 @@ export class Histories {
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || (event.shiftKey && event.key.startsWith("Arrow"))) return;
     const how = {"+": "in", "=": "in", "-": "out", "−": "out", ArrowLeft: "left", ArrowRight: "right", "0": "active"}[event.key];
     if (!how) return;
     event.preventDefault();
     this.zoom(how);
   }
 
-  /** Show where the cursor is. @param {number} time */
+  /** Show where the cursor is, if it is anywhere. @param {number | null} time */
   mark(time) {
     if (!this.made) return;
-    for (const span of this.cursors) span.setv({location: this.scale.plotted(time), visible: true});
+    for (const span of this.cursors) span.setv({location: time === null ? NaN : this.scale.plotted(time), visible: time !== null});
   }
 
-  /** The pointer is here: say what is. @param {number} x */
+  /** The pointer is here. @param {number} x */
   point(x) {
     const time = this.scale.time(x);
     this.mark(time);
-    const first = this.drawn[0];
-    if (!first || !this.tell.cursor) return;
-    const theta = at(first.lines.time, first.lines.rotation, time - this.window[0]);
-    const ground = at(first.lines.ground_time, first.lines.ground_g, time - this.window[0]);
-    const alpha = first.block.sides[theta >= 0 ? 0 : 1].alpha;
-    const width = this.window[1] - this.window[0];
-    this.tell.cursor(`${time.toFixed(decimals(width))} s: θ = ${short(theta / alpha)} α = ${short((theta * 180) / Math.PI)}°, ground ${short(ground)} g`);
+    this.tell.cursor?.(time);
   }
 }
 

@@ -5,7 +5,9 @@ import {Latest, Problem, json, payload} from "./api.js";
 import {ChatteringPanel} from "./chattering.js";
 import {makeCopying, showCode, showFiles} from "./exports.js";
 import {BlockForm, ModelForm, MotionForm} from "./forms.js";
+import {Cursor} from "./cursor.js";
 import {Histories} from "./histories.js";
+import {PhasePanel} from "./phase.js";
 import {coarse} from "./theme.js";
 import {acceptFiles} from "./upload.js";
 import {counted, fixed, legend, make, one, say, short} from "./words.js";
@@ -15,8 +17,8 @@ import {counted, fixed, legend, make, one, say, short} from "./words.js";
 const state = readAddress();
 
 /** What the views share.
- * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, remember: (parts: Partial<import("./parameters.js").Good>) => void}} */
-const page = {state, shown: null, go, problem, restate, remember: (parts) => accepted(state, parts)};
+ * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, follow: typeof follow, remember: (parts: Partial<import("./parameters.js").Good>) => void}} */
+const page = {state, shown: null, go, problem, restate, follow, remember: (parts) => accepted(state, parts)};
 /** @type {Record<string, any>} */
 const views = {};
 
@@ -25,7 +27,11 @@ const forms = {
   motion: new MotionForm(one("motion-form"), changed),
   model: new ModelForm(one("model-form"), changed),
 };
-const histories = new Histories(one("histories"), {window: showWindow, cursor: (text) => { one("cursor").textContent = text; }, pick: (time) => views.block?.seek(time)});
+const histories = new Histories(one("histories"), {
+  window: showWindow, cursor: (time) => { if (time === null) cursor.show(); else cursor.hover(time); }, pick: (time) => cursor.set(time),
+});
+const phase = new PhasePanel(page, (time) => cursor.set(time));
+const cursor = new Cursor(page, {mark: (time) => { histories.mark(time); phase.mark(time); }, seek: (time) => { if (state.view === "block") views.block?.seek(time); }});
 const chattering = new ChatteringPanel(showWindow);
 
 /** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
@@ -79,6 +85,8 @@ const afterPause = new Latest(async () => {
   showLegend(header.motion?.vertical);
   chattering.window(header.window);
   if (state.view === "response") chattering.draw(page.shown, texts);
+  phase.update();
+  cursor.show();
   if (!ofOwn(state.view)) {
     showFiles(state, problem);
     const {python, command} = await json("/api/code", texts);
@@ -96,9 +104,17 @@ const look = new Latest(async () => {
   Object.assign(page.shown.arrays, arrays);
   draw();
   chattering.window(header.window);
+  phase.update();
+  cursor.show();
   showFiles(state, problem);
   counted("drawn");
 }, problem);
+
+/** The block is shown at another time: the plots follow, and where it stands still, so does the cursor.
+ * @param {number} time @param {boolean} playing */
+function follow(time, playing) {
+  if (playing) { histories.mark(time); phase.mark(time); } else if (time !== state.at) cursor.take(time);
+}
 
 /** @param {[number, number] | null} chosen */
 function showWindow(chosen) {
@@ -109,7 +125,7 @@ function showWindow(chosen) {
 
 /** A form has changed the case: new texts stand for all those that they replace. @param {Texts} texts @param {string[]} replaced */
 function changed(texts, replaced) {
-  if (replaced.includes("motion") && state.texts.motion !== texts.motion) state.window = null;
+  if (replaced.includes("motion") && state.texts.motion !== texts.motion) state.window = state.at = null;
   const kept = Object.entries(state.texts).filter(([name]) => !replaced.includes(name));
   state.texts = {...Object.fromEntries(kept), ...texts};
   views[state.view]?.update?.();
@@ -118,7 +134,7 @@ function changed(texts, replaced) {
 
 /** Other texts altogether: show them in the forms, too. @param {Texts} texts */
 function restate(texts) {
-  state.window = null;
+  state.window = state.at = null;
   for (const form of Object.values(forms)) form.show(texts);
   changed(texts, Object.keys(state.texts));
 }
@@ -135,11 +151,12 @@ async function go(name) {
   }
   const parts = {
     summary: !ofOwn(name), "view-histories": name === "response" || name === "block", "view-response": name === "response",
+    "view-phase": name === "response" || name === "block",
     "view-block": name === "block", "view-map": name === "map", "view-periodic": name === "periodic",
     "view-compare": name === "compare",
   };
   for (const [id, shown] of Object.entries(parts)) one(id).hidden = !shown;
-  one("figures").hidden = name === "block";
+  one("figures").hidden = one("at-slider").hidden = name === "block";
   if (name === "block") histories.size(190, 140);
   else if (name === "response") histories.size(290, 190);
   writeAddress(state);

@@ -1,22 +1,12 @@
 // A map of the case over two of its parameters, coarse to fine; or of a study.
 
 import {Latest, frames, json, payload} from "./api.js";
-import {showExports, withLegend} from "./exports.js";
+import {showExports} from "./exports.js";
+import {MapPicture} from "./map-picture.js";
+import {MapReading} from "./map-reading.js";
+import {MapZoom} from "./map-zoom.js";
 import {namesOf, specification} from "./parameters.js";
-import {bokeh, colour, figure, themed} from "./theme.js";
-import {make, one, short} from "./words.js";
-
-/** From harmless to the worst, each darker than the one before; the last stands out. */
-const OUTCOMES = ["#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a23c"];
-const MODES = /** @type {[number, string, string][]} */ ([
-  [-3, "no uplift", "#ffffff"], [-1, "rocks", "#d7e3f2"], [-2, "rests before the motion is over", "#9db6d4"],
-  [0, "overturns without impact", "#1c2c47"], [1, "overturns after 1 impact", "#c76b29"], [2, "overturns after 2 impacts or more", "#e9a94f"],
-  [-4, "overturns after a rest", "#7a3b69"],
-]);
-/** What overturns after a rest, as a mode; and the colour of the hatch over what overturns later than in the first rocking. */
-const AFTER_REST = -4, LATER = "#b0390c";
-/** Dark to light, even steps of lightness. */
-const RAMP = ["#0b1a3a", "#14346b", "#1f5190", "#3a74a8", "#5f97b8", "#8bb8c6", "#b9d6d4", "#e6efe4", "#fdf3d6"];
+import {make, one} from "./words.js";
 
 const ENDS = ["x_from", "x_to", "y_from", "y_to"];
 
@@ -30,19 +20,26 @@ export class View {
     this.latest = new Latest(() => this.run(), (error) => page.problem(error, "view-map"));
     /** @type {any} */
     this.about = null;
-    this.mark = [0, 0];
     this.waiting = 0;
+    this.complete = false;
+    this.picture = new MapPicture({
+      over: (x, y) => this.reading.over(x, y), chosen: (x, y) => { this.reading.put(x, y); void this.open(); }, zoomed: (box) => this.zoom.into(box),
+    });
+    this.reading = new MapReading(this);
+    this.zoom = new MapZoom(this);
     /** @type {Record<string, HTMLElement>} */
     this.slices = {};
     this.form();
-    one("map").addEventListener("keydown", (event) => this.key(event));
     one("map-open").addEventListener("click", () => this.open());
     one("map-sine").addEventListener("click", () => this.sine());
   }
 
   enter() { this.update(); }
 
-  leave() { this.running?.abort(); }
+  leave() {
+    this.running?.abort();
+    this.reading.leave();
+  }
 
   /** @param {string} name @returns {HTMLSelectElement} */
   select(name) { return one(`map-${name}`); }
@@ -74,7 +71,7 @@ export class View {
   chosen(name) {
     const {map} = this.page.state;
     map[name] = this.select(name).value;
-    if (name === "x" || name === "y") { delete map[`${name}_from`]; delete map[`${name}_to`]; }
+    if (name === "x" || name === "y") { delete map[`${name}_from`]; delete map[`${name}_to`]; this.zoom.forget(); }
     if (name === "quantity" && this.about && !this.study) {
       this.fill();
       this.page.remember({map});
@@ -233,19 +230,9 @@ export class View {
     const name = this.study ? "rocking-study" : "rocking-map";
     const {quantity} = this.page.state.map;
     showExports("map", this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
-      [`${name}.svg`, "Figure, SVG", () => this.picture("svg")], [`${name}.png`, "Figure, PNG", () => this.picture("png")],
+      [`${name}.svg`, "Figure, SVG", () => this.picture.file("svg")], [`${name}.png`, "Figure, PNG", () => this.picture.file("png")],
       [`${name}.csv`, "Numbers, CSV", async () => new Blob([this.table()], {type: "text/csv"})],
     ]);
-  }
-
-  /** The map as it is drawn, without the mark and with its legend. @param {"svg" | "png"} form @returns {Promise<Blob>} */
-  async picture(form) {
-    const marks = this.plot.renderers.filter((/** @type {any} */ each) => each.data_source === this.at);
-    for (const each of marks) each.visible = false;
-    const drawn = bokeh().index.find_one(this.plot).export(form);
-    for (const each of marks) each.visible = true;
-    const curves = /** @type {[string, string][]} */ (this.about.curves.exact ? [["critical amplitude: exact (solid), Eq. 76 (dashed)", "#b0390c"]] : []);
-    return withLegend(await drawn.to_blob(), [...(this.entries ?? []), ...curves], this.plot.outer_width, this.plot.outer_height);
   }
 
   /** Every point of the map with all that is known of it. */
@@ -263,10 +250,24 @@ export class View {
     /** @type {Record<string, string>} */
     const measured = {rest: "s from uplift to rest, empty where it never rests", peak: "rotation over slenderness, inf where it overturns"};
     return quantities.flatMap((name) => {
-      const kinds = this.kinds(name)?.map(([value, text]) => (name === "mode" && value === 2 ? "n overturns after n impacts" : `${value} ${text}`));
+      const kinds = this.picture.kinds(name)?.map(([value, text]) => (name === "mode" && value === 2 ? "n overturns after n impacts" : `${value} ${text}`));
       const words = kinds ? kinds.join("; ") : measured[name];
       return words ? [`# ${name}: ${words}`] : [];
     });
+  }
+
+  drawAxes() {
+    this.picture.axes(this.about);
+    this.reading.keep();
+    if (this.study) this.zoom.forget();
+    this.zoom.offer();
+  }
+
+  recolour() {
+    const {quantity} = this.page.state.map;
+    if (!this.about || !this.values) return;
+    this.picture.paint(this.values, quantity, {complete: this.complete, label: this.select("quantity").selectedOptions[0].text});
+    this.reading.say();
   }
 
   async slice() {
@@ -283,201 +284,17 @@ export class View {
     document.body.dataset.map = "complete";
   }
 
-  build() {
-    const B = bokeh();
-    this.plot = figure({height: 500, x_range: new B.Range1d({start: 0, end: 1}), y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 46}, "Map of outcomes over two parameters");
-    for (const grid of this.plot.center) grid.visible = false;
-    this.image = new B.ColumnDataSource({data: {image: [], x: [], y: [], dw: [], dh: []}});
-    const F = (/** @type {string} */ field) => ({field});
-    this.plot.add_renderers(new B.GlyphRenderer({data_source: this.image, glyph: new B.ImageRGBA({image: F("image"), x: F("x"), y: F("y"), dw: F("dw"), dh: F("dh")}), level: "image"}));
-    /** @type {Record<string, any>} */
-    this.curves = {};
-    for (const [name, dash] of /** @type {[string, number[]][]} */ ([["eq76", [7, 4]], ["exact", []]])) {
-      const source = new B.ColumnDataSource({data: {x: [], y: []}});
-      // A light line under the dark one: it is seen on every colour of the map.
-      for (const [width, ink] of /** @type {[number, string][]} */ ([[4.5, "#ffffff"], [2, "#b0390c"]])) {
-        this.plot.add_renderers(new B.GlyphRenderer({data_source: source, glyph: new B.Line({x: F("x"), y: F("y"), line_width: width, line_color: ink, line_alpha: width > 3 ? 0.75 : 1, line_dash: width > 3 ? [] : dash})}));
-      }
-      this.curves[name] = source;
-    }
-    this.at = new B.ColumnDataSource({data: {x: [], y: []}});
-    for (const [size, ink] of /** @type {[number, string][]} */ ([[17, "#ffffff"], [14, "#10243e"]])) {
-      this.plot.add_renderers(new B.GlyphRenderer({data_source: this.at, glyph: new B.Scatter({x: F("x"), y: F("y"), size, line_width: size > 15 ? 4 : 2, line_color: ink, fill_alpha: 0, marker: {value: "circle_cross"}})}));
-    }
-    this.bar = new B.ColorBar({color_mapper: new B.LinearColorMapper({palette: RAMP, low: 0, high: 1}), width: 12, title_text_font_style: "normal", padding: 6, visible: false});
-    this.plot.add_layout(this.bar, "right");
-    themed(() => this.bar.setv({background_fill_color: colour("paper"), major_label_text_color: colour("ink"), title_text_color: colour("ink"), major_tick_line_color: colour("ink")}));
-    this.plot.on_event("mousemove", (/** @type {any} */ event) => this.point(event.x, event.y));
-    this.plot.on_event("tap", (/** @type {any} */ event) => { this.put(event.x, event.y); void this.open(); });
-    B.Plotting.show(this.plot, one("map"));
-  }
-
-  drawAxes() {
-    if (!this.plot) this.build();
-    const {x, y} = this.about;
-    const label = (/** @type {any} */ axis) => (axis.unit ? `${axis.label} (${axis.unit})` : axis.label);
-    this.plot.below[0].axis_label = label(x);
-    this.plot.left[0].axis_label = label(y);
-    const [x0, x1, y0, y1] = this.box();
-    this.plot.x_range.setv({start: x0, end: x1});
-    this.plot.y_range.setv({start: y0, end: y1});
-    for (const [name, source] of Object.entries(this.curves ?? {})) {
-      const values = this.about.curves[name];
-      source.data = values ? {x: x.values, y: values.map((/** @type {number | null} */ each) => each ?? NaN)} : {x: [], y: []};
-    }
-    if (!(this.mark[0] >= x0 && this.mark[0] <= x1 && this.mark[1] >= y0 && this.mark[1] <= y1)) this.put(0.5 * (x0 + x1), 0.5 * (y0 + y1));
-    else this.put(this.mark[0], this.mark[1]);
-  }
-
-  /** Ends of the map, half a step beyond the outermost points. */
-  box() {
-    const {x, y} = this.about;
-    return [x.values, y.values].flatMap((values) => {
-      const half = 0.5 * ((values[values.length - 1] - values[0]) / Math.max(1, values.length - 1));
-      return [values[0] - half, values[values.length - 1] + half];
-    });
-  }
-
-  recolour() {
-    if (!this.about || !this.values) return;
-    const {map} = this.page.state;
-    const which = Math.max(0, this.about.quantities.indexOf(map.quantity));
-    const values = this.values[which];
-    const [rows, columns] = this.about.shape;
-    const colours = this.coloured(map.quantity, values);
-    const {ndarray} = bokeh().require("core/util/ndarray");
-    const [x0, x1, y0, y1] = this.box();
-    this.image.data = {image: [ndarray(colours, {shape: [rows, columns], dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]};
-    this.point(this.mark[0], this.mark[1]);
-  }
-
-  /** Colour of every point, and the legend or the bar that says what it means. @param {string} quantity @param {Float32Array} values */
-  coloured(quantity, values) {
-    const out = new Uint32Array(values.length);
-    const kinds = this.kinds(quantity);
-    if (kinds) {
-      const later = quantity === "outcome" ? this.later() : null;
-      const known = new Map(kinds.map(([value, , ink]) => [value, rgba(ink)]));
-      /** @type {Map<number, number>} */
-      const seen = new Map();
-      values.forEach((value, k) => {
-        if (Number.isNaN(value)) return;
-        const kind = quantity === "mode" && value > 2 ? 2 : value;
-        seen.set(kind, (seen.get(kind) ?? 0) + 1);
-        out[k] = later?.[k] && striped(k, this.about.shape[1]) ? rgba(LATER) : known.get(kind) ?? 0;
-      });
-      this.bar.visible = false;
-      const share = (/** @type {number} */ value) => (this.complete ? `, ${short((100 * (seen.get(value) ?? 0)) / values.length, 2)} %` : "");
-      this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]), later?.some(Boolean) ? later.filter(Boolean).length / values.length : 0);
-      return out;
-    }
-    const finite = values.filter((each) => Number.isFinite(each));
-    const sorted = finite.sort();
-    const logarithmic = quantity === "rest";
-    const scale = logarithmic ? Math.log10 : (/** @type {number} */ each) => each;
-    const low = quantity === "peak" || !logarithmic ? 0 : sorted[Math.floor(0.02 * sorted.length)] ?? 1e-3;
-    const high = quantity === "peak" ? 1 : sorted[Math.floor(0.995 * (sorted.length - 1))] ?? 1;
-    const inks = RAMP.map(rgba);
-    values.forEach((value, k) => {
-      if (Number.isNaN(value)) return;
-      if (value === Infinity) { out[k] = rgba("#c76b29"); return; }
-      const part = (scale(value) - scale(low)) / (scale(high) - scale(low) || 1);
-      out[k] = inks[Math.max(0, Math.min(RAMP.length - 1, Math.floor(part * RAMP.length)))];
-    });
-    const ends = {low, high: high > low ? high : low + 1};
-    const kind = logarithmic ? "LogColorMapper" : "LinearColorMapper";
-    if (this.bar.color_mapper.type === kind) this.bar.color_mapper.setv(ends);
-    else this.bar.color_mapper = new (bokeh()[kind])({palette: RAMP, ...ends});
-    const title = {rest: "s", peak: "peak / α"}[quantity] ?? this.select("quantity").selectedOptions[0].text;
-    this.bar.setv({title, visible: true});
-    const extra = quantity === "peak" ? [["overturns", "#c76b29"]] : quantity === "rest" ? [["never comes to rest", "rgba(0,0,0,0)"]] : [];
-    this.legend(/** @type {[string, string][]} */ (extra));
-    return out;
-  }
-
-  /** @param {string} quantity @returns {[number, string, string][] | null} */
-  kinds(quantity) {
-    if (quantity === "outcome") return this.about.outcomes.map((/** @type {string} */ text, /** @type {number} */ k) => [k, text, OUTCOMES[k]]);
-    if (quantity === "mode") return MODES;
-    if (quantity === "overturned") return [[0, "stays", "#d7e3f2"], [1, "overturns", "#c76b29"], [-1, "not known: ended before its verdict", "#8d8d8d"]];
-    return null;
-  }
-
-  /** Where a block overturns after its first rocking has ended otherwise. @returns {boolean[] | null} */
-  later() {
-    const [outcome, mode] = ["outcome", "mode"].map((name) => (this.values ?? [])[this.about.quantities.indexOf(name)]);
-    if (!outcome || !mode) return null;
-    return Array.from(mode, (each, k) => (each >= 0 || each === AFTER_REST) && outcome[k] !== this.about.outcomes.indexOf("overturns"));
-  }
-
-  /** @param {[string, string][]} entries @param {number} [later] share of the points that overturn later */
-  legend(entries, later = 0) {
-    if (later) entries = [...entries, [`hatched: overturns later${this.complete ? `, ${short(100 * later, 2)} %` : ""}`, LATER]];
-    this.entries = entries;
-    const parts = entries.map(([text, ink]) => {
-      const key = make("i", {className: "key swatch"});
-      key.style.background = ink;
-      return make("span", {}, [key, text]);
-    });
-    if (this.about.curves.exact) parts.push(make("span", {}, [make("i", {className: "key exact"}), "exact critical amplitude (slender block)"]), make("span", {}, [make("i", {className: "key eq76"}), "Eq. 76"]));
-    one("map-legend").replaceChildren(...parts);
-  }
-
-  /** Row and column at a place. @param {number} x @param {number} y */
-  place(x, y) {
-    const nearest = (/** @type {number[]} */ values, /** @type {number} */ wanted) => values.reduce((best, each, k) => (Math.abs(each - wanted) < Math.abs(values[best] - wanted) ? k : best), 0);
-    return [nearest(this.about.y.values, y), nearest(this.about.x.values, x)];
-  }
-
-  /** Say what is at a place. @param {number} x @param {number} y */
-  point(x, y) {
-    if (!this.about || !this.values) return;
-    const [row, column] = this.place(x, y);
-    const written = (/** @type {any} */ axis, /** @type {number} */ k) => `${axis.label} ${short(axis.values[k])}${axis.names ? ` (${axis.names[k]})` : ""}`;
-    const at = `${written(this.about.x, column)}, ${written(this.about.y, row)}`;
-    const index = row * this.about.shape[1] + column;
-    const said = this.about.quantities.map((/** @type {string} */ name, /** @type {number} */ q) => this.said(name, /** @type {Float32Array[]} */ (this.values)[q][index])).filter(Boolean);
-    one("map-at").textContent = `${at}: ${said.join("; ")}.`;
-  }
-
-  /** @param {string} name @param {number} value */
-  said(name, value) {
-    if (Number.isNaN(value)) return "";
-    const kinds = this.kinds(name);
-    if (name === "mode" && value > 1) return `overturns after ${value} impacts`;
-    if (kinds) return kinds.find(([each]) => each === value)?.[1] ?? "";
-    if (name === "rest") return `rests ${short(value)} s after uplift`;
-    if (name === "peak") return value === Infinity ? "" : `peak ${short(value)} α`;
-    return `${name} ${short(value)}`;
-  }
-
-  /** @param {number} x @param {number} y */
-  put(x, y) {
-    const [row, column] = this.place(x, y);
-    this.mark = [this.about.x.values[column], this.about.y.values[row]];
-    this.at.data = {x: [this.mark[0]], y: [this.mark[1]]};
-    this.point(this.mark[0], this.mark[1]);
-  }
-
-  /** @param {KeyboardEvent} event */
-  key(event) {
-    const way = {ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [1, 0], ArrowDown: [-1, 0]}[event.key];
-    if (event.key === "Enter") { event.preventDefault(); void this.open(); }
-    if (!way || !this.about) return;
-    event.preventDefault();
-    const [row, column] = this.place(this.mark[0], this.mark[1]);
-    const step = event.shiftKey ? 10 : 1;
-    const clip = (/** @type {number} */ k, /** @type {number} */ size) => Math.min(size - 1, Math.max(0, k));
-    this.put(this.about.x.values[clip(column + step * way[1], this.about.shape[1])], this.about.y.values[clip(row + step * way[0], this.about.shape[0])]);
+  /** What is asked of the server about a point. @param {string} what @param {number[]} at to the right and upwards @returns {[string, Record<string, string>]} */
+  request(what, [x, y]) {
+    const at = {at_x: String(x), at_y: String(y)};
+    return this.study ? [`/api/study/${what}`, {...this.page.state.map, ...at}] : [`/api/map/${what}`, {...this.asked(), ...at}];
   }
 
   /** Open the case at the mark. */
   async open() {
     if (!this.about) return;
-    const at = {at_x: String(this.mark[0]), at_y: String(this.mark[1])};
-    const {map} = this.page.state;
     try {
-      const found = await (this.study ? json("/api/study/point", {...map, ...at}) : json("/api/map/point", {...this.asked(), ...at}));
+      const found = await json(...this.request("point", this.reading.mark));
       this.page.state.view = "response";
       this.page.restate(found);
       await this.page.go("response");
@@ -497,13 +314,4 @@ export class View {
     this.page.state.map = {};
     this.page.restate({...block, motion});
   }
-}
-
-/** Whether a point lies on a stripe of a hatch. @param {number} k @param {number} columns */
-const striped = (k, columns) => (Math.floor(k / columns) + (k % columns)) % 4 === 0;
-
-/** Colour as the image takes it: red in the lowest byte. @param {string} ink */
-function rgba(ink) {
-  const number = parseInt(ink.slice(1), 16);
-  return ((0xff << 24) | ((number & 0xff) << 16) | (number & 0xff00) | (number >> 16)) >>> 0;
 }

@@ -5,7 +5,7 @@ import {Problem, json} from "./api.js";
 import {one} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts, sweep: Texts, good: Good}} State */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, at: number | null, map: Texts, sweep: Texts, good: Good}} State */
 /** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts}} Good */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
 
@@ -40,7 +40,7 @@ export function readAddress() {
   const texts = those(namesOf());
   const {view: first, ...opening} = specification.opening;
   const view = given.get("view") ?? first ?? "response";
-  const from = Number(given.get("from") ?? NaN), to = Number(given.get("to") ?? NaN);
+  const from = Number(given.get("from") ?? NaN), to = Number(given.get("to") ?? NaN), time = Number(given.get("at") || NaN);
   const parts = {
     texts: complete(Object.keys(texts).length ? texts : opening), other: those(namesOf(), "other."),
     compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], map: those(specification.map), sweep: those(specification.sweep),
@@ -50,6 +50,7 @@ export function readAddress() {
     good: {...parts},
     view: VIEWS.includes(view) ? view : "response",
     window: from < to ? [from, to] : null,
+    at: time >= 0 && time < Infinity ? time : null,
   };
 }
 
@@ -89,6 +90,7 @@ export function writeAddress(state) {
     if (state.view === "map") put(good.map, specification.map);
     if (state.view === "periodic") put(good.sweep, specification.sweep);
     put(ends(state), ["from", "to"]);
+    if (state.at !== null && (state.view === "response" || state.view === "block")) given.set("at", String(state.at));
     history.replaceState(null, "", `?${given}`);
   }, 150);
 }

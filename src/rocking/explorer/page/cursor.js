@@ -1,0 +1,127 @@
+// The time that is read: by the pointer, by keys, by a slider or typed; what the case is then, from Python's series.
+
+import {Latest, json} from "./api.js";
+import {writeAddress} from "./parameters.js";
+import {decimals, one, say, short} from "./words.js";
+
+/** How long the time must stay before it is read from the response, and before it is spoken, ms. */
+const STILL = 60, QUIET = 600;
+/** Steps of the slider, and those of a key with Shift, across the window. */
+const STEPS = 1000, KEYS = 200;
+
+export class Cursor {
+  /** @param {any} page @param {{mark: (time: number | null) => void, seek: (time: number) => void}} tell */
+  constructor(page, tell) {
+    this.page = page;
+    this.tell = tell;
+    this.field = /** @type {HTMLInputElement} */ (one("at"));
+    this.slider = /** @type {HTMLInputElement} */ (one("at-slider"));
+    this.still = this.quiet = 0;
+    /** Whether what is read shall be spoken. */
+    this.spoken = false;
+    this.latest = new Latest((text) => this.read(text), (error) => page.problem(error, "reading"));
+    this.slider.addEventListener("input", () => this.set(this.left() + (Number(this.slider.value) / STEPS) * this.width()));
+    this.field.addEventListener("change", () => this.typed());
+    one("histories").addEventListener("keydown", (event) => this.key(event));
+  }
+
+  left() { return this.page.shown?.header.window.from ?? 0; }
+  width() { return (this.page.shown?.header.window.to ?? 1) - this.left(); }
+
+  /** Set the time, and let the block follow. @param {number} time */
+  set(time) {
+    const {header} = this.page.shown ?? {};
+    if (!header) return;
+    const kept = Math.min(Math.max(time, 0), header.duration);
+    this.spoken = true;
+    this.take(kept);
+    this.tell.seek(kept);
+  }
+
+  /** The time is another one. @param {number} time */
+  take(time) {
+    this.page.state.at = time;
+    writeAddress(this.page.state);
+    this.show();
+  }
+
+  /** Mark the time that is set, and read it soon; nothing where none is, or where the response ends before. */
+  show() {
+    const {state: {at}, shown} = this.page;
+    const known = at !== null && shown && at <= shown.header.duration;
+    this.tell.mark(known ? at : null);
+    window.clearTimeout(this.still);
+    if (!known) {
+      one("cursor").textContent = at === null ? "" : "The response ends before this time.";
+      return;
+    }
+    const text = `${at.toFixed(decimals(this.width()))} s`;
+    if (document.activeElement !== this.field) this.field.value = text.slice(0, -2);
+    this.slider.value = String(Math.round((STEPS * (at - this.left())) / this.width()));
+    this.slider.setAttribute("aria-valuetext", text);
+    this.ask(String(at));
+  }
+
+  /** The pointer is at a time: read it without setting it. @param {number} time */
+  hover(time) {
+    if (!this.page.shown || time < 0 || time > this.page.shown.header.duration) return;
+    this.tell.mark(time);
+    this.ask(String(time));
+  }
+
+  /** @param {string} text */
+  ask(text) {
+    window.clearTimeout(this.still);
+    this.still = window.setTimeout(() => void this.latest.ask(text), STILL);
+  }
+
+  /** A time was typed, with a unit or without. */
+  async typed() {
+    const text = this.field.value.trim().replace("−", "-").replace(",", ".");
+    if (!text) {
+      this.page.state.at = null;
+      writeAddress(this.page.state);
+      this.page.problem(null, "reading");
+      this.show();
+      return;
+    }
+    try {
+      const {time} = await this.found(text);
+      this.page.problem(null, "reading");
+      this.set(time);
+    } catch (error) {
+      this.page.problem(error, "reading");
+    }
+  }
+
+  /** What the case is at a time. @param {string} at */
+  found(at) {
+    const {shown: {header: {window: {from, to}, duration}}, state: {good}} = this.page;
+    return json("/api/at", {...good.texts, at, from: String(from), to: String(Math.min(to, duration) > from ? to : duration)});
+  }
+
+  /** @param {string} text */
+  async read(text) {
+    const found = await this.found(text);
+    const digits = decimals(this.width());
+    const degrees = (/** @type {number} */ radians) => short((radians * 180) / Math.PI);
+    const parts = [
+      `rotation ${degrees(found.rotation)}° = ${short(found.over_slenderness)} α`, `velocity ${short(found.velocity)} rad/s`,
+      ...(found.ground_g === null ? [] : [`ground ${short(found.ground_g)} g`]), ...(found.vertical_g === null ? [] : [`upwards ${short(found.vertical_g)} g`]),
+      `energy ${short(found.energy)} of what overturns it`,
+    ];
+    const words = `At ${found.time.toFixed(digits)} s the block ${found.state}: ${parts.join(", ")}.`;
+    one("cursor").textContent = words;
+    one("cursor").dataset.time = String(found.time);
+    window.clearTimeout(this.quiet);
+    if (this.spoken) this.quiet = window.setTimeout(() => { this.spoken = false; say(words); }, QUIET);
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    if (!event.shiftKey || !["ArrowLeft", "ArrowRight"].includes(event.key)) return;
+    event.preventDefault();
+    const from = this.page.state.at ?? this.left() + 0.5 * this.width();
+    this.set(from + ((event.key === "ArrowLeft" ? -1 : 1) * this.width()) / KEYS);
+  }
+}

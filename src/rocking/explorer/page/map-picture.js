@@ -1,0 +1,222 @@
+// A map as it is drawn: its plot, its colours, and the legend that says what they mean.
+
+import {withLegend} from "./exports.js";
+import {bokeh, coarse, colour, figure, themed} from "./theme.js";
+import {make, one, short} from "./words.js";
+
+/** From harmless to the worst, each darker than the one before; the last stands out. */
+const OUTCOMES = ["#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a23c"];
+const MODES = /** @type {[number, string, string][]} */ ([
+  [-3, "no uplift", "#ffffff"], [-1, "rocks", "#d7e3f2"], [-2, "rests before the motion is over", "#9db6d4"],
+  [0, "overturns without impact", "#1c2c47"], [1, "overturns after 1 impact", "#c76b29"], [2, "overturns after 2 impacts or more", "#e9a94f"],
+  [-4, "overturns after a rest", "#7a3b69"],
+]);
+/** What overturns after a rest, as a mode; and the colour of the hatch over what overturns later than in the first rocking. */
+const AFTER_REST = -4, LATER = "#b0390c";
+/** Dark to light, even steps of lightness. */
+const RAMP = ["#0b1a3a", "#14346b", "#1f5190", "#3a74a8", "#5f97b8", "#8bb8c6", "#b9d6d4", "#e6efe4", "#fdf3d6"];
+
+export class MapPicture {
+  /** @param {{over: (x: number, y: number) => void, chosen: (x: number, y: number) => void, zoomed: (box: number[]) => void}} tell is told where the
+   * pointer is, where it clicked, and what rectangle it drew: ends to the right, ends upwards */
+  constructor(tell) {
+    this.tell = tell;
+    /** @type {any} */
+    this.about = null;
+    /** @type {Float32Array[] | null} */
+    this.values = null;
+    this.complete = false;
+    this.setting = false;
+    this.waiting = 0;
+  }
+
+  build() {
+    const B = bokeh();
+    this.plot = figure({height: 500, x_range: new B.Range1d({start: 0, end: 1}), y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 46}, "Map of outcomes over two parameters");
+    for (const grid of this.plot.center) grid.visible = false;
+    this.image = new B.ColumnDataSource({data: {image: [], x: [], y: [], dw: [], dh: []}});
+    const F = (/** @type {string} */ field) => ({field});
+    this.plot.add_renderers(new B.GlyphRenderer({data_source: this.image, glyph: new B.ImageRGBA({image: F("image"), x: F("x"), y: F("y"), dw: F("dw"), dh: F("dh")}), level: "image"}));
+    /** @type {Record<string, any>} */
+    this.curves = {};
+    for (const [name, dash] of /** @type {[string, number[]][]} */ ([["eq76", [7, 4]], ["exact", []]])) {
+      const source = new B.ColumnDataSource({data: {x: [], y: []}});
+      // A light line under the dark one: it is seen on every colour of the map.
+      for (const [width, ink] of /** @type {[number, string][]} */ ([[4.5, "#ffffff"], [2, "#b0390c"]])) {
+        this.plot.add_renderers(new B.GlyphRenderer({data_source: source, glyph: new B.Line({x: F("x"), y: F("y"), line_width: width, line_color: ink, line_alpha: width > 3 ? 0.75 : 1, line_dash: width > 3 ? [] : dash})}));
+      }
+      this.curves[name] = source;
+    }
+    this.mark = new B.ColumnDataSource({data: {x: [], y: []}});
+    for (const [size, ink] of /** @type {[number, string][]} */ ([[17, "#ffffff"], [14, "#10243e"]])) {
+      this.plot.add_renderers(new B.GlyphRenderer({data_source: this.mark, glyph: new B.Scatter({x: F("x"), y: F("y"), size, line_width: size > 15 ? 4 : 2, line_color: ink, fill_alpha: 0, marker: {value: "circle_cross"}})}));
+    }
+    this.bar = new B.ColorBar({color_mapper: new B.LinearColorMapper({palette: RAMP, low: 0, high: 1}), width: 12, title_text_font_style: "normal", padding: 6, visible: false});
+    this.plot.add_layout(this.bar, "right");
+    themed(() => this.bar.setv({background_fill_color: colour("paper"), major_label_text_color: colour("ink"), title_text_color: colour("ink"), major_tick_line_color: colour("ink")}));
+    this.plot.on_event("mousemove", (/** @type {any} */ event) => this.tell.over(event.x, event.y));
+    this.plot.on_event("tap", (/** @type {any} */ event) => this.tell.chosen(event.x, event.y));
+    if (!coarse()) {
+      const zoom = new B.BoxZoomTool();
+      zoom.overlay.setv({fill_color: colour("accent"), fill_alpha: 0.2, line_color: "#10243e", line_dash: []});
+      this.plot.add_tools(zoom);
+      this.plot.toolbar.active_drag = zoom;
+      for (const range of [this.plot.x_range, this.plot.y_range]) for (const end of ["start", "end"]) range.properties[end].change.connect(() => this.ranged());
+    }
+    B.Plotting.show(this.plot, one("map"));
+  }
+
+  /** Draw the axes of a map. @param {any} about what the server says of it */
+  axes(about) {
+    this.about = about;
+    if (!this.plot) this.build();
+    const {x, y} = about;
+    const label = (/** @type {any} */ axis) => (axis.unit ? `${axis.label} (${axis.unit})` : axis.label);
+    this.plot.below[0].axis_label = label(x);
+    this.plot.left[0].axis_label = label(y);
+    const [x0, x1, y0, y1] = this.box();
+    this.show([x0, x1, y0, y1]);
+    for (const [name, source] of Object.entries(this.curves ?? {})) {
+      const values = this.about.curves[name];
+      source.data = values ? {x: x.values, y: values.map((/** @type {number | null} */ each) => each ?? NaN)} : {x: [], y: []};
+    }
+  }
+
+  /** Show a rectangle: ends to the right, ends upwards. @param {number[]} box */
+  show([x0, x1, y0, y1]) {
+    this.setting = true;
+    this.plot.x_range.setv({start: x0, end: x1});
+    this.plot.y_range.setv({start: y0, end: y1});
+    this.setting = false;
+  }
+
+  /** The pointer drew a rectangle. */
+  ranged() {
+    if (this.setting) return;
+    window.clearTimeout(this.waiting);
+    this.waiting = window.setTimeout(() => {
+      const {x_range: x, y_range: y} = this.plot;
+      this.tell.zoomed([x.start, x.end, y.start, y.end]);
+    }, 30);
+  }
+
+  /** Pixels of a place from the upper left corner of the picture. @param {number} x @param {number} y */
+  pixels(x, y) {
+    const {frame} = bokeh().index.find_one(this.plot);
+    return [frame.x_scale.compute(x), frame.y_scale.compute(y)];
+  }
+
+  /** Ends of the map, half a step beyond the outermost points. */
+  box() {
+    const {x, y} = this.about;
+    return [x.values, y.values].flatMap((values) => {
+      const half = 0.5 * ((values[values.length - 1] - values[0]) / Math.max(1, values.length - 1));
+      return [values[0] - half, values[values.length - 1] + half];
+    });
+  }
+
+  /** Colour all points. @param {Float32Array[]} all values of each quantity @param {string} quantity the one that is shown
+   * @param {{complete: boolean, label: string}} given whether they are all computed, and what the quantity is called */
+  paint(all, quantity, {complete, label}) {
+    if (!this.about) return;
+    this.values = all;
+    this.complete = complete;
+    const values = all[Math.max(0, this.about.quantities.indexOf(quantity))];
+    const [rows, columns] = this.about.shape;
+    const colours = this.coloured(quantity, values, label);
+    const {ndarray} = bokeh().require("core/util/ndarray");
+    const [x0, x1, y0, y1] = this.box();
+    this.image.data = {image: [ndarray(colours, {shape: [rows, columns], dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]};
+  }
+
+  /** Colour of every point, and the legend or the bar that says what it means. @param {string} quantity @param {Float32Array} values @param {string} label */
+  coloured(quantity, values, label) {
+    const out = new Uint32Array(values.length);
+    const kinds = this.kinds(quantity);
+    if (kinds) {
+      const later = quantity === "outcome" ? this.later() : null;
+      const known = new Map(kinds.map(([value, , ink]) => [value, rgba(ink)]));
+      /** @type {Map<number, number>} */
+      const seen = new Map();
+      values.forEach((value, k) => {
+        if (Number.isNaN(value)) return;
+        const kind = quantity === "mode" && value > 2 ? 2 : value;
+        seen.set(kind, (seen.get(kind) ?? 0) + 1);
+        out[k] = later?.[k] && striped(k, this.about.shape[1]) ? rgba(LATER) : known.get(kind) ?? 0;
+      });
+      this.bar.visible = false;
+      const share = (/** @type {number} */ value) => (this.complete ? `, ${short((100 * (seen.get(value) ?? 0)) / values.length, 2)} %` : "");
+      this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]), later?.some(Boolean) ? later.filter(Boolean).length / values.length : 0);
+      return out;
+    }
+    const finite = values.filter((each) => Number.isFinite(each));
+    const sorted = finite.sort();
+    const logarithmic = quantity === "rest";
+    const scale = logarithmic ? Math.log10 : (/** @type {number} */ each) => each;
+    const low = quantity === "peak" || !logarithmic ? 0 : sorted[Math.floor(0.02 * sorted.length)] ?? 1e-3;
+    const high = quantity === "peak" ? 1 : sorted[Math.floor(0.995 * (sorted.length - 1))] ?? 1;
+    const inks = RAMP.map(rgba);
+    values.forEach((value, k) => {
+      if (Number.isNaN(value)) return;
+      if (value === Infinity) { out[k] = rgba("#c76b29"); return; }
+      const part = (scale(value) - scale(low)) / (scale(high) - scale(low) || 1);
+      out[k] = inks[Math.max(0, Math.min(RAMP.length - 1, Math.floor(part * RAMP.length)))];
+    });
+    const ends = {low, high: high > low ? high : low + 1};
+    const kind = logarithmic ? "LogColorMapper" : "LinearColorMapper";
+    if (this.bar.color_mapper.type === kind) this.bar.color_mapper.setv(ends);
+    else this.bar.color_mapper = new (bokeh()[kind])({palette: RAMP, ...ends});
+    const title = {rest: "s", peak: "peak / α"}[quantity] ?? label;
+    this.bar.setv({title, visible: true});
+    const extra = quantity === "peak" ? [["overturns", "#c76b29"]] : quantity === "rest" ? [["never comes to rest", "rgba(0,0,0,0)"]] : [];
+    this.legend(/** @type {[string, string][]} */ (extra));
+    return out;
+  }
+
+  /** @param {string} quantity @returns {[number, string, string][] | null} */
+  kinds(quantity) {
+    if (quantity === "outcome") return this.about.outcomes.map((/** @type {string} */ text, /** @type {number} */ k) => [k, text, OUTCOMES[k]]);
+    if (quantity === "mode") return MODES;
+    if (quantity === "overturned") return [[0, "stays", "#d7e3f2"], [1, "overturns", "#c76b29"], [-1, "not known: ended before its verdict", "#8d8d8d"]];
+    return null;
+  }
+
+  /** Where a block overturns after its first rocking has ended otherwise. @returns {boolean[] | null} */
+  later() {
+    const [outcome, mode] = ["outcome", "mode"].map((name) => (this.values ?? [])[this.about.quantities.indexOf(name)]);
+    if (!outcome || !mode) return null;
+    return Array.from(mode, (each, k) => (each >= 0 || each === AFTER_REST) && outcome[k] !== this.about.outcomes.indexOf("overturns"));
+  }
+
+  /** @param {[string, string][]} entries @param {number} [later] share of the points that overturn later */
+  legend(entries, later = 0) {
+    if (later) entries = [...entries, [`hatched: overturns later${this.complete ? `, ${short(100 * later, 2)} %` : ""}`, LATER]];
+    this.entries = entries;
+    const parts = entries.map(([text, ink]) => {
+      const key = make("i", {className: "key swatch"});
+      key.style.background = ink;
+      return make("span", {}, [key, text]);
+    });
+    if (this.about.curves.exact) parts.push(make("span", {}, [make("i", {className: "key exact"}), "exact critical amplitude (slender block)"]), make("span", {}, [make("i", {className: "key eq76"}), "Eq. 76"]));
+    one("map-legend").replaceChildren(...parts);
+  }
+
+  /** The map as it is drawn, without the mark and with its legend. @param {"svg" | "png"} form @returns {Promise<Blob>} */
+  async file(form) {
+    const marks = this.plot.renderers.filter((/** @type {any} */ each) => each.data_source === this.mark);
+    for (const each of marks) each.visible = false;
+    const drawn = bokeh().index.find_one(this.plot).export(form);
+    for (const each of marks) each.visible = true;
+    const curves = /** @type {[string, string][]} */ (this.about.curves.exact ? [["critical amplitude: exact (solid), Eq. 76 (dashed)", "#b0390c"]] : []);
+    return withLegend(await drawn.to_blob(), [...(this.entries ?? []), ...curves], this.plot.outer_width, this.plot.outer_height);
+  }
+}
+
+/** Whether a point lies on a stripe of a hatch. @param {number} k @param {number} columns */
+const striped = (k, columns) => (Math.floor(k / columns) + (k % columns)) % 4 === 0;
+
+/** Colour as the image takes it: red in the lowest byte. @param {string} ink */
+function rgba(ink) {
+  const number = parseInt(ink.slice(1), 16);
+  return ((0xff << 24) | ((number & 0xff) << 16) | (number & 0xff00) | (number >> 16)) >>> 0;
+}

@@ -1,0 +1,129 @@
+"""What is read from a case beside its histories: its phase plane and energy, one instant, a thumbnail. No web here."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from rocking.errors import InvalidOption
+from rocking.explorer.core import Explorer, Simulated, checked_window, extremes, verdict
+from rocking.explorer.inputs import Texts
+from rocking.explorer.parameters import READING
+from rocking.explorer.payload import Payload
+from rocking.response import Response, active_span
+from rocking.response.phase import boundary_of, course_of, marked, needed_of
+
+#: Points of a thumbnail, and times at which its rotation is evaluated.
+_POINTS: Final = 300
+_TIMES: Final = 2_000
+
+
+def phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payload:
+    """Return the phase plane and the energy of a case in a window (s); times count from its start.
+
+    Examples
+    --------
+    >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
+    >>> payload = phase(Explorer(), texts, (0.0, 0.5))
+    >>> payload.header["needed"], round(float(payload.arrays["potential"][0]), 6)
+    ((1.0, 1.0), 0.189487)
+    """
+    shown = explorer.show(texts)
+    start, end = checked_window(window, shown.response.duration)
+    response = shown.resolved(start, end)
+    course = course_of(response, start, end)
+    x, y = boundary_of(response)
+    seen = marked(response, start, end)
+    header = {"window": {"from": start, "to": end}, "needed": needed_of(response)}
+    arrays = {
+        "time": course.time - start,
+        "rotation": course.rotation,
+        "velocity": course.velocity,
+        "kinetic": course.kinetic,
+        "potential": course.potential,
+        "before": course.before.astype(float),
+        "boundary_x": x,
+        "boundary_y": y,
+        **{kind: times - start for kind, times in seen.items()},
+    }
+    return Payload(header, arrays)
+
+
+def at(explorer: Explorer, texts: Texts, time: str, window: tuple[float, float] | None = None) -> dict[str, Any]:
+    """Return what a case is at a time, as its text says it, in the response that a window (s) shows.
+
+    Raises
+    ------
+    InvalidOption
+        If the text is no time of the response.
+
+    Examples
+    --------
+    >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
+    >>> found = at(Explorer(), texts, "0 ms")
+    >>> found["rotation"], round(found["over_slenderness"], 12), found["state"]
+    (0.02, 0.1, 'leans to the right')
+    """
+    shown = explorer.show(texts)
+    seconds = READING["at"].read(time)
+    duration = shown.response.duration
+    if not 0.0 <= seconds <= duration:
+        raise InvalidOption(
+            f"{{}} must be within the response, from 0 to {duration:.6g} s, not {seconds:g} s", "at", value=time
+        )
+    response = shown.response if window is None else shown.resolved(*checked_window(window, duration))
+    rotation, velocity, acceleration = response.states(seconds).tolist()
+    kinetic, potential = float(response.kinetic_energy(seconds)), float(response.potential_energy(seconds))
+    sides = response.block.sides
+    return {
+        "time": seconds,
+        "state": _state(response, seconds, rotation),
+        "rotation": rotation,
+        "over_slenderness": rotation / sides[0 if rotation >= 0.0 else 1].alpha,
+        "velocity": velocity,
+        "acceleration": acceleration,
+        **_ground(shown, seconds),
+        "kinetic": kinetic,
+        "potential": potential,
+        "energy": kinetic + potential,
+    }
+
+
+def _state(response: Response, time: float, rotation: float) -> str:
+    """Say what the block does at a time."""
+    rests = response.rest_intervals
+    if np.any((rests[:, 0] <= time) & (time < rests[:, 1])):
+        return "is at rest"
+    if rotation == 0.0:
+        return "stands on both corners"
+    return "leans to the right" if rotation > 0.0 else "leans to the left"
+
+
+def _ground(shown: Simulated, time: float) -> dict[str, float | None]:
+    """Ground accelerations at a time, g; None where there is no such motion."""
+    motion, gravity = shown.case.motion, shown.case.block.gravity
+    both = {"ground_g": motion, "vertical_g": None if motion is None else motion.vertical}
+    return {name: None if each is None else float(each.acceleration(time)) / gravity for name, each in both.items()}
+
+
+def thumbnail(explorer: Explorer, texts: Texts) -> Payload:
+    """Return what becomes of a case, in one line, and its rotation over the slenderness where it moves, in few points.
+
+    Examples
+    --------
+    >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
+    >>> payload = thumbnail(Explorer(), texts)
+    >>> payload.header["verdict"], len(payload.arrays["time"]) <= 300
+    ('It rocks, comes to rest once, and does not overturn.', True)
+    """
+    shown = explorer.show(texts)
+    response = shown.response
+    start, end = active_span(response)
+    times = np.linspace(start, end, _TIMES)
+    rotation = response.rotation(times)
+    plus, minus = (side.alpha for side in response.block.sides)
+    kept = extremes(rotation, _POINTS)
+    over = np.where(rotation >= 0.0, rotation / plus, rotation / minus)
+    words = verdict(response, response.block.uplift_thresholds(shown.case.model))
+    return Payload({"verdict": words, "from": start, "to": end}, {"time": times[kept], "rotation": over[kept]})
