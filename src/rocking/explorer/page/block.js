@@ -204,9 +204,12 @@ export class View {
     pen.restore();
     if (drawn !== 0) {
       pen.beginPath();
-      pen.arc(middle + scale * pivot, floor, 4, 0, 2 * Math.PI);
+      pen.arc(middle + scale * pivot, floor, 5, 0, 2 * Math.PI);
       pen.fillStyle = colour("accent");
       pen.fill();
+      pen.lineWidth = 2;
+      pen.strokeStyle = colour("paper");
+      pen.stroke();
     }
   }
 

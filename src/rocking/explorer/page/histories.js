@@ -130,13 +130,13 @@ export class Histories {
       paints.push(() => paint(glyph));
     };
     const F = (/** @type {string} */ field) => ({field});
-    add(this.rotation, new B.VStrip({x0: F("from"), x1: F("to"), line_color: null}), this.source("rest", ["from", "to"]),
-      (glyph) => { glyph.fill_color = colour("rest"); });
+    add(this.rotation, new B.VStrip({x0: F("from"), x1: F("to"), line_width: 1}), this.source("rest", ["from", "to"]),
+      (glyph) => glyph.setv({fill_color: colour("rest"), line_color: colour("edge")}));
     for (const [k, name] of [...NAMES.entries()].reverse()) {
       const [ink, ground] = k === 0 ? ["ink", "ground"] : ["second", "second"];
       if (k === 0) {
         const source = this.source("vertical", ["x", "y", "plus", "minus"]);
-        add(this.ground, new B.Line({x: F("x"), y: F("y"), line_width: 0.9}), source, (glyph) => { glyph.line_color = colour("stone"); });
+        add(this.ground, new B.Line({x: F("x"), y: F("y"), line_width: 0.9}), source, (glyph) => { glyph.line_color = colour("vertical"); });
         for (const side of ["plus", "minus"]) {
           add(this.ground, new B.Line({x: F("x"), y: F(side), line_width: 0.9, line_dash: [5, 3]}), source, (glyph) => { glyph.line_color = colour("ink"); });
         }
@@ -156,7 +156,7 @@ export class Histories {
     }
     add(this.rotation, new B.Scatter({x: F("x"), y: F("y"), marker: {value: "triangle"}, size: 8, line_color: null}), this.source("uplift", ["x", "y"]),
       (glyph) => { glyph.fill_color = colour("accent"); });
-    this.levels = {balance: [0, 1].map(() => this.level(this.rotation, [7, 3, 2, 3], "accent")), threshold: [0, 1].map(() => this.level(this.ground, [5, 3], "ink"))};
+    this.levels = {balance: [0, 1].map(() => this.level(this.rotation, [7, 3, 2, 3], "over")), threshold: [0, 1].map(() => this.level(this.ground, [5, 3], "ink"))};
     for (const plot of [this.rotation, this.ground]) this.level(plot, [], "soft").location = 0;
     themed(() => paints.forEach((paint) => paint()));
   }

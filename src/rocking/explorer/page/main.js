@@ -76,7 +76,7 @@ const afterPause = new Latest(async () => {
   const {header} = page.shown, {texts} = state;
   forms.block.show(texts, header.block.sides);
   showNotes(header);
-  showLegend(header.motion?.vertical);
+  showLegend(header);
   chattering.window(header.window);
   if (state.view === "response") chattering.draw(page.shown, texts);
   if (!ofOwn(state.view)) {
@@ -185,10 +185,12 @@ function put(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** @param {{name: string, pga_g: number} | null} [vertical] */
-function showLegend(vertical) {
+/** @param {any} header */
+function showLegend({motion, peak_over_slenderness: peak}) {
+  const vertical = motion?.vertical;
   const entries = [["line", "rotation"], ["rest", "at rest"], ["impact", "impact"], ["uplift", "uplift"], ["ground", "ground acceleration"], ["beyond", "beyond the threshold of uplift"]];
   if (vertical) entries.push(["up", `vertical acceleration (${vertical.name}, peak ${short(vertical.pga_g)} g), with which the thresholds move`]);
+  if (!(peak < 0.9)) entries.push(["over", "rotation at which it would overturn on still ground"]);
   legend("legend", entries);
 }
 

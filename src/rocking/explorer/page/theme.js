@@ -1,12 +1,24 @@
 // Colours of the plots: those of the style sheet, which follow the system's light or dark.
 
-const dark = window.matchMedia("(prefers-color-scheme: dark)");
 /** @type {Set<() => void>} */
 const followers = new Set();
-dark.addEventListener("change", () => followers.forEach((follow) => follow()));
+const forced = window.matchMedia("(forced-colors: active)");
+for (const query of [window.matchMedia("(prefers-color-scheme: dark)"), forced]) query.addEventListener("change", () => followers.forEach((follow) => follow()));
 
 /** @param {string} name */
-export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export function colour(name) {
+  const found = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  return forced.matches ? resolved(found) : found;
+}
+
+/** A colour of the system, which the plots do not know by its name, as numbers. @param {string} name */
+function resolved(name) {
+  const probe = document.head;
+  probe.style.color = name;
+  const found = getComputedStyle(probe).color;
+  probe.style.color = "";
+  return found;
+}
 
 /** Call now, and again whenever the colours change. @param {() => void} follow */
 export function themed(follow) {
