@@ -1,6 +1,6 @@
 // Rotation over ground acceleration: one axis of time, which keeps its digits however far it is zoomed.
 
-import {bokeh, coarse, colour, figure, themed} from "./theme.js";
+import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
 import {decimals, short} from "./words.js";
 
 /** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, weight?: Float64Array, impact: Float64Array}} Lines */
@@ -77,7 +77,7 @@ export class Histories {
     this.glyphs();
     this.cursors = [this.rotation, this.ground].map((plot) => this.vertical(plot));
     const grid = B.Plotting.gridplot([[this.rotation], [this.ground]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false});
-    B.Plotting.show(grid, this.element);
+    void showPlot(grid, this.element);
     this.x.properties.start.change.connect(() => this.ranged());
     this.x.properties.end.change.connect(() => this.ranged());
     this.made = true;

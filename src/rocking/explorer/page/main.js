@@ -6,6 +6,8 @@ import {ChatteringPanel} from "./chattering.js";
 import {makeCopying, showCode, showFiles} from "./exports.js";
 import {BlockForm, ModelForm, MotionForm} from "./forms.js";
 import {Histories} from "./histories.js";
+import {Lecture} from "./lecture.js";
+import {Sheet} from "./sheet.js";
 import {coarse} from "./theme.js";
 import {acceptFiles} from "./upload.js";
 import {counted, fixed, legend, make, one, say, short} from "./words.js";
@@ -27,6 +29,8 @@ const forms = {
 };
 const histories = new Histories(one("histories"), {window: showWindow, cursor: (text) => { one("cursor").textContent = text; }, pick: (time) => views.block?.seek(time)});
 const chattering = new ChatteringPanel(showWindow);
+const lecture = new Lecture(page, histories);
+new Sheet();
 
 /** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
 const problems = {};
@@ -44,7 +48,9 @@ function problem(error, place = "settings") {
     if (!each.checkVisibility()) continue;
     each.setAttribute("aria-invalid", "true");
     each.setAttribute("aria-errormessage", "problem");
-    each.closest(".number, .choice")?.setAttribute("data-problem", problems[place] ?? "");
+    const around = each.closest(".number, .choice, label");
+    around?.setAttribute("data-problem", problems[place] ?? "");
+    if (place === "settings") around?.scrollIntoView({block: "nearest"});
   }
   one(place === "settings" ? "main" : place).classList.toggle("old", Boolean(error && page.shown));
   one("old").hidden = !(problems.settings && page.shown);
@@ -256,5 +262,5 @@ acceptFiles(async (file, upwards) => {
 });
 for (const form of Object.values(forms)) form.show(state.texts);
 void watchCompilation();
-await go(state.view);
+await (state.lecture ? lecture.enter() : go(state.view));
 document.body.dataset.ready = String(performance.now());

@@ -2,9 +2,9 @@
 
 import {Latest, frames, json, payload} from "./api.js";
 import {showExports, withLegend} from "./exports.js";
-import {AFTER_REST, AROUND, MARK, MODES, OUTCOMES, OVERTURNS, RAMP, STRIPES, VERDICTS, picture, rgba} from "./outcomes.js";
+import {AFTER_REST, AROUND, MARK, MODES, OUTCOMES, OVERTURNS, RAMP, STRIPES, UNKNOWN, VERDICTS, picture, rgba} from "./outcomes.js";
 import {namesOf, specification} from "./parameters.js";
-import {bokeh, colour, figure, themed} from "./theme.js";
+import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {make, one, short} from "./words.js";
 
 const ENDS = ["x_from", "x_to", "y_from", "y_to"];
@@ -293,12 +293,15 @@ export class View {
     for (const [size, ink] of /** @type {[number, string][]} */ ([[17, AROUND], [14, MARK]])) {
       this.plot.add_renderers(new B.GlyphRenderer({data_source: this.at, glyph: new B.Scatter({x: F("x"), y: F("y"), size, line_width: size > 15 ? 4 : 2, line_color: ink, fill_alpha: 0, marker: {value: "circle_cross"}})}));
     }
-    this.bar = new B.ColorBar({color_mapper: new B.LinearColorMapper({palette: RAMP, low: 0, high: 1}), width: 12, title_text_font_style: "normal", padding: 6, visible: false});
+    this.bar = new B.ColorBar({color_mapper: new B.LinearColorMapper({palette: RAMP, low: 0, high: 1}), width: 12, padding: 6, visible: false});
     this.plot.add_layout(this.bar, "right");
-    themed(() => this.bar.setv({background_fill_color: colour("paper"), major_label_text_color: colour("ink"), title_text_color: colour("ink"), major_tick_line_color: colour("ink")}));
+    // The bar's own title would stand beside it, on its head.
+    this.plot.title.setv({align: "right", offset: -44, text_font_size: "12px", text_font_style: "normal", text_font: "system-ui, sans-serif"});
+    themed(() => this.bar.setv({background_fill_color: colour("paper"), major_label_text_color: colour("ink"), major_tick_line_color: colour("ink")}));
+    themed(() => { this.plot.title.text_color = colour("ink"); });
     this.plot.on_event("mousemove", (/** @type {any} */ event) => this.point(event.x, event.y));
     this.plot.on_event("tap", (/** @type {any} */ event) => { this.put(event.x, event.y); void this.open(); });
-    B.Plotting.show(this.plot, one("map"));
+    void showPlot(this.plot, one("map"));
   }
 
   drawAxes() {
@@ -358,6 +361,7 @@ export class View {
         out[k] = known.get(kind) ?? 0;
       });
       this.bar.visible = false;
+      this.plot.title.text = "";
       const share = (/** @type {number} */ value) => (this.complete ? `, ${short((100 * (seen.get(value) ?? 0)) / values.length, 2)} %` : "");
       this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]), later?.some(Boolean) ? later.filter(Boolean).length / values.length : 0);
       return {inks: out, kinds: new Set(known.values()), hatched: later};
@@ -369,8 +373,12 @@ export class View {
     const low = quantity === "peak" || !logarithmic ? 0 : sorted[Math.floor(0.02 * sorted.length)] ?? 1e-3;
     const high = quantity === "peak" ? 1 : sorted[Math.floor(0.995 * (sorted.length - 1))] ?? 1;
     const inks = RAMP.map(rgba);
+    const mode = quantity === "rest" && !this.study ? /** @type {Float32Array[]} */ (this.values)[this.about.quantities.indexOf("mode")] : null;
     values.forEach((value, k) => {
-      if (Number.isNaN(value)) return;
+      if (Number.isNaN(value)) {
+        if (mode && !Number.isNaN(mode[k])) out[k] = rgba(mode[k] >= 0 || mode[k] === AFTER_REST ? OVERTURNS : UNKNOWN);
+        return;
+      }
       if (value === Infinity) { out[k] = rgba(OVERTURNS); return; }
       const part = (scale(value) - scale(low)) / (scale(high) - scale(low) || 1);
       out[k] = inks[Math.max(0, Math.min(RAMP.length - 1, Math.floor(part * RAMP.length)))];
@@ -379,11 +387,12 @@ export class View {
     const kind = logarithmic ? "LogColorMapper" : "LinearColorMapper";
     if (this.bar.color_mapper.type === kind) this.bar.color_mapper.setv(ends);
     else this.bar.color_mapper = new (bokeh()[kind])({palette: RAMP, ...ends});
-    const title = {rest: "s", peak: "peak / α"}[quantity] ?? this.select("quantity").selectedOptions[0].text;
-    this.bar.setv({title, visible: true});
-    const extra = quantity === "peak" ? [["overturns", OVERTURNS]] : quantity === "rest" ? [["never comes to rest", "rgba(0,0,0,0)"]] : [];
+    const title = {rest: "uplift to rest (s)", peak: "peak / α"}[quantity] ?? this.select("quantity").selectedOptions[0].text;
+    this.bar.visible = true;
+    this.plot.title.text = title;
+    const extra = quantity === "peak" ? [["overturns", OVERTURNS]] : mode ? [["overturns without a rest", OVERTURNS], ["never lifts, or is not at rest when the simulation ends", UNKNOWN]] : [];
     this.legend(/** @type {[string, string][]} */ (extra));
-    return {inks: out, kinds: new Set([rgba(OVERTURNS)]), hatched: null};
+    return {inks: out, kinds: new Set([rgba(OVERTURNS), rgba(UNKNOWN)]), hatched: null};
   }
 
   /** @param {string} quantity @returns {[number, string, string][] | null} */
@@ -472,6 +481,7 @@ export class View {
       this.page.state.view = "response";
       this.page.restate(found);
       await this.page.go("response");
+      one("histories").focus({preventScroll: true}); // where the keys go on
     } catch (error) {
       this.page.problem(error, "view-map");
     }

@@ -3,7 +3,7 @@
 
 /** No uplift, complete chattering, rests later, rests at last, overturns, unproven. */
 export const OUTCOMES = ["#ffffff", "#c9dcf0", "#7fa3cf", "#1d3f73", "#d4660f", "#b0b0b0"];
-export const OVERTURNS = OUTCOMES[4];
+export const OVERTURNS = OUTCOMES[4], UNKNOWN = OUTCOMES[5];
 /** What overturns after a rest, as a mode. */
 export const AFTER_REST = -4;
 export const MODES = /** @type {[number, string, string][]} */ ([
@@ -12,7 +12,7 @@ export const MODES = /** @type {[number, string, string][]} */ ([
   [AFTER_REST, "overturns after a rest", "#ffc58a"],
 ]);
 /** Whether a block of a study overturns, or what is known of it. */
-export const VERDICTS = /** @type {[number, string, string][]} */ ([[0, "stays", "#c9dcf0"], [1, "overturns", OVERTURNS], [-1, "not known: ended before its verdict", "#b0b0b0"]]);
+export const VERDICTS = /** @type {[number, string, string][]} */ ([[0, "stays", "#c9dcf0"], [1, "overturns", OVERTURNS], [-1, "not known: ended before its verdict", UNKNOWN]]);
 /** Stripes over what overturns later than in the first rocking: on light colours, and on dark ones. */
 export const STRIPES = ["#8a3405", "#ffb366"];
 /** Dark to light, even steps of lightness. */

@@ -5,7 +5,7 @@ import {Problem, json} from "./api.js";
 import {one} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts, sweep: Texts, good: Good}} State */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, lecture: boolean, map: Texts, sweep: Texts, good: Good}} State */
 /** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts}} Good */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
 
@@ -50,6 +50,7 @@ export function readAddress() {
     good: {...parts},
     view: VIEWS.includes(view) ? view : "response",
     window: from < to ? [from, to] : null,
+    lecture: given.get("lecture") === "1",
   };
 }
 
@@ -89,6 +90,7 @@ export function writeAddress(state) {
     if (state.view === "map") put(good.map, specification.map);
     if (state.view === "periodic") put(good.sweep, specification.sweep);
     put(ends(state), ["from", "to"]);
+    if (state.lecture) given.set("lecture", "1");
     history.replaceState(null, "", `?${given}`);
   }, 150);
 }

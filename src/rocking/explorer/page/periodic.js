@@ -3,7 +3,7 @@
 import {Latest, frames, json, payload, unpacked} from "./api.js";
 import {showExports, withLegend} from "./exports.js";
 import {specification} from "./parameters.js";
-import {bokeh, colour, figure, themed} from "./theme.js";
+import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {counted, legend, one, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
@@ -201,8 +201,8 @@ export class View {
     };
     this.plot.on_event("mousemove", (/** @type {any} */ event) => { if (this.about) this.say(this.nearest(event.x)); });
     this.plot.on_event("tap", (/** @type {any} */ event) => { if (this.about) { this.put(this.nearest(event.x), event.y); void this.open(); } });
-    B.Plotting.show(this.plane, one("phase-plane"));
-    B.Plotting.show(this.plot, one("diagram"));
+    void showPlot(this.plane, one("phase-plane"));
+    void showPlot(this.plot, one("diagram"));
     legend("orbit-legend", [
       ["line", "trajectory"], ["jump", "impact: the velocity jumps"], ["dot", "start of each period"], ["at", "this case"],
       ["up-dot", "swept upwards"], ["down-ring", "swept downwards"], ["cross", "at the top: overturns"],
