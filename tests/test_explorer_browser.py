@@ -1265,6 +1265,11 @@ def test_axes_and_settings_are_read_at_a_glance(opened):
         place["#map-y"]["y"] < place["#map"]["y"] < place["#map"]["y"] + place["#map"]["height"] <= place["#map-x"]["y"]
     )
     assert place["#model-form"]["y"] + place["#model-form"]["height"] <= 900
+    page.page.click("[data-view=response]")
+    page.page.fill("#pulse-amplitude", "2")
+    page.page.press("#pulse-amplitude", "Enter")
+    page.until("document.getElementById('legend').textContent.includes('would overturn')")
+    assert page.text("#verdict").startswith("It overturns")
 
 
 # A notebook

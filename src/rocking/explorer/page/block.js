@@ -208,7 +208,7 @@ export class View {
     const scale = (floor - above) / Math.max(reach, 1e-9);
     const drawn = theta * this.larger();
     // The ground moves across a still background; where it would leave the picture, the background moves instead.
-    const widthBeside = width / 2 - scale * reach * 0.75 - 20; // pixels that are free on each side of the block
+    const widthBeside = Math.max(0, width / 2 - scale * reach * 0.75 - 20); // pixels that are free on each side of the block
     const shift = Math.max(-widthBeside, Math.min(widthBeside, scale * moved));
     const behind = scale * moved - shift;
     const middle = width / 2 + shift;
@@ -287,7 +287,7 @@ export class View {
   /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} theta @param {number} ground @param {number} moved */
   caption(pen, width, theta, ground, moved) {
     pen.fillStyle = colour("ink");
-    const size = textSize(13);
+    const size = Math.min(textSize(13), Math.round(width / 20));
     pen.font = `${size}px system-ui, sans-serif`;
     pen.textAlign = "left";
     const alpha = this.page.shown.header.block.sides[theta >= 0 ? 0 : 1].alpha;

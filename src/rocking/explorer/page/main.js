@@ -192,11 +192,11 @@ function put(node, text) {
 }
 
 /** @param {any} header */
-function showLegend({motion, peak_over_slenderness: peak}) {
+function showLegend({motion, overturned, peak_over_slenderness: peak}) {
   const vertical = motion?.vertical;
   const entries = [["line", "rotation"], ["rest", "at rest"], ["impact", "impact"], ["uplift", "uplift"], ["ground", "ground acceleration"], ["beyond", "beyond the threshold of uplift"]];
   if (vertical) entries.push(["up", `vertical acceleration (${vertical.name}, peak ${short(vertical.pga_g)} g), with which the thresholds move`]);
-  if (!(peak < 0.9)) entries.push(["over", "rotation at which it would overturn on still ground"]);
+  if (overturned || peak > 0.9) entries.push(["over", "rotation at which it would overturn on still ground"]);
   legend("legend", entries);
 }
 

@@ -337,7 +337,7 @@ export class View {
     const values = this.values[which];
     const [rows, columns] = this.about.shape;
     const {inks, kinds, hatched} = this.coloured(map.quantity, values);
-    const {colours, shape} = picture(inks, [rows, columns], this.plot.inner_width ?? 800, kinds, hatched);
+    const {colours, shape} = picture(inks, [rows, columns], one("map").clientWidth - 80, kinds, hatched);
     const {ndarray} = bokeh().require("core/util/ndarray");
     const [x0, x1, y0, y1] = this.box();
     this.image.data = {image: [ndarray(colours, {shape, dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]};

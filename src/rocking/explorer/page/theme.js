@@ -50,6 +50,7 @@ export function figure(given, label) {
     html_attributes: {role: "img", "aria-label": label}, ...given,
   });
   for (const axis of [...made.below, ...made.left]) if (axis.type === "LinearAxis") axis.formatter = plain(new (bokeh().BasicTickFormatter)());
+  for (const axis of [...made.below, ...made.left]) axis.major_label_policy = new (bokeh().NoOverlap)({min_distance: 6});
   themed(() => {
     const ink = colour("ink"), soft = colour("soft"), grid = colour("grid");
     made.setv({background_fill_color: colour("paper"), border_fill_color: colour("paper"), min_border_left: enlarged > 1 ? 118 : 62});
