@@ -194,8 +194,8 @@ export class View {
     this.sources = {
       down: add(this.plot, marks(5.5), ["x", "y"], hollow("ground")),
       up: add(this.plot, marks(2.6), ["x", "y"], filled("ink")),
-      downOver: add(this.plot, marks(7), ["x", "y"], hollow("ground")),
-      upOver: add(this.plot, marks(5, "x"), ["x", "y"], hollow("ink")),
+      downOver: add(this.plot, marks(7), ["x", "y"], hollow("over")),
+      upOver: add(this.plot, marks(5, "x"), ["x", "y"], hollow("over")),
       orbit: add(this.plot, this.here, ["x", "y"], filled("accent")),
       mark: add(this.plot, marks(15, "circle_cross"), ["x", "y"], () => ({fill_alpha: 0, line_color: colour("second"), line_width: 1.6})),
     };
