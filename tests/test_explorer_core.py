@@ -401,11 +401,15 @@ def test_a_window_that_is_none_is_refused(explorer, window):
 
 def test_verdicts_are_those_of_the_response(explorer):
     assert "does not move" in explorer.case({**STATUE, "pga": "0.1g"}).header["verdict"]
-    assert "overturns" in explorer.case({**STATUE, "pga": "0.8g"}).header["verdict"]
+    fallen = explorer.case({**STATUE, "pga": "0.8g"}).header
     stopped = explorer.case({**STATUE, "duration": "232"}).header["verdict"]
     assert stopped.startswith("Still rocking at 232 s, where the simulation was stopped")
     header = explorer.case(STATUE).header
-    assert f"comes to rest {header['rests']} times, and does not overturn" in header["verdict"]
+    share = f"{100.0 * header['peak_over_slenderness']:.2g} %"
+    assert header["verdict"] == (
+        f"It stays up: it reaches {share} of the overturning rotation, and comes to rest {header['rests']} times."
+    )
+    assert fallen["verdict"].startswith(f"It overturns, {fallen['overturn_time']:.2f} s after the start")
 
 
 def test_a_block_that_nothing_moves_is_shown_at_rest_for_a_second(explorer):

@@ -339,6 +339,13 @@ def test_no_text_leaves_the_figure(kind, width, dpi):
     assert not any("9318234567890123" in text for text, _ in boxes)
 
 
+def test_a_title_of_one_long_word_is_broken_where_the_figure_ends():
+    figure = fragility_of(title="/data/" + "a-record-of-a-station-" * 8 + "090.csv", figsize=(COLUMN, 2.8))
+    FigureCanvasAgg(figure).draw()
+    (box,) = [box for text, box in shown_boxes(figure) if text.startswith("/data/")]
+    assert box.x0 >= figure.bbox.x0 and box.x1 <= figure.bbox.x1
+
+
 @pytest.mark.parametrize("kind", FIGURES)
 def test_axes_of_the_caller_take_the_main_panel(kind):
     draw, _ = FIGURES[kind]
@@ -420,10 +427,32 @@ def test_few_scaled_motions_are_named_and_many_are_a_family_with_fractiles():
     assert entries(ida_of(1))[0] == RECORDS[0] and not ida_of(1).axes[1].get_xticks().size
     assert len({line.get_color() for line in few.axes[0].lines}) == 4
     assert entries(many)[0] == "each motion"
-    assert [text.get_text() for text in many.axes[0].texts] == ["16 %", "median", "84 %"]
+    shares = [text for text in entries(many) if "suffices" in text]
+    assert shares == [f"level that suffices for {share} % of them" for share in (16, 50, 84)]
+    assert not many.axes[0].texts  # beside curves that lie close they would name the wrong ones
+    drawn = {line.get_label(): line for line in many.axes[0].lines}
+    assert len({str(drawn[f"{share} %"]._dash_pattern) for share in (16, 50, 84)}) == 3
     assert [text.get_text() for text in many.axes[1].get_xticklabels()] == RECORDS
     for figure in (few, many):
         assert {text.partition(":")[0] for text in entries(figure)} >= {"dot", "kink", "strip"}
+
+
+def test_the_cross_of_a_fall_is_on_the_curve_where_that_leaves_the_frame():
+    time = np.linspace(0.0, 2.0, 201)
+    for sign in (1.0, -1.0):
+        rotation = (
+            sign * 0.02 * np.expm1(3.0 * time)
+        )  # passes twice the slenderness, 0.2, at 1.01 s, and then the frame
+        figure = response_of(
+            time=time, rotation=rotation, overturn_time=2.0, motion_time=np.empty(0), duration=2.0, chattering=None,
+            impact_times=np.empty(0), uplift_times=np.empty(0), rest_intervals=np.empty((0, 2)),
+        )  # fmt: skip
+        axes = figure.axes[0]
+        (cross,) = [line for line in axes.lines if line.get_marker() == "X"]
+        (at,), (height,) = cross.get_xdata(), cross.get_ydata()
+        assert height == axes.get_ylim()[0 if sign < 0 else 1]
+        assert height == pytest.approx(np.interp(at, time, rotation / 0.2), rel=1e-12)
+        assert 1.0 < at < 1.2
 
 
 def test_the_lowest_level_that_reaches_a_peak_is_on_the_curve_before_it_turns_back():

@@ -265,7 +265,9 @@ def test_the_likelihood_ratio_says_whether_the_intensity_matters():
 
 def test_the_test_of_fit_is_pearsons_over_stripes():
     intensity, exceeded = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([1, 4, 11, 13, 19])
-    curve = fit_fragility(intensity, exceeded, trials=20).curves[0]
+    found = fit_fragility(intensity, exceeded, trials=20)
+    (curve,) = found.curves
+    assert found.summary().splitlines()[3].split()[-1] == f"{curve.goodness.p_value:.2g}"
     chance = curve.probability(intensity)
     statistic = np.sum((exceeded - 20 * chance) ** 2 / (20 * chance * (1 - chance)))
     assert curve.goodness.statistic == pytest.approx(statistic, rel=1e-12)
@@ -544,6 +546,7 @@ def test_what_cannot_be_told_is_left_out_with_its_reason():
     assert axes.get_ylabel() == "probability of overturning"
     four = fragility(block, motions, levels=levels, polarity="both")
     assert not any("polarity" in note or "infinity" in note for note in four.notes)
+    assert "4 motions, 46 stripes, nonlinear model, both polarities" in four.description
     rate = two.annual_rate(rocking.HazardCurve([0.5, 20.0], [1e-1, 1e-4])).rates[0]
     assert rate.interval == (0.0, math.inf)
 

@@ -104,7 +104,7 @@ class Explorer:
     >>> explorer = Explorer()
     >>> payload = explorer.case({"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"})
     >>> payload.header["verdict"]
-    'It rocks, comes to rest once, and does not overturn.'
+    'It stays up: it reaches 10 % of the overturning rotation, and comes to rest once.'
     """
 
     def __init__(self) -> None:
@@ -388,7 +388,7 @@ def _facts(shown: Simulated) -> dict[str, Any]:
 
 
 def verdict(response: Response, thresholds: tuple[float, float]) -> str:
-    """Say in one sentence what becomes of a block that these ground accelerations (m/s^2) lift."""
+    """Say in one sentence what becomes of a block that these ground accelerations (m/s^2) lift: first whether it falls."""
     if response.stopped:
         words = in_words(response, "")
         return f"{words[0].upper()}{words[1:]}."
@@ -400,16 +400,21 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> str:
             return "It does not move: the ground acceleration never passes what would lift it."
         return f"It does not move: the ground acceleration never passes {lifting:.3g} g, which would lift it."
     rests = int(np.sum(response.events["kind"] == "rest"))
-    count = {0: "does not come to rest", 1: "comes to rest once", 2: "comes to rest twice"}
-    resting = count.get(rests, f"comes to rest {rests} times")
+    times = {1: "once", 2: "twice"}.get(rests, f"{rests} times")
     if response.overturned:
-        before = "" if rests == 0 else f"{resting}, then "
-        return f"It {before}overturns, {response.overturn_time:.2f} s after the start."
+        before = f", after it has come to rest {times}" if rests else ""
+        return f"It overturns, {response.overturn_time:.2f} s after the start{before}."
     if response.unfinished:
         return f"It rocks on: the simulation was given up at {response.duration:.2f} s, after too many steps."
     unproven = rests - int(np.sum(np.isfinite(response.chattering["upper"])))
     doubt = "" if unproven == 0 else f" ({unproven} by the treatment, not proven)"
-    return f"It rocks, {resting}{doubt}, and does not overturn."
+    resting = f"comes to rest {times}{doubt}" if rests else "does not come to rest"
+    return f"It stays up: it reaches {_percent(response.peak_over_slenderness)} of the overturning rotation, and {resting}."
+
+
+def _percent(share: float) -> str:
+    """Write a share in percent: two digits, and four about the whole, where they decide."""
+    return f"{100.0 * share:.{2 if share < 0.99 else 4}g} %"
 
 
 @functools.lru_cache(maxsize=4)

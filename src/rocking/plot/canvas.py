@@ -129,7 +129,11 @@ def _add_title(figure: Figure, ax: Axes | None, title: str) -> None:
         ax.set_title(short, wrap=True)
     elif short:
         # From the figure's edge, not from that of axes: the lines do not depend on how the panels are laid out.
-        figure.suptitle(short, x=_TITLE_AT, ha="left", wrap=True)
+        line = figure.suptitle("", x=_TITLE_AT, ha="left", wrap=True)
+        letters = int((1.0 - 2.0 * _TITLE_AT) * 72.0 * figure.get_figwidth() / (_LETTER * float(line.get_fontsize())))
+        # Matplotlib breaks lines between words: a word longer than a line, as a path, is broken here.
+        pieces = functools.partial(textwrap.wrap, width=letters, break_on_hyphens=False)
+        line.set_text(re.sub(r"\S+", lambda word: " ".join(pieces(word[0])), short))
 
 
 def magnified(largest: float) -> tuple[float, str]:

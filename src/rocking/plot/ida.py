@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for, write
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +19,13 @@ if TYPE_CHECKING:
 #: Up to so many motions have a line style of their own; more are drawn alike, with the fractiles of their levels.
 _FEW: Final = len(CURVES)
 
-#: Shares of the motions that the fractiles are of.
-FRACTILES: Final = (0.16, 0.5, 0.84)
+#: Shares of the motions that the fractiles are of, and their lines. The legend names these: beside curves that lie
+#: close names would stand on the wrong ones.
+FRACTILES: Final[Mapping[float, dict[str, Any]]] = {
+    0.16: {"linewidth": 1.1, "linestyle": (0, (1, 1))},
+    0.5: {"linewidth": 1.8, "linestyle": "-"},
+    0.84: {"linewidth": 1.1, "linestyle": (0, (5, 1.5))},
+}
 
 #: Peak rotations at which the fractiles are taken.
 _POINTS: Final = 200
@@ -132,19 +137,11 @@ def _draw_fractiles(axes: Axes, motions: Sequence[ScaledMotion]) -> None:
     finite = np.concatenate([motion.peak[np.isfinite(motion.peak)] for motion in motions])
     peaks = np.linspace(0.0, float(np.max(finite, initial=0.0)), _POINTS)[1:]
     reached = np.sort([levels_reaching(motion, peaks) for motion in motions], axis=0)
-    for share in FRACTILES:
+    for share, look in FRACTILES.items():
         # The lowest level that is enough for this share of the motions.
         level = reached[int(np.ceil(share * len(motions))) - 1]
         shown = np.isfinite(level)
-        name = f"{100 * share:g} %"
-        width, dashes, text = (1.8, "-", "median") if share == 0.5 else (1.1, (0, (5, 1.5)), name)
-        axes.plot(peaks[shown], level[shown], color=ABOVE, linewidth=width, linestyle=dashes, label=name)
-        if shown.any():
-            # Where the curves lie close, each label still has a place of its own.
-            place, above = (0.6, True) if share == 0.5 else (1.0, share > 0.5)
-            k = int(place * (np.count_nonzero(shown) - 1))
-            at, off, side = (peaks[shown][k], level[shown][k]), (0, 2 if above else -2), "bottom" if above else "top"
-            write(axes, text, at, off, ha="right", va=side, color=ABOVE, fontsize="small")
+        axes.plot(peaks[shown], level[shown], color=ABOVE, label=f"{100 * share:g} %", **look)
 
 
 def _highest_shown(motions: Sequence[ScaledMotion]) -> float:
@@ -195,7 +192,10 @@ def _handles(named: Sequence[ScaledMotion], *, with_strips: bool, with_arrows: b
         Line2D([], [], linewidth=1.1, label=name, **style) for name, style in zip(names, CURVES, strict=False)
     ] or [
         Line2D([], [], color=GROUND, linewidth=0.6, label="each motion"),
-        Line2D([], [], color=ABOVE, linewidth=1.8, label="level that suffices for 16, 50, 84 % of them"),
+        *(
+            Line2D([], [], color=ABOVE, label=f"level that suffices for {100 * share:g} % of them", **look)
+            for share, look in FRACTILES.items()
+        ),
     ]
     alone: dict[str, Any] = {"color": INK, "linestyle": ""}
     handles += [

@@ -109,7 +109,7 @@ def response_figure(
             _tell_sides(main, grounds[0] if grounds else None, thresholds_g, scale)
         _mark_impacts(main, _within(impact_times, shown), _within(uplift_times, shown))
         if overturn_time is not None:
-            _mark_overturning(main, drawn, overturn_time)
+            _mark_overturning(main, time, drawn, overturn_time)
         main.set_xlim(*shown)
         if grounds:
             _draw_motion(grounds[0], motion_time, motion_acceleration_g, thresholds_g)
@@ -205,11 +205,16 @@ def _mark_impacts(axes: Axes, impact_times: Floats, uplift_times: Floats) -> Non
         add_ticks(axes, uplift_times, 0.13, "^", color=ABOVE, markersize=4.5, markeredgewidth=0.0, label="uplift")
 
 
-def _mark_overturning(axes: Axes, drawn: Floats, overturn_time: float) -> None:
-    """Put a cross at the time of the fall: where the curve ends, or at the edge of the frame that it has left."""
+def _mark_overturning(axes: Axes, time: Floats, drawn: Floats, overturn_time: float) -> None:
+    """Put a cross on the curve: at the time of the fall, where it ends, or where it has left the frame before."""
     look: dict[str, Any] = {"color": ABOVE, "markersize": 7, "markeredgecolor": "white", "markeredgewidth": 0.5}
     height, label = float(np.clip(drawn[-1], *axes.get_ylim())), f"overturned at {overturn_time:.3f} s"
-    axes.plot(overturn_time, height, "X", clip_on=False, zorder=4, label=label, **look)
+    at = overturn_time
+    inside = np.flatnonzero((drawn - height) * (drawn[-1] - height) < 0.0)
+    if inside.size:
+        k = inside[-1]
+        at = float(time[k] + (height - drawn[k]) / (drawn[k + 1] - drawn[k]) * (time[k + 1] - time[k]))
+    axes.plot(at, height, "X", clip_on=False, zorder=4, label=label, **look)
 
 
 def _draw_motion(

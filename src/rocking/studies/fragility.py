@@ -79,7 +79,7 @@ def pooled_fragility(
     return Fragility(
         curves=tuple(curves),
         measure=measure,
-        description=f"{text}, {product.model} model",
+        description=f"{text}, {product.model} model{', both polarities' if product.polarity == 'both' else ''}",
         block=only_block(product.bodies),
         model=product.model,
         outcomes=None,

@@ -35,6 +35,7 @@ _MOST_TRIALS: Final = 2.0**53
 _LIKELIHOOD: Final = Band()
 
 _IN_BOTH: Final = ", one polarity, since a symmetric block does the same in both"
+_BOTH: Final = ", both polarities"
 
 #: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
 OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
@@ -157,7 +158,7 @@ def fragility(
     return Fragility(
         curves=tuple(curves),
         measure=how,
-        description=f"{text}{_IN_BOTH if mirrored else ''}",
+        description=f"{text}{_IN_BOTH if mirrored else _BOTH if polarity == 'both' else ''}",
         block=only_block(blocks),
         model=model,
         outcomes=outcomes,

@@ -87,7 +87,7 @@ class Fragility(DrawnResult, TableResult):
                 interval_text([scale * end for end in curve.median_interval], 4),
                 curve.dispersion,
                 interval_text(curve.dispersion_interval, 3),
-                curve.goodness.p_value,
+                float(f"{curve.goodness.p_value:.2g}"),
             ]
             for curve in self.curves
         ]

@@ -2,8 +2,10 @@
 
 import {Latest, payload} from "./api.js";
 import {at} from "./histories.js";
-import {colour, themed} from "./theme.js";
-import {decimals, one, short} from "./words.js";
+import {Recording} from "./recording.js";
+import {Clicks} from "./sound.js";
+import {colour, textSize, themed} from "./theme.js";
+import {decimals, one, say, short} from "./words.js";
 
 /** Wall-clock seconds that an interval between impacts takes at least where playing slows down for them. */
 const SEEN = 0.22;
@@ -11,6 +13,10 @@ const SEEN = 0.22;
 const AHEAD = 2.5;
 /** Times as slow as chosen at most: what is faster then passes unseen. */
 const SLOWEST = 50;
+/** Times as large as it is that a rotation may be drawn, where the peak says how many. */
+const LARGER = [1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000];
+
+const still = window.matchMedia("(prefers-reduced-motion: reduce)");
 
 export class View {
   /** @param {any} page @param {import("./histories.js").Histories} histories */
@@ -30,10 +36,14 @@ export class View {
     this.scrubber.addEventListener("input", () => this.seek(this.left() + (Number(this.scrubber.value) / 10000) * (this.right() - this.left())));
     one("to-uplift").addEventListener("click", () => this.jump("uplift"));
     one("to-rest").addEventListener("click", () => this.jump("rest"));
-    one("magnify").addEventListener("change", () => this.paint());
-    one("view-block").addEventListener("keydown", (event) => {
-      if (event.key === " " && !(event.target instanceof HTMLButtonElement)) { event.preventDefault(); this.toggle(); }
+    one("magnify").addEventListener("change", () => this.draw());
+    one("stage-frame").addEventListener("keydown", (event) => {
+      if (event.key === " ") { event.preventDefault(); this.toggle(); }
     });
+    this.clicks = new Clicks();
+    one("sound").addEventListener("change", () => this.clicks.turn(/** @type {HTMLInputElement} */ (one("sound")).checked));
+    this.recording = new Recording(this, this.clicks);
+    still.addEventListener("change", () => this.draw());
     new ResizeObserver(() => this.paint()).observe(this.canvas);
     themed(() => this.paint());
   }
@@ -58,8 +68,23 @@ export class View {
       this.lines = null;
     }
     this.seek(Math.min(Math.max(this.time, 0), header.duration));
+    const larger = this.larger();
+    one("magnify").querySelectorAll("option")[0].textContent = `by its peak, ${this.byPeak() === 1 ? "to scale" : `${this.byPeak()} × larger`}`;
     one("stage-about").textContent = "The block turns about the corner that it stands on"
-      + (header.motion?.filtered ? "; the ground's displacement is drawn without periods above 10 s, with which a record's would drift away." : ".");
+      + (larger > 1 ? `, and its rotation is drawn ${larger} times larger` : "")
+      + (still.matches ? "; the ground is drawn still, since the system asks for little motion." : header.motion?.filtered ? "; the ground's displacement is drawn without periods above 10 s, with which a record's would drift away." : ".");
+  }
+
+  /** Times as large as it is that the largest rotation can be drawn without standing beyond its balance. */
+  byPeak() {
+    const {overturned, peak_over_slenderness: peak} = this.page.shown?.header ?? {};
+    return overturned || !(peak > 0) ? 1 : LARGER.findLast((each) => each * peak <= 1) ?? 1;
+  }
+
+  /** Times as large as it is that the rotation is drawn. */
+  larger() {
+    const {value} = /** @type {HTMLSelectElement} */ (one("magnify"));
+    return value === "peak" ? this.byPeak() : Number(value);
   }
 
   /** @param {string} to */
@@ -82,7 +107,10 @@ export class View {
   }
 
   stop() {
+    if (this.playing) say(`The animation stands at ${one("clock").textContent}.`);
     this.playing = false;
+    this.recording.stop();
+    this.scrubber.setAttribute("aria-valuetext", one("clock").textContent ?? "");
     one("play").textContent = "Play";
     one("play").setAttribute("aria-pressed", "false");
     if (this.page.shown) this.page.follow(this.time, false);
@@ -95,7 +123,9 @@ export class View {
     this.before = now;
     if (this.has(this.time)) {
       this.pace = this.slowed(Number(this.speed.value));
+      const before = this.time, {impact_time: times, impact_speed: speeds} = this.page.shown.arrays;
       this.time += elapsed * this.pace;
+      this.clicks.pass(before, this.time, this.pace, times, speeds);
     }
     if (this.time >= this.right()) { this.time = this.right(); this.stop(); }
     this.seek(this.time);
@@ -129,8 +159,9 @@ export class View {
     const shown = this.right() - this.left();
     this.scrubber.value = String(Math.round((10000 * (this.time - this.left())) / shown));
     const said = `${this.time.toFixed(decimals(Math.min(1, this.pace)))} s`;
-    this.scrubber.setAttribute("aria-valuetext", said);
+    if (!this.playing) this.scrubber.setAttribute("aria-valuetext", said);
     one("clock").textContent = said;
+    this.recording.progress();
     this.page.follow(this.time, this.playing);
   }
 
@@ -158,13 +189,17 @@ export class View {
     const pen = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d"));
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
+    if (this.recording.on) {
+      pen.fillStyle = colour("paper"); // a video has no page behind it
+      pen.fillRect(0, 0, width, height);
+    }
     this.canvas.dataset.shown = inside ? String(this.time) : "";
     if (!inside) {
       this.scene(pen, width, height, header.block.outline, 0, 0);
       return;
     }
     const after = this.time - inside.from;
-    const theta = at(inside.time, inside.rotation, after), moved = at(inside.displacement_time, inside.displacement, after);
+    const theta = at(inside.time, inside.rotation, after), moved = still.matches ? 0 : at(inside.displacement_time, inside.displacement, after);
     this.scene(pen, width, height, header.block.outline, theta, moved);
     this.caption(pen, width, theta, at(inside.ground_time, inside.ground_g, after), moved);
   }
@@ -173,16 +208,20 @@ export class View {
   scene(pen, width, height, outline, theta, moved) {
     const {left, right, centre, top} = outline;
     const reach = Math.hypot(Math.max(left, right) * 2, top);
-    const scale = (height - 92) / Math.max(reach, 1e-9);
-    const floor = height - 40;
-    const drawn = theta * Number(/** @type {HTMLSelectElement} */ (one("magnify")).value);
+    const floor = height - 40, above = textSize(13) > 13 ? 122 : 52; // what large text needs
+    const scale = (floor - above) / Math.max(reach, 1e-9);
+    const drawn = theta * this.larger();
     // The ground moves across a still background; where it would leave the picture, the background moves instead.
-    const widthBeside = width / 2 - scale * reach * 0.75 - 20; // pixels that are free on each side of the block
+    const widthBeside = Math.max(0, width / 2 - scale * reach * 0.75 - 20); // pixels that are free on each side of the block
     const shift = Math.max(-widthBeside, Math.min(widthBeside, scale * moved));
     const behind = scale * moved - shift;
     const middle = width / 2 + shift;
-    this.background(pen, width, floor, scale, behind);
+    const step = this.background(pen, width, floor, scale, behind);
     this.ground(pen, width, height, floor, middle);
+    pen.fillStyle = colour("ink");
+    pen.font = `${textSize(12)}px system-ui, sans-serif`;
+    pen.textAlign = "right";
+    pen.fillText(`grid ${short(step)} m`, width - 10, height - 8);
     pen.save();
     const pivot = drawn >= 0 ? right : -left;
     pen.translate(middle + scale * pivot, floor);
@@ -208,9 +247,12 @@ export class View {
     pen.restore();
     if (drawn !== 0) {
       pen.beginPath();
-      pen.arc(middle + scale * pivot, floor, 4, 0, 2 * Math.PI);
+      pen.arc(middle + scale * pivot, floor, 5, 0, 2 * Math.PI);
       pen.fillStyle = colour("accent");
       pen.fill();
+      pen.lineWidth = 2;
+      pen.strokeStyle = colour("paper");
+      pen.stroke();
     }
   }
 
@@ -229,10 +271,7 @@ export class View {
     }
     for (let y = floor; y > 0; y -= step * scale) { pen.moveTo(0, Math.round(y) + 0.5); pen.lineTo(width, Math.round(y) + 0.5); }
     pen.stroke();
-    pen.fillStyle = colour("soft");
-    pen.font = "12px system-ui, sans-serif";
-    pen.textAlign = "right";
-    pen.fillText(`grid ${short(step)} m`, width - 10, floor - 8);
+    return step;
   }
 
   /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {number} floor @param {number} middle */
@@ -252,12 +291,15 @@ export class View {
   /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} theta @param {number} ground @param {number} moved */
   caption(pen, width, theta, ground, moved) {
     pen.fillStyle = colour("ink");
-    pen.font = "13px system-ui, sans-serif";
+    const size = Math.min(textSize(13), Math.round(width / 20));
+    pen.font = `${size}px system-ui, sans-serif`;
     pen.textAlign = "left";
     const alpha = this.page.shown.header.block.sides[theta >= 0 ? 0 : 1].alpha;
     const rows = [`rotation ${short((theta * 180) / Math.PI)}° = ${short(theta / alpha)} α`, `ground ${short(ground, 2)} g, moved ${short(100 * moved, 2)} cm`];
-    rows.forEach((row, k) => pen.fillText(row, 12, 22 + 18 * k));
+    const larger = this.larger();
+    if (larger > 1) rows.push(`rotation drawn ${larger} × larger`);
+    rows.forEach((row, k) => pen.fillText(row, 12, 9 + size * (1 + 1.4 * k)));
     pen.textAlign = "right";
-    if (this.playing && this.pace < 0.999 * Number(this.speed.value)) pen.fillText(`slowed to ${short(this.pace, 2)} ×`, width - 12, 22);
+    if (this.playing && this.pace < 0.999 * Number(this.speed.value)) pen.fillText(`slowed to ${short(this.pace, 2)} ×`, width - 12, 9 + size);
   }
 }

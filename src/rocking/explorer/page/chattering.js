@@ -1,7 +1,7 @@
 // Chattering sequences: their rests with brackets, intervals between impacts, and their ratios against eta^2.
 
 import {json} from "./api.js";
-import {bokeh, colour, figure, themed} from "./theme.js";
+import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {fill, fixed, make, one, short, span} from "./words.js";
 
 export class ChatteringPanel {
@@ -85,7 +85,7 @@ export class ChatteringPanel {
     // Ranges that follow the data by themselves would paint everything twice.
     this.x = new B.Range1d({start: 0, end: 1});
     this.intervals = figure({height: 210, x_range: this.x, y_range: new B.Range1d({start: 1e-3, end: 1}), y_axis_type: "log", min_border_bottom: 44}, "Interval to the next impact, by number of the impact");
-    this.ratios = figure({height: 210, x_range: this.x, y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 44}, "Ratio of intervals, by number of the impact");
+    this.ratios = figure({height: 232, x_range: this.x, y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 44}, "Ratio of intervals, by number of the impact");
     this.intervals.left[0].axis_label = "interval (s)";
     this.ratios.left[0].axis_label = "interval ratio";
     for (const plot of [this.intervals, this.ratios]) plot.below[0].axis_label = "impact since uplift";
@@ -99,12 +99,12 @@ export class ChatteringPanel {
     this.eta = new B.Span({dimension: "width", location: 0, line_width: 1.4});
     this.ratios.add_layout(this.eta);
     themed(() => { if (this.eta) this.eta.line_color = colour("accent"); });
-    this.label = new B.Label({x: 8, y: 0, x_units: "screen", y_units: "data", text_font_size: "12px", y_offset: 4});
-    this.ratios.add_layout(this.label);
+    this.label = new B.Title({text: "", align: "right", text_font_size: "12px", text_font_style: "normal", text_font: "system-ui, sans-serif"});
+    this.ratios.title = this.label;
     themed(() => { if (this.label) this.label.text_color = colour("accent"); });
     const narrow = window.matchMedia("(max-width: 700px)").matches;
     const rows = narrow ? [[this.intervals], [this.ratios]] : [[this.intervals, this.ratios]];
-    B.Plotting.show(B.Plotting.gridplot(rows, {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false}), one("ratios"));
+    void showPlot(B.Plotting.gridplot(rows, {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false}), one("ratios"));
     this.made = true;
   }
 
@@ -134,7 +134,7 @@ export class ChatteringPanel {
     /** @type {any} */ (this.sources)[0].data = intervals;
     /** @type {any} */ (this.sources)[1].data = ratios;
     if (this.eta) this.eta.location = eta;
-    this.label?.setv({y: eta, text: `η² = ${short(eta, 4)}`});
+    this.label?.setv({text: `line: η² = ${short(eta, 4)}`});
   }
 
   /** All numbers, once somebody wants to read them. @param {Record<string, string>} texts */

@@ -98,7 +98,7 @@ async function inDrawing(picture, rows, width, height, whole, paper, ink) {
 }
 
 /** @param {string} name @param {Blob} content */
-function save(name, content) {
+export function save(name, content) {
   const link = /** @type {HTMLAnchorElement} */ (make("a", {href: URL.createObjectURL(content), download: name}));
   link.click();
   window.setTimeout(() => URL.revokeObjectURL(link.href), 10_000);

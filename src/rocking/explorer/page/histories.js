@@ -1,6 +1,6 @@
 // Rotation over ground acceleration: one axis of time, which keeps its digits however far it is zoomed.
 
-import {bokeh, coarse, colour, figure, themed} from "./theme.js";
+import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
 
 /** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, weight?: Float64Array, impact: Float64Array}} Lines */
 /** @typedef {{lines: Lines, rest: Float64Array, uplift: Float64Array, block: {sides: {alpha: number}[], thresholds_g: number[]}}} Drawn */
@@ -76,7 +76,7 @@ export class Histories {
     this.glyphs();
     this.cursors = [this.rotation, this.ground].map((plot) => this.vertical(plot));
     const grid = B.Plotting.gridplot([[this.rotation], [this.ground]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false});
-    B.Plotting.show(grid, this.element);
+    void showPlot(grid, this.element);
     this.x.properties.start.change.connect(() => this.ranged());
     this.x.properties.end.change.connect(() => this.ranged());
     this.made = true;
@@ -130,13 +130,13 @@ export class Histories {
       paints.push(() => paint(glyph));
     };
     const F = (/** @type {string} */ field) => ({field});
-    add(this.rotation, new B.VStrip({x0: F("from"), x1: F("to"), line_color: null}), this.source("rest", ["from", "to"]),
-      (glyph) => { glyph.fill_color = colour("rest"); });
+    add(this.rotation, new B.VStrip({x0: F("from"), x1: F("to"), line_width: 1}), this.source("rest", ["from", "to"]),
+      (glyph) => glyph.setv({fill_color: colour("rest"), line_color: colour("edge")}));
     for (const [k, name] of [...NAMES.entries()].reverse()) {
       const [ink, ground] = k === 0 ? ["ink", "ground"] : ["second", "second"];
       if (k === 0) {
         const source = this.source("vertical", ["x", "y", "plus", "minus"]);
-        add(this.ground, new B.Line({x: F("x"), y: F("y"), line_width: 0.9}), source, (glyph) => { glyph.line_color = colour("stone"); });
+        add(this.ground, new B.Line({x: F("x"), y: F("y"), line_width: 0.9}), source, (glyph) => { glyph.line_color = colour("vertical"); });
         for (const side of ["plus", "minus"]) {
           add(this.ground, new B.Line({x: F("x"), y: F(side), line_width: 0.9, line_dash: [5, 3]}), source, (glyph) => { glyph.line_color = colour("ink"); });
         }
@@ -156,7 +156,7 @@ export class Histories {
     }
     add(this.rotation, new B.Scatter({x: F("x"), y: F("y"), marker: {value: "triangle"}, size: 8, line_color: null}), this.source("uplift", ["x", "y"]),
       (glyph) => { glyph.fill_color = colour("accent"); });
-    this.levels = {balance: [0, 1].map(() => this.level(this.rotation, [7, 3, 2, 3], "accent")), threshold: [0, 1].map(() => this.level(this.ground, [5, 3], "ink"))};
+    this.levels = {balance: [0, 1].map(() => this.level(this.rotation, [7, 3, 2, 3], "over")), threshold: [0, 1].map(() => this.level(this.ground, [5, 3], "ink"))};
     for (const plot of [this.rotation, this.ground]) this.level(plot, [], "soft").location = 0;
     themed(() => paints.forEach((paint) => paint()));
   }

@@ -8,6 +8,8 @@ import {BlockForm, ModelForm, MotionForm} from "./forms.js";
 import {Cursor} from "./cursor.js";
 import {Histories} from "./histories.js";
 import {PhasePanel} from "./phase.js";
+import {Lecture} from "./lecture.js";
+import {Sheet} from "./sheet.js";
 import {coarse} from "./theme.js";
 import {acceptFiles} from "./upload.js";
 import {counted, fixed, legend, make, one, say, short} from "./words.js";
@@ -33,6 +35,8 @@ const histories = new Histories(one("histories"), {
 const phase = new PhasePanel(page, (time) => cursor.set(time));
 const cursor = new Cursor(page, {mark: (time) => { histories.mark(time); phase.mark(time); }, seek: (time) => { if (state.view === "block") views.block?.seek(time); }});
 const chattering = new ChatteringPanel(showWindow);
+const lecture = new Lecture(page, histories);
+new Sheet();
 
 /** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
 const problems = {};
@@ -50,7 +54,9 @@ function problem(error, place = "settings") {
     if (!each.checkVisibility()) continue;
     each.setAttribute("aria-invalid", "true");
     each.setAttribute("aria-errormessage", "problem");
-    each.closest(".number, .choice")?.setAttribute("data-problem", problems[place] ?? "");
+    const around = each.closest(".number, .choice, label");
+    around?.setAttribute("data-problem", problems[place] ?? "");
+    if (place === "settings") around?.scrollIntoView({block: "nearest"});
   }
   one(place === "settings" ? "main" : place).classList.toggle("old", Boolean(error && page.shown));
   one("old").hidden = !(problems.settings && page.shown);
@@ -82,7 +88,7 @@ const afterPause = new Latest(async () => {
   const {header} = page.shown, {texts} = state;
   forms.block.show(texts, header.block.sides);
   showNotes(header);
-  showLegend(header.motion?.vertical);
+  showLegend(header);
   chattering.window(header.window);
   if (state.view === "response") chattering.draw(page.shown, texts);
   phase.update();
@@ -202,10 +208,12 @@ function put(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** @param {{name: string, pga_g: number} | null} [vertical] */
-function showLegend(vertical) {
+/** @param {any} header */
+function showLegend({motion, overturned, peak_over_slenderness: peak}) {
+  const vertical = motion?.vertical;
   const entries = [["line", "rotation"], ["rest", "at rest"], ["impact", "impact"], ["uplift", "uplift"], ["ground", "ground acceleration"], ["beyond", "beyond the threshold of uplift"]];
   if (vertical) entries.push(["up", `vertical acceleration (${vertical.name}, peak ${short(vertical.pga_g)} g), with which the thresholds move`]);
+  if (overturned || peak > 0.9) entries.push(["over", "rotation at which it would overturn on still ground"]);
   legend("legend", entries);
 }
 
@@ -271,5 +279,5 @@ acceptFiles(async (file, upwards) => {
 });
 for (const form of Object.values(forms)) form.show(state.texts);
 void watchCompilation();
-await go(state.view);
+await (state.lecture ? lecture.enter() : go(state.view));
 document.body.dataset.ready = String(performance.now());

@@ -1,20 +1,9 @@
 // A map as it is drawn: its plot, its colours, and the legend that says what they mean.
 
 import {withLegend} from "./exports.js";
-import {bokeh, coarse, colour, figure, themed} from "./theme.js";
+import {AFTER_REST, AROUND, MARK, MODES, OUTCOMES, OVERTURNS, RAMP, STRIPES, UNKNOWN, VERDICTS, picture, rgba} from "./outcomes.js";
+import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
 import {make, one, short} from "./words.js";
-
-/** From harmless to the worst, each darker than the one before; the last stands out. */
-const OUTCOMES = ["#ffffff", "#d7e3f2", "#9db6d4", "#5d7da6", "#1c2c47", "#e0a23c"];
-const MODES = /** @type {[number, string, string][]} */ ([
-  [-3, "no uplift", "#ffffff"], [-1, "rocks", "#d7e3f2"], [-2, "rests before the motion is over", "#9db6d4"],
-  [0, "overturns without impact", "#1c2c47"], [1, "overturns after 1 impact", "#c76b29"], [2, "overturns after 2 impacts or more", "#e9a94f"],
-  [-4, "overturns after a rest", "#7a3b69"],
-]);
-/** What overturns after a rest, as a mode; and the colour of the hatch over what overturns later than in the first rocking. */
-const AFTER_REST = -4, LATER = "#b0390c";
-/** Dark to light, even steps of lightness. */
-const RAMP = ["#0b1a3a", "#14346b", "#1f5190", "#3a74a8", "#5f97b8", "#8bb8c6", "#b9d6d4", "#e6efe4", "#fdf3d6"];
 
 export class MapPicture {
   /** @param {{over: (x: number, y: number) => void, chosen: (x: number, y: number) => void, zoomed: (box: number[]) => void}} tell is told where the
@@ -42,28 +31,31 @@ export class MapPicture {
     for (const [name, dash] of /** @type {[string, number[]][]} */ ([["eq76", [7, 4]], ["exact", []]])) {
       const source = new B.ColumnDataSource({data: {x: [], y: []}});
       // A light line under the dark one: it is seen on every colour of the map.
-      for (const [width, ink] of /** @type {[number, string][]} */ ([[4.5, "#ffffff"], [2, "#b0390c"]])) {
-        this.plot.add_renderers(new B.GlyphRenderer({data_source: source, glyph: new B.Line({x: F("x"), y: F("y"), line_width: width, line_color: ink, line_alpha: width > 3 ? 0.75 : 1, line_dash: width > 3 ? [] : dash})}));
+      for (const [width, ink] of /** @type {[number, string][]} */ ([[4.5, AROUND], [2, MARK]])) {
+        this.plot.add_renderers(new B.GlyphRenderer({data_source: source, glyph: new B.Line({x: F("x"), y: F("y"), line_width: width, line_color: ink, line_dash: width > 3 ? [] : dash})}));
       }
       this.curves[name] = source;
     }
     this.mark = new B.ColumnDataSource({data: {x: [], y: []}});
-    for (const [size, ink] of /** @type {[number, string][]} */ ([[17, "#ffffff"], [14, "#10243e"]])) {
+    for (const [size, ink] of /** @type {[number, string][]} */ ([[17, AROUND], [14, MARK]])) {
       this.plot.add_renderers(new B.GlyphRenderer({data_source: this.mark, glyph: new B.Scatter({x: F("x"), y: F("y"), size, line_width: size > 15 ? 4 : 2, line_color: ink, fill_alpha: 0, marker: {value: "circle_cross"}})}));
     }
-    this.bar = new B.ColorBar({color_mapper: new B.LinearColorMapper({palette: RAMP, low: 0, high: 1}), width: 12, title_text_font_style: "normal", padding: 6, visible: false});
+    this.bar = new B.ColorBar({color_mapper: new B.LinearColorMapper({palette: RAMP, low: 0, high: 1}), width: 12, padding: 6, visible: false});
     this.plot.add_layout(this.bar, "right");
-    themed(() => this.bar.setv({background_fill_color: colour("paper"), major_label_text_color: colour("ink"), title_text_color: colour("ink"), major_tick_line_color: colour("ink")}));
+    // The bar's own title would stand beside it, on its head.
+    this.plot.title.setv({align: "right", offset: -44, text_font_size: "12px", text_font_style: "normal", text_font: "system-ui, sans-serif"});
+    themed(() => this.bar.setv({background_fill_color: colour("paper"), major_label_text_color: colour("ink"), major_tick_line_color: colour("ink")}));
+    themed(() => { this.plot.title.text_color = colour("ink"); });
     this.plot.on_event("mousemove", (/** @type {any} */ event) => this.tell.over(event.x, event.y));
     this.plot.on_event("tap", (/** @type {any} */ event) => this.tell.chosen(event.x, event.y));
     if (!coarse()) {
       const zoom = new B.BoxZoomTool();
-      zoom.overlay.setv({fill_color: colour("accent"), fill_alpha: 0.2, line_color: "#10243e", line_dash: []});
+      zoom.overlay.setv({fill_color: colour("accent"), fill_alpha: 0.2, line_color: MARK, line_dash: []});
       this.plot.add_tools(zoom);
       this.plot.toolbar.active_drag = zoom;
       for (const range of [this.plot.x_range, this.plot.y_range]) for (const end of ["start", "end"]) range.properties[end].change.connect(() => this.ranged());
     }
-    B.Plotting.show(this.plot, one("map"));
+    void showPlot(this.plot, one("map"));
   }
 
   /** Draw the axes of a map. @param {any} about what the server says of it */
@@ -123,13 +115,15 @@ export class MapPicture {
     this.complete = complete;
     const values = all[Math.max(0, this.about.quantities.indexOf(quantity))];
     const [rows, columns] = this.about.shape;
-    const colours = this.coloured(quantity, values, label);
+    const {inks, kinds, hatched} = this.coloured(quantity, values, label);
+    const {colours, shape} = picture(inks, [rows, columns], one("map").clientWidth - 80, kinds, hatched);
     const {ndarray} = bokeh().require("core/util/ndarray");
     const [x0, x1, y0, y1] = this.box();
-    this.image.data = {image: [ndarray(colours, {shape: [rows, columns], dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]};
+    this.image.data = {image: [ndarray(colours, {shape, dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]};
   }
 
-  /** Colour of every point, and the legend or the bar that says what it means. @param {string} quantity @param {Float32Array} values @param {string} label */
+  /** Colour of every point, those that stand for an outcome, and what is hatched; and the legend or the bar that says what they mean.
+   * @param {string} quantity @param {Float32Array} values @param {string} label @returns {{inks: Uint32Array, kinds: Set<number>, hatched: boolean[] | null}} */
   coloured(quantity, values, label) {
     const out = new Uint32Array(values.length);
     const kinds = this.kinds(quantity);
@@ -142,12 +136,13 @@ export class MapPicture {
         if (Number.isNaN(value)) return;
         const kind = quantity === "mode" && value > 2 ? 2 : value;
         seen.set(kind, (seen.get(kind) ?? 0) + 1);
-        out[k] = later?.[k] && striped(k, this.about.shape[1]) ? rgba(LATER) : known.get(kind) ?? 0;
+        out[k] = known.get(kind) ?? 0;
       });
       this.bar.visible = false;
+      this.plot.title.text = "";
       const share = (/** @type {number} */ value) => (this.complete ? `, ${short((100 * (seen.get(value) ?? 0)) / values.length, 2)} %` : "");
       this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]), later?.some(Boolean) ? later.filter(Boolean).length / values.length : 0);
-      return out;
+      return {inks: out, kinds: new Set(known.values()), hatched: later};
     }
     const finite = values.filter((each) => Number.isFinite(each));
     const sorted = finite.sort();
@@ -156,9 +151,14 @@ export class MapPicture {
     const low = quantity === "peak" || !logarithmic ? 0 : sorted[Math.floor(0.02 * sorted.length)] ?? 1e-3;
     const high = quantity === "peak" ? 1 : sorted[Math.floor(0.995 * (sorted.length - 1))] ?? 1;
     const inks = RAMP.map(rgba);
+    const at = quantity === "rest" ? this.about.quantities.indexOf("mode") : -1;
+    const mode = at >= 0 ? /** @type {Float32Array[]} */ (this.values)[at] : null;
     values.forEach((value, k) => {
-      if (Number.isNaN(value)) return;
-      if (value === Infinity) { out[k] = rgba("#c76b29"); return; }
+      if (Number.isNaN(value)) {
+        if (mode && !Number.isNaN(mode[k])) out[k] = rgba(mode[k] >= 0 || mode[k] === AFTER_REST ? OVERTURNS : UNKNOWN);
+        return;
+      }
+      if (value === Infinity) { out[k] = rgba(OVERTURNS); return; }
       const part = (scale(value) - scale(low)) / (scale(high) - scale(low) || 1);
       out[k] = inks[Math.max(0, Math.min(RAMP.length - 1, Math.floor(part * RAMP.length)))];
     });
@@ -166,18 +166,19 @@ export class MapPicture {
     const kind = logarithmic ? "LogColorMapper" : "LinearColorMapper";
     if (this.bar.color_mapper.type === kind) this.bar.color_mapper.setv(ends);
     else this.bar.color_mapper = new (bokeh()[kind])({palette: RAMP, ...ends});
-    const title = {rest: "s", peak: "peak / α"}[quantity] ?? label;
-    this.bar.setv({title, visible: true});
-    const extra = quantity === "peak" ? [["overturns", "#c76b29"]] : quantity === "rest" ? [["never comes to rest", "rgba(0,0,0,0)"]] : [];
+    const title = {rest: "uplift to rest (s)", peak: "peak / α"}[quantity] ?? label;
+    this.bar.visible = true;
+    this.plot.title.text = title;
+    const extra = quantity === "peak" ? [["overturns", OVERTURNS]] : mode ? [["overturns without a rest", OVERTURNS], ["never lifts, or is not at rest when the simulation ends", UNKNOWN]] : [];
     this.legend(/** @type {[string, string][]} */ (extra));
-    return out;
+    return {inks: out, kinds: new Set([rgba(OVERTURNS), rgba(UNKNOWN)]), hatched: null};
   }
 
   /** @param {string} quantity @returns {[number, string, string][] | null} */
   kinds(quantity) {
     if (quantity === "outcome") return this.about.outcomes.map((/** @type {string} */ text, /** @type {number} */ k) => [k, text, OUTCOMES[k]]);
     if (quantity === "mode") return MODES;
-    if (quantity === "overturned") return [[0, "stays", "#d7e3f2"], [1, "overturns", "#c76b29"], [-1, "not known: ended before its verdict", "#8d8d8d"]];
+    if (quantity === "overturned") return VERDICTS;
     return null;
   }
 
@@ -190,7 +191,7 @@ export class MapPicture {
 
   /** @param {[string, string][]} entries @param {number} [later] share of the points that overturn later */
   legend(entries, later = 0) {
-    if (later) entries = [...entries, [`hatched: overturns later${this.complete ? `, ${short(100 * later, 2)} %` : ""}`, LATER]];
+    if (later) entries = [...entries, [`hatched: overturns later${this.complete ? `, ${short(100 * later, 2)} %` : ""}`, STRIPES[0]]];
     this.entries = entries;
     const parts = entries.map(([text, ink]) => {
       const key = make("i", {className: "key swatch"});
@@ -207,16 +208,7 @@ export class MapPicture {
     for (const each of marks) each.visible = false;
     const drawn = bokeh().index.find_one(this.plot).export(form);
     for (const each of marks) each.visible = true;
-    const curves = /** @type {[string, string][]} */ (this.about.curves.exact ? [["critical amplitude: exact (solid), Eq. 76 (dashed)", "#b0390c"]] : []);
+    const curves = /** @type {[string, string][]} */ (this.about.curves.exact ? [["critical amplitude: exact (solid), Eq. 76 (dashed)", MARK]] : []);
     return withLegend(await drawn.to_blob(), [...(this.entries ?? []), ...curves], this.plot.outer_width, this.plot.outer_height);
   }
-}
-
-/** Whether a point lies on a stripe of a hatch. @param {number} k @param {number} columns */
-const striped = (k, columns) => (Math.floor(k / columns) + (k % columns)) % 4 === 0;
-
-/** Colour as the image takes it: red in the lowest byte. @param {string} ink */
-function rgba(ink) {
-  const number = parseInt(ink.slice(1), 16);
-  return ((0xff << 24) | ((number & 0xff) << 16) | (number & 0xff00) | (number >> 16)) >>> 0;
 }

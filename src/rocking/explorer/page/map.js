@@ -298,6 +298,7 @@ export class View {
       this.page.state.view = "response";
       this.page.restate(found);
       await this.page.go("response");
+      one("histories").focus({preventScroll: true}); // where the keys go on
     } catch (error) {
       this.page.problem(error, "view-map");
     }

@@ -5,7 +5,7 @@ import {Problem, json} from "./api.js";
 import {one} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, at: number | null, map: Texts, sweep: Texts, good: Good}} State */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, at: number | null, lecture: boolean, map: Texts, sweep: Texts, good: Good}} State */
 /** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts}} Good */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
 
@@ -51,6 +51,7 @@ export function readAddress() {
     view: VIEWS.includes(view) ? view : "response",
     window: from < to ? [from, to] : null,
     at: time >= 0 && time < Infinity ? time : null,
+    lecture: given.get("lecture") === "1",
   };
 }
 
@@ -91,6 +92,7 @@ export function writeAddress(state) {
     if (state.view === "periodic") put(good.sweep, specification.sweep);
     put(ends(state), ["from", "to"]);
     if (state.at !== null && (state.view === "response" || state.view === "block")) given.set("at", String(state.at));
+    if (state.lecture) given.set("lecture", "1");
     history.replaceState(null, "", `?${given}`);
   }, 150);
 }

@@ -3,7 +3,7 @@
 import {Latest, frames, json, payload, unpacked} from "./api.js";
 import {showExports, withLegend} from "./exports.js";
 import {specification} from "./parameters.js";
-import {bokeh, colour, figure, themed} from "./theme.js";
+import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {counted, legend, one, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
@@ -194,15 +194,15 @@ export class View {
     this.sources = {
       down: add(this.plot, marks(5.5), ["x", "y"], hollow("ground")),
       up: add(this.plot, marks(2.6), ["x", "y"], filled("ink")),
-      downOver: add(this.plot, marks(7), ["x", "y"], hollow("ground")),
-      upOver: add(this.plot, marks(5, "x"), ["x", "y"], hollow("ink")),
+      downOver: add(this.plot, marks(7), ["x", "y"], hollow("over")),
+      upOver: add(this.plot, marks(5, "x"), ["x", "y"], hollow("over")),
       orbit: add(this.plot, this.here, ["x", "y"], filled("accent")),
       mark: add(this.plot, marks(15, "circle_cross"), ["x", "y"], () => ({fill_alpha: 0, line_color: colour("second"), line_width: 1.6})),
     };
     this.plot.on_event("mousemove", (/** @type {any} */ event) => { if (this.about) this.say(this.nearest(event.x)); });
     this.plot.on_event("tap", (/** @type {any} */ event) => { if (this.about) { this.put(this.nearest(event.x), event.y); void this.open(); } });
-    B.Plotting.show(this.plane, one("phase-plane"));
-    B.Plotting.show(this.plot, one("diagram"));
+    void showPlot(this.plane, one("phase-plane"));
+    void showPlot(this.plot, one("diagram"));
     legend("orbit-legend", [
       ["line", "trajectory"], ["jump", "impact: the velocity jumps"], ["dot", "start of each period"], ["at", "this case"],
       ["up-dot", "swept upwards"], ["down-ring", "swept downwards"], ["cross", "at the top: overturns"],

@@ -1,12 +1,37 @@
 // Colours of the plots: those of the style sheet, which follow the system's light or dark.
 
-const dark = window.matchMedia("(prefers-color-scheme: dark)");
+import {plain} from "./ticks.js";
+
 /** @type {Set<() => void>} */
 const followers = new Set();
-dark.addEventListener("change", () => followers.forEach((follow) => follow()));
+const forced = window.matchMedia("(forced-colors: active)");
+for (const query of [window.matchMedia("(prefers-color-scheme: dark)"), forced]) query.addEventListener("change", () => followers.forEach((follow) => follow()));
+
+/** How many times as large as usual the text of the plots is. */
+let enlarged = 1;
+/** Size of a text of the plots, px. @param {number} usual */
+export const textSize = (usual) => Math.round(usual * enlarged);
+
+/** Draw the text of all plots so many times as large. @param {number} times */
+export function enlarge(times) {
+  enlarged = times;
+  followers.forEach((follow) => follow());
+}
 
 /** @param {string} name */
-export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export function colour(name) {
+  const found = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  return forced.matches ? resolved(found) : found;
+}
+
+/** A colour of the system, which the plots do not know by its name, as numbers. @param {string} name */
+function resolved(name) {
+  const probe = document.head;
+  probe.style.color = name;
+  const found = getComputedStyle(probe).color;
+  probe.style.color = "";
+  return found;
+}
 
 /** Call now, and again whenever the colours change. @param {() => void} follow */
 export function themed(follow) {
@@ -24,14 +49,15 @@ export function figure(given, label) {
     min_border_top: 6, min_border_bottom: 4, outline_line_color: null,
     html_attributes: {role: "img", "aria-label": label}, ...given,
   });
-  for (const axis of [...made.below, ...made.left]) if (axis.type === "LinearAxis") axis.formatter = new (bokeh().BasicTickFormatter)({power_limit_low: -3, power_limit_high: 6});
+  for (const axis of [...made.below, ...made.left]) if (axis.type === "LinearAxis") axis.formatter = plain(new (bokeh().BasicTickFormatter)());
+  for (const axis of [...made.below, ...made.left]) axis.major_label_policy = new (bokeh().NoOverlap)({min_distance: 6});
   themed(() => {
     const ink = colour("ink"), soft = colour("soft"), grid = colour("grid");
-    made.setv({background_fill_color: colour("paper"), border_fill_color: colour("paper")});
+    made.setv({background_fill_color: colour("paper"), border_fill_color: colour("paper"), min_border_left: enlarged > 1 ? 118 : 62});
     for (const axis of [...made.below, ...made.left]) {
       axis.setv({
         axis_line_color: soft, major_tick_line_color: soft, minor_tick_line_color: null, major_label_text_color: ink,
-        axis_label_text_color: ink, major_label_text_font_size: "12px", axis_label_text_font_size: "12px",
+        axis_label_text_color: ink, major_label_text_font_size: `${textSize(12)}px`, axis_label_text_font_size: `${textSize(12)}px`,
         axis_label_text_font_style: "normal", axis_label_text_font: "system-ui, sans-serif", major_label_text_font: "system-ui, sans-serif",
         axis_label_standoff: 8,
       });
@@ -39,6 +65,20 @@ export function figure(given, label) {
     for (const each of made.center) if (each.type === "Grid") each.setv({grid_line_color: grid});
   });
   return made;
+}
+
+/** Put a plot into an element. Keys go to the element: within the plot the keyboard does not stop, where nobody would see it.
+ * @param {any} plot @param {HTMLElement} element */
+export async function showPlot(plot, element) {
+  await bokeh().Plotting.show(plot, element);
+  /** @param {Element | ShadowRoot} node */
+  const pass = (node) => {
+    for (const each of node.children) {
+      if (each instanceof HTMLElement && each.tabIndex === 0) each.tabIndex = -1;
+      pass(each.shadowRoot ?? each);
+    }
+  };
+  pass(element);
 }
 
 /** Whether the pointer is a finger: then dragging scrolls the page. */

@@ -1,0 +1,108 @@
+"""Colours of the explorer's page: marks stand out against what is beside them, and orange means overturning."""
+
+import colorsys
+import itertools
+import re
+from pathlib import Path
+
+import pytest
+
+import rocking.explorer
+
+PAGE = Path(rocking.explorer.__file__).parent / "page"
+STYLE = (PAGE / "style.css").read_text("utf-8")
+OUTCOMES = (PAGE / "outcomes.js").read_text("utf-8")
+HEX = re.compile(r"#[0-9a-fA-F]{6}\b")
+
+#: Marks, each with what is beside it; contrast is 3:1 at least (WCAG 2.2, 1.4.11).
+MARKS = {
+    "ink": "paper rest desk stone",
+    "soft": "paper rest",
+    "border": "paper desk",
+    "accent": "paper desk",
+    "over": "paper",
+    "wrong": "paper desk",
+    "second": "paper rest ink",
+    "ground": "paper",
+    "vertical": "paper",
+    "edge": "paper rest",
+    "earth": "paper rest",
+    "focus": "paper desk",
+    "paper": "accent",
+}
+#: Texts, each with what they are written on; contrast is 4.5:1 at least (1.4.3).
+TEXTS = {"ink": "paper desk", "soft": "paper desk", "accent": "paper", "wrong": "paper desk", "paper": "accent soft"}
+
+
+def palettes():
+    """Colours of the light page and of the dark one."""
+    light, dark = (dict(re.findall(r"--([a-z]+): (#[0-9a-f]{6});", each)) for each in STYLE.split(":root {")[1:3])
+    return {"light": light, "dark": dark}
+
+
+def channels(ink):
+    return [int(ink[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+
+
+def luminance(ink):
+    red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in channels(ink))
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def contrast(first, second):
+    low, high = sorted((luminance(first), luminance(second)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def is_orange(ink):
+    hue, _, saturation = colorsys.rgb_to_hls(*channels(ink))
+    return 15 <= 360 * hue <= 45 and saturation > 0.5
+
+
+def constant(name):
+    """Colours of a constant of outcomes.js."""
+    return HEX.findall(re.search(rf"export const {name} = .*?;\n", OUTCOMES, re.S)[0])
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("kind", "least"), [(MARKS, 3.0), (TEXTS, 4.5)], ids=["marks", "texts"])
+def test_colours_of_the_page_stand_out(scheme, kind, least):
+    colours = palettes()[scheme]
+    pairs = [(mark, other) for mark, others in kind.items() for other in others.split()]
+    faint = {pair: contrast(*(colours[name] for name in pair)) for pair in pairs}
+    assert len(pairs) >= 9
+    assert {pair: each for pair, each in faint.items() if each < least} == {}
+
+
+def test_neighbours_on_a_map_differ_or_a_line_parts_them():
+    lines, judged = constant("LINES"), 0
+    for name in ("OUTCOMES", "MODES", "VERDICTS"):
+        inks = constant(name) if name != "VERDICTS" else [*constant(name), *constant("OUTCOMES")[4:]]
+        for first, second in itertools.combinations(inks, 2):
+            judged += 1
+            parted = any(min(contrast(line, first), contrast(line, second)) >= 3.0 for line in lines)
+            assert contrast(first, second) >= 3.0 or parted, (name, first, second)
+    assert judged >= 36
+    dark, light = constant("STRIPES")
+    hatched = [each for each in constant("OUTCOMES") if not is_orange(each)]
+    assert len(hatched) == 5
+    for ink in hatched:
+        assert contrast(dark if luminance(ink) > 0.3 else light, ink) >= 3.0, ink
+    assert contrast(*constant("MARK")) >= 3.0
+
+
+def test_orange_means_overturning_and_nothing_else():
+    for scheme, colours in palettes().items():
+        assert [name for name, ink in colours.items() if is_orange(ink)] == ["over"], scheme
+    words = re.findall(r'\[[-\w]+, "([^"]*)", "(#[0-9a-f]{6})"', OUTCOMES)
+    assert len(words) >= 7
+    for text, ink in words:
+        assert is_orange(ink) == text.startswith("overturns"), text
+    assert [is_orange(ink) for ink in constant("OUTCOMES")] == [False] * 4 + [True, False]
+    assert not any(map(is_orange, constant("RAMP")[:-1]))
+
+
+def test_colours_stand_in_one_place():
+    others = [file for file in sorted(PAGE.glob("*.js")) if file.name != "outcomes.js"]
+    assert len(others) >= 12
+    assert [file.name for file in others if HEX.search(file.read_text("utf-8"))] == []
