@@ -138,8 +138,9 @@ class Solid(Result):
 
         Parameters
         ----------
-        mesh : path, trimesh.Trimesh or trimesh.Scene
-            Triangles; "statue" is a mesh that ships with the package.
+        mesh : path, binary stream, trimesh.Trimesh or trimesh.Scene
+            Triangles; "statue" is a mesh that ships with the package. A stream has the file's name as its ``name``, as
+            an open file has; nothing is read beside it, while of a path files that it names are read, too.
         density : float or mapping of str to float, optional
             Density, kg/m^3: of all, or of each part (object, group, node) by its name. Without it all is of one
             density, and the mass not known. What parts have in common counts twice, and is noted.
@@ -186,7 +187,7 @@ class Solid(Result):
         >>> [round(side.alpha, 4) for side in statue.block(90.0).sides]
         [0.2758, 0.3248]
         """
-        made = properties(mesh, density, support, tolerance, up=up, unit=unit, turn=turn)
+        made, _ = properties(mesh, density, support, tolerance, up=up, unit=unit, turn=turn)
         return cls(gravity=gravity, **made)
 
     @property
