@@ -112,7 +112,7 @@ def _has_one_slenderness(case: Case) -> bool:
     Their restitution is Housner's where none is given; two p, pivots and eccentric sizes belong to another.
     """
     plus, minus = case.block.sides
-    return "restitution" in case.texts or (plus.p == minus.p and not {"pivots", "offset"} & case.texts.keys())
+    return "restitution" in case.texts or (plus.p == minus.p and not {"pivots", "offset", "mesh"} & case.texts.keys())
 
 
 def grid_of(case: Case, texts: Texts) -> MapGrid:
@@ -304,7 +304,9 @@ def _tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
 
 def _change_block(texts: dict[str, str], grid: MapGrid, name: str, value: float) -> None:
     sides = grid.case.block.sides
-    if "alpha" not in (grid.x.name, grid.y.name) and (not grid.case.block.is_symmetric or "pivots" in texts):
+    if "alpha" not in (grid.x.name, grid.y.name) and (
+        not grid.case.block.is_symmetric or {"pivots", "mesh"} & texts.keys()
+    ):
         texts.setdefault("restitution", _both([side.restitution for side in sides]))
     if "p" not in texts:
         texts["p"], texts["alpha"] = (_both([getattr(side, each) for side in sides]) for each in ("p", "alpha"))

@@ -28,6 +28,9 @@ _TOLERANCE: Final = 1e-3
 _GROWS: Final = 0.02
 #: Between the names of parts that were joined.
 _AND: Final = " + "
+#: Sizes of a body, m, whose fifth powers can be computed with.
+_SMALLEST: Final = 1e-9
+_LARGEST: Final = 1e9
 #: Volumes below this part of the cube of the size are none, and supports may be this part of the size beyond the mesh.
 _FLAT: Final = 1e-9
 _BEYOND: Final = 1e-6
@@ -57,6 +60,10 @@ def properties(
     The arguments are those of `Solid.from_mesh`; a mesh of more than `most` triangles is refused.
     """
     found = parts_of(mesh, most)
+    with np.errstate(over="ignore"):
+        extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in found.parts) * length_of(unit)
+    if extent and not _SMALLEST < extent < _LARGEST:
+        raise InvalidBlock(f"is {extent:.3g} m large, which no body is: correct {{}}", "unit", path=found.name)
     rotation = _turned(turn) @ upright(found.up if up is None else up) * length_of(unit)
     parts = [part._replace(vertices=part.vertices @ rotation.T) for part in found.parts]
     every = np.vstack([part.vertices[np.unique(part.faces)] for part in parts])
