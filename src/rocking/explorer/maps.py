@@ -232,7 +232,8 @@ def _described(axis: Axis) -> dict[str, Any]:
 def _axis(which: str, case: Case, texts: Texts, points: int) -> Axis:
     name = texts.get(which, "")
     if name not in axes_of(case):
-        raise InvalidOption(f"this case is mapped over {', '.join(axes_of(case))}, not over {name[:20]!r}")
+        why = "; the slenderness of a mesh follows from its azimuth, which no map varies" if case.body else ""
+        raise InvalidOption(f"this case is mapped over {', '.join(axes_of(case))}, not over {name[:20]!r}{why}")
     if which == "x" and name in ("a", "pga"):
         raise InvalidOption("amplitudes go upwards: choose another parameter for the axis to the right")
     kind = AXES[name]
