@@ -6,6 +6,7 @@ import runpy
 import shlex
 import struct
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -151,6 +152,25 @@ def test_meshes_are_known_by_their_content_and_so_many_at_most(here):
     assert len({*others, key}) == MOST + 1
     assert store.add_mesh("again.stl", data) == key
     assert read_case({**STATUE, "mesh": f"file:{key}"}, store).block.sides == first.sides
+
+
+def test_a_body_that_is_known_does_not_wait_for_a_file_that_is_read(monkeypatch):
+    store, going, free = UploadStore(), threading.Event(), threading.Event()
+    known = read_case(STATUE, store).block
+
+    def slow(name, data, options):
+        going.set()
+        assert free.wait(30.0)
+        return apart.made_here("statue", options)
+
+    monkeypatch.setattr(meshes, "made_apart", slow)
+    key = store.add_mesh("box.stl", content(box()))
+    reader = threading.Thread(target=lambda: read_case({**STATUE, "mesh": f"file:{key}"}, store))
+    reader.start()
+    assert going.wait(30.0)
+    assert read_case({**STATUE, "pga": "0.5g"}, store).block.sides == known.sides
+    free.set()
+    reader.join()
 
 
 def gltf(**changed):

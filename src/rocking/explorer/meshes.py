@@ -142,12 +142,13 @@ class MeshStore:
         given = {each: read(texts[each]) for each, read in _READERS.items() if each in texts}
         given |= {each: value for each, value in (("tolerance", tolerance), ("gravity", gravity)) if value is not None}
         request = json.dumps([name, upload and upload[0], given])
-        with self._reading:
-            if request not in self._known:
-                self._known[request] = _read(name, upload, given)
+        found = self._known.get(request)
+        if found is None:
+            with self._reading:
+                found = self._known.get(request) or _read(name, upload, given)
+                self._known[request] = found
                 while len(self._known) > _KEPT:
                     self._known.popitem(last=False)
-            found = self._known[request]
         if isinstance(found, RockingError):
             raise found
         return found
